@@ -39,6 +39,14 @@ class PersonSize:
         return fits
 
 
+SPLIT_PERSON = PersonSize(1.3, min_height_m=0.5, min_top_m=1.1, max_top_m=2.2, min_extent_m=0.2)
+"""A part of a cluster that is split off: from a child of five to a tall person on a kerb, in stride."""
+STRIP_PERSON = PersonSize(0.9, min_height_m=0.7, min_top_m=1.1)
+"""A strip that becomes no part of a car; its extent is the width across the ray."""
+PART_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
+"""A proposal that becomes no part of background: from a child of five on."""
+
+
 def unknown_near(result: FrameResult) -> Bool:
     """(M,) tracks in view, background as far as is known, that may be people: cut above, below a third of one."""
     own, box = result.tracks.proposal, result.proposals.box

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from modt.app import assembly
-from modt.config import FragmentConfig
 from modt.geometry import FieldOfView, transform
 from modt.profile import load
 from modt.tracking.association import Matches, assign
@@ -35,8 +34,8 @@ class NearestCentroid:
 def test_the_tracker_follows_by_the_association_it_is_given():
     profile = load("vlp-16")
     pipeline = assembly.pipeline(assembly.MODES["accurate"], profile, FieldOfView())
-    config = replace(profile.tracking, fragments=FragmentConfig(min_coverage=1.0))  # every track keeps its proposal
-    tracker = Tracker(config, ACCURATE, association=NearestCentroid(), regroupings=())
+    config = replace(profile.tracking, extensions="none")  # every track keeps its proposal
+    tracker = Tracker(config, ACCURATE, association=NearestCentroid())
     pipeline = replace(pipeline, tracker=tracker)
     for frame in SyntheticStream("street", "vlp-16", 1.0, seed=0):
         result = pipeline.step(frame)

@@ -5,6 +5,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from modt.class_sizes import STRIP_PERSON
+from modt.segmentation import ground
+from modt.segmentation.clustering import MAX_GAP_BEAMS, MAX_GAP_M
 from modt.segmentation.grids import SECTORS
 from modt.segmentation.groups import HEADINGS
 
@@ -16,7 +19,7 @@ def within_distance(plane, radius):
     return connected_components(graph, directed=False)[1]
 
 
-def flood_fill(cells, beam_m, config):
+def flood_fill(cells, beam_m):
     """(C,) component of each cell, filled from seed to seed; (C,) beam_m is the vertical distance of beams."""
     row, column, low, high = cells.row, cells.column, cells.low, cells.high
     at = {(r, c): i for i, (r, c) in enumerate(zip(row.tolist(), column.tolist(), strict=True))}
@@ -31,35 +34,34 @@ def flood_fill(cells, beam_m, config):
                 if j is not None and component[j] < 0:
                     first = min(i, j, key=lambda k: (row[k], column[k]))
                     gap = max(low[i], low[j]) - min(high[i], high[j])
-                    if gap < config.max_gap_m + config.max_gap_beams * beam_m[first]:
+                    if gap < MAX_GAP_M + MAX_GAP_BEAMS * beam_m[first]:
                         todo.append(j)
     return component
 
 
-def trace(lowest, stands, range_m, height_m, config):
+def trace(lowest, stands, range_m, height_m, max_slope_deg):
     """(rings, SECTORS) ground cells, and cells on and beside a ramp, ring by ring and ray by ray."""
-    c = config.ground
-    max_slope, ramp_slope = (np.tan(np.deg2rad(v * config.max_slope_deg)) for v in (1.0, c.ramp_share))
-    ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
+    max_slope, ramp_slope = (np.tan(np.deg2rad(v * max_slope_deg)) for v in (1.0, ground.RAMP_SHARE))
+    is_ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
     last = [(-height_m, 0.0, 0.0)] * SECTORS
     for ring in range(len(range_m)):
         for ray in range(SECTORS):
             here, (height, at, slope) = lowest[ring, ray], last[ray]
             if np.isfinite(here):
                 gap = range_m[ring] - at
-                reach = min(gap, c.max_gap_m)
+                reach = min(gap, ground.MAX_GAP_M)
                 off = here - height - slope * reach
-                near = c.max_gap_m if ring and ramp[ring - 1, ray] else c.near_m
+                near = ground.MAX_GAP_M if ring and ramp[ring - 1, ray] else ground.NEAR_M
                 bound = 0.0 if stands[ring, ray] else min(gap, near) * max_slope
-                if -gap * max_slope - c.noise_m < off < bound + c.noise_m:
-                    ground[ring, ray] = True
-                    slope = slope + c.slope_gain * ((here - height) / gap - slope)
+                if -gap * max_slope - ground.NOISE_M < off < bound + ground.NOISE_M:
+                    is_ground[ring, ray] = True
+                    slope = slope + ground.SLOPE_GAIN * ((here - height) / gap - slope)
                     slope = float(np.clip(slope, -max_slope, max_slope))
                     last[ray] = here, range_m[ring], slope
             steep[ring, ray] = abs(slope) > ramp_slope
         for ray in range(SECTORS):
-            ramp[ring, ray] = steep[ring, [(ray + k * c.flank_sectors) % SECTORS for k in (-1, 0, 1)]].any()
-    return ground, ramp
+            ramp[ring, ray] = steep[ring, [(ray + k * ground.FLANK_SECTORS) % SECTORS for k in (-1, 0, 1)]].any()
+    return is_ground, ramp
 
 
 def closeness(x, y, noise_m):
@@ -83,7 +85,7 @@ def refines(fine, coarse):
     return len(np.unique(np.stack([fine, coarse]), axis=1).T) == len(np.unique(fine))
 
 
-def car_targets(bounds, beam, config):
+def car_targets(bounds, beam, limits):
     """(G,) first of the clusters that make one car with each, pair by pair."""
     n = len(bounds)
     (right, near, low, down), (left, far, top, up) = bounds.min, bounds.max
@@ -93,11 +95,11 @@ def car_targets(bounds, beam, config):
 
     def small(own):
         size = np.hypot(far[own].max() - near[own].min(), width(own))
-        return size < config.max_diagonal_m and width(own) < config.max_width_m and top[own].max() < config.max_top_m
+        return size < limits.max_diagonal_m and width(own) < limits.max_width_m and top[own].max() < limits.max_top_m
 
     def person(one):
-        narrow = width([one]) < config.max_person_width_m and top[one] > config.min_person_top_m
-        return narrow and top[one] - low[one] > config.min_person_height_m
+        narrow = width([one]) < STRIP_PERSON.max_extent_m and top[one] > STRIP_PERSON.min_top_m
+        return narrow and top[one] - low[one] > STRIP_PERSON.min_height_m
 
     connected = [[] for _ in range(n)]
     for front in range(n):
@@ -107,10 +109,10 @@ def car_targets(bounds, beam, config):
                 continue
             meets = max(right[front], right[back]) <= min(left[front], left[back])
             beams = (down[back] - up[front]) / beam
-            follows = near[back] - far[front] < config.max_gap_m
-            follows = follows and config.min_gap_beams < beams < config.max_gap_beams
-            like = width(pair) > config.min_width_m and top[pair].max() > config.min_top_m
-            if meets and follows and like and low[pair].min() < config.max_bottom_m:
+            follows = near[back] - far[front] < limits.max_gap_m
+            follows = follows and limits.min_gap_beams < beams < limits.max_gap_beams
+            like = width(pair) > limits.min_width_m and top[pair].max() > limits.min_top_m
+            if meets and follows and like and low[pair].min() < limits.max_bottom_m:
                 connected[front].append(back)
                 connected[back].append(front)
     first = np.arange(n)

@@ -3,12 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.config import SegmentationConfig
 from modt.geometry import upright_boxes
 from modt.segmentation.groups import HEADINGS, Groups, best_headings
+from modt.segmentation.segmenter import SIDE_NOISE_M
 from tests.segmentation import reference
-
-NOISE_M = SegmentationConfig().boxes.noise_m
 
 
 def groups_of(sizes):
@@ -40,9 +38,9 @@ def l_shape(length, width, yaw, centre, n=60):
 def test_headings_equal_those_of_each_cluster_alone(seed, sizes):
     x, y = np.random.default_rng(seed).normal(0, 2, (2, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    found = HEADINGS[best_headings(x, y, groups, 1000, NOISE_M)]
+    found = HEADINGS[best_headings(x, y, groups, 1000, SIDE_NOISE_M)]
     for i, (start, end) in enumerate(zip(groups.offsets[:-1], groups.offsets[1:], strict=True)):
-        closeness = reference.closeness(x[start:end].astype(float), y[start:end].astype(float), NOISE_M)
+        closeness = reference.closeness(x[start:end].astype(float), y[start:end].astype(float), SIDE_NOISE_M)
         chosen = np.argmin(np.abs(HEADINGS - found[i]))
         assert closeness[chosen] >= closeness.max() * 0.999
 
@@ -51,7 +49,8 @@ def test_headings_equal_those_of_each_cluster_alone(seed, sizes):
 def test_a_box_contains_its_points_and_touches_them_on_every_side(seed, sizes):
     x, y, z = np.random.default_rng(seed).normal(0, 2, (3, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    box = upright_boxes(np.stack([x, y, z]), groups.offsets, HEADINGS[best_headings(x, y, groups, 1000, NOISE_M)])
+    heading = HEADINGS[best_headings(x, y, groups, 1000, SIDE_NOISE_M)]
+    box = upright_boxes(np.stack([x, y, z]), groups.offsets, heading)
     assert (box[:, 3] >= box[:, 4]).all()
     own = np.repeat(box, sizes, axis=0)
     c, s = np.cos(own[:, 6]), np.sin(own[:, 6])
@@ -81,7 +80,7 @@ def test_heading_and_size_of_an_l_of_points(yaw_deg):
     box = upright_boxes(
         np.stack([x, y, np.zeros(120, np.float32)]),
         groups.offsets,
-        HEADINGS[best_headings(x, y, groups, 1000, NOISE_M)],
+        HEADINGS[best_headings(x, y, groups, 1000, SIDE_NOISE_M)],
     )[0]
     error = (box[6] - np.deg2rad(yaw_deg) + np.pi / 2) % np.pi - np.pi / 2
     assert abs(error) < np.deg2rad(2.6)

@@ -10,15 +10,15 @@ from modt.segmentation.clusters import ClusterSizes
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.strips import ViewBounds, pairs
+from modt.segmentation.strips import CarLimits, ViewBounds, pairs
 from tests.segmentation import reference, scans
 
 BEAM = np.tan(np.deg2rad(SensorConfig().elevation_step_deg))
 PERSON = (0.35, 0.5, 0.0, 1.75)
 
 
-def merger(**config):
-    return StripMerger(SensorConfig(), SegmentationConfig(**config))
+def merger(max_extent_m=9.0):
+    return StripMerger(SensorConfig(), max_extent_m)
 
 
 def strips(rng, n):
@@ -50,9 +50,7 @@ def strips(rng, n):
 @settings(max_examples=80)
 def test_targets_equal_those_of_pairs_one_by_one(seed, n):
     bounds = strips(np.random.default_rng(seed), n)
-    np.testing.assert_array_equal(
-        merger().targets(bounds), reference.car_targets(bounds, BEAM, SegmentationConfig().car_merging)
-    )
+    np.testing.assert_array_equal(merger().targets(bounds), reference.car_targets(bounds, BEAM, CarLimits()))
 
 
 def test_random_strips_are_merged():
@@ -64,7 +62,7 @@ def test_random_strips_are_merged():
         target = stage.targets(bounds)
         merged += np.count_nonzero(target != np.arange(24))
         chained += np.count_nonzero(np.bincount(target, minlength=24) > 2)
-        front, back = pairs(bounds, np.full(24, BEAM, np.float32), stage.config)
+        front, back = pairs(bounds, np.full(24, BEAM, np.float32), stage.limits)
         refused += np.count_nonzero(target[front] != target[back])
     assert merged > 40
     assert chained > 5
@@ -145,7 +143,7 @@ def test_merged_cars_stay_within_the_size_of_an_object():
     for seed in range(20):
         bounds = strips(np.random.default_rng(seed), 24)
         for limit_m in (2.0, 6.0):
-            target = merger(max_extent_m=limit_m).targets(bounds)
+            target = merger(limit_m).targets(bounds)
             merged = [np.flatnonzero(target == first) for first in np.unique(target) if np.sum(target == first) > 1]
             for own in merged:
                 car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))

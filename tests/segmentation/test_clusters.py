@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.clustering import Clusterer
+from modt.segmentation.clustering import MAX_GAP_BEAMS, MAX_GAP_M, Clusterer
 from modt.segmentation.clusters import connect, occupied_cells
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.types import NONE
@@ -34,8 +34,7 @@ def cells_of(grid, points, height):
 
 
 def components(grid, cells, beam_m):
-    gap = SegmentationConfig().clusters
-    gap_m = np.float32(gap.max_gap_m) + np.float32(gap.max_gap_beams) * beam_m
+    gap_m = np.float32(MAX_GAP_M) + np.float32(MAX_GAP_BEAMS) * beam_m
     return connect(grid, cells, gap_m, np.ones(len(cells), np.bool_))
 
 
@@ -47,7 +46,7 @@ def test_components_equal_those_of_a_flood_fill(seed, n, sigma):
         return
     grid = SqrtRangeGrid(STEP, 80.0)
     cells, _, beam_m = cells_of(grid, points, points.z + 1.7)
-    slow = reference.flood_fill(cells, beam_m, SegmentationConfig().clusters)
+    slow = reference.flood_fill(cells, beam_m)
     assert reference.same_partition(components(grid, cells, beam_m), slow)
 
 

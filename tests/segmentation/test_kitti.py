@@ -67,7 +67,7 @@ def test_labelled_objects_are_found(kitti_root):
 
 def test_ground_agrees_with_the_semantic_labels(kitti_root):
     settings = profile.load("hdl-64e")
-    ground = GroundEstimator(settings.sensor, settings.segmentation)
+    ground = GroundEstimator(settings.sensor, settings.segmentation.max_slope_deg)
     for path in sorted((kitti_root / "odometry" / "00" / "labels").glob("*.label")):
         kind = np.fromfile(path, np.uint32) & 0xFFFF
         points = np.fromfile(kitti_root / "odometry" / "00" / "velodyne" / f"{path.stem}.bin", np.float32).reshape(

@@ -13,16 +13,17 @@ from hypothesis import strategies as st
 
 from modt import profile
 from modt.config import SegmentationConfig, SensorConfig
-from modt.config.segmentation import CarMergeConfig
 from modt.geometry import FieldOfView
+from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
-from modt.segmentation.kernels import NUMPY
+from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
+from modt.segmentation.strips import CarLimits
 from modt.types import NONE, UNRECORDED
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop_pairs import WEIGHTS, random_pairs
@@ -173,9 +174,9 @@ def test_cells_and_components(kernels, seed, n, sigma):
 @given(seed=st.integers(0, 10_000), n=st.integers(0, 60), beam_deg=st.floats(0.05, 2.0))
 @settings(max_examples=100, deadline=None)
 def test_strips(kernels, seed, n, beam_deg):
-    rng, config = np.random.default_rng(seed), CarMergeConfig()
+    rng = np.random.default_rng(seed)
     bounds, beam_rad = strips(rng, n + 1), np.full(n + 1, np.deg2rad(beam_deg), np.float32)
-    assert same(*(k.merge_strips(bounds, beam_rad, config) for k in (NUMPY, kernels)))
+    assert same(*(k.merge_strips(bounds, beam_rad, CarLimits()) for k in (NUMPY, kernels)))
 
 
 @given(
@@ -263,3 +264,9 @@ def test_another_kind_of_array_is_refused(kernels):
         kernels.group_sums(np.zeros((1, 4)), np.array([0, 4]))
     with pytest.raises(TypeError, match="contiguous"):
         kernels.group(np.zeros(8, np.int64)[::2], 1)
+
+
+def test_every_pass_is_compiled():
+    passes = {name for kind in Kernels.__mro__[:-1] for name in vars(kind) if not name.startswith("_")}
+    compiled = {name for kind in (NativeKernels, NativeGeometryKernels) for name in vars(kind)}
+    assert passes - {"name"} <= compiled

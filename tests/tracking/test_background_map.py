@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.config import BackgroundMapConfig, TrackingConfig
+from modt.config import TrackingConfig
 from modt.observations import observe
 from modt.tracking.background_map import BackgroundMap
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
@@ -23,7 +23,7 @@ def recalled(background_map, boxes, tracks=EMPTY, rows=NO_ROWS, which=None):
 
 
 def map_of(*boxes, **options):
-    background_map = BackgroundMap(BackgroundMapConfig(**options))
+    background_map = BackgroundMap(**options)
     background_map.add(tracks_at(boxes), np.arange(len(boxes)))
     return background_map
 
@@ -43,11 +43,11 @@ def map_of(*boxes, **options):
 )
 def test_a_proposal_within_a_place_is_recalled_unless_it_rises_above(stranger, known):
     assert recalled(map_of(FAR, POST), [stranger]) == [known]
-    assert recalled(BackgroundMap(BackgroundMapConfig()), [stranger], tracks_at([FAR, POST]), np.arange(2)) == [known]
+    assert recalled(BackgroundMap(), [stranger], tracks_at([FAR, POST]), np.arange(2)) == [known]
 
 
 def test_only_the_rows_and_observations_named_count():
-    tracks, nothing = tracks_at([FAR, POST]), BackgroundMap(BackgroundMapConfig())
+    tracks, nothing = tracks_at([FAR, POST]), BackgroundMap()
     assert recalled(nothing, [POST, FAR], tracks, np.array([0])) == [False, True]
     assert recalled(nothing, [POST, FAR], tracks, np.array([0]), which=[1]) == [True]
     assert recalled(nothing, [POST, FAR], tracks, np.array([0]), which=NO_ROWS) == []
@@ -58,7 +58,7 @@ def test_only_the_rows_and_observations_named_count():
 def test_the_oldest_places_beyond_the_capacity_are_forgotten():
     boxes = [box(10 + 5 * i, 0, 1, 1) for i in range(5)]
     assert recalled(map_of(*boxes, capacity=3), boxes) == [False, False, True, True, True]
-    by_one = BackgroundMap(BackgroundMapConfig(capacity=3))
+    by_one = BackgroundMap(capacity=3)
     for row in range(5):
         by_one.add(tracks_at(boxes), np.array([row]))
     assert recalled(by_one, boxes) == [False, False, True, True, True]
@@ -66,15 +66,6 @@ def test_the_oldest_places_beyond_the_capacity_are_forgotten():
 
 def test_without_capacity_nothing_is_recalled():
     assert recalled(map_of(POST, capacity=0), [POST], tracks_at([POST]), np.arange(1)) == [False]
-
-
-@pytest.mark.parametrize(
-    ("options", "stranger", "known"),
-    [({"min_coverage": 0.9}, box(10.4, 4, 1, 1), False), ({"rise_m": 2.0}, box(10, 4, 1, 1, 2.6, z=-0.35), True)],
-)
-def test_the_thresholds_are_those_of_the_configuration(options, stranger, known):
-    assert recalled(map_of(POST), [stranger]) == [not known]
-    assert recalled(map_of(POST, **options), [stranger]) == [known]
 
 
 def run(follower, scenes, object_class=BACKGROUND):
@@ -111,10 +102,9 @@ def test_an_heir_is_final_background_at_once(machine, state):
     [
         lambda: gone(object_class=CAR),
         lambda: gone(CONVENTIONAL),
-        lambda: gone(association="paper"),
-        lambda: gone(background_map=BackgroundMapConfig(capacity=0)),
+        lambda: gone(extensions="none"),
     ],
-    ids=["a car", "no class is final", "the paper's association", "no capacity"],
+    ids=["a car", "no class is final", "as in the paper"],
 )
 def test_what_is_not_remembered_is_classified(follower):
     assert run(follower(), [[FAR, POST]]) == 1

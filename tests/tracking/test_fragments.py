@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt.config import FragmentConfig, TrackingConfig
 from modt.geometry.kdop import DIRECTIONS
-from modt.tracking.fragments import NoReunion, Reunion, swap_proposals
+from modt.tracking.fragments import Reunion, swap_proposals
 from modt.types import NONE
 from tests.tracking.tracking_scenes import EYE, Follower, associated, box, frame_of, tracks_at
 
@@ -64,10 +63,10 @@ def ranked(boxes, *classes, **columns):
     return tracks
 
 
-def reunited(tracks, boxes, rows, points, min_hits=4, **options):
+def reunited(tracks, boxes, rows, points):
     """Proposal of each track after reunite, where the first proposals were matched with the rows given."""
     frame = associated(frame_of(boxes, points=points)[1], rows)
-    matches = Reunion(FragmentConfig(**options), min_hits).reunite(tracks, frame.observations, frame.matches)
+    matches = Reunion().reunite(tracks, frame.observations, frame.matches)
     assert len(set(matches.rows.tolist())) == len(matches.rows)
     assert len(set(matches.proposals.tolist())) == len(matches.proposals)
     proposal = np.full(len(tracks), NONE)
@@ -147,22 +146,6 @@ def test_parts_of_different_classes_are_not_one_object(senior_class, junior_clas
     assert (reunited(tracks, [REAR, FRONT], [0, 1], (40, 80))[0] == [1, 0]) == swapped
 
 
-@pytest.mark.parametrize(
-    ("senior_class", "junior_hits", "swapped"),
-    [(CAR, 10, True), (BACKGROUND, 10, False), (BACKGROUND, 3, True)],
-)
-def test_a_part_of_the_size_of_a_person_stays_with_an_established_track(senior_class, junior_hits, swapped):
-    tracks = ranked([WHOLE, PERSON], senior_class, BACKGROUND)
-    tracks.hits[1] = junior_hits
-    assert (reunited(tracks, [POST, PERSON], [0, 1], (20, 40))[0] == [1, 0]) == swapped
-
-
-def test_the_threshold_is_that_of_the_configuration():
-    tracks, boxes = ranked([WHOLE, FRONT], CAR, CAR), [REAR, box(13.6, 4, l=1.9)]
-    assert reunited(tracks, boxes, [0, 1], (40, 80))[0] == [1, 0]
-    assert reunited(tracks, boxes, [0, 1], (40, 80), min_coverage=1.0)[0] == [0, 1]
-
-
 def test_an_empty_frame_is_no_fragment():
     assert reunited(tracks_at([WHOLE], CAR), [], [], 0)[0] == [NONE]
 
@@ -183,11 +166,3 @@ def test_a_car_behind_a_pole_keeps_its_track():
             follower.classify(CAR)
             i += 1
         assert follower.tracks.id[follower.tracks.proposal == larger].tolist() == [0]
-
-
-def test_without_reunion_every_track_keeps_its_proposal():
-    tracker = Follower(TrackingConfig(fragments=FragmentConfig(min_coverage=1.0))).tracker
-    assert isinstance(tracker._reunion, NoReunion)
-    frame = associated(frame_of([FRONT], points=40)[1], [1])
-    matches = NoReunion().reunite(tracks_at([WHOLE, FRONT], CAR, CAR), frame.observations, frame.matches)
-    assert matches is frame.matches

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.config import KdopAssociationConfig
 from modt.observations import observe
 from modt.tracking.kdop_association import KdopAssociation
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, tracks_at
@@ -16,9 +15,9 @@ def observed(boxes, points=60):
     return observe(frame_of(boxes, points=points)[1], EYE)
 
 
-def matched(tracks, observations, **options):
+def matched(tracks, observations):
     """Pairs of a row and a proposal, and the matches."""
-    matches = KdopAssociation(KdopAssociationConfig(**options)).match(tracks, observations)
+    matches = KdopAssociation().match(tracks, observations)
     return sorted(zip(matches.rows.tolist(), matches.proposals.tolist(), strict=True)), matches
 
 
@@ -45,28 +44,22 @@ def test_a_lost_track_does_not_take_the_proposal_of_a_track_that_is_expected_the
     assert matched(tracks, person)[0] == [(0, 0)]
 
 
-def test_a_pair_too_far_apart_is_not_matched():
-    tracks, person = tracks_at([box(10, 0, 0.6, 0.6)]), observed([box(10.9, 0, 0.6, 0.6)])
-    assert matched(tracks, person, max_cost=30.0)[0] == [(0, 0)]
-    assert matched(tracks, person, max_cost=2.0, min_coverage=1.0)[0] == []
+@pytest.mark.parametrize(("x", "pairs"), [(10.1, [(0, 0)]), (11.4, [])])
+def test_a_pair_too_far_apart_is_not_matched(x, pairs):
+    assert matched(tracks_at([box(10, 0, 0.6, 0.6)]), observed([box(x, 0, 0.6, 0.6)]))[0] == pairs
+
+
+@pytest.mark.parametrize(("x", "pairs"), [(9.0, [(0, 0)]), (7.4, [])])
+def test_what_changed_its_shape_is_matched_by_coverage(x, pairs):
+    """A car of which most disappeared costs more than a pair may."""
+    tracks, part = tracks_at([box(10, 3)], points=3000), observed([box(x, 3, 0.3, 0.3, 0.3, z=-1.6)], points=6)
+    assert matched(tracks, part)[0] == pairs
 
 
 def test_pairs_are_sought_as_far_as_the_filter_is_uncertain():
     person = observed([box(12, 0, 0.6, 0.6)])
     assert matched(tracks_at([box(10, 0, 0.6, 0.6)]), person)[0] == []
     assert matched(tracks_at([box(10, 0, 0.6, 0.6)], P=4 * np.eye(4)), person)[0] == [(0, 0)]
-
-
-def test_a_pair_above_the_highest_cost_is_not_matched():
-    """A car of which most disappeared."""
-    tracks, part = tracks_at([box(10, 3)], points=300), observed([box(9.0, 3, 0.5, 1.8, 0.4, z=-1.5)], points=8)
-    assert matched(tracks, part, max_cost=20.0)[0] == [(0, 0)]
-    assert matched(tracks, part, max_cost=2.0, min_coverage=1.0)[0] == []
-
-
-def test_what_changed_its_shape_is_matched_by_coverage_among_the_rest():
-    tracks, part = tracks_at([box(10, 3)], points=300), observed([box(9.0, 3, 0.5, 1.8, 0.4, z=-1.5)], points=8)
-    assert matched(tracks, part, max_cost=2.0, min_coverage=0.3)[0] == [(0, 0)]
 
 
 def test_a_stationary_car_that_comes_into_view_has_no_speed():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.config import MergeConfig, TrackingConfig
+from modt.config import TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
 from modt.placement import Placement
@@ -28,9 +28,9 @@ AHEAD = box(15, 3, 4.2, 1.8, 1.5)
 POINTS = 80
 
 
-def merging(tracks, frame, **options):
+def merging(tracks, frame):
     """The frame after merging."""
-    return CarMerging(MergeConfig(**options), min_hits=4).regroup(tracks, frame, Placement(EYE))
+    return CarMerging().regroup(tracks, frame, Placement(EYE))
 
 
 def frame_at_rest(tracks, boxes, *rows):
@@ -91,15 +91,6 @@ def test_only_established_cars_merge(object_class, columns, why):
 def test_what_exceeds_the_known_extent_is_no_part(own, part, why):
     tracks = tracks_at([WHOLE], CAR)
     assert len(merging(tracks, frame_at_rest(tracks, [own, part], 0)).proposals) == 2, why
-
-
-@pytest.mark.parametrize(("option", "value"), [("min_coverage", 1.0), ("longer_m", 0.0)])
-def test_the_thresholds_are_those_of_the_configuration(option, value):
-    part = box(11.3, 3, 2.0, 1.8, 1.5)  # sticks out by 0.2 m
-    tracks = tracks_at([WHOLE], CAR)
-    frame = frame_at_rest(tracks, [REAR, part], 0)
-    assert len(merging(tracks, frame).proposals) == 1
-    assert len(merging(tracks, frame, **{option: value}).proposals) == 2
 
 
 @pytest.mark.parametrize(
@@ -218,8 +209,8 @@ def test_a_car_in_two_parts_keeps_its_track_and_its_box(pose):
     np.testing.assert_allclose(follower.tracks.box[0], transform_boxes(T, np.array([WHOLE]))[0], atol=0.05)
 
 
-def test_the_papers_association_takes_proposals_as_they_are():
-    follower = Follower(TrackingConfig(association="paper"))
+def test_without_extensions_the_tracker_takes_proposals_as_they_are():
+    follower = Follower(TrackingConfig(extensions="none"))
     for i in range(KNOWN):
         follow(follower, [WHOLE], i)
     follow(follower, [REAR, FRONT], KNOWN)

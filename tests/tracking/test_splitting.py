@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt.config import SplitConfig, TrackingConfig
+from modt.config import TrackingConfig
 from modt.geometry import inverse, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
 from modt.placement import Placement
@@ -38,10 +38,10 @@ def wall_with(*people, points=PERSON_POINTS, wall=WALL):
     return joined(frame_of([*people, wall], points=counts)[1], [range(len(people) + 1)])
 
 
-def split(tracks, proposals, rows=(), matched=None, **options):
+def split(tracks, proposals, rows=(), matched=None):
     """The frame after splitting."""
     frame = associated(proposals, rows, matched)
-    return ExpectedSplitting(SplitConfig(**options), min_hits=4).regroup(tracks, frame, Placement(EYE))
+    return ExpectedSplitting().regroup(tracks, frame, Placement(EYE))
 
 
 def tracks_of_person_and_wall(object_class=PEDESTRIAN, person=PERSON, **columns):
@@ -123,24 +123,6 @@ def test_a_matched_track_splits_nothing():
     assert len(split(tracks, proposals, rows=[0, 1]).proposals) == 2
 
 
-@pytest.mark.parametrize(
-    ("options", "pieces"),
-    [
-        ({}, 1),
-        ({"min_points": PERSON_POINTS + 30}, 0),
-        ({"min_share": 1.0, "pad_m": 0.0}, 0),
-        ({"min_coverage": 1.0}, 0),
-        ({"longer_m": 10.0}, 1),
-        ({"longer_m": 10.0, "max_drop_m": 0.0, "pad_m": 0.0}, 0),
-    ],
-)
-def test_the_thresholds_are_those_of_the_configuration(options, pieces):
-    lower = box(10, 2.5, 0.6, 0.6, 1.65, z=-0.875)
-    wall = box(12, 3, l=16.0, w=0.3, h=1.65, z=-0.875)
-    proposals = wall_with(lower, wall=wall)
-    assert len(split(tracks_of_person_and_wall(), proposals, rows=[1], **options).proposals) == 1 + pieces
-
-
 def test_points_above_the_expected_top_stay_with_the_rest():
     roof = box(10, 2.5, l=8.0, w=3.0, h=0.5, z=1.2)
     after = split(tracks_of_person_and_wall(), wall_with(PERSON, wall=roof), rows=[1])
@@ -153,7 +135,7 @@ def test_points_beyond_the_diagonal_sides_stay_with_the_rest():
     corner = box(10.62, 3.12, 0.1, 0.1, 1.7, z=-0.85)
     tracks = tracks_of_person_and_wall(person=diamond)
     proposals = joined(frame_of([diamond, corner, WALL], points=[80, 20, 400])[1], [(0, 1, 2)])
-    after = split(tracks, proposals, rows=[1], longer_m=0.1)
+    after = split(tracks, proposals, rows=[1])
     assert len(after.proposals) == 2
     piece = after.proposals.members[after.proposals.offsets[1] :]
     assert not ((piece >= 80) & (piece < 100)).any()
@@ -238,8 +220,8 @@ def test_two_pedestrians_who_meet_keep_their_tracks():
         assert min(shares) > 0.95
 
 
-def test_the_papers_association_takes_proposals_as_they_are():
-    follower = Follower(TrackingConfig(association="paper"))
+def test_without_extensions_the_tracker_takes_proposals_as_they_are():
+    follower = Follower(TrackingConfig(extensions="none"))
     for i in range(TOUCH + 1):
         follow(follower, [walker(i), WALL], i, together=[(0, 1)] if i == TOUCH else ())
     assert len(follower.proposals) == 1

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
-from modt.config.tracking import FilterConfig
 from modt.geometry.kdop import DIRECTIONS
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, UndefinedTransitionError
-from modt.tracking.tracker import association_of, regroupings_of
+from modt.tracking.tracker import association_of
 from modt.types import NONE, Cut, Proposals
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
@@ -118,11 +117,9 @@ def test_a_classification_that_the_machine_has_no_row_for_is_an_error(machine, c
         tracker.conclude([0], [certain])
 
 
-@pytest.mark.parametrize(("association", "kind", "n"), [("kdop", KdopAssociation, 2), ("paper", PaperAssociation, 0)])
-def test_association_and_regroupings_follow_the_configuration(association, kind, n):
-    config = TrackingConfig(association=association)
-    assert isinstance(association_of(config), kind)
-    assert len(regroupings_of(config)) == n
+@pytest.mark.parametrize(("association", "kind"), [("kdop", KdopAssociation), ("paper", PaperAssociation)])
+def test_the_association_follows_the_configuration(association, kind):
+    assert isinstance(association_of(TrackingConfig(association=association)), kind)
 
 
 @settings(max_examples=40)
@@ -181,15 +178,6 @@ def test_two_runs_give_the_same_tracks():
         np.testing.assert_array_equal(a, b, err_msg=name)
 
 
-def test_the_process_noise_is_that_of_the_configuration():
-    tracker = Follower(TrackingConfig(filter=FilterConfig(acceleration_sigma_mps2=3.0)))
-    for i in range(6):
-        tracker.follow(*frame_of([box(12, 3, 0.6, 0.6, 1.7)], i, EYE))
-    before = tracker.tracks.P[0, 3, 3]
-    grown = tracker.follow(*frame_of([], 6, EYE)).P[0, 3, 3] - before
-    assert grown == pytest.approx(np.square(0.1 * 3.0))
-
-
 def test_a_track_at_rest_is_stationary_until_it_leaves_its_rest_position():
     tracker = Follower()
     for i in range(20):
@@ -212,13 +200,6 @@ def test_the_mean_kdop_follows_views_that_jitter_and_restarts_at_an_end_that_jum
     reach = tracks.kdop[0] - tracks.x[0, :2] @ DIRECTIONS
     assert tracks.mean_kdop[0, 0] == pytest.approx(reach[0], abs=0.15)
     np.testing.assert_allclose(tracks.mean_kdop[0][[2, 4, 6]], [0.5, 1.0, 0.5], atol=0.15)
-
-
-def test_new_tracks_begin_with_the_uncertainty_of_the_configuration():
-    config = FilterConfig(initial_position_sigma_m=0.7, initial_speed_sigma_mps=9.0)
-    tracker = Follower(TrackingConfig(filter=config))
-    tracks = tracker.follow(*frame_of([box(10, 0)], 0, EYE))
-    np.testing.assert_allclose(np.diag(tracks.P[0]), [0.49, 0.49, np.pi**2, 81.0])
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import numpy as np
 
 from modt.classification.box_classifier import box_features
 from modt.classification.crops import Crops
-from modt.config.segmentation import BoxConfig
 from modt.geometry import upright_boxes
 from modt.segmentation.groups import HEADINGS, Groups, best_headings
+from modt.segmentation.segmenter import SIDE_NOISE_M
 from modt.types import Float64, Int
 from tools.train.dataset import Dataset, Sensors
 
@@ -20,7 +20,7 @@ def crop_features(crops: Crops, sensors: Sensors) -> Float64:
     """(R, 7) features of the boxes fitted to crops."""
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
-    heading = best_headings(x, y, groups, len(x), BoxConfig().noise_m)
+    heading = best_headings(x, y, groups, len(x), SIDE_NOISE_M)
     box = upright_boxes(np.stack([x, y, z]), groups.offsets, HEADINGS[heading])
     return box_features(crops.count, box, sensors.ground_z_m, sensors.beam_sr)
 

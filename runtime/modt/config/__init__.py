@@ -11,27 +11,16 @@ from modt.config.odometry import OdometryConfig
 from modt.config.profile import EnergyConfig, LoopConfig, ProfileConfig, RecordingConfig, SensorConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.tracking import (
-    BackgroundMapConfig,
-    FilterConfig,
-    FragmentConfig,
-    KdopAssociationConfig,
-    MergeConfig,
     PaperAssociationConfig,
-    SplitConfig,
     TrackingConfig,
 )
 
 __all__ = [
-    "BackgroundMapConfig",
     "ClassificationConfig",
     "DecisionConfig",
     "EnergyConfig",
-    "FilterConfig",
-    "FragmentConfig",
     "FusionConfig",
-    "KdopAssociationConfig",
     "LoopConfig",
-    "MergeConfig",
     "OdometryConfig",
     "PaperAssociationConfig",
     "ProfileConfig",
@@ -39,7 +28,6 @@ __all__ = [
     "SchedulerConfig",
     "SegmentationConfig",
     "SensorConfig",
-    "SplitConfig",
     "StageConfig",
     "TrackingConfig",
     "ValueRangeError",

@@ -8,6 +8,7 @@ from array import array
 import numpy as np
 
 from modt.geometry.kdop import HALF_ROOT, PAD_M, PairWeights, Shapes
+from modt.geometry.kernels import GeometryKernels
 from modt.native.library import FLOAT64, INT64, Signatures, address, at, declare, pointers
 from modt.types import Bool, Float32, Float64, Int
 
@@ -26,7 +27,7 @@ _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
 
 
-class NativeGeometryKernels:
+class NativeGeometryKernels(GeometryKernels):
     """The passes in C.
 
     Args:

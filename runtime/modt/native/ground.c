@@ -145,7 +145,7 @@ static void median_across(i32 sectors, i32 step, const float *row, float *median
     }
 }
 
-/* NumpyKernels.above_ground: of n points in rows of `width`, those within bounds of height and of square root of
+/* Kernels.above_ground: of n points in rows of `width`, those within bounds of height and of square root of
  * range; returns how many. Their rows are written, and x, y, z, square root of range, and height. `range_m` and
  * `flat_m` are by ring; a ray has 4 * sectors floats. */
 EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float *flat_m, float height_m,

@@ -6,14 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from modt.class_sizes import PersonSize
+from modt.class_sizes import SPLIT_PERSON
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.clusters import Cells, Clusters, ClusterSizes
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
-from modt.segmentation.strips import ELEVATION, ViewBounds
+from modt.segmentation.strips import ELEVATION, MAX_BEAMS, MIN_POINTS, VISIBLE_M, CarLimits, ViewBounds
 from modt.types import NONE, Bool, Float32, Int
+
+MAX_GAP_M, MAX_GAP_BEAMS = 0.3, 2.0
+"""Neighbouring cells with a vertical gap below the sum, the beams taken at their range, are one cluster."""
+MIN_LINE_POINTS, MIN_LINE_TOP_M = 15, 0.5
+"""A cluster lower than `min_height_m` is kept from so many points and such a top on: one beam meets an object."""
+MIN_PART_POINTS, MIN_PART_TOP_M = 15, 0.9
+"""The same for a part of an oversized cluster."""
+MIN_SPLIT_M, MIN_CELL_RETURNS = 0.8, 0.9
+"""A cluster of this extent may hold a person and more, where a fine cell is as wide as so many spacings of points."""
+MIN_PERSON_POINTS = 8
+"""Least number of points of a person that is split off."""
 
 
 class StripMerger:
@@ -25,14 +36,13 @@ class StripMerger:
 
     Args:
         sensor: beam spacing.
-        config: `max_extent_m` and the keys of `car_merging`.
+        max_extent_m: longest side of a proposal.
         kernels: passes over cells.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig, kernels: Kernels = NUMPY) -> None:
+    def __init__(self, sensor: SensorConfig, max_extent_m: float, kernels: Kernels = NUMPY) -> None:
         self.kernels = kernels
-        diagonal_m = min(config.car_merging.max_diagonal_m, config.max_extent_m)
-        self.config = replace(config.car_merging, max_diagonal_m=diagonal_m)
+        self.limits = CarLimits(max_diagonal_m=min(CarLimits().max_diagonal_m, max_extent_m))
         self.beams = sensor.beams
 
     def merge(self, clusters: Clusters, sizes: ClusterSizes, mergeable: Bool) -> Int:
@@ -46,15 +56,15 @@ class StripMerger:
 
     def candidates(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters that can be a strip of a car."""
-        c = self.config
-        candidate: Bool = (sizes.points >= c.min_points) & (sizes.extent_m < c.max_diagonal_m)
-        candidate &= (sizes.top_m < c.max_top_m) & (c.max_beams * sizes.beam_m > c.visible_m)
+        limits = self.limits
+        candidate: Bool = (sizes.points >= MIN_POINTS) & (sizes.extent_m < limits.max_diagonal_m)
+        candidate &= (sizes.top_m < limits.max_top_m) & (MAX_BEAMS * sizes.beam_m > VISIBLE_M)
         return candidate
 
     def targets(self, bounds: ViewBounds) -> Int:
         """(G,) first of the clusters that make one car with each, itself where it is not merged."""
         beam_rad = np.full(len(bounds), self.beams.step_rad(bounds.min[ELEVATION]), np.float32)
-        return self.kernels.merge_strips(bounds, beam_rad, self.config)
+        return self.kernels.merge_strips(bounds, beam_rad, self.limits)
 
 
 class Clusterer:
@@ -66,7 +76,7 @@ class Clusterer:
 
     Args:
         sensor: range and beam spacing.
-        config: clustering distance, sizes of objects, and the keys of `clusters`.
+        config: clustering distance and sizes of objects.
         kernels: passes over points and cells.
     """
 
@@ -74,12 +84,10 @@ class Clusterer:
         self.kernels = kernels
         step = config.cell_m / np.sqrt(10.0)
         self.config, self.beams = config, sensor.beams
-        self.gap_m = np.float32(config.clusters.max_gap_m)
-        self.gap_beams = np.float32(config.clusters.max_gap_beams)
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
-        self.merger = StripMerger(sensor, config, kernels)
-        spacing = config.person_splitting.min_cell_returns * np.deg2rad(sensor.azimuth_step_deg)
+        self.merger = StripMerger(sensor, config.max_extent_m, kernels)
+        spacing = MIN_CELL_RETURNS * np.deg2rad(sensor.azimuth_step_deg)
         self.max_split_sqrt_range = np.float32(self.fine.step / spacing)  # a cell is as wide as step * sqrt(range)
 
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
@@ -94,7 +102,7 @@ class Clusterer:
     def _connect(self, cells: Cells, points: PointColumns) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each; sizes of the clusters."""
         beam_m = self._beam_m(points)
-        max_gap_m = self.gap_m + self.gap_beams * beam_m
+        max_gap_m = np.float32(MAX_GAP_M) + np.float32(MAX_GAP_BEAMS) * beam_m
         cluster = self.kernels.connect_coarse(self.coarse, cells, max_gap_m)
         coarse = self._sizes(cells, points, beam_m, cluster)
         oversized = coarse.extent_m >= self.config.max_extent_m
@@ -121,16 +129,13 @@ class Clusterer:
 
     def _may_hold_person(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters that may hold a person and more, near enough for the fine grid to hold an object together."""
-        c = self.config.person_splitting
-        may: Bool = (sizes.extent_m > c.min_cluster_m) & (sizes.top_m > c.min_top_m)
-        may &= (sizes.points >= 2 * c.min_points) & (sizes.sqrt_range < self.max_split_sqrt_range)
+        may: Bool = (sizes.extent_m > MIN_SPLIT_M) & (sizes.top_m > SPLIT_PERSON.min_top_m)
+        may &= (sizes.points >= 2 * MIN_PERSON_POINTS) & (sizes.sqrt_range < self.max_split_sqrt_range)
         return may
 
     def _may_be_person(self, sizes: ClusterSizes) -> Bool:
         """(G,) parts of a person's size."""
-        c = self.config.person_splitting
-        size = PersonSize(c.max_extent_m, c.min_height_m, c.min_top_m, c.max_top_m, c.min_extent_m)
-        return (sizes.points >= c.min_points) & size.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
+        return (sizes.points >= MIN_PERSON_POINTS) & SPLIT_PERSON.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""
@@ -140,9 +145,9 @@ class Clusterer:
 
     def _valid(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""
-        config, c = self.config, self.config.clusters
+        config = self.config
         valid: Bool = (sizes.points >= config.min_points) & (sizes.extent_m < config.max_extent_m)
-        line = (sizes.points >= c.min_line_points) & (sizes.top_m > c.min_line_top_m)
+        line = (sizes.points >= MIN_LINE_POINTS) & (sizes.top_m > MIN_LINE_TOP_M)
         valid &= line | (sizes.top_m - sizes.bottom_m >= config.min_height_m)
-        valid &= ~sizes.is_part | ((sizes.top_m >= c.min_part_top_m) & (sizes.points >= c.min_part_points))
+        valid &= ~sizes.is_part | ((sizes.top_m >= MIN_PART_TOP_M) & (sizes.points >= MIN_PART_POINTS))
         return valid

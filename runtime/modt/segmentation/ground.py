@@ -4,10 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.config import SegmentationConfig, SensorConfig
+from modt.config import SensorConfig
 from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid
 from modt.segmentation.groups import label_max, label_min
 from modt.types import Bool, Float32, Int
+
+DEFAULT_HEIGHT_M = 1.73
+"""Height of the sensor while no ground is in sight: that of KITTI's sensor."""
+HEIGHT_SWEEPS = 5
+"""First sweeps whose median is the estimate of the height."""
+HEIGHT_RANGE_M, HEIGHT_BIN_M, MIN_HEIGHT_CELLS = 15.0, 0.05, 12
+"""Farthest cell used for the height; width of a bin of depths; least number of ground cells in three bins."""
+HORIZON_BEAMS = 2.0
+"""Cells less than this many beams below the horizon say nothing of the height."""
+
+NOISE_M = 0.1
+"""Greatest residual of a lowest return on the plane of its ray."""
+NEAR_M = 1.5
+"""Greatest distance over which ground rises by `max_slope_deg`, from one ground cell of a ray to the next."""
+MAX_GAP_M = 6.0
+"""The same on and beside a ramp; reach of the running slope."""
+RAMP_SHARE = 0.3
+"""A ray is on a ramp when its running slope exceeds this share of `max_slope_deg`."""
+SLOPE_GAIN = 0.2
+"""Weight of the newest slope in the running slope of a ray."""
+FLAT_M, FLAT_SLOPE = 0.1, 0.2
+"""Greatest height range of the returns of a flat cell, and its growth with the width of the cell."""
+FLANK_SECTORS, FLANK_M = 3, 0.25
+"""A surface this far above the median of the rays so many sectors beside it is the side of a vehicle."""
 
 
 class HeightEstimator:
@@ -17,36 +41,34 @@ class HeightEstimator:
 
     Args:
         sensor: range and beam spacing.
-        config: the keys of `sensor_height`, and of `ground` those of a flat cell.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
-        self.config = c = config.sensor_height
-        max_range_m = min(c.max_range_m, sensor.max_range_m)
+    def __init__(self, sensor: SensorConfig) -> None:
+        max_range_m = min(HEIGHT_RANGE_M, sensor.max_range_m)
         self.near, self.far = np.sqrt(sensor.min_range_m), np.sqrt(max_range_m)
         self.grid = PolarGrid(max_range_m)
         range_m = np.repeat(self.grid.range_m, SECTORS).astype(np.float64)
-        self.flat_m = config.ground.flat_m + config.ground.flat_slope * np.repeat(self.grid.ring_width_m, SECTORS)
-        self.horizon_m = c.horizon_beams * float(sensor.beams.step_rad(np.zeros(1, np.float32)).item()) * range_m
+        self.flat_m = FLAT_M + FLAT_SLOPE * np.repeat(self.grid.ring_width_m, SECTORS)
+        self.horizon_m = HORIZON_BEAMS * float(sensor.beams.step_rad(np.zeros(1, np.float32)).item()) * range_m
         self.estimates_m: list[float] = []
 
     def height_m(self, points: Float32) -> float:
         """Median of the estimates of the first sweeps, this (N, 4) one included; the default before any [m]."""
-        if len(self.estimates_m) < self.config.sweeps:
+        if len(self.estimates_m) < HEIGHT_SWEEPS:
             estimate = self._estimate(PointColumns.from_array(points))
             if estimate is not None:
                 self.estimates_m.append(estimate)
-        return float(np.median(self.estimates_m)) if self.estimates_m else self.config.default_m
+        return float(np.median(self.estimates_m)) if self.estimates_m else DEFAULT_HEIGHT_M
 
     def _estimate(self, points: PointColumns) -> float | None:
         around = points.take(np.flatnonzero((points.sqrt_range > self.near) & (points.sqrt_range < self.far)))
-        cell, bin_m = self.grid.cell(around), self.config.bin_m
+        cell, bin_m = self.grid.cell(around), HEIGHT_BIN_M
         lowest, highest = (reduce(around.z, cell, self.grid.size) for reduce in (label_min, label_max))
         flat = (highest - lowest < self.flat_m) & (-lowest > self.horizon_m)
         depth = -lowest[flat].astype(np.float64)
         cells = np.bincount((depth / bin_m).astype(np.int64), minlength=1)
         in_three_bins = np.convolve(cells, np.ones(3, np.int64), mode="same")
-        if in_three_bins.max() < self.config.min_cells:
+        if in_three_bins.max() < MIN_HEIGHT_CELLS:
             return None
         mode = (int(np.argmax(in_three_bins)) + 0.5) * bin_m
         return float(depth[np.abs(depth - mode) < 1.5 * bin_m].mean())
@@ -62,17 +84,16 @@ class GroundEstimator:
 
     Args:
         sensor: range.
-        config: `max_slope_deg` and the keys of `ground`.
+        max_slope_deg: steepest ground.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
-        self.config = config.ground
+    def __init__(self, sensor: SensorConfig, max_slope_deg: float) -> None:
         self.grid = PolarGrid(sensor.max_range_m)
-        flat_m = self.config.flat_m + self.config.flat_slope * self.grid.ring_width_m
+        flat_m = FLAT_M + FLAT_SLOPE * self.grid.ring_width_m
         self.flat_m: Float32 = flat_m[:, None].astype(np.float32)
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
-        steepest_rad = np.deg2rad(config.max_slope_deg)
-        self.max_slope, self.ramp_slope = np.tan([steepest_rad, self.config.ramp_share * steepest_rad]).tolist()
+        steepest_rad = np.deg2rad(max_slope_deg)
+        self.max_slope, self.ramp_slope = np.tan([steepest_rad, RAMP_SHARE * steepest_rad]).tolist()
 
     def height_above(self, points: PointColumns, sensor_height_m: float) -> Float32:
         """(N,) height of each point above the ground [m]."""
@@ -81,8 +102,8 @@ class GroundEstimator:
         is_ground, is_ramp = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
         known = np.where(is_ground, lowest, np.float32(-sensor_height_m))
         surface = _median_across(self._interpolate(known, is_ground))
-        beside = _median_across(surface, self.config.flank_sectors)
-        flank = surface - beside > np.float32(self.config.flank_m)
+        beside = _median_across(surface, FLANK_SECTORS)
+        flank = surface - beside > np.float32(FLANK_M)
         np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))  # what stands on a ramp hides it
         height: Float32 = points.z - surface.ravel().take(cell)
         return height
@@ -91,7 +112,7 @@ class GroundEstimator:
         """(rings, SECTORS) lowest return of each cell that can be ground [m], infinite without any."""
         reach = points.sqrt_range * points.sqrt_range
         reach *= np.float32(self.max_slope)
-        reach += np.float32(self.config.noise_m)
+        reach += np.float32(NOISE_M)
         plausible = np.abs(points.z + np.float32(sensor_height_m)) < reach
         plausible &= points.sqrt_range > self.min_sqrt_range
         z = np.where(plausible, points.z, np.float32(np.inf))
@@ -109,9 +130,8 @@ class GroundEstimator:
 
         All rays advance together, ring by ring, from the foot of the sensor.
         """
-        c = self.config
         max_slope, ramp = np.float32(self.max_slope), np.float32(self.ramp_slope)
-        gain, noise, max_gap, near = (np.float32(v) for v in (c.slope_gain, c.noise_m, c.max_gap_m, c.near_m))
+        gain, noise, max_gap, near = (np.float32(v) for v in (SLOPE_GAIN, NOISE_M, MAX_GAP_M, NEAR_M))
         last = np.zeros((3, SECTORS), np.float32)  # ground cell of each ray
         height, at, slope = last
         height[:] = -sensor_height_m
@@ -130,7 +150,7 @@ class GroundEstimator:
             step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -max_slope), max_slope)
             np.copyto(last, step, where=found)
             on = np.abs(slope) > ramp
-            is_ramp[ring] = on | np.roll(on, c.flank_sectors) | np.roll(on, -c.flank_sectors)
+            is_ramp[ring] = on | np.roll(on, FLANK_SECTORS) | np.roll(on, -FLANK_SECTORS)
             bend_m = np.where(is_ramp[ring], max_gap, near)
         return is_ground, is_ramp
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import ctypes
 from array import array
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from modt.config.segmentation import CarMergeConfig
+from modt.class_sizes import STRIP_PERSON
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native.library import BOOL, FLOAT32, FLOAT64, INT32, INT64, Signatures, address, at, declare, pointers
 from modt.segmentation.clusters import Cells, ClusterBounds, Clusters, Members
 from modt.segmentation.grids import FAR_M, RING_STEP, SECTORS, PointColumns, SqrtRangeGrid
-from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, NOISE_M, SLOPE_GAIN, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
-from modt.segmentation.strips import DIRECTION, ViewBounds
+from modt.segmentation.kernels import Kernels
+from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
 from modt.types import NONE, Bool, Float32, Float64, Int
 
 _F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
@@ -45,30 +47,31 @@ class _Ground(ctypes.Structure):
 
 _STRIP_KEYS = (
     *("max_gap_m", "min_gap_beams", "max_gap_beams", "min_width_m", "max_width_m", "min_top_m", "max_top_m"),
-    *("max_bottom_m", "max_diagonal_m", "max_person_width_m", "min_person_top_m", "min_person_height_m"),
+    *("max_bottom_m", "max_diagonal_m"),
 )
-"""Of CarMergeConfig, in the order of Strips of cells.c."""
+_PERSON_KEYS = "max_extent_m", "min_top_m", "min_height_m"
+"""Fields of CarLimits and of STRIP_PERSON, in the order of Strips of cells.c."""
 
 
 class _GroundBuffers:
     """What ground.c needs for one estimator: its constants, and scratch."""
 
     def __init__(self, ground: GroundEstimator) -> None:
-        grid, c = ground.grid, ground.config
+        grid = ground.grid
         scales = FAR_M, 1 / RING_STEP, SECTORS / 4
         slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
         self.constants = _Ground(
             grid.rings,
             SECTORS,
             SECTORS.bit_length() - 1,
-            c.flank_sectors,
+            FLANK_SECTORS,
             *scales,
             *slopes,
-            c.near_m,
-            c.slope_gain,
-            c.noise_m,
-            c.max_gap_m,
-            c.flank_m,
+            NEAR_M,
+            SLOPE_GAIN,
+            NOISE_M,
+            MAX_GAP_M,
+            FLANK_M,
         )
         self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
         self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
@@ -84,7 +87,7 @@ class _GroundBuffers:
         return self._scratch
 
 
-class NativeKernels(NativeGeometryKernels):
+class NativeKernels(NativeGeometryKernels, Kernels):
     """The passes in C.
 
     Args:
@@ -97,7 +100,7 @@ class NativeKernels(NativeGeometryKernels):
         declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
         self._work = np.empty(1, np.int32)
-        self._strips: dict[CarMergeConfig, Any] = {}
+        self._strips: dict[CarLimits, Any] = {}
         self._ground: dict[GroundEstimator, _GroundBuffers] = {}
 
     def above_ground(
@@ -179,16 +182,17 @@ class NativeKernels(NativeGeometryKernels):
         )  # fmt: skip
         return ViewBounds(bounds[:4], bounds[4:], scale_m)
 
-    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> Int:
+    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> Int:
         """(G,) first of the clusters that make one car with each, given (G,) the spacing of beams there [rad]."""
-        n, limits = len(bounds), self._strips.get(config)
-        if limits is None:
-            limits = self._strips[config] = (_F * len(_STRIP_KEYS))(*(getattr(config, key) for key in _STRIP_KEYS))
+        n, strips = len(bounds), self._strips.get(limits)
+        if strips is None:
+            values = *attrgetter(*_STRIP_KEYS)(limits), *attrgetter(*_PERSON_KEYS)(STRIP_PERSON)
+            strips = self._strips[limits] = (_F * len(values))(*values)
         order, target = bounds.min[DIRECTION].argsort(kind="stable"), np.empty(n, np.int64)
         parent, united = np.empty(n, np.int32), np.empty((8, n), np.float32)
         given, out = pointers(bounds.min, bounds.max), pointers(united)
         self._library.modt_merge_strips(
-            ctypes.addressof(limits), address(given), at(bounds.scale_m), at(beam_rad), n,
+            ctypes.addressof(strips), address(given), at(bounds.scale_m), at(beam_rad), n,
             at(order, INT64), address(parent), address(out), at(target, INT64),
         )  # fmt: skip
         return target

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.class_sizes import SPLIT_PERSON
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.ceiling import below_ceiling_m
@@ -15,6 +16,13 @@ from modt.segmentation.groups import HEADINGS, has_reflectance, reflectance_stat
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.view_ends import ViewEnds
 from modt.types import NONE, Bool, Cut, Float32, Int, Proposals
+
+VIEW_MARGIN_M, IN_VIEW_M = 6.0, 1.0
+"""Points this far outside a limited field of view are segmented, and proposals this far outside it are kept."""
+TRUNCATION_M = 0.3
+"""A proposal this near to the end of the margin is cut there."""
+HEADING_CELLS, SIDE_NOISE_M = 32, 0.1
+"""Cells of a proposal that decide on the heading of its box; points nearer to a side lie on it."""
 
 
 class Segmenter:
@@ -31,14 +39,12 @@ class Segmenter:
         self, config: SegmentationConfig, sensor: SensorConfig, fov: FieldOfView, kernels: Kernels = NUMPY
     ) -> None:
         self.config, self.sensor, self.fov, self.kernels = config, sensor, fov, kernels
-        self.margin_m = config.view_margin.margin_m
-        self.truncated_m = config.view_margin.truncation_m - self.margin_m
         ranges = np.sqrt([sensor.min_range_m, sensor.max_range_m])
         self.bounds: Float32 = np.array([config.clearance_m, config.max_height_m, *ranges], np.float32)
-        self.height_estimator = HeightEstimator(sensor, config)
-        self.ground = GroundEstimator(sensor, config)
+        self.height_estimator = HeightEstimator(sensor)
+        self.ground = GroundEstimator(sensor, config.max_slope_deg)
         self.clusterer = Clusterer(sensor, config, kernels)
-        self.ends = ViewEnds(sensor, config.person_splitting.max_top_m)
+        self.ends = ViewEnds(sensor, SPLIT_PERSON.max_top_m)
 
     def facts(self) -> dict[str, str]:
         """Which kernels it runs on."""
@@ -46,7 +52,7 @@ class Segmenter:
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""
-        region = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -self.margin_m)
+        region = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -VIEW_MARGIN_M)
         rows, above, height = self.above_ground(points if region is None else points[region])
         if not len(rows):
             return Proposals.empty()
@@ -81,15 +87,14 @@ class Segmenter:
         if not clusters.n:
             return Proposals.empty()
         by_cell = kernels.group(clusters.of_cell, clusters.n)
-        boxes = self.config.boxes
-        heading = kernels.best_headings(cells.x, cells.y, by_cell, boxes.max_cells, boxes.noise_m)
+        heading = kernels.best_headings(cells.x, cells.y, by_cell, HEADING_CELLS, SIDE_NOISE_M)
         members = kernels.members_of(clusters, index)
         offsets, own = members.offsets, members.columns[:3]
         mean = kernels.group_sums(members.columns, offsets) / (offsets[1:] - offsets[:-1])
         box = kernels.upright_boxes(own, offsets, HEADINGS[heading])
         cut, statistics = self.ends.cut(own, offsets, box), None
         if depth is not None:
-            cut |= Cut.SIDE * (by_cell.min(depth[by_cell.rows]) < self.truncated_m)
+            cut |= Cut.SIDE * (by_cell.min(depth[by_cell.rows]) < TRUNCATION_M - VIEW_MARGIN_M)
         if self.sensor.reflectance != "none" and has_reflectance(sweep[:, 3]):
             statistics = reflectance_statistics(*kernels.reflectance_sums(sweep, members.index, offsets))
         return Proposals(
@@ -105,5 +110,5 @@ class Segmenter:
 
     def _in_view(self, clusters: Clusters, depth: Float32) -> Bool:
         """(n,) clusters in the field of view or close to it, given the (C,) depth of each cell in it [m]."""
-        seen = (depth > -self.config.view_margin.object_m) & (clusters.of_cell != NONE)
+        seen = (depth > -IN_VIEW_M) & (clusters.of_cell != NONE)
         return np.bincount(clusters.of_cell[seen], minlength=clusters.n) > 0

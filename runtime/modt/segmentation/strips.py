@@ -6,14 +6,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.class_sizes import PersonSize
-from modt.config.segmentation import CarMergeConfig
+from modt.class_sizes import STRIP_PERSON
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns, pseudo_angle
 from modt.segmentation.groups import Groups
 from modt.types import Bool, Float32, Int, Self
 
 DIRECTION, RANGE, HEIGHT, ELEVATION = range(4)
+MIN_POINTS = 2
+"""Least number of points of a strip."""
+VISIBLE_M, MAX_BEAMS = 1.5, 8.0
+"""Height of a car, and the beams on it from which a cluster is a whole car and no strip."""
+
+
+@dataclass(frozen=True, slots=True)
+class CarLimits:
+    """Bounds of strips that make one car, and of that car."""
+
+    max_diagonal_m: float = 6.0
+    """Greatest diagonal from above of a strip and of the car."""
+    min_width_m: float = 0.7
+    max_width_m: float = 5.2
+    """Width of the car across the ray."""
+    min_top_m: float = 0.8
+    max_top_m: float = 2.2
+    max_bottom_m: float = 0.8
+    """Top and bottom of the car above ground."""
+    max_gap_m: float = 1.8
+    """Greatest distance in range between two strips, the length of a bonnet."""
+    min_gap_beams: float = -1.0
+    max_gap_beams: float = 2.0
+    """Distance in elevation from the nearer strip to the farther one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,28 +94,28 @@ def view_bounds(clusters: Clusters, number: Int, n: int) -> ViewBounds:
     return ViewBounds.of_cells(points, ground, cells.low.take(groups.rows), cells.high.take(groups.rows), groups)
 
 
-def merge_strips(bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> Int:
+def merge_strips(bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> Int:
     """(G,) first of the clusters that make one car with each, itself where it is not merged.
 
     Args:
         bounds: of the clusters.
         beam_rad: (G,) spacing of the beams at the foot of each [rad].
-        config: limits.
+        limits: of strips and cars.
     """
     self_index = np.arange(len(bounds))
     representative = self_index.copy()
-    front, back = pairs(bounds, beam_rad, config)
+    front, back = pairs(bounds, beam_rad, limits)
     if len(front):
         _propagate_min(representative, front, back)
         car_id = (np.cumsum(representative == self_index) - 1)[representative]
         cars = bounds.union(Groups.from_labels(car_id, int(car_id.max()) + 1))
-        representative = np.where(fits(cars, config)[car_id], representative, self_index)
+        representative = np.where(fits(cars, limits)[car_id], representative, self_index)
     return representative
 
 
-def pairs(bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> tuple[Int, Int]:
+def pairs(bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> tuple[Int, Int]:
     """Nearer and farther cluster of each pair of strips of one car."""
-    c = config
+    c = limits
     one, other = _overlapping(bounds.min[DIRECTION], bounds.max[DIRECTION])
     near = bounds.min[RANGE]
     swap = near[other] < near[one]
@@ -100,7 +123,7 @@ def pairs(bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> tupl
     beams = (bounds.min[ELEVATION][back] - bounds.max[ELEVATION][front]) / beam_rad[back]
     adjacent = near[back] - bounds.max[RANGE][front] < c.max_gap_m
     adjacent &= (beams > c.min_gap_beams) & (beams < c.max_gap_beams)
-    person = person_like(bounds, c)
+    person = STRIP_PERSON.fits(bounds.width_m, bounds.min[HEIGHT], bounds.max[HEIGHT])
     adjacent &= ~(person[front] | person[back])
     front, back = front[adjacent], back[adjacent]
     a, b = bounds.take(front), bounds.take(back)
@@ -110,16 +133,10 @@ def pairs(bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> tupl
     return front[car], back[car]
 
 
-def person_like(bounds: ViewBounds, config: CarMergeConfig) -> Bool:
-    """(G,) may be a person."""
-    size = PersonSize(config.max_person_width_m, config.min_person_height_m, config.min_person_top_m)
-    return size.fits(bounds.width_m, bounds.min[HEIGHT], bounds.max[HEIGHT])
-
-
-def fits(bounds: ViewBounds, config: CarMergeConfig) -> Bool:
+def fits(bounds: ViewBounds, limits: CarLimits) -> Bool:
     """(G,) no larger than a car."""
-    fits: Bool = bounds.diagonal_m2 < np.square(np.float32(config.max_diagonal_m))
-    fits &= (bounds.width_m < config.max_width_m) & (bounds.max[HEIGHT] < config.max_top_m)
+    fits: Bool = bounds.diagonal_m2 < np.square(np.float32(limits.max_diagonal_m))
+    fits &= (bounds.width_m < limits.max_width_m) & (bounds.max[HEIGHT] < limits.max_top_m)
     return fits
 
 

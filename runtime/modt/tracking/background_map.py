@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.config import BackgroundMapConfig
 from modt.geometry.kdop import coverage
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
 from modt.types import Bool, Int
 
+CAPACITY = 2048
+"""Places of deleted tracks that are remembered."""
+MIN_COVERAGE, RISE_M = 0.6, 0.5
+"""Least part of a new proposal that lies within a place; by how much it may rise above the place."""
+
 
 class BackgroundMap:
     """k-DOPs and tops of deleted background in the world; of capacity 0, a map that recalls nothing."""
 
-    def __init__(self, config: BackgroundMapConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
-        self.config, self._kernels = config, kernels
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY, capacity: int = CAPACITY) -> None:
+        self.capacity, self._kernels = capacity, kernels
         self.clear()
 
     def clear(self) -> None:
@@ -27,18 +31,18 @@ class BackgroundMap:
         """Remember the places of rows, background at rest; beyond the capacity the oldest places are dropped."""
         if not len(rows):
             return
-        first = max(0, len(self._top) + len(rows) - self.config.capacity)
+        first = max(0, len(self._top) + len(rows) - self.capacity)
         self._kdop = np.concatenate([self._kdop, tracks.kdop.take(rows, axis=0).T], axis=1)[:, first:]
         self._top = np.concatenate([self._top, tracks.top[rows]])[first:]
 
     def recall(self, tracks: TrackTable, rows: Int, observations: Observations, which: Int) -> Bool:
         """(n,) whether background stood, or as rows of the tracks stands, where the observations which (n,) are."""
-        known, config = np.zeros(len(which), np.bool_), self.config
-        if config.capacity and len(which):
+        known = np.zeros(len(which), np.bool_)
+        if self.capacity and len(which):
             place = np.concatenate([self._kdop, tracks.known_kdops(rows)], axis=1)
             top = np.concatenate([self._top, tracks.top[rows]])
             kdop = observations.kdop.take(which, axis=1)
             i, j = self._kernels.overlapping_pairs(kdop, place)
-            within = coverage(kdop.take(i, axis=1), place.take(j, axis=1)) >= config.min_coverage
-            known[i[within & (observations.top[which[i]] < top[j] + config.rise_m)]] = True
+            within = coverage(kdop.take(i, axis=1), place.take(j, axis=1)) >= MIN_COVERAGE
+            known[i[within & (observations.top[which[i]] < top[j] + RISE_M)]] = True
         return known

@@ -15,34 +15,26 @@ import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_PERSON_M, MAX_SIZE_M
 from modt.classes import ObjectClass
-from modt.config import FragmentConfig
 from modt.geometry.kdop import coverage
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches
-from modt.tracking.track_table import TrackTable
+from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Float64, Int
 
-
-class NoReunion:
-    """Every track keeps its proposal."""
-
-    def reunite(self, tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
-        """The matches."""
-        return matches
+MIN_COVERAGE = 0.6
+"""Least part of one fragment that lies within the known extent of the other."""
 
 
 class Reunion:
     """Gives the larger part of an object to its most senior track.
 
     Args:
-        config: what counts as a part.
-        min_hits: of an established track.
         kernels: passes over pairs.
     """
 
-    def __init__(self, config: FragmentConfig, min_hits: int, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
-        self.config, self.min_hits, self._kernels = config, min_hits, kernels
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self._kernels = kernels
 
     def reunite(self, tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
         """The matches after senior tracks have swapped their proposals for larger parts of their objects."""
@@ -71,22 +63,16 @@ class Reunion:
         junior = (other == NONE) | (seniority[other] < seniority[senior])
         larger = (junior & (other != senior) & (observations.count[part] > size[senior])).nonzero()[0]
         bulky = np.minimum(observations.box[part[larger], 3], tracks.box[senior[larger], 3]) > MAX_PERSON_M
-        larger = larger[bulky | self._gives_way(tracks, senior[larger], other[larger])]
+        larger = larger[bulky | _gives_way(tracks, senior[larger], other[larger])]
         i, senior, part = i[larger], senior[larger], part[larger]
         box = tracks.box.take(senior, axis=0)
         box[:, :2] += tracks.x.take(senior, axis=0)[:, :2] - tracks.anchor.take(senior, axis=0)
         related = _fit_together(box, observations.box.take(part, axis=0), MAX_SIZE_M[tracks.last_class[senior]])
         kdop = observations.kdop.take(part, axis=1)
-        within = coverage(kdop, known.take(i, axis=1)) > self.config.min_coverage
-        around = coverage(tracks.predicted_kdops(senior), kdop) > self.config.min_coverage
+        within = coverage(kdop, known.take(i, axis=1)) > MIN_COVERAGE
+        around = coverage(tracks.predicted_kdops(senior), kdop) > MIN_COVERAGE
         related &= (within | around) & _may_be_one_class(tracks, senior, track_of_proposal[part])
         return senior[related], part[related]
-
-    def _gives_way(self, tracks: TrackTable, senior: Int, other: Int) -> Bool:
-        """(k,) whether a part has no established track (other NONE: no track), or the senior track is a car."""
-        car: Bool = tracks.last_class[senior] == ObjectClass.CAR.value
-        gives_way: Bool = (other == NONE) | (tracks.hits[other] < self.min_hits) | car
-        return gives_way
 
 
 def swap_proposals(senior: Int, parts: Int, proposal_of_track: Int, track_of_proposal: Int) -> tuple[Int, Int]:
@@ -113,6 +99,13 @@ def swap_proposals(senior: Int, parts: Int, proposal_of_track: Int, track_of_pro
         taken.add(part)
     rows = sorted(has)
     return np.array(rows, np.int64), np.array([has[row] for row in rows], np.int64)
+
+
+def _gives_way(tracks: TrackTable, senior: Int, other: Int) -> Bool:
+    """(k,) whether a part has no established track (other NONE: no track), or the senior track is a car."""
+    car: Bool = tracks.last_class[senior] == ObjectClass.CAR.value
+    gives_way: Bool = (other == NONE) | (tracks.hits[other] < ESTABLISHED_HITS) | car
+    return gives_way
 
 
 def _seniority(tracks: TrackTable) -> Int:

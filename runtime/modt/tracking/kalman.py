@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.geometry import wrap
-from modt.tracking.track_table import TrackTable
-from modt.types import Float64, Int
+from modt.types import Float64
 
 X, Y, HEADING, SPEED = range(4)
 
@@ -127,27 +126,3 @@ def inverse_2x2(S: Float64) -> Float64:
     (a, b), (c, d) = S
     inverse: Float64 = np.array(((d, -b), (-c, a))) / (a * d - b * c)
     return inverse
-
-
-class NoStandstill:
-    """Nothing: such a track is filtered as any other."""
-
-    def observe(self, tracks: TrackTable, rows: Int) -> None:
-        """No effect."""
-
-
-class Standstill:
-    """Its speed is zero, within sigma_mps: the zero-velocity update."""
-
-    def __init__(self, sigma_mps: float) -> None:
-        self._sigma_mps = sigma_mps
-
-    def observe(self, tracks: TrackTable, rows: Int) -> None:
-        """Update the state of the rows (R,)."""
-        x, P = components_first(tracks.x.take(rows, axis=0), tracks.P.take(rows, axis=0))
-        tracks.x[rows], tracks.P[rows] = tracks_first(*observe_speed(x, P, 0.0, self._sigma_mps))
-
-
-def standstill_of(sigma_mps: float | None) -> Standstill | NoStandstill:
-    """The zero-velocity update with a deviation, or none."""
-    return NoStandstill() if sigma_mps is None else Standstill(sigma_mps)

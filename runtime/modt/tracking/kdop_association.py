@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.config import KdopAssociationConfig
 from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes, measured
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches, assign
 from modt.tracking.track_table import TrackTable
 from modt.types import Bool, Float64, Int
+
+MAX_COST = 7.0
+"""Cost of leaving a track without a proposal; no pair costs more."""
+MIN_OVERLAP = 0.3
+"""Least overlap, over the smaller, of a pair that changed its shape and is matched second."""
+JUMP_SIGMA_M, POSITION_SIGMA_M = 0.4, 0.1
+"""Deviations of a k-DOP as parts of an object come into view, and of a measured position [m]."""
+WEIGHTS = PairWeights(size=2.0, overlap=3.0, height=2.0, points=0.5)
+"""Cost of a unit of difference: of log sizes, of 1 - IoU, of heights [1/m], of log point numbers."""
 
 
 class KdopAssociation:
@@ -21,35 +29,30 @@ class KdopAssociation:
     displacements from where the filter expects them is the object's own, and pairs are costed by it alone.
 
     Args:
-        config: weights of the cost and noise of the positions.
         kernels: passes over pairs.
     """
 
-    def __init__(self, config: KdopAssociationConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
-        self.config, self._kernels = config, kernels
-        self._weights = PairWeights(
-            config.size_weight, config.overlap_weight, config.height_weight, config.count_weight
-        )
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self._kernels = kernels
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs of least cost; then, among the rest, those that overlap although they changed their shape."""
-        weight = self.config
         expected = tracks.predicted_kdops()
-        variance = weight.position_sigma_m**2
+        variance = POSITION_SIGMA_M**2
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
         rows, columns = self._kernels.overlapping_pairs(expected + reach, observations.kdop)
         cost, coverage = self._kernels.pair_costs(
             Shapes.of(expected, tracks.bottom, tracks.top, tracks.points),
             Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count),
             np.stack([tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]]),
-            variance + weight.jump_sigma_m**2,
+            variance + JUMP_SIGMA_M**2,
             (rows, columns),
-            self._weights,
+            WEIGHTS,
         )
-        first = (cost < weight.max_cost).nonzero()[0]
-        first = first[assign(rows[first], columns[first], cost[first], weight.max_cost, self._kernels)]
+        first = (cost < MAX_COST).nonzero()[0]
+        first = first[assign(rows[first], columns[first], cost[first], MAX_COST, self._kernels)]
         free = _free(rows, rows[first], len(tracks)) & _free(columns, columns[first], len(observations))
-        second = (free & (coverage > weight.min_coverage)).nonzero()[0]
+        second = (free & (coverage > MIN_OVERLAP)).nonzero()[0]
         second = second[assign(rows[second], columns[second], 1 - coverage[second], 1.0, self._kernels)]
         kept = np.concatenate([first, second])
         rows, columns = rows[kept], columns[kept]

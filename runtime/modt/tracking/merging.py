@@ -13,33 +13,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_PERSON_M, PersonSize
+from modt.class_sizes import IS_PERSON, MAX_CAR_M, PART_PERSON
 from modt.classes import ObjectClass
-from modt.config import MergeConfig
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.placement import Placement
 from modt.tracking.regrouping import Associated, Grouping, runs_of
-from modt.tracking.track_table import TrackTable
+from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Int
 
-_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
-"""Size of a part that may be a person: from a child of five on."""
+MIN_COVERAGE, LONGER_M = 0.7, 0.3
+"""Least part of a piece within the known extent of the car; by how much the merged car may exceed that extent."""
 
 
 class CarMerging:
     """Merges the parts of cars that are known as such, and of background that may be a car.
 
     Args:
-        config: what fits into a car.
-        min_hits: of a track that merges.
         kernels: passes over points and pairs.
     """
 
-    def __init__(self, config: MergeConfig, min_hits: int, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
-        self.config, self.min_hits, self._kernels = config, min_hits, kernels
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self._kernels = kernels
 
     def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
         """The frame with one proposal in place of the parts of each car."""
@@ -67,13 +64,13 @@ class CarMerging:
     def _parts(self, tracks: TrackTable, frame: Associated) -> tuple[Int, Int, Int]:
         """Rows of tracks that merge, the proposal of each, and a further part of it; every part once."""
         matches, kdops = frame.matches, frame.observations.kdop
-        cars = (_may_be_car(tracks, matches.rows) & (tracks.hits[matches.rows] >= self.min_hits)).nonzero()[0]
+        cars = (_may_be_car(tracks, matches.rows) & (tracks.hits[matches.rows] >= ESTABLISHED_HITS)).nonzero()[0]
         cars = cars[matches.rows[cars].argsort()]  # the oldest first: tracks are in the order of their birth
         rows, hosts = matches.rows[cars], matches.proposals[cars]
         if not len(rows):
             return rows, hosts, hosts
         known = tracks.envelope.take(rows, axis=0).T + DIRECTIONS.T @ matches.position.take(cars, axis=0).T
-        room = (known - kdops.take(hosts, axis=1)).max(axis=0) > self.config.longer_m
+        room = (known - kdops.take(hosts, axis=1)).max(axis=0) > LONGER_M
         mergers = (room | _cars(tracks, rows)).nonzero()[0]  # background that reaches its ends lacks no part
         rows, hosts, known = rows[mergers], hosts[mergers], known.take(mergers, axis=1)
         k, parts = self._kernels.overlapping_pairs(known, kdops)
@@ -83,8 +80,8 @@ class CarMerging:
         owner[matches.proposals] = matches.rows
         part, whole = kdops.take(parts, axis=1), known.take(k, axis=1)
         both = np.maximum(part, kdops.take(hosts[k], axis=1))
-        fits = np.flatnonzero((widths(both) < widths(whole) + self.config.longer_m).all(axis=0))
-        fits = fits[coverage(part.take(fits, axis=1), whole.take(fits, axis=1)) > self.config.min_coverage]
+        fits = np.flatnonzero((widths(both) < widths(whole) + LONGER_M).all(axis=0))
+        fits = fits[coverage(part.take(fits, axis=1), whole.take(fits, axis=1)) > MIN_COVERAGE]
         k, parts = k[fits], parts[fits]
         free = _may_take(tracks, rows[k], owner[parts])
         free &= _cars(tracks, rows[k]) | ~_person_like(frame.observations, parts)
@@ -112,7 +109,7 @@ def _may_be_car(tracks: TrackTable, rows: Int) -> Bool:
 def _person_like(observations: Observations, parts: Int) -> Bool:
     """(k,) which parts are as slim and as tall as a person."""
     extent = widths(observations.kdop.take(parts, axis=1)).max(axis=0, initial=0.0)
-    return _PERSON.fits(extent, observations.bottom[parts], observations.top[parts])
+    return PART_PERSON.fits(extent, observations.bottom[parts], observations.top[parts])
 
 
 def _may_take(tracks: TrackTable, rows: Int, owner: Int) -> Bool:

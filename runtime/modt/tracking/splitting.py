@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.config import SplitConfig
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -19,21 +18,28 @@ from modt.observations import Observations
 from modt.placement import Placement
 from modt.tracking.association import Matches
 from modt.tracking.regrouping import Associated, Grouping, runs_of
-from modt.tracking.track_table import TrackTable
+from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Float64, Int
+
+MIN_COVERAGE, LONGER_M = 0.6, 0.3
+"""A proposal holds something else beside a track if it covers so much of the expected k-DOP and is so much longer."""
+PAD_M = 0.2
+"""Margin around the expected k-DOP, and above the expected top, within which points are taken."""
+MIN_POINTS, MIN_SHARE = 8, 0.4
+"""Least number of points that are split off and that remain; least share of the points last seen."""
+MAX_DROP_M = 0.4
+"""What is split off reaches at most this far below the expected top."""
 
 
 class ExpectedSplitting:
     """Splits objects off larger proposals.
 
     Args:
-        config: what is split off.
-        min_hits: of a track that splits.
         kernels: passes over points and pairs.
     """
 
-    def __init__(self, config: SplitConfig, min_hits: int, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
-        self.config, self.min_hits, self._kernels = config, min_hits, kernels
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self._kernels = kernels
 
     def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
         """The frame with one more proposal for each track that is split off a larger one."""
@@ -41,7 +47,7 @@ class ExpectedSplitting:
         if not len(rows):
             return frame
         position = placement.deskew(tracks.x.take(rows, axis=0)[:, :2])
-        expected = tracks.predicted_kdops(rows) + self.config.pad_m
+        expected = tracks.predicted_kdops(rows) + PAD_M
         free = np.ones(len(frame.proposals.members), np.bool_)
         pieces = [
             self._piece(tracks, frame, placement, row, host, step, kdop, free)
@@ -56,7 +62,7 @@ class ExpectedSplitting:
         """Rows of objects that were matched a frame ago and are not now."""
         lost = tracks.missed == 0
         lost[matches.rows] = False
-        lost &= (tracks.hits >= self.min_hits) & (tracks.last_class != ObjectClass.BACKGROUND.value)
+        lost &= (tracks.hits >= ESTABLISHED_HITS) & (tracks.last_class != ObjectClass.BACKGROUND.value)
         rows: Int = lost.nonzero()[0]
         return rows
 
@@ -68,9 +74,9 @@ class ExpectedSplitting:
         i, j = self._kernels.overlapping_pairs(expected, observations.kdop)
         kdop, expected = observations.kdop.take(j, axis=1), expected.take(i, axis=1)
         covered = coverage(expected, kdop)
-        longer = widths(kdop).max(axis=0) > widths(expected).max(axis=0) + self.config.longer_m
+        longer = widths(kdop).max(axis=0) > widths(expected).max(axis=0) + LONGER_M
         order = covered.argsort(kind="stable")
-        order = order[(longer & (covered > self.config.min_coverage))[order]]
+        order = order[(longer & (covered > MIN_COVERAGE))[order]]
         host = np.full(len(rows), NONE)
         host[i[order]] = j[order]  # the last written covers most
         found = host != NONE
@@ -94,12 +100,12 @@ class ExpectedSplitting:
         x += step[0]
         y += step[1]
         available = free[first:end]
-        own = available & (z < tracks.top[row] + self.config.pad_m) & _within(x, y, kdop)
+        own = available & (z < tracks.top[row] + PAD_M) & _within(x, y, kdop)
         n = np.count_nonzero(own)
-        least = max(self.config.min_points, self.config.min_share * tracks.points[row])
-        if n < least or np.count_nonzero(available) - n < self.config.min_points:
+        least = max(MIN_POINTS, MIN_SHARE * tracks.points[row])
+        if n < least or np.count_nonzero(available) - n < MIN_POINTS:
             return np.zeros(0, np.int64)
-        if z[own].max() < tracks.top[row] - self.config.max_drop_m:
+        if z[own].max() < tracks.top[row] - MAX_DROP_M:
             return np.zeros(0, np.int64)
         piece: Int = first + own.nonzero()[0]
         free[piece] = False

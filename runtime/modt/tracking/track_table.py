@@ -10,6 +10,8 @@ import numpy as np
 from modt.geometry.kdop import DIRECTIONS, widths
 from modt.types import Bool, Float64, Int, Tracks, column
 
+ESTABLISHED_HITS = 4
+"""Frames in which a track was observed, from which its velocity and class change proposals."""
 LAG_S = 1.5
 """Time constant of the place that a displacement is measured from."""
 

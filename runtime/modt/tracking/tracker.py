@@ -6,15 +6,15 @@ import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_SIZE_M
 from modt.classes import ObjectClass
-from modt.config import BackgroundMapConfig, TrackingConfig
+from modt.config import TrackingConfig
 from modt.geometry.kdop import AGREE_M, DIRECTIONS, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
-from modt.tracking.background_map import BackgroundMap
-from modt.tracking.fragments import NoReunion, Reunion
-from modt.tracking.kalman import HEADING, SPEED, components_first, standstill_of, tracks_first
+from modt.tracking.background_map import CAPACITY, BackgroundMap
+from modt.tracking.fragments import Reunion
+from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.merging import CarMerging
 from modt.tracking.regrouping import Associated, Regrouping
@@ -23,6 +23,16 @@ from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks
 
+ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS = 2.0, 0.3
+"""Process noise of speed [m/s2] and heading [rad/s]."""
+INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS = 0.3, 8.0
+"""Deviations of a new track."""
+STATIONARY_RADIUS_M, STATIONARY_SIGMA_MPS = 0.5, 1.0
+"""A track this near to its rest position is stationary: the speed 0 is observed of it, with this deviation."""
+STOPPED_MPS, REST_GAIN = 0.5, 0.1
+"""A moving track slower than this has a new rest position; weight of a new position in the rest position."""
+ENVELOPE_DECAY, MEAN_KDOP_DECAY = 0.98, 0.8
+"""Share kept a frame of an extent that is not seen again; greatest weight of the past in a mean k-DOP."""
 CREEPING = 0.1
 """Of the period: shorter steps are those of a clock that stands."""
 
@@ -33,15 +43,12 @@ def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOM
         from modt.tracking.paper_association import PaperAssociation
 
         return PaperAssociation(config.paper)
-    return KdopAssociation(config.kdop, kernels)
+    return KdopAssociation(kernels)
 
 
 def regroupings_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> tuple[Regrouping, ...]:
     """The regroupings of a configuration; the paper takes proposals as they are."""
-    if config.association == "paper":
-        return ()
-    splitting = ExpectedSplitting(config.split, config.min_hits, kernels)
-    return splitting, CarMerging(config.merge, config.min_hits, kernels)
+    return (ExpectedSplitting(kernels), CarMerging(kernels)) if config.extensions == "all" else ()
 
 
 class Tracker:
@@ -68,14 +75,12 @@ class Tracker:
         self.config, self.machine = config, machine
         self.association = association_of(config, kernels) if association is None else association
         self.regroupings = regroupings_of(config, kernels) if regroupings is None else regroupings
-        none = BackgroundMapConfig(capacity=0)  # the paper classifies every new proposal
-        self.background_map = BackgroundMap(none if config.association == "paper" else config.background_map, kernels)
+        self._extended = config.extensions == "all"
+        self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0)
         self._period_s = period_s
-        apart = config.fragments.min_coverage >= 1.0
-        self._reunion = NoReunion() if apart else Reunion(config.fragments, config.min_hits, kernels)
-        self._standstill = standstill_of(config.filter.stationary_sigma_mps)
-        position, speed = config.filter.initial_position_sigma_m, config.filter.initial_speed_sigma_mps
-        self._P_new = np.diag(np.square([position, position, np.pi, speed]))  # a heading of pi: unknown
+        self._reunion = Reunion(kernels)
+        position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
+        self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
         self._tracks = TrackTable.blank()
         self.next_id = 0
         self._stamp_s: float | None = None
@@ -126,7 +131,8 @@ class Tracker:
         self._forget(stamp_s)
         dt_s = self._predict(stamp_s)
         matches = self.association.match(self._tracks, located.observations)
-        matches = self._reunion.reunite(self._tracks, located.observations, matches)
+        if self._extended:
+            matches = self._reunion.reunite(self._tracks, located.observations, matches)
         frame = Associated(proposals, located.observations, matches)
         for regrouping in self.regroupings:
             frame = regrouping.regroup(self._tracks, frame, located.placement)
@@ -181,12 +187,12 @@ class Tracker:
         """Equation 1, over the time since the last frame, which is returned [s]."""
         dt_s = self._lapse_s(stamp_s)
         self._stamp_s = stamp_s
-        t, noise = self._tracks, self.config.filter
+        t = self._tracks
         creeps = dt_s < CREEPING * self._period_s  # a clock that stands does not keep tracks alive
         t.unseen_s += self._period_s if creeps else dt_s
         t.last_class = t.object_class
         x, P = components_first(t.x, t.P)
-        t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, noise.acceleration_sigma_mps2, noise.turn_sigma_radps))
+        t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS))
         return dt_s
 
     def _update(self, matches: Matches, observations: Observations) -> None:
@@ -206,13 +212,12 @@ class Tracker:
         t.end_variance[rows] = matches.end_variance
         about = self._record(rows, matches.proposals, observations, matches.position)
         known = t.envelope.take(rows, axis=0)
-        decay = self.config.envelope_decay
-        envelope = np.maximum(about, decay * known + (1 - decay) * about)
+        envelope = np.maximum(about, ENVELOPE_DECAY * known + (1 - ENVELOPE_DECAY) * about)
         merged = _oversized(t.last_class[rows], about)
         envelope[merged] = known[merged]
         t.envelope[rows] = envelope
         off = t.mean_kdop.take(rows, axis=0) - about
-        weight = np.minimum(1.0 - 1.0 / t.hits[rows], self.config.mean_kdop_decay)[:, None]
+        weight = np.minimum(1.0 - 1.0 / t.hits[rows], MEAN_KDOP_DECAY)[:, None]
         t.mean_kdop[rows] = about + (np.abs(off) < AGREE_M) * weight * off
 
     def _keep_top(self, frame: Associated, known: Float64) -> None:
@@ -236,15 +241,18 @@ class Tracker:
 
     def _observe_rest(self, rows: Int) -> None:
         """Which tracks are near their rest position; a track that stopped rests where it is."""
-        t, rest = self._tracks, self.config.filter
+        t = self._tracks
         x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
-        stopped = ((x[:, SPEED] < rest.stopped_mps) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
+        stopped = ((x[:, SPEED] < STOPPED_MPS) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
         position[stopped] = x[stopped, :2]
         step = x[:, :2] - position
-        near = np.hypot(step[:, 0], step[:, 1]) < rest.stationary_radius_m
+        near = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
         t.stationary[rows] = near & (hits > 2)
-        t.rest_position[rows] = position + rest.rest_gain * near[:, None] * step
-        self._standstill.observe(t, rows[near])
+        t.rest_position[rows] = position + REST_GAIN * near[:, None] * step
+        if self._extended:
+            still = rows[near]
+            x, P = components_first(t.x.take(still, axis=0), t.P.take(still, axis=0))
+            t.x[still], t.P[still] = tracks_first(*kalman.observe_speed(x, P, 0.0, STATIONARY_SIGMA_MPS))
 
     def _coast(self, matched: Int) -> None:
         """Tracks without a proposal go on as predicted."""
@@ -260,7 +268,7 @@ class Tracker:
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
         step = self._tracks.x[:, :2] - self._tracks.rest_position
-        near: Bool = np.hypot(step[:, 0], step[:, 1]) < self.config.filter.stationary_radius_m
+        near: Bool = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
         return near
 
     def _background_at_rest(self) -> Bool:

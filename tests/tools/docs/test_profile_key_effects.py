@@ -28,14 +28,13 @@ from modt.app.ladder import Ladder
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
-from modt.segmentation.ground import HeightEstimator
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sources.pose_socket import PoseSocket
 from modt.types import Frame
 from modt_desk.cli.profile_schema import Key, keys
 from modt_desk.reporting.run_report import run_tree
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.desk.reporting.test_run_report import write_run
 from tests.results import result
 
@@ -89,25 +88,6 @@ def street(config: ProfileConfig, _folder: Path) -> str:
 
 def long_street(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(6, 4.0), config)
-
-
-def unknown_height(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(3, 1.0), changed(config, "sensor.height_m", None))
-
-
-def heights(config: ProfileConfig, _folder: Path) -> str:
-    """Estimates of the sensor's height, frame by frame."""
-    estimator = HeightEstimator(config.sensor, config.segmentation)
-    return str([estimator.height_m(frame.points) for frame in frames(3, 1.0)])
-
-
-def no_ground(config: ProfileConfig, _folder: Path) -> str:
-    raised = [dataclasses.replace(f, points=f.points[f.points[:, 2] > -0.2]) for f in frames(3, 1.0)]
-    return replay(tuple(raised), changed(config, "sensor.height_m", None))
-
-
-def camera(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(3, 1.0), config, view=FieldOfView.of_camera(CAMERA))
 
 
 def efficient(config: ProfileConfig, _folder: Path) -> str:
@@ -220,15 +200,7 @@ SCENARIOS: dict[str, Scenario] = {
     "sensor.blind_range_m": near_blind,
     "sensor.blind_sectors_deg": far_blind,
     "segmentation.kernels": kernels,
-    "segmentation.sensor_height.": unknown_height,
-    "segmentation.sensor_height.default_m": no_ground,
-    "segmentation.sensor_height.sweeps": heights,
-    "segmentation.view_margin.": camera,
-    "segmentation.car_merging.min_person_top_m": long_street,
     "tracking.paper.": paper,
-    "tracking.split.": long_street,
-    "tracking.merge.": long_street,
-    "tracking.background_map.": long_street,
     "fusion.start_frame": product,
     "fusion.point_change": product,
     "odometry.": pose_socket,
