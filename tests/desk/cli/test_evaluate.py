@@ -127,7 +127,6 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):
         ((run, tmp_path), "holds no labels that are recognised"),
         ((run, truth, "--further", broken), "broken.csv:2: 'Tree' is no type of an object"),
         ((run, truth, run, truth, "--further", broken), "is the table of one drive"),
-        (("--experiment", "all", "--further", broken), "takes no further objects"),
         ((run, truth, "--sector", "0"), "is no half sector"),
     ):
         done = modt("evaluate", *arguments, cwd=tmp_path)
