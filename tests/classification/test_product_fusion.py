@@ -89,10 +89,14 @@ def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
     np.testing.assert_allclose(tracks.posterior[0], clear[0], rtol=1e-6)
 
 
-def test_a_distinct_first_view_is_certain() -> None:
+def test_no_class_is_final_before_the_start_frame_however_distinct_a_view() -> None:
     proposals, tracks = scene()
     fusion = KeyViews(dataclasses.replace(PAPER, start_frame=4), ALIKE)
-    assert fusion.fuse(tracks, proposals, ROW, np.array([[0.98, 0.01, 0.005, 0.005]])).all()
+    distinct = np.array([[0.98, 0.01, 0.005, 0.005]])
+    assert not fusion.fuse(tracks, proposals, ROW, distinct).any()
+    tracks.age[:] = 4
+    assert fusion.asks(tracks, proposals, YES).all()
+    assert fusion.fuse(tracks, proposals, ROW, distinct).all()
     assert tracks.views.tolist() == [1]
 
 

@@ -61,7 +61,7 @@ def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
 
 
 def contenders() -> dict[str, Work]:
-    """What is timed."""
+    """Work that is timed, by name."""
     found: dict[str, Work] = {YARDSTICK: partial(timed, lambda _: np.sort(_NUMBERS))}
     if find_spec("pypatchworkpp"):
         patchwork = import_module("pypatchworkpp")
@@ -127,7 +127,7 @@ def table(rows: Rows) -> str:
 
 
 def regressions(rows: Rows, earlier: Rows, tolerance: float) -> list[str]:
-    """What takes longer than before, by more than the tolerance."""
+    """Rows that take longer than before by more than the tolerance."""
     found = []
     for name in rows.keys() & earlier.keys():
         change = rows[name]["to_yardstick"] / earlier[name]["to_yardstick"] - 1

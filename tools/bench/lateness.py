@@ -71,7 +71,7 @@ def after(path: Path, frames: int, loop: subprocess.Popen[bytes]) -> dict[str, A
 
 
 def figures(status: dict[str, Any]) -> str:
-    """What is missed and lost, and the times."""
+    """Sweeps missed and lost, and the times."""
     loop, sensor = status["loop"], status["sensor"]
     lost = f"{sensor['lost_messages']} messages lost, {sensor['dropped_sweeps']} sweeps dropped"
     missed = f"{loop['missed_deadlines']} of {loop['frames']} deadlines missed"

@@ -168,8 +168,8 @@ def paper_page(drive: KittiDrive, further: Path | None) -> str:
     own: list[Drive] = [drive, *simulated_drives(SIMULATED, SIMULATED_S)]
     if further is not None:
         own.insert(1, completed([drive], further))
-    rows = Study(chosen(NAMES), own, PROFILES).rows(1, lambda name: None)
-    return section(rows, f"{sources(PROFILES)}; made by `python -m tools.docs.figures`.")
+    about = f"{sources(PROFILES)}; made by `python -m tools.docs.figures`."
+    return section(Study(chosen(NAMES), own, PROFILES).rows(1, lambda name: None), about)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""CPU time of a frame that may be expected on boards that were never measured: an estimate.
+"""Estimated CPU time of a frame on boards that were not measured.
 
     python -m tools.study.boards [--rating MIPS] [--sensors NAME ...] [--seeds 600:602] [--seconds 4] [--write]
 
@@ -46,7 +46,7 @@ _FIRST = 10
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """The work of a sensor's frames in a mode, and its CPU time here; means, and a median."""
+    """Mean work of a frame of a sensor in a mode, and its median CPU time on this machine."""
 
     sensor: str
     mode: str

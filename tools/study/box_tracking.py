@@ -32,11 +32,11 @@ MIN_HEIGHT_PX, MIN_IOU, TEST = 25, 0.25, "0000"
 Objects = dict[int, list[list[str]]]
 """Fields of the lines of a label file, by frame."""
 Judged = dict[str, list[Association]]
-"""What is to be associated in each frame of a sequence."""
+"""Boxes and their similarities in each frame of a sequence."""
 
 
 def objects(text: str) -> Objects:
-    """Of a KITTI tracking file."""
+    """Lines of a KITTI tracking file."""
     found = defaultdict(list)
     for line in text.splitlines():
         found[int(line.split(" ", 1)[0])].append(line.split())
@@ -58,7 +58,7 @@ def inside(image_box: Float64, areas: Float64) -> Bool:
 
 
 def association(kind: str, truth: Sequence[Sequence[str]], tracked: Sequence[Sequence[str]]) -> Association:
-    """Of the tracks of a class in a frame with the objects that count."""
+    """Overlap of the tracks of a class in a frame with the objects that count."""
     labelled = [row for row in truth if row[2] in (kind, *NEIGHBOURS[kind])]
     counts = np.array([row[2] == kind and float(row[3]) <= 0 and float(row[4]) <= 2 for row in labelled], np.bool_)
     (id_, _, box), (track, image_box, own) = columns(labelled), columns([row for row in tracked if row[2] == kind])
@@ -74,7 +74,7 @@ def association(kind: str, truth: Sequence[Sequence[str]], tracked: Sequence[Seq
 
 
 def judge(sequences: Sequence[Detections], labels: Path, sure: float | None, *, online: bool) -> dict[str, Judged]:
-    """By class."""
+    """Scores by class."""
     out: dict[str, Judged] = {kind: {} for kind in NEIGHBOURS}
     for sequence in sequences:
         truth = objects((labels / f"{sequence.name}.txt").read_text(encoding="utf-8"))

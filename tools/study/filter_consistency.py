@@ -173,7 +173,7 @@ def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
 
 
 def study(all_lives: Sequence[TrackLife]) -> dict[str, dict[str, Consistency]]:
-    """By kind: consistency of the position, and of the motion of moving bodies."""
+    """Consistency of the position, and of the motion of moving bodies, by kind."""
     out: dict[str, dict[str, Consistency]] = {}
     for kind in sorted({life.kind for life in all_lives}):
         chosen = [life for life in all_lives if life.kind == kind]

@@ -1,12 +1,13 @@
-"""People found and called, by the mount of the sensor and by place: simulated drives with exact truth.
+"""Recall of people by the mount of the sensor and by place, on simulated drives with exact truth.
 
     python -m tools.study.mounts [--sensors vlp-16 ...] [--scenes yard corridor ...] [--heights 0.3 0.8 ...]
                                  [--mounts 0,0 0,10 ...] [--seeds 700:702] [--seconds 4] [--mode accurate]
                                  [--levelled]
 
 A row is a sensor in a scene, at a height [m] and with a roll and a pitch [deg], over the seeds; its profile states
-the height. Of objects of 20 points or more: found (point IoU over 1/2) and called (found, with the right class) [%],
-people by distance [m] and in all, and cars; and proposals longer than 1.5 m that hold no object, a frame. --levelled
+the height. Printed are, for objects of 20 points or more, the shares detected (point IoU over 1/2) and detected with
+the right class [%], for people by distance [m] and in all, and for cars, and the proposals longer than 1.5 m that
+hold no object, a frame. --levelled
 turns the sweeps level by the true angles first: the best that a fitted mount can reach.
 """
 
@@ -74,14 +75,14 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a drive, and its long proposals without an object."""
+    """Judged rows of a drive, and the number of long proposals without an object."""
 
     rows: DriveRows
     long: int
 
 
 def run(drive: Drive, mode_name: str, config: ProfileConfig, *, levelled: bool = False) -> Outcome:
-    """What became of a drive in a mode of the method."""
+    """Run a drive in a mode and judge it."""
     mount, mode, longer = drive.mount, assembly.MODES[mode_name], 0
     given = [mount.level(frame) if levelled else frame for frame, _ in drive.frames]
     config = recognise(given[0].points, config).mounted(config)
@@ -114,7 +115,7 @@ def of_mount(sensor: str, height_m: float) -> ProfileConfig:
 
 
 def shares(objects: Rows, kind: ObjectClass, band_m: tuple[float, float]) -> str:
-    """Number, found and called [%] of the objects of a class within a band of range."""
+    """Number, share detected and share with the right class [%] of the objects of a class within a band of range."""
     wanted = objects[
         (objects["class"] == kind)
         & (objects["role"] == Role.COUNTED)

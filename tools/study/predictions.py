@@ -25,11 +25,11 @@ import numpy as np
 from tools.options import parser
 
 SECONDS, FRAMES = 5, "0:24"
-"""Of simulated drives, and those that are used of every stream."""
+"""Frames of a simulated drive, and frames used of every stream."""
 RECORDED = {"kitti-0005": "raw/2011_09_26/2011_09_26_drive_0005_sync"}
 RIVALS = ("gamma = N_go", "Equation 3 bare", "the calibration's ratio")
 NEAR, BOUND = 0.06, 0.10
-"""Errors that are told."""
+"""Relative errors within which predictions are counted."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class Study:
         return (self._drive(stream), *shared)
 
     def _drive(self, stream: str) -> Path:
-        """Of a simulated stream."""
+        """Folder of a simulated stream, made where it is not there."""
         scene, sensor = stream.split("-", 1)
         sensor, seed = sensor.rsplit("-", 1)
         out = self._work / "drives" / stream
@@ -145,7 +145,7 @@ class Study:
         return self._work / kind / f"{_slug(name)}-{stream}.json"
 
     def _made(self, out: Path, *command: str | Path) -> dict[str, Any]:
-        """What a command writes, or has written."""
+        """JSON that a command prints, read from its file where that is there."""
         if not out.exists():
             print(f"{out.parent.name}: {out.stem}", file=sys.stderr, flush=True)
             text = _command("modt.cli.profile", *command)
@@ -157,7 +157,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Gamma of a mode on a test, and its prediction and rivals, by name; the first is the prediction."""
+    """Measured gamma of a mode on a test; `said` holds the prediction and its rivals by name."""
 
     regime: str
     test: str
@@ -169,11 +169,11 @@ class Outcome:
 
     @property
     def error(self) -> float:
-        """Relative, of the prediction."""
+        """Relative error of the prediction."""
         return self.off("predicted")
 
     def off(self, name: str) -> float:
-        """Relative error of what was said."""
+        """Relative error of the prediction, or of a rival, by name."""
         return self.said[name] / self.measured - 1.0
 
     @property
@@ -183,7 +183,7 @@ class Outcome:
 
 
 def outcomes(regime: str, test: str, prediction: dict[str, Any], found: dict[str, Any]) -> Iterator[Outcome]:
-    """Of each mode, by a prediction and the comparison that came after it."""
+    """Outcome of each mode, from a prediction and the comparison made after it."""
     for mode, saved in found["savings"].items():
         row = prediction["gamma"][mode]
         interval = row["predicted"]["low"], row["predicted"]["high"]
@@ -206,7 +206,7 @@ def table(found: Sequence[Outcome]) -> Iterator[str]:
 
 
 def summary(found: Sequence[Outcome]) -> Iterator[str]:
-    """How often and how far the predictions are off."""
+    """Errors of the predictions and of their rivals, and coverage of the intervals."""
     errors = {name: np.abs([o.off(name) for o in found]) for name in ("predicted", *RIVALS)}
     mine, copied = errors["predicted"], errors["the calibration's ratio"]
     gamma, reconciled = (np.array([getattr(o, name) for o in found]) for name in ("measured", "reconciled"))

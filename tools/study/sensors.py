@@ -1,4 +1,4 @@
-"""What is found, called and followed, by sensor and mode: simulated drives, or a labelled recording.
+"""Recall, precision and track length by sensor and mode, on simulated drives or a labelled recording.
 
     python -m tools.study.sensors [--sensors NAME ...] [--modes MODE ...] [--scene street crossing] [--seeds 450:453]
                                   [--seconds 6] [--camera] [--recording TRUTH --profile PROFILE]
@@ -30,7 +30,7 @@ CLASSES = CLASS_NAMES[1:]
 
 
 def run(drive: Drive, config: ProfileConfig, mode_name: str, fov: FieldOfView, number: int) -> DriveRows:
-    """What became of a drive in a mode of the method."""
+    """Run a drive in a mode and judge it."""
     mode = assembly.MODES[mode_name]
     pipeline, budget = assembly.pipeline(mode, config, fov), mode.budget(config)
 

@@ -32,8 +32,8 @@ class AnyView:
 class KeyViews(AnyView):
     """Mode accurate of the paper: views whose number of points differs are independent (Equation 4, Table II).
 
-    A new track is classified at once: a certain class is final, any other is replaced by the first view at or after
-    `start_frame`, since first views are often far and partial (Fig. 11).
+    A new track is classified at once, so that it has a class, but views are fused, and a certain class is final, only
+    from `start_frame` on: first views are often far and partial (Fig. 11).
     """
 
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
@@ -55,6 +55,6 @@ class KeyViews(AnyView):
         """Multiply the view into the posterior (Equation 6); (R,) which rows are certain now."""
         tracks.evidence[rows[tracks.views[rows] == 0]] = 0.0
         super().fuse(tracks, proposals, rows, likelihood)
-        certain = self._certain(tracks.posterior[rows])
-        tracks.views[rows] -= ~(certain | (tracks.age[rows] >= self._start_frame))
-        return certain
+        started: Bool = tracks.age[rows] >= self._start_frame
+        tracks.views[rows] -= ~started
+        return self._certain(tracks.posterior[rows]) & started

@@ -11,7 +11,7 @@ from modt.tracking.track_table import TrackTable
 from modt.types import Float64, Int
 
 POSITION_SIGMA_M = 0.3
-"""Standard deviation of a centroid [m]. The paper states none; of a greater one tracks follow turns later."""
+"""Standard deviation of a centroid [m], which the paper does not state. With a greater one tracks turn later."""
 _NO_PARTNER = 1e6
 """Cost of leaving a row without a partner."""
 _TINY = 1e-9

@@ -126,7 +126,7 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):
         ((tmp_path, truth), "describes no run"),
         ((run, tmp_path), "holds no labels that are recognised"),
         ((run, truth, "--further", broken), "broken.csv:2: 'Tree' is no type of an object"),
-        ((run, truth, run, truth, "--further", broken), "--further: is for one drive"),
+        ((run, truth, run, truth, "--further", broken), "is the table of one drive"),
         ((run, truth, "--sector", "0"), "is no half sector"),
     ):
         done = modt("evaluate", *arguments, cwd=tmp_path)

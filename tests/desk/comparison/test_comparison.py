@@ -6,7 +6,6 @@ import pytest
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions, model_meter
 from modt.energy.windows import Clocks, Windows
-from modt.pipeline import STAGES
 from modt.types import UNLIMITED, Budget, Frame
 from modt_desk.comparison.comparison import COUNTS, ModeRun, interleave, total
 from tests.results import CAR, result
@@ -70,11 +69,6 @@ def test_lives_are_frames_with_a_proposal(one):
     counts = total(one.counts())
     assert counts.tracks == one.lives.count
     assert counts.n_go == pytest.approx(one.lives.mean)
-
-
-def test_cpu_time_has_a_column_a_stage(one):
-    assert one.cpu_s().shape == (len(FRAMES), len(STAGES))
-    assert (one.cpu_s() >= 0).all()
 
 
 @pytest.mark.parametrize(

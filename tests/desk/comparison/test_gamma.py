@@ -4,9 +4,9 @@ import pytest
 from modt.energy.meters.meter import Kind
 from modt.pipeline import STAGES
 from modt_desk.comparison.comparison import COUNTS
-from modt_desk.comparison.gamma import RunCosts, estimate_gamma, mean, unit_costs
+from modt_desk.comparison.gamma import RunCosts, estimate_gamma, unit_costs
 from modt_desk.energy.savings import UnitCosts
-from modt_desk.reporting.quantity import Quantity, format_number, quantity, to_json
+from modt_desk.reporting.quantity import Quantity, quantity, to_json
 
 TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
 FRAMES, N = 120, 50
@@ -103,23 +103,6 @@ def test_unit_costs_are_never_negative() -> None:
     found = unit_costs(load)
     assert min(found.class_call, found.class_item, found.class_point) == 0.0
     assert found.class_call > 0.0
-
-
-def test_nothing_classified_costs_nothing_to_classify() -> None:
-    found = unit_costs(run(np.zeros(20, np.int64)))
-    assert (found.class_call, found.class_item, found.class_point) == (0.0, 0.0, 0.0)
-
-
-def test_interval_of_a_constant_is_a_point() -> None:
-    found = mean(np.full(30, 2.5), "J", Kind.MEASURED, np.random.default_rng(0))
-    assert (found.low, found.value, found.high) == (2.5, 2.5, 2.5)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(0.0, "0"), (12345.6, "12346"), (0.01234, "0.0123"), (1.5e-7, "1.50e-07"), (None, "-")]
-)
-def test_numbers_have_three_digits(value: float | None, text: str) -> None:
-    assert format_number(value) == text
 
 
 def test_quantity_without_a_value_is_unavailable() -> None:

@@ -74,7 +74,7 @@ def _against_meter(saving: dict[str, Any]) -> str:
 
 
 def compare_plots(tree: dict[str, Any]) -> list[Plot]:
-    """Plots over frames, over N_go and over the life of tracks."""
+    """Plots over frames, over N_go and over track length."""
     series, modes = tree["series"], tree["modes"]
     base, *others = series
     basis = energy_plots.basis(modes[base]["gross_J"])

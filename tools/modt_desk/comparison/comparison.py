@@ -82,7 +82,7 @@ class ModeRun:
             self.energy_lines.append(self.windows.close())
 
     def finish(self) -> None:
-        """Count the lives of the tracks still alive at the end of the stream."""
+        """Count the length of the tracks that are alive at the end of the stream."""
         self._end(self._life.keys())
 
     def counts(self) -> Int:

@@ -32,7 +32,7 @@ class RunCosts:
 
     @classmethod
     def median(cls, runs: Sequence[ModeRun]) -> Self:
-        """Of every frame the repetition of median cost: its counts with its costs.
+        """Counts and costs of the repetition of median cost, chosen frame by frame.
 
         Under a budget of CPU time the work of a frame may differ between repetitions.
         """

@@ -20,9 +20,9 @@ from modt_desk.comparison.prediction import OBSERVED
 BASELINE = "conventional"
 MODES = (BASELINE, "efficient", "accurate")
 VARIED = "varied"
-"""Tracking-by-detection with a random classification load: its costs are the unit costs of the reconciliation."""
+"""Tracking-by-detection with a random classification load, whose costs give the unit costs of the reconciliation."""
 _LOADS = (0, 1, 2, 4, 8, 16, 32, 64, 128, None, None)
-"""Calls of a frame, None for all: unit costs found from few calls alone do not hold for many."""
+"""Calls of a frame, None for all. Unit costs fitted to few calls alone would not hold for many."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ class Stream:
 
 @dataclass(frozen=True, slots=True)
 class Views:
-    """How a mode selects what it classifies."""
+    """Selection of the proposals that a mode classifies."""
 
     each: float  # classifications of a track that asks
     size: float  # network's points of such a proposal over those of any that is seen
@@ -55,7 +55,7 @@ class Views:
 
     @classmethod
     def of(cls, run: RunCosts, asking: Float64, size: float) -> Self:
-        """Of a mode's run.
+        """Selection seen in a run.
 
         Args:
             run: of the mode.
@@ -72,10 +72,10 @@ class Views:
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """What units of work cost [CPU s], and how the modes select.
+    """Cost of each unit of work [CPU s], and the selection of each mode.
 
-    Tracking, scheduling and fusion are by what tracking alone sees: known classes regroup proposals, so that a mode
-    has others than are seen without.
+    Tracking, scheduling and fusion are fitted to the counts of tracking without classification: known classes regroup
+    proposals, so that the counts of a mode itself are not known before it runs.
     """
 
     segmentation: Float64  # (2,) a frame, a point of the sweep

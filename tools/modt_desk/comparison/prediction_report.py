@@ -24,7 +24,7 @@ from modt_desk.reporting.quantity import Quantity, estimate, from_json
 SCHEMA = "modt.prediction/1"
 _SEEN = (*OBSERVED, *(f"asked_{k}" for k in range(len(MODES) - 1)))
 _MIN_FRAMES = 8
-"""Of a comparison that is used as a calibration."""
+"""Least number of frames of a comparison that is used as a calibration."""
 _OVER = (
     "The interval at 95 % is over resampled frames of the calibration and of those seen, and over the calibration's "
     "own error on streams, or quarters of its only one, that it was not fitted to."
@@ -74,7 +74,7 @@ def _check(stream: Stream) -> None:
 
 
 def observed_tree(observed: Int) -> dict[str, list[int]]:
-    """Of every frame (F, 7), by column, what tracking alone sees."""
+    """Counts of tracking without classification (F, 7), as lists by column."""
     return dict(zip(_SEEN, observed.T.tolist(), strict=True))
 
 
@@ -143,7 +143,7 @@ def read_prediction(path: Path, about: dict[str, Any]) -> dict[str, Any]:
 
 
 def against(prediction: dict[str, Any], modes: dict[str, Any], savings: dict[str, Any]) -> list[dict[str, Any]]:
-    """Of each figure predicted, and of each rival of gamma: the figure, the measured one, and how far it is off."""
+    """Each predicted figure and each rival of gamma, beside the measured one, with the relative error."""
     rows = [
         _row(f"cpu time, {mode}", value, modes[mode]["cpu_ms"], "ms") for mode, value in prediction["cpu_ms"].items()
     ]

@@ -80,7 +80,7 @@ class KittiDrive:
         return FieldOfView() if camera is None else FieldOfView.of_camera(camera)
 
     def sweeps(self) -> Iterator[tuple[Frame, FrameTruth]]:
-        """Its labelled sweeps."""
+        """Labelled sweeps with their labels."""
         truth = _truth(self.path, self.further)
         for frame in truth.scans or ():
             if frame.index in truth.frames:
@@ -117,7 +117,7 @@ class SimulatedDrive:
         return FieldOfView()
 
     def sweeps(self) -> Iterator[tuple[Frame, FrameTruth]]:
-        """Every sweep; what has no point in it is not labelled."""
+        """Every sweep with its labels; a body without a point has none."""
         for frame, truth in SyntheticStream(self.scene, self.sensor, self.seconds, self.seed).sweeps():
             seen = np.flatnonzero(truth.points)
             names = [truth.kinds[k].name for k in seen]

@@ -1,4 +1,4 @@
-"""What became of the frames of a drive: tables that every figure of an experiment is computed from."""
+"""Tables of the judged frames of a drive, from which every figure of an experiment is computed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from modt_desk.experiments.segmented import SegmentedFrame
 
 FRAME = np.dtype([("drive", int), ("frame", int), ("proposals", int)])
 CALL = np.dtype([("drive", int), ("frame", int), ("track", int), ("points", int)])
-"""A row a classification: points that the network processed, padding included."""
+"""One row for each classification; `points` are those that the network processes, padding included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Judged:
 
     @classmethod
     def of_labels(cls, labels: Iterable[tuple[int, FrameTruth]]) -> Self:
-        """Where every labelled object is found, followed and called by itself."""
+        """Tables of labels alone: every labelled object is detected and followed by itself."""
         rows = []
         for frame, truth in labels:
             wanted = (truth.object_class > 0) & (truth.role != Role.IGNORED)
@@ -53,7 +53,7 @@ class Judged:
         rules: Rules,
         limits: ClassificationConfig,
     ) -> Self:
-        """Of a drive's results beside its labels."""
+        """Tables of the results of a drive, judged by its labels."""
         frames, objects, proposals, calls = [], [], [], []
         for result, known in results:
             truth = known.truth

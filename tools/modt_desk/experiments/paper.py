@@ -37,7 +37,7 @@ DEVIATIONS = {
     "0059": "63.3, not 61.9: 57 objects and 373 frames as in the paper; the labels of KITTI tracking hold 2 % more "
     "frames an object than the paper counts.",
 }
-"""Of N_go by the labels, Table III."""
+"""Reasons why N_go by the labels differs from Table III, by drive."""
 
 
 def figure(experiment: str, streams: str, variant: str, at: float | None, quantity: str) -> tuple[float, str] | None:
