@@ -15,7 +15,7 @@ from modt.classes import CLASS_NAMES
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.recognise import open_scans
 from modt.viewer.html_page import LIVE, content, page
-from modt.viewer.look import LIGHT
+from modt.viewer.theme import LIGHT
 from tests.cli.commands import environment, modt
 from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.viewer.chromium import LOADED, WIDE

@@ -1,4 +1,4 @@
-"""Tracks that move like road users where no label is: what the labels of a drive may leave out."""
+"""Tracks that move like road users and have no label: objects that the labels of a drive may leave out."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ STEADINESS = 15.0
 MIN_SCATTER_M = 0.05
 """Scatter that every outline has."""
 STEP_S = 0.5
-"""Steps of the path that straightness compares with the way from its begin to its end."""
+"""Steps of the path by which straightness is computed."""
 CAR_LENGTH_M, CAR_WIDTH_M, RIDING_MPS = 2.6, 1.3, 2.5
 """A longer or wider mover is taken for a car; of the others, a faster one for a cyclist."""
 
