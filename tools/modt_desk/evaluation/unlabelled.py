@@ -13,12 +13,13 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import corners, inverse, se3, transform_boxes, yaw_of
 from modt.sinks.output import writing
+from modt.sinks.records import BROKEN
 from modt.sinks.tracks import BOX_KEYS, recorded_pose
 from modt.types import Bool, Float64, Int
 from modt_desk.evaluation.further_objects import COLUMNS
 from modt_desk.evaluation.matching import most_in_sector
 from modt_desk.evaluation.overlap import FOOT_M, Overlap
-from modt_desk.evaluation.run_record import RunRecord
+from modt_desk.evaluation.run_record import RunRecord, broken
 from modt_desk.evaluation.truth import Truth
 
 WINDOW_S = 2.0
@@ -63,7 +64,7 @@ def unlabelled(run: RunRecord, truth: Truth) -> list[Mover]:
     """The movers among the tracks of a run, those that went farthest first.
 
     Raises:
-        MisuseError: as `RunRecord.frames`.
+        MisuseError: the run cannot be used, or is not of the recording of the truth.
     """
     R = run.mount.R_level_sensor
     T_sensor_level = np.eye(4) if R is None else inverse(se3(R, np.zeros(3)))
@@ -113,6 +114,8 @@ def moving(stamp_s: Float64, world: Float64) -> Bool:
 
 def _evenly(stamp_s: Float64, world: Float64) -> bool:
     """Whether the boxes of a window move as a road user does."""
+    if not np.ptp(stamp_s):
+        return False
     t = stamp_s - stamp_s.mean()
     weight = t / (t @ t)
     xy = world[:, :2] - world[:, :2].mean(axis=0)
@@ -131,14 +134,18 @@ def _evenly(stamp_s: Float64, world: Float64) -> bool:
 def _sightings(run: RunRecord, truth: Truth) -> dict[int, list[Sighting]]:
     """The sightings of each track in the judged sector that are not of a labelled object."""
     rows = defaultdict[int, list[Sighting]](list)
-    for (_, record), frame in zip(run.records(), run.frames(truth), strict=True):
-        overlap, pose = Overlap.of(frame), recorded_pose(record)
+    for (place, record), frame in zip(run.records(), run.frames(truth), strict=True):
+        overlap = Overlap.of(frame)
         labelled = ((overlap.held > 0.5 * overlap.size) | (overlap.shared > 0.5 * overlap.size)).any(axis=0)
         free = most_in_sector(frame, overlap.size, truth.rules) & ~labelled
-        for track in record["tracks"]:
-            if track["proposal"] is not None and free[track["proposal"]]:
-                box = [track["box"][key] for key in BOX_KEYS]
-                rows[track["id"]].append((frame.index, record["stamp_s"], box, pose, track["class"]))
+        try:
+            stamp_s, pose = float(record["stamp_s"]), recorded_pose(record)
+            for track in record["tracks"]:
+                if track["proposal"] is not None and free[track["proposal"]]:
+                    box = [float(track["box"][key]) for key in BOX_KEYS]
+                    rows[track["id"]].append((frame.index, stamp_s, box, pose, track["class"]))
+        except BROKEN as error:
+            raise broken(place, error) from None
     return rows
 
 
