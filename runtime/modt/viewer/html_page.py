@@ -1,4 +1,4 @@
-"""The HTML page on which a run is seen: its shell, and what it knows of classes, states and stages."""
+"""The HTML page that shows a run: its shell and its legends."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from modt.viewer import look
-from modt.viewer.look import REACH_M, THEME
+from modt.viewer import theme
 from modt.viewer.point_cells import SIDE
+from modt.viewer.theme import REACH_M, THEME
 from modt.viewer.track_rows import COLUMNS, SCALE
 
 _PAGE = Path(__file__).parent / "page"
@@ -17,14 +17,14 @@ _SCRIPTS = [_PAGE / f"{part}.js" for part in ("data", "draw", "text", "input")]
 LIVE = _PAGE / "live.js"
 
 
-def content(states: list[look.Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
-    """What each page knows: columns, legends, the budget of a frame, the width of a cell (None without points)."""
+def content(states: list[theme.Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
+    """Content of each page: columns, legends, budget of a frame, width of a cell (None without points)."""
     return {
         "schema": "modt.player/2",
         "columns": [(name, SCALE.get(name, 1)) for name in COLUMNS],
-        "classes": look.classes(),
+        "classes": theme.classes(),
         "states": states,
-        "stages": look.stages(),
+        "stages": theme.stages(),
         "budget": budget,
         "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},
         "reach_m": REACH_M,

@@ -1,4 +1,4 @@
-"""A result, still in memory, as a page takes it."""
+"""Message of a result for the live page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from modt.sinks.records import line
 from modt.types import FrameResult
-from modt.viewer import look
+from modt.viewer import theme
 from modt.viewer.packed import packed_cells, packed_table
 from modt.viewer.point_cells import LEVEL_M, LEVELS, SIDE, Cells, occupied
 from modt.viewer.track_rows import planar, result_rows, scaled
@@ -16,11 +16,11 @@ from modt.viewer.track_rows import planar, result_rows, scaled
 STEP_CM = 5
 MOST_CELLS = 50_000
 FASTEST = 1
-"""Level of the compression."""
+"""Level of the fastest compression."""
 
 
 def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
-    """Line of JSON of a frame."""
+    """Line of JSON for a frame."""
     frame = {
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 3),
@@ -32,7 +32,7 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
     }
     content = {
         "frame": frame,
-        "states": look.states(result.state_names),
+        "states": theme.states(result.state_names),
         "tracks": packed_table(scaled(result_rows(result)), FASTEST),
         "points": packed_cells(live_cells(result).thinned(MOST_CELLS), FASTEST),
     }
@@ -40,7 +40,7 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
 
 
 def live_cells(result: FrameResult) -> Cells:
-    """Cells of the sweep; what is part of no proposal counts as ground."""
+    """Cells of the sweep; points without a proposal count as ground."""
     x, y, z = (result.frame.points[:, k] for k in range(3))
     reach_m = (SIDE // 2 - 1) * STEP_CM / 100
     used = (np.abs(x) < reach_m) & (np.abs(y) < reach_m) & ((x != 0) | (y != 0))

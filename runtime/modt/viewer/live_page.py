@@ -1,4 +1,4 @@
-"""The sink view://: the page of a run that is going on, for browsers."""
+"""The sink view://, the live page of a run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOCAL = "127.0.0.1"
 
 
 class LivePage:
-    """Publishes each frame with what it cost, when the ledger's line of it comes, to those who look."""
+    """Publishes each frame with its cost to the open pages, once its line of the ledger arrives."""
 
     def __init__(self, host: str, port: int) -> None:
         head, tail = page("modt", "waits for a sweep", content([], None, STEP_CM), LIVE)
@@ -30,7 +30,7 @@ class LivePage:
         self._energy: dict[str, Any] = {}
 
     def write(self, result: FrameResult, /) -> None:
-        """Keep a frame until its line comes."""
+        """Keep a frame until its line of the ledger arrives."""
         self._result = result if self._server.watched else None
 
     def ledger(self, record: dict[str, Any], /) -> None:
@@ -46,12 +46,12 @@ class LivePage:
                 self._server.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}))
 
     def close(self) -> None:
-        """Leave everybody."""
+        """Close the page."""
         self._server.close()
 
 
 def open_view(address: Address) -> LivePage:
-    """A page at 127.0.0.1, which nobody else reaches, if no other host is given.
+    """Open the live page, by default at 127.0.0.1, which no other machine reaches.
 
     Raises:
         MisuseError: it cannot be bound.

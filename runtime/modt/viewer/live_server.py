@@ -1,4 +1,4 @@
-"""A page over HTTP, and events for those who have it open; nobody waits for one of them."""
+"""HTTP server of a page and its events. A slow client misses events; the run never waits."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from socketserver import ThreadingTCPServer
 _Request = socket.socket | tuple[bytes, socket.socket]
 
 MOST_CLIENTS, MOST_CONNECTIONS = 8, 32
-"""Pages open, and connections with one each of their threads, at a time."""
+"""Most pages that receive events, and most connections, each with its thread."""
 SEND_S = 5.0
-"""A client that takes nothing for so long is left."""
+"""A client that takes nothing for so long is disconnected [s]."""
 POLL_S = 0.1
-"""Between two looks whether the end has come."""
+"""Interval between two checks for the end of the server [s]."""
 ALIVE_S = 10.0
-"""Longest time without a sign of life to a client."""
+"""Longest time without an event before a comment keeps a connection open [s]."""
 
 
 class Client:
-    """What a client shall get next: the newest event, those before it are not missed."""
+    """Mailbox of a client, which holds the newest event alone."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -30,19 +30,19 @@ class Client:
         self._ended = False
 
     def put(self, event: bytes) -> None:
-        """Replace what has not been sent yet."""
+        """Replace the event that has not been sent."""
         with self._changed:
             self._event = event
             self._changed.notify()
 
     def end(self) -> None:
-        """Send nothing more."""
+        """Send no more events."""
         with self._changed:
             self._ended = True
             self._changed.notify()
 
     def take(self) -> bytes | None:
-        """The next event, a sign of life after a while without one, None at the end."""
+        """The next event, a comment after ALIVE_S without one, None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._event is not None or self._ended, ALIVE_S)
             event, self._event = self._event, None
@@ -76,11 +76,11 @@ class LiveServer(ThreadingTCPServer):
 
     @property
     def watched(self) -> bool:
-        """Whether anybody has the page open."""
+        """Whether a page is open."""
         return bool(self._clients)
 
     def publish(self, data: str) -> None:
-        """Hand an event to everybody."""
+        """Hand an event to every client."""
         event = f"data: {data.rstrip()}\n\n".encode()
         with self._lock:
             for client in self._clients:
@@ -101,7 +101,7 @@ class LiveServer(ThreadingTCPServer):
             self._clients.discard(client)
 
     def close(self) -> None:
-        """End everything."""
+        """Stop the server and disconnect its clients."""
         self.shutdown()
         with self._lock:
             for client in self._clients:
@@ -113,7 +113,7 @@ class LiveServer(ThreadingTCPServer):
         return self._free.acquire(blocking=False)
 
     def process_request_thread(self, request: _Request, client_address: object) -> None:
-        """Answer one, and make room for the next."""
+        """Answer a request, and release its place."""
         try:
             super().process_request_thread(request, client_address)
         finally:
@@ -128,7 +128,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = SEND_S
 
     def handle(self) -> None:
-        """Answer; one that has not asked for anything after SEND_S, however slowly it writes, is left."""
+        """Answer a request; a client whose request takes longer than SEND_S is disconnected."""
         self.late = threading.Timer(SEND_S, self._leave)
         self.late.start()
         try:
@@ -178,4 +178,4 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, format: str, *args: object) -> None:
-        """Nothing: the loop's log is for the loop."""
+        """Log nothing: the log belongs to the run."""

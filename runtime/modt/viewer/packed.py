@@ -11,7 +11,7 @@ from modt.types import Int
 from modt.viewer.point_cells import Cells
 
 LEVEL = 6
-"""Of the compression: more takes longer and gains little."""
+"""Level of the compression; higher ones take longer and gain little."""
 CELL_BYTES = 3
 NUMBER_BYTES = 4
 
@@ -22,7 +22,7 @@ def packed(data: bytes, level: int = LEVEL) -> str:
 
 
 def planes(numbers: Int, n_bytes: int) -> bytes:
-    """Lowest bytes of all numbers, then the next lowest: equal bytes lie together and compress well."""
+    """Lowest bytes of all numbers, then the next lowest. Equal bytes lie together and compress well."""
     each = np.ascontiguousarray(numbers, "<i8").view(np.uint8).reshape(-1, 8)
     return each[:, :n_bytes].T.tobytes()
 

@@ -113,6 +113,8 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):
     (empty / "tracks.jsonl").write_text("")
     longer = shutil.copytree(run, tmp_path / "longer")
     (longer / "tracks.jsonl").write_text("".join(lines) + lines[-1].replace('"frame":4', '"frame":9'))
+    boxless = shutil.copytree(run, tmp_path / "boxless")
+    (boxless / "tracks.jsonl").write_text("".join(lines).replace('"box":{', '"bax":{'))
     broken = tmp_path / "broken.csv"
     broken.write_text(f"{COLUMNS}\n0,1,Tree,9,0,-1.7,1,1,2,0\n")
     for arguments, message in (
@@ -126,7 +128,9 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):
         ((tmp_path, truth), "describes no run"),
         ((run, tmp_path), "holds no labels that are recognised"),
         ((run, truth, "--further", broken), "broken.csv:2: 'Tree' is no type of an object"),
-        ((run, truth, run, truth, "--further", broken), "is the table of one drive"),
+        ((run, truth, run, truth, "--further", broken), "--further: is for one drive"),
+        ((boxless, truth, "--unlabelled", "found"), "tracks.jsonl:1: no record of a frame"),
+        ((run, truth, "--json", "--unlabelled", "found"), "makes a list, and no evaluation"),
         ((run, truth, "--sector", "0"), "is no half sector"),
     ):
         done = modt("evaluate", *arguments, cwd=tmp_path)

@@ -15,7 +15,7 @@ from modt.classes import CLASS_NAMES
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.recognise import open_scans
 from modt.viewer.html_page import LIVE, content, page
-from modt.viewer.look import LIGHT
+from modt.viewer.theme import LIGHT
 from modt_desk.reporting.run_report import run_tree
 from modt_desk.viewer.recorded_run import RecordedRun
 from tests.cli.commands import environment, modt

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modt.viewer.look import REACH_M
+from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.extent import reach_m
 

@@ -1,4 +1,4 @@
-"""Tracker of classified boxes, in two passes by score as in ByteTrack (Zhang et al., ECCV 2022).
+"""Tracker of classified boxes in two passes by score as in ByteTrack (Zhang et al., ECCV 2022).
 
 The box of a detection covers the whole object, so its centre is the measured position; its score sets the variance of
 that position. Detections of high score are associated first; the others may continue a track but not start one. The
@@ -41,7 +41,7 @@ SCORE_GAIN, AGE_BONUS = 0.5, 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoxClass:
-    """What differs between classes; confidences are on the scale of PointRCNN's scores."""
+    """Parameters that differ between classes. Confidences are on the scale of PointRCNN's scores."""
 
     report_above: float = 1.0  # least confidence of a track in a frame in which it is reported
     keep_above: float  # least mean confidence of a track that is written

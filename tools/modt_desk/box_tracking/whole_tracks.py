@@ -1,4 +1,4 @@
-"""What is known of tracks after the last frame: which are to be believed, of what class, and where in short gaps."""
+"""Judgement of whole tracks after the last frame: their confidence, rival classes on one object, short gaps."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class TrackedBoxes:
 
 
 def confident(found: TrackedBoxes, least: float) -> TrackedBoxes:
-    """The tracks whose mean confidence reaches the least."""
+    """Keep the tracks whose mean confidence reaches `least`."""
     return found.take(_mean(found.id, found.confidence) >= least)
 
 
 def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
-    """The tracks, of classes (n,), without those of which most boxes lie on a surer track of another class."""
+    """Remove tracks most of whose boxes lie on a more confident track of another class; classes are (n,)."""
     mean = _mean(found.id, found.confidence)
     place = np.column_stack([found.box[:, :2], 2 * REACH_M * found.frame])
     a, b = cKDTree(place).query_pairs(REACH_M, output_type="ndarray").T

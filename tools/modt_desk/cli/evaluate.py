@@ -67,9 +67,12 @@ def run(arguments: argparse.Namespace) -> int:
     for option in ("further", "unlabelled"):
         if getattr(arguments, option) is not None and len(paths) > 2:
             raise MisuseError(f"--{option}", "is for one drive", "judge that drive alone")
-    if arguments.unlabelled is not None:
-        return list_unlabelled(arguments)
-    judge_runs(arguments)
+    if arguments.unlabelled is None:
+        judge_runs(arguments)
+    elif arguments.json or arguments.html:
+        raise MisuseError("--unlabelled", "makes a list, and no evaluation", "leave --json and --html out")
+    else:
+        list_unlabelled(arguments)
     return 0
 
 
@@ -128,7 +131,7 @@ def judge_runs(arguments: argparse.Namespace) -> None:
         print(report(sensors))
 
 
-def list_unlabelled(arguments: argparse.Namespace) -> int:
+def list_unlabelled(arguments: argparse.Namespace) -> None:
     """Print the tracks that move like road users and have no label; write their pictures and their table.
 
     Raises:
@@ -147,7 +150,7 @@ def list_unlabelled(arguments: argparse.Namespace) -> int:
     movers = unlabelled(record, truth)
     if not movers:
         print("every track that moves like a road user has a label")
-        return 0
+        return
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     table = folder / "further.csv"
@@ -156,4 +159,3 @@ def list_unlabelled(arguments: argparse.Namespace) -> int:
         save_film_strips(folder, movers, truth.scans)
     print("\n".join(listing(movers)))
     print(f"\npictures and rows in {folder}: keep the rows of real road users, then give --further {table}")
-    return 0

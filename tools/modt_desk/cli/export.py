@@ -46,10 +46,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Export, and say what was written.
+    """Export, and print the name of what was written.
 
     Raises:
-        MisuseError: no run, the target exists, or the run or its source lacks what the format needs.
+        MisuseError: no run, the target exists, or a part of the run that the format needs is missing.
         ModtError: it cannot be written.
     """
     from modt_desk.evaluation.run_record import RunRecord
@@ -85,7 +85,7 @@ def whole(target: Path) -> Iterator[Path]:
 
 
 class Export:
-    """What is asked for of a run.
+    """The run, the frames and the points that are exported.
 
     Attributes:
         n_frames: exported so far.
@@ -116,10 +116,10 @@ class Export:
         return self.each(recorded_result)
 
     def each(self, made_of: Callable[[dict[str, Any]], T]) -> Iterator[T]:
-        """What a function makes of the records of the frames.
+        """Apply a function to the record of each frame.
 
         Raises:
-            MisuseError: there are none, or one lacks something.
+            MisuseError: there are none, or one is incomplete.
         """
         from modt.sinks.records import BROKEN
         from modt_desk.evaluation.run_record import broken
@@ -139,7 +139,7 @@ class Export:
 
 
 def _mcap(export: Export, target: Path) -> None:
-    """What the sink mcap:///FILE would have recorded."""
+    """Write an MCAP file as the sink mcap:///FILE does."""
     try:
         from modt.sinks.mcap_file import McapFile
     except ModuleNotFoundError as error:
@@ -168,7 +168,7 @@ def _with_points(export: Export) -> Iterator[FrameResult]:
 
 
 def _kitti(export: Export, target: Path) -> None:
-    """As kitti/NNNN.txt of a replay."""
+    """Write a KITTI result file as a replay does."""
     from modt.sinks.kitti import KittiResults
 
     source = export.source()

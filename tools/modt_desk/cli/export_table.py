@@ -31,10 +31,10 @@ COLUMNS = (
 
 
 def track_rows(record: dict[str, Any]) -> str:
-    """The rows of a line of tracks.jsonl; cells of what is null there are empty, booleans are 0 and 1.
+    """The rows of a line of tracks.jsonl. Null becomes an empty cell, booleans 0 and 1.
 
     Raises:
-        KeyError, TypeError: the record lacks something.
+        KeyError, TypeError: the record is incomplete.
     """
     when = (record["frame"], record["stamp_s"])
     return _text([(*when, *_cells(track)) for track in record["tracks"]])

@@ -27,7 +27,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     which.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
     film = "make a film, RUN/view.mp4, or RUN/view.gif where ffmpeg is not installed"
     which.add_argument("--animate", action="store_true", help=film)
-    track = "tell how the class of a track was decided (default: RUN/track-ID.html)"
+    track = "explain how the class of a track was decided (default: RUN/track-ID.html)"
     which.add_argument("--track", type=options.integer(0, 10**9, "the number of a track"), metavar="ID", help=track)
     out = (
         "FILE.html, a page that plays the run (default: RUN/view.html); of one frame FILE.svg (with --frame: "
@@ -96,14 +96,14 @@ def tell(arguments: argparse.Namespace) -> int:
 
 
 def default_name(frame: int | None, animate: bool) -> str:
-    """Of the file, where none is given."""
+    """Default name of the file."""
     if animate:
         return f"view{MP4 if shutil.which('ffmpeg') else GIF}"
     return f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}"
 
 
 def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None, stream: Stream | None) -> Stream | None:
-    """Add to the frames what is true of them, by labels or by those that lie with the source of the run.
+    """Mark the frames with their truth, by the given labels or those beside the source of the run.
 
     Returns:
         the stream, of a live run the scans of its truth.
@@ -137,7 +137,7 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None, stre
 
 
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:
-    """The stream that a run was made of, None where it was live or is not found any more."""
+    """The stream of a run, None if it was live or cannot be found."""
     from modt.app import inputs
     from modt_desk.evaluation.level_stream import LevelStream, recorded_mount
 

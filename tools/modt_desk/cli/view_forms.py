@@ -1,4 +1,4 @@
-"""What `modt view` writes, by the ending of the file's name."""
+"""Output formats of `modt view` by the ending of the file's name."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 PLAYER, PICTURE, PIXELS, GIF, MP4 = ".html", ".svg", ".png", ".gif", ".mp4"
 PICTURE_WIDTH, FILM_WIDTH = 1280, 960
-"""Pixels."""
+"""Widths of pictures and films [pixel]."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What is to be shown, and where."""
+    """The frames to show and the file to write."""
 
     run: RecordedRun
     at: int  # index of the frame, or of the first
@@ -34,7 +34,7 @@ class View:
     out: Path
 
     def cells(self, numbers: Sequence[int], most: int) -> Iterator[Cells] | None:
-        """Those of the frames, None without points."""
+        """Cells of the frames, None without points."""
         from modt_desk.viewer.sweeps import sweeps
 
         return None if self.stream is None else sweeps(numbers, self.stream, self.grid, most)
@@ -57,7 +57,7 @@ class View:
 
     @property
     def period_s(self) -> float:
-        """Between two frames."""
+        """Mean time between two frames."""
         stamps: list[float] = [frame["stamp_s"] for frame in self.run.frames]
         return max((stamps[-1] - stamps[0]) / max(len(stamps) - 1, 1), 0.02)
 

@@ -1,1 +1,1 @@
-"""What a run was worth: summary, the paper's figures."""
+"""Evaluation of recorded runs against labels."""

@@ -1,4 +1,4 @@
-"""How well proposals are classified: by posterior, and by the class that the program says."""
+"""Scores of classification, by the posterior and by the reported class."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modt_desk.evaluation.rows import Outcome, Rows, ratio
 from modt_desk.evaluation.truth import CLASSIFIED
 
 BINS = 15
-"""Of confidence, equally wide."""
+"""Number of bins of confidence, equally wide."""
 CURVE_RECALLS = np.arange(1, 21) / 20
 
 
@@ -23,12 +23,12 @@ class ClassScore:
     objects: int  # of the class, one count an object and frame
     average_precision: float | None  # area under the envelope of precision over recall
     curve: tuple[tuple[float, float, float], ...]  # threshold, precision, recall at each new twentieth
-    called: int  # proposals that the program says are of the class
+    called: int  # proposals reported as the class
     precision: float | None  # share of them that lie on an object of the class
-    objects_called: float | None  # share of the objects that have a proposal that is said to be of the class
+    objects_called: float | None  # share of the objects whose proposal is reported as the class
     segmentable: int  # objects of the class that are judged for segmentation
-    recall: float | None  # share of them that are found and said to be of the class
-    recall_of_found: float | None  # of those that are found, share said to be of the class
+    recall: float | None  # share of them that are detected and reported as the class
+    recall_of_found: float | None  # share of the detected ones reported as the class
     calibration_error: float | None  # of the class's posterior over all judged proposals
 
 

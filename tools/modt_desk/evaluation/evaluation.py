@@ -1,4 +1,4 @@
-"""The judgement of runs: every figure, from what became of each frame."""
+"""The judgement of runs: every figure, from the judged rows of each frame."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0)
 
 @dataclass(frozen=True, slots=True)
 class DriveRows:
-    """What became of the frames of one drive: how many, both tables, and by class the associations frame by frame."""
+    """Judged rows of one drive: its tables of objects and proposals, and its associations by class and frame."""
 
     rules: Rules
     frames: int
@@ -75,7 +75,7 @@ def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES) -> Evaluati
 
 
 def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> DriveRows:
-    """What became of a drive's frames; drives that are pooled need numbers of their own.
+    """Judge the frames of a drive. Pooled drives need different numbers.
 
     Raises:
         ValueError: there are no frames.

@@ -1,4 +1,4 @@
-"""What was found in a frame beside what is true of it: all that is judged."""
+"""Results and truth of one frame, side by side for the judgement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modt_desk.evaluation.truth import FrameTruth
 
 @dataclass(frozen=True, slots=True)
 class JudgedFrame:
-    """What was found in a frame of N points and M tracks seen, and what is true of it."""
+    """Results and truth of a frame of N points and M visible tracks."""
 
     index: int
     points: Float32  # (N, 4) sensor frame

@@ -9,7 +9,7 @@ from modt.types import Frame
 
 
 class FramesByNumber:
-    """Frames asked for by ascending number; what lies between is passed over."""
+    """Gives frames by ascending number and skips those between."""
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
@@ -17,7 +17,7 @@ class FramesByNumber:
         self._next: Frame | None = None
 
     def get(self, number: int) -> Frame | None:
-        """The frame, None where the stream lacks it."""
+        """The frame, None if the stream does not hold it."""
         if self._frames is None:
             self._frames = iter(self._stream.between(number, None))
             self._next = next(self._frames, None)

@@ -57,7 +57,7 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
     of = np.repeat(np.arange(len(overlap.own)), overlap.count)
 
     def most(which: Bool) -> Bool:
-        """(n,) whether most points of each object are so; nothing is said of one without points."""
+        """(n,) whether most points of each object satisfy it; true for an object without points."""
         times = np.bincount(of[which], minlength=len(overlap.own))
         found: Bool = (times > 0.5 * overlap.count) | (overlap.count == 0)
         return found

@@ -59,7 +59,7 @@ class Overlap:
 
     @classmethod
     def of(cls, frame: JudgedFrame, objects: ObjectPoints | None = None) -> Overlap:
-        """Of a frame; objects: those of its points and truth, where they are known."""
+        """Overlap in a frame; objects: points of its labelled objects, where they are known."""
         p = max(frame.n_proposals, int(frame.proposal.max(initial=NONE)) + 1) + 1
         size = np.bincount(frame.proposal + 1, minlength=p + 1)[1:]
         objects = objects or ObjectPoints.of(frame.points, frame.truth)

@@ -1,4 +1,4 @@
-"""Recorded frames as the results that they were, for the sinks."""
+"""Results restored from recorded frames, for the sinks."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import NONE, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
 
 MOST_PROPOSALS = 100_000
-"""Of a record that is believed: sweeps have some hundreds."""
+"""Most proposals of a valid record; sweeps have some hundreds."""
 NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
 
 
 @np.errstate(over="raise", invalid="raise")
 def recorded_result(record: dict[str, Any]) -> FrameResult:
-    """The result that a line of tracks.jsonl is of.
+    """The result that a line of tracks.jsonl records.
 
     Proposals have their boxes, no members, and none counts as truncated. Points, covariances, the views of the fusion
     and the boxes of lost tracks stay blank.

@@ -74,7 +74,7 @@ def _sector(e: Evaluation) -> str:
 
 
 def _completeness(e: Evaluation) -> str:
-    """How complete the labels are believed to be."""
+    """Completeness of the labels, in words."""
     labels = COMPLETE if e.complete else INCOMPLETE
     if e.further_objects:
         what = f"{e.further_objects} objects" if e.complete else f"{e.further_objects} of them"

@@ -1,4 +1,4 @@
-"""What became of the objects and the proposals of a frame: tables that every figure is computed from."""
+"""Tables of the judged objects and proposals, from which every figure is computed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Rows = NDArray[np.void]
 
 
 class Outcome(IntEnum):
-    """What segmentation made of an object (docs/evaluation.md)."""
+    """Outcome of the segmentation of an object (docs/evaluation.md)."""
 
     FOUND = 0
     MERGED = 1
@@ -39,11 +39,11 @@ OBJECT = np.dtype(
         ("in_view", bool),  # most of its points are
         ("to_segment", bool),  # judged for segmentation
         ("to_classify", bool),  # judged for average precision
-        ("to_follow", bool),  # judged for life
+        ("to_follow", bool),  # judged for the length of its track
         ("outcome", int),
-        ("said", int),  # class of the proposal that found it, NONE where none did
-        ("called", int),  # class of the proposal that stands for it, NONE where none does
-        ("track", int),  # that owns its best proposal, NONE where none does
+        ("said", int),  # reported class of the proposal that detects it, NONE without one
+        ("called", int),  # reported class of the proposal that stands for it, NONE without one
+        ("track", int),  # track of its best proposal, NONE without one
     ]
 )
 PROPOSAL = np.dtype(
@@ -53,11 +53,11 @@ PROPOSAL = np.dtype(
         ("track", int),
         ("range_m", float),  # of the object that it stands for; of none, the mean of its points
         ("posterior", float, N_CLASSES),
-        ("said", int),  # class that the program says
+        ("said", int),  # reported class
         ("label", int),  # class of the object that it stands for, BACKGROUND for none
         ("owner", int),  # class of the object in whose box most of its points lie, BACKGROUND for none
         ("to_classify", bool),  # judged for average precision
-        ("to_call", bool),  # judged for the class that is said
+        ("to_call", bool),  # judged for the reported class
         ("to_associate", bool),  # judged for HOTA, CLEAR and Identity
     ]
 )
@@ -72,7 +72,7 @@ def table(dtype: np.dtype[np.void], n: int, **columns: Any) -> Rows:
 
 
 def kinds(objects: Rows) -> dict[str, Bool]:
-    """Which rows are of each class, of those that count, and of each labelled type."""
+    """Masks of the counted rows of each class, and of the rows of each labelled type."""
     groups: dict[str, Bool] = {
         name: (objects["class"] == c) & (objects["role"] == Role.COUNTED) for c, name in enumerate(CLASS_NAMES) if c
     }
@@ -80,7 +80,7 @@ def kinds(objects: Rows) -> dict[str, Bool]:
 
 
 def ratio(part: float, whole: float) -> float | None:
-    """Part of a whole, None of nothing."""
+    """Part over whole, None if the whole is zero."""
     return part / whole if whole else None
 
 

@@ -1,4 +1,4 @@
-"""What counts in a judgement (docs/evaluation.md)."""
+"""Rules of the evaluation (docs/evaluation.md)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class Rules:
     holds more than half of the other.
     """
 
-    min_points: int = 20  # of an object that must be segmented
-    min_points_followed: int = 10  # of an object that must be followed, and of one for average precision
-    min_points_further: int = 8  # of an object beside the labels, for average precision
+    min_points: int = 20  # least points of an object that must be segmented
+    min_points_followed: int = 10  # the same of one that must be followed, or counts for average precision
+    min_points_further: int = 8  # the same of an object beside the labels
     by_iou: bool = False
     sector_deg: float = 40.0  # half the sector about x in which proposals are judged: where everything is labelled
-    max_range_m: float = float("inf")  # of objects and proposals that are judged
-    ignored: frozenset[str] = frozenset(IGNORABLE)  # what counts neither for nor against
+    max_range_m: float = float("inf")  # farthest judged object or proposal
+    ignored: frozenset[str] = frozenset(IGNORABLE)  # kinds that count neither for nor against
     complete: bool = False  # whether every road user in the sector is believed to be labelled
 
 

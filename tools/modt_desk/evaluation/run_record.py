@@ -28,7 +28,7 @@ from modt_desk.evaluation.truth import Truth
 
 LABELS = "labels"
 Record = tuple[str, dict[str, Any]]
-"""Of a frame, after the place where it stands."""
+"""File and line of a record, and the record of a frame."""
 Proposed = Callable[[dict[str, Any], Float32], Int]
 """(N,) proposal of each point, NONE where it belongs to none, by the record of a frame and its (N, 4) points."""
 
@@ -41,8 +41,8 @@ class RunRecord:
     stream: Path | None  # where its scans lay, None for the embedded stream
     fov: str  # camera or full
     sensor: str  # name of its profile
-    live: bool  # of a live source, which no one can open again
-    mount: Mount = LEVEL  # of its sensor
+    live: bool  # whether its source was live and cannot be read again
+    mount: Mount = LEVEL  # mount of its sensor
 
     @classmethod
     def open(cls, path: Path) -> RunRecord:
@@ -95,7 +95,7 @@ class RunRecord:
 
         Args:
             truth: of the run's recording.
-            proposed: says which points are of which proposal; None: the labels that replay --labels has written.
+            proposed: assigns points to proposals; None: the labels that replay --labels has written.
             stream: the recording; None: the scans of the truth.
             records: those of frames that are labelled; None: all.
 
@@ -149,7 +149,7 @@ class RunRecord:
 
 
 def broken(place: str, error: Exception) -> MisuseError:
-    """What is said of a record that lacks something."""
+    """The error of an incomplete record."""
     return MisuseError(place, f"no record of a frame ({error!r})", "run it again")
 
 

@@ -1,4 +1,4 @@
-"""How many labelled objects segmentation finds, and what became of the others."""
+"""Recall of segmentation, and the outcomes of the objects that it misses."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from modt_desk.evaluation.truth import LABELLED
 
 @dataclass(frozen=True, slots=True)
 class SegmentationScore:
-    """Objects of one kind, one count an object and frame; merged to missed are those not found (`Outcome`)."""
+    """Objects of one kind, one count an object and frame; merged to missed are those not detected (`Outcome`)."""
 
     objects: int  # judged
-    recall: float | None  # share of them that is found
+    recall: float | None  # share of them that is detected
     merged: int
     split: int
     partial: int

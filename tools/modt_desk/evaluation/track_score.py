@@ -1,4 +1,4 @@
-"""How long objects are followed: life and its breaks, and HOTA, CLEAR and Identity as TrackEval computes them."""
+"""Lengths and breaks of tracks; HOTA, CLEAR and Identity as TrackEval computes them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _life(objects: int, frames: int, followed: int, discontinuities: int) -> Lif
 
 @dataclass(frozen=True, slots=True)
 class TrackScore:
-    """How well the objects of one kind are followed over all frames.
+    """Scores of the tracks of one kind of objects over all frames.
 
     At a discontinuity, another track follows the object than when it was last followed. If that track had followed it
     earlier, this counts as returned; if not, but the track existed before, as taken over; if it is new, as neither.
@@ -49,7 +49,7 @@ class TrackScore:
     labelled: Life  # over all labelled frames, whatever points the object has there; Table III gives this ideal
     followed: float | None  # share of the frames in which an object is followed
     discontinuities: int  # times that another track than before follows an object
-    taken_over: int  # of these, by a track from elsewhere
+    taken_over: int  # of these, by an existing track of something else
     returned: int  # of these, by a track that had followed the object before
     mis_associations: int  # tracks that follow more than one object for MIN_FRAMES_OWNED frames or more each
 
@@ -129,6 +129,6 @@ def _trackeval_data(frames: Sequence[Association]) -> dict[str, Any]:
 
 
 def _renumbered(ids: Sequence[Int]) -> tuple[int, list[Int]]:
-    """How many identities there are, and those of each frame without gaps."""
+    """Number of identities, and the identities of each frame renumbered without gaps."""
     names, number = np.unique(np.concatenate([np.zeros(0, np.int64), *ids]), return_inverse=True)
     return len(names), np.split(number, np.cumsum([len(own) for own in ids])[:-1])

@@ -1,4 +1,4 @@
-"""What is true of a frame: labelled objects, and where nothing is known."""
+"""Truth of a frame: its labelled objects, and regions without labels."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ STILL_M, LEAST_FRAMES = 1.0, 3
 
 
 class Role(IntEnum):
-    """What a labelled type is judged for."""
+    """The judgements that a labelled type takes part in."""
 
     COUNTED = 0
     NEUTRAL = 1
-    """To be segmented and followed; its class is free: neither an object for average precision nor a false one."""
+    """Must be segmented and followed. Its class is free: it counts neither as an object nor as a false one."""
     IGNORED = 2
-    """Neither to be found nor wrong when found."""
+    """Need not be detected, and a detection of it is not false."""
     FURTHER = 3
     """Added beside the labels: counted for its class alone, neither to be segmented nor followed."""
 
@@ -81,7 +81,7 @@ class FrameTruth:
 
     id: Int  # (n,) NONE where objects are not followed
     type_: Sequence[str]  # (n,) as labelled
-    object_class: Int  # (n,) that each should be said to be
+    object_class: Int  # (n,) true class of each
     role: Int  # (n,) `Role`
     box: Float64  # (n, 7) x, y, z of the centre, l, w, h [m], yaw [rad]
     parked: Float64 = field(default_factory=lambda: np.zeros((0, 7)))  # (k, 7) parked cars that are not labelled here
@@ -100,13 +100,13 @@ class FrameTruth:
 class Truth:
     """The labels of a recording."""
 
-    frames: Mapping[int, FrameTruth]  # of each labelled frame, by its index
-    scans: ScanStream | None  # the recording itself, None where it is not found
-    rules: Rules  # by which its labels are judged, unless others are given
+    frames: Mapping[int, FrameTruth]  # truth of each labelled frame, by its index
+    scans: ScanStream | None  # the recording itself, None if it cannot be found
+    rules: Rules  # rules of its evaluation
 
 
 def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Float64]) -> dict[int, Float64]:
-    """By frame, (k, 7) boxes of parked cars that are not labelled in it, as they stood when last or next labelled.
+    """Map each frame to (k, 7) boxes of parked cars without a label in it, as they stood at their nearest label.
 
     Args:
         labels: of a recording.

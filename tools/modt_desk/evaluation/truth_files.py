@@ -77,7 +77,7 @@ def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False)
 
 
 def labels_beside(stream: Path) -> Path | None:
-    """Where the labels of a recording lie, if they lie where those of its layout do."""
+    """Path of the labels of a recording, if they lie where its layout puts them."""
     if (stream / TRACKLETS).is_file():
         return stream
     sequence = stream.parent.parent / "label_02" / f"{stream.name}.txt"

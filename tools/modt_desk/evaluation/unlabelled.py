@@ -1,4 +1,4 @@
-"""Tracks that move like road users where no label is: what the labels of a drive may leave out."""
+"""Tracks that move like road users and have no label: objects that the labels of a drive may leave out."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import corners, inverse, se3, transform_boxes, yaw_of
 from modt.sinks.output import writing
+from modt.sinks.records import BROKEN
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Bool, Float64, Int
 from modt_desk.evaluation.further_objects import COLUMNS
 from modt_desk.evaluation.matching import most_in_sector
 from modt_desk.evaluation.overlap import FOOT_M, Overlap
 from modt_desk.evaluation.recorded_result import recorded_pose
-from modt_desk.evaluation.run_record import RunRecord
+from modt_desk.evaluation.run_record import RunRecord, broken
 from modt_desk.evaluation.truth import Truth
 
 WINDOW_S = 2.0
@@ -37,26 +38,13 @@ STEADINESS = 15.0
 MIN_SCATTER_M = 0.05
 """Scatter that every outline has."""
 STEP_S = 0.5
-"""Steps of the path that straightness compares with the way from its begin to its end."""
+"""Steps of the path by which straightness is computed."""
 CAR_LENGTH_M, CAR_WIDTH_M, RIDING_MPS = 2.6, 1.3, 2.5
 """A longer or wider mover is taken for a car; of the others, a faster one for a cyclist."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sightings:
-    """A track in the n frames in which it is seen, judged and without a label."""
-
-    frame: Int  # (n,)
-    stamp_s: Float64  # (n,)
-    box: Float64  # (n, 7) level frame of the sensor
-    T_world_sensor: Float64  # (n, 4, 4)
-    called: Sequence[str]  # (n,) class that the run gave the track
-
-    @property
-    def world(self) -> Float64:
-        """(n, 7) boxes in the world."""
-        placed = [transform_boxes(T, box[None])[0] for T, box in zip(self.T_world_sensor, self.box, strict=True)]
-        return np.array(placed).reshape(-1, 7)
+Sighting = tuple[int, float, list[float], Float64, str]
+"""Frame, stamp [s], (7,) box in the level frame, T_world_sensor and reported class of a track without a label."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +65,7 @@ def unlabelled(run: RunRecord, truth: Truth) -> list[Mover]:
     """The movers among the tracks of a run, those that went farthest first.
 
     Raises:
-        MisuseError: as `RunRecord.frames`.
+        MisuseError: the run cannot be used, or is not of the recording of the truth.
     """
     R = run.mount.R_level_sensor
     T_sensor_level = np.eye(4) if R is None else inverse(se3(R, np.zeros(3)))
@@ -102,7 +90,7 @@ def write_table(path: Path, movers: Sequence[Mover]) -> None:
 
 def listing(movers: Sequence[Mover]) -> Iterator[str]:
     """A line for each mover, below a head."""
-    yield "track   frames      gone m  straight  m/s  l x w x h m       looks like  called"
+    yield "track   frames      gone m  straight  m/s  l x w x h m       looks like  reported"
     for m in movers:
         span, size = f"{m.frame[0]} to {m.frame[-1]}", " x ".join(f"{side:.1f}" for side in m.box[0, 3:6].tolist())
         motion = f"{m.gone_m:6.1f}  {m.straightness:8.2f}  {m.speed_mps:3.1f}"
@@ -127,6 +115,8 @@ def moving(stamp_s: Float64, world: Float64) -> Bool:
 
 def _evenly(stamp_s: Float64, world: Float64) -> bool:
     """Whether the boxes of a window move as a road user does."""
+    if not np.ptp(stamp_s):
+        return False
     t = stamp_s - stamp_s.mean()
     weight = t / (t @ t)
     xy = world[:, :2] - world[:, :2].mean(axis=0)
@@ -142,52 +132,52 @@ def _evenly(stamp_s: Float64, world: Float64) -> bool:
     return bool(gone_m > MIN_GONE_M and slower_mps > ENDS_SHARE * speed and steady)
 
 
-def _sightings(run: RunRecord, truth: Truth) -> dict[int, Sightings]:
+def _sightings(run: RunRecord, truth: Truth) -> dict[int, list[Sighting]]:
     """The sightings of each track in the judged sector that are not of a labelled object."""
-    rows = defaultdict(list)
-    for (_, record), frame in zip(run.records(), run.frames(truth), strict=True):
-        overlap, pose = Overlap.of(frame), recorded_pose(record)
+    rows = defaultdict[int, list[Sighting]](list)
+    for (place, record), frame in zip(run.records(), run.frames(truth), strict=True):
+        overlap = Overlap.of(frame)
         labelled = ((overlap.held > 0.5 * overlap.size) | (overlap.shared > 0.5 * overlap.size)).any(axis=0)
         free = most_in_sector(frame, overlap.size, truth.rules) & ~labelled
-        for track in record["tracks"]:
-            if track["proposal"] is not None and free[track["proposal"]]:
-                box = [track["box"][key] for key in BOX_KEYS]
-                rows[track["id"]].append((frame.index, record["stamp_s"], box, pose, track["class"]))
-    tracks = {}
-    for track, seen in rows.items():
-        frames, stamps_s, boxes, poses, called = zip(*seen, strict=True)
-        tracks[track] = Sightings(np.array(frames), np.array(stamps_s), np.array(boxes), np.array(poses), called)
-    return tracks
+        try:
+            stamp_s, pose = float(record["stamp_s"]), recorded_pose(record)
+            for track in record["tracks"]:
+                if track["proposal"] is not None and free[track["proposal"]]:
+                    box = [float(track["box"][key]) for key in BOX_KEYS]
+                    rows[track["id"]].append((frame.index, stamp_s, box, pose, track["class"]))
+        except BROKEN as error:
+            raise broken(place, error) from None
+    return rows
 
 
-def _mover(track: int, seen: Sightings, T_sensor_level: Float64) -> Mover | None:
-    """The track from where it begins to move to where it ends; None if it does not."""
-    rows = np.flatnonzero(moving(seen.stamp_s, seen.world))
+def _mover(track: int, sightings: list[Sighting], T_sensor_level: Float64) -> Mover | None:
+    """The track from where it starts to move to where it ends; None if it does not move."""
+    stamp_s = np.array([sighting[1] for sighting in sightings])
+    world = np.array([transform_boxes(T, np.array([box]))[0] for _, _, box, T, _ in sightings])
+    rows = np.flatnonzero(moving(stamp_s, world))
     if not len(rows):
         return None
     part = slice(rows[0], rows[-1] + 1)
-    seen = Sightings(
-        seen.frame[part], seen.stamp_s[part], seen.box[part], seen.T_world_sensor[part], seen.called[part]
-    )
-    world, stamp_s = seen.world, seen.stamp_s
+    stamp_s, world = stamp_s[part], world[part]
+    frames, _, boxes, poses, called = zip(*sightings[part], strict=True)
     step = ((stamp_s - stamp_s[0]) // STEP_S).astype(np.int64)
     path = np.array([world[step == k, :2].mean(axis=0) for k in np.unique(step)])
     gone_m = float(np.hypot(*(world[-1, :2] - world[0, :2])))
     path_m = float(np.hypot(*np.diff([world[0, :2], *path[1:-1], world[-1, :2]], axis=0).T).sum())
     speed_mps = path_m / float(np.ptp(stamp_s))
     heading = _heading(stamp_s, world)
-    across = np.stack([np.cos(heading), np.sin(heading), -np.sin(heading), np.cos(heading)], axis=-1)
-    extent = np.ptp(corners(world) @ across.reshape(-1, 2, 2).swapaxes(1, 2), axis=1)
+    axes = np.stack([np.cos(heading), np.sin(heading), -np.sin(heading), np.cos(heading)], axis=-1)
+    extent = np.ptp(corners(world) @ axes.reshape(-1, 2, 2).swapaxes(1, 2), axis=1)
     length, width, height = np.quantile(np.column_stack([extent, world[:, 5]]), 0.9, axis=0).tolist()
-    box = seen.box.copy()
+    box = np.array(boxes)
     box[:, 2] += (height - box[:, 5] - FOOT_M) / 2  # the lowest points stand FOOT_M above the foot
     box[:, 3:6] = length, width, height + FOOT_M
-    box[:, 6] = heading - [yaw_of(T) for T in seen.T_world_sensor]
+    box[:, 6] = heading - [yaw_of(T) for T in poses]
     return Mover(
         track=track,
         type_=_type(length, width, speed_mps),
-        called=Counter(seen.called).most_common(1)[0][0],
-        frame=seen.frame,
+        called=Counter(called).most_common(1)[0][0],
+        frame=np.array(frames),
         box=transform_boxes(T_sensor_level, box),
         gone_m=gone_m,
         straightness=min(gone_m / path_m, 1.0),

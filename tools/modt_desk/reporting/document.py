@@ -36,7 +36,7 @@ class Document:
     about: Sequence[str]  # sentences on the run, the meter and its conditions
     results: Sequence[tuple[str, Quantity, str]]  # name, value, note
     tables: Sequence[Table]
-    test: str  # what the figures test
+    test: str  # claim that the figures test
 
     def text(self) -> str:
         """Lines of 100 columns at most, results first."""

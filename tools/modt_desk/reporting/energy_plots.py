@@ -45,7 +45,7 @@ def cumulative_energy(energy_mJ: dict[str, Float64], each: Float64, note: str, d
 
 
 def life_histogram(title: str, lives: dict[str, list[int]]) -> Plot:
-    """Histogram of the lives of tracks [frames], by the occurrences of each life."""
+    """Histogram of track lengths [frames], by the occurrences of each length."""
     life = np.array(lives["values"], float)
     edges = np.linspace(0.5, max(life.max(initial=1.0), 1.0) + 0.5, 31)
     heights = np.histogram(life, edges, weights=np.array(lives["counts"], float))[0]

@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 
 from modt.sinks.output import writing
-from modt.viewer.look import COLOURS, THEME
+from modt.viewer.theme import COLOURS, THEME
 from modt_desk.reporting.document import TERMS, Cell, Document, Table
 from modt_desk.reporting.quantity import LEGEND
 

@@ -37,12 +37,12 @@ class Quantity:
         return "unavailable" if self.value is None else _MARKS[self.kind] + self._number()
 
     def text(self) -> str:
-        """As marked, with the interval if its ends differ in the digits shown."""
+        """Mark, value, unit, and the interval if its ends differ in the digits shown."""
         interval = self.interval()
         return self.marked() + (f" ({interval})" if interval else "")
 
     def interval(self) -> str:
-        """Its ends; empty if they do not differ in the digits shown."""
+        """Ends of the interval; empty if they do not differ in the digits shown."""
         low, high = format_number(self.low), format_number(self.high)
         return f"{low} to {high}" if low != high else ""
 

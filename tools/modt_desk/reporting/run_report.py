@@ -97,7 +97,7 @@ def _frames(run: Path) -> Iterator[Line]:
 
 
 def _facts(run: Path) -> dict[str, Any]:
-    """Content of run.yaml, with the default of every key that its profile lacks."""
+    """Content of run.yaml, with defaults for keys missing in its profile."""
     path = run / RUN
     try:
         text = path.read_text(encoding="utf-8")
@@ -146,7 +146,7 @@ def _ledger(sums: FrameSums) -> dict[str, Any]:
 
 
 def _series(sums: FrameSums, e1_s: Float64) -> dict[str, Any]:
-    """Means over the frames of each point, and the lives of the tracks."""
+    """Means over the frames of each point, and the lengths of the tracks."""
     measured = ("cpu_ms", "classified", "deferred", "proposals", "lives")
     column = dict(zip(COLUMNS, sums.series.means.T, strict=True))
     return {
@@ -254,7 +254,7 @@ def _stages(tree: dict[str, Any]) -> Table:
 
 
 def run_plots(tree: dict[str, Any]) -> list[Plot]:
-    """Plots over frames, over N_go and over the life of tracks."""
+    """Plots over frames, over N_go and over the lengths of tracks."""
     series, saved = tree["series"], tree["saved"]
     each = np.array(series["frames"], float)
     frames = np.cumsum(each) - each

@@ -1,4 +1,4 @@
-"""What a report needs of a run's records, summed while they are read: bounded memory at any length of the run."""
+"""Sums over a run's records for its report, in bounded memory at any length of the run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from modt_desk.reporting.frame_series import FrameSeries
 
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
 COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")
-"""Of the series: CPU time of the stages [s], counts, and points if all proposals were classified."""
+"""Columns of the series: CPU time of the stages [s], counts, and points if all proposals were classified."""
 
 
 class FrameSums:
@@ -55,7 +55,7 @@ class FrameSums:
         self.series.add([*cpu_s.values(), *counts])
 
     def finish(self) -> None:
-        """Count the lives of the tracks still alive."""
+        """Count the lengths of the tracks that have not ended."""
         self._end(self._life.keys())
 
     def column(self, name: str) -> float:

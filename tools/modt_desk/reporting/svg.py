@@ -19,7 +19,7 @@ CHARACTER = 10
 _MAX_POINTS = 400
 """Points drawn of a line at most, to keep the page small."""
 _LEAST_TICKS = 3
-"""Of a logarithmic axis, where there are so many."""
+"""Least number of ticks of a logarithmic axis, where it has so many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +32,12 @@ class Trace:
     dots: bool = False  # marks instead of a line
     dashed: bool = False
     colour: str = ""  # instead of that of its place
-    names: Sequence[str] = ()  # of each mark, instead of that of the trace
+    names: Sequence[str] = ()  # name of each mark, instead of that of the trace
     span: Float64 | None = None  # (n, 2) interval of the y of each mark
 
     @property
     def all_y(self) -> Float64:
-        """With the ends of intervals."""
+        """Values and ends of intervals."""
         return self.y if self.span is None else np.append(self.y, self.span)
 
 

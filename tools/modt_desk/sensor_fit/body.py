@@ -24,7 +24,7 @@ MIN_SWEEPS = 5
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """What is seen of the robot."""
+    """Visible parts of the robot."""
 
     sectors_deg: Float64  # (S, 2) from, to, counter-clockwise
     range_m: float  # of its farthest part

@@ -32,7 +32,7 @@ MOST_FLOORS, LEVEL_DEG = 10, 1.0
 """Sweeps whose floor is fitted, and tilt of a sensor that counts as level."""
 
 Finder = Callable[[Recording, ProfileConfig], Iterable[Finding]]
-"""Finds keys in a recording, given the profile that the finders before it have found."""
+"""Finds keys in a recording, given the profile with the keys that earlier finders have set."""
 
 
 def find_period(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
@@ -107,7 +107,7 @@ FINDERS: tuple[Finder, ...] = (
     *(find_period, find_pattern, find_mount),
     *(find_body_and_range, find_height, find_reflectance),
 )
-"""Each knows what those before it have found."""
+"""Finders in order: each uses the keys of those before it."""
 
 
 def fit(recording: Recording, finders: Sequence[Finder] = FINDERS) -> tuple[ProfileConfig, list[Finding]]:

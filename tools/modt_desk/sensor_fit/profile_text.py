@@ -13,7 +13,7 @@ WIDTH = 116
 
 
 def profile_text(title: str, findings: Sequence[Finding]) -> str:
-    """YAML of the values found; a comment states what each was measured by."""
+    """YAML of the fitted values; a comment states how each was measured."""
     lines = [f"# {title}"]
     stage = ""
     for found in sorted(findings, key=lambda f: [g.stage for g in findings].index(f.stage)):
@@ -39,5 +39,5 @@ def _plain(value: Any) -> str:
 
 
 def doubts(findings: Sequence[Finding]) -> list[str]:
-    """A line for each value that is not sure."""
+    """A line for each uncertain value."""
     return [f"{f.stage}.{f.key}: {f.evidence}" for f in findings if not f.sure]

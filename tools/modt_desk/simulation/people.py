@@ -13,7 +13,7 @@ from modt_desk.simulation.solids import Solids
 
 
 class Posture(IntEnum):
-    """What a person does."""
+    """Posture of a person."""
 
     STAND = 0
     WALK = 1

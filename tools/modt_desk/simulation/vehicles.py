@@ -8,7 +8,7 @@ from modt_desk.simulation.materials import Material
 from modt_desk.simulation.solids import Solids, Triple, box, cylinder, rod, rounded, wedge
 
 CLEARANCE_M = 0.07
-"""Between the roof of a car and the top of its annotated box."""
+"""Gap between the roof of a car and the top of its annotated box."""
 LEAN = 0.1
 """Inward slope of the sides of a van [m/m]."""
 PLATE_M = (0.52, 0.11)

@@ -8,11 +8,11 @@ from modt.types import Float32, Float64
 from modt_desk.evaluation.overlap import inside
 
 METRE = 80
-"""Pixels."""
+"""Pixels a metre."""
 MARGIN_M = 0.02
-"""Around the box, which is rounded."""
+"""Margin around the box, because recorded boxes are rounded."""
 MOST = 600
-"""Points drawn."""
+"""Most points drawn."""
 _STYLE = 'style="display:inline-block;width:auto;max-width:100%;margin-right:24px;overflow:visible"'
 
 

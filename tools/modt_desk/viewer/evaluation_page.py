@@ -1,4 +1,4 @@
-"""An evaluation to look at: precision and recall by range, their curves, and the lives of the tracks."""
+"""Page of an evaluation: precision and recall by range, their curves, and the lengths of tracks."""
 
 from __future__ import annotations
 

@@ -1,23 +1,23 @@
-"""How much of a scene a picture shows."""
+"""Extent of the scene that a picture shows."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from modt.types import Int
-from modt.viewer.look import REACH_M
+from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 
 _SIDE_M = 32.0
-"""Half of what is shown along y, where REACH_M is shown along x."""
+"""Half the height of a picture whose half width is REACH_M."""
 RINGS_M = {6.0: 2, 10.0: 5, 15.0: 5, 20.0: 10, 30.0: 10, REACH_M: 20}
 """Ranges that a picture may reach, and the distance of the rings in it."""
 _NEARLY = 0.95
-"""Part of what was tracked that is to be seen."""
+"""Share of the tracked boxes that must be visible."""
 
 
 def reach_m(tracks: Int) -> float:
-    """Half of what is shown along x, to see nearly all of (R, COLUMNS) rows of tracks; REACH_M at most."""
+    """Half the width of a picture that shows nearly all of (R, COLUMNS) rows of tracks; REACH_M at most."""
     seen = tracks[tracks[:, COLUMNS.index("seen")] > 0]
     if not len(seen):
         return REACH_M

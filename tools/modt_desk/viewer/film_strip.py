@@ -12,17 +12,17 @@ from matplotlib.figure import Figure
 from modt.sinks.output import writing
 from modt.sources.stream import Stream
 from modt.types import Float32, Float64
-from modt.viewer.look import COLOURS, LIGHT
+from modt.viewer.theme import COLOURS, LIGHT
 from modt_desk.evaluation.frames_by_number import FramesByNumber
 from modt_desk.evaluation.overlap import inside
 from modt_desk.evaluation.unlabelled import Mover
 
 PICTURES = 10
 ROOM_M = 1.0
-"""Shown around the box."""
+"""Margin shown around the box."""
 SIDE_IN, DPI = 1.4, 100
 SHADES = LIGHT["soft"], COLOURS[0]
-"""Points beside the box and in it."""
+"""Colours of points beside the box and in it."""
 
 
 def save_film_strips(folder: Path, movers: Sequence[Mover], stream: Stream) -> None:
@@ -51,7 +51,7 @@ def _around(points: Float32, box: Float64) -> Float32:
 
 
 def _reach_m(box: Float64) -> float:
-    """Half of what is shown along each side."""
+    """Half the side of a picture."""
     return float(box[3:6].max()) / 2 + ROOM_M
 
 

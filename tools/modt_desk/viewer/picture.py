@@ -20,9 +20,9 @@ from matplotlib.transforms import Bbox
 from modt.geometry import corners
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64
-from modt.viewer import look
-from modt.viewer.look import LIGHT, REACH_M
+from modt.viewer import theme
 from modt.viewer.point_cells import SIDE, Cells
+from modt.viewer.theme import LIGHT, REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.extent import RINGS_M, reach_m
 from modt_desk.viewer.recorded_run import RecordedRun
@@ -30,7 +30,7 @@ from modt_desk.viewer.truth_marks import LEGEND
 
 SIZE_IN = (12.8, 9.1)
 TRAIL = 30
-"""Frames."""
+"""Length of a trail [frames]."""
 TRIES = 6
 """Heights at which a label may stand above its box."""
 INK, SOFT, LINE, PAPER = (LIGHT[name] for name in ("ink", "soft", "line", "paper"))
@@ -51,7 +51,7 @@ def new_figure(width: int) -> Figure:
 
 
 def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells | None) -> None:
-    """Draw points, tracks, truth, and what the frame cost, in place of what the figure holds.
+    """Draw points, tracks, truth, and the cost of the frame, in place of the former content of the figure.
 
     Args:
         figure: drawn on.
@@ -92,10 +92,10 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     of = {name: column / SCALE.get(name, 1) for name, column in zip(COLUMNS, rows.T, strict=True)}
     kind, is_object = of["class"].astype(int), of["class"] > 0
     false = is_object & np.isin(of["id"], run.frames[at].get("false", ()))
-    names = [entry["name"] for entry in look.classes()]
-    fill = to_rgba_array([entry["colour"] for entry in look.classes()])[kind]
+    names = [entry["name"] for entry in theme.classes()]
+    fill = to_rgba_array([entry["colour"] for entry in theme.classes()])[kind]
     wrong = LEGEND["false"]["colour"]
-    edge = to_rgba_array([entry["colour"] for entry in look.states(run.states)])[of["state"].astype(int)]
+    edge = to_rgba_array([entry["colour"] for entry in theme.states(run.states)])[of["state"].astype(int)]
     box, xy = corners(np.stack([of[key] for key in BOX_KEYS], axis=1)), np.column_stack([of["x"], of["y"]])
     boxes = PolyCollection(box, gid="tracks", linestyles=np.where(of["seen"] > 0, "-", "--").tolist())
     boxes.set_facecolor(np.column_stack([fill[:, :3], np.where(is_object, 0.35, 0.1)]))
@@ -129,7 +129,7 @@ def _truth(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
         colour, missed = LEGEND[o["outcome"]]["colour"], o["outcome"] == "missed"
         axes.add_patch(Polygon(box, fill=False, edgecolor=colour, linewidth=3.0 if missed else 1.2, linestyle=":"))
         if missed:
-            labels.append((o["x"], box[:, 1].max(), f"missed {look.classes()[o['class']]['name']}", colour))
+            labels.append((o["x"], box[:, 1].max(), f"missed {theme.classes()[o['class']]['name']}", colour))
     return labels
 
 
@@ -144,7 +144,7 @@ def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
 
 
 def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
-    """What the frame was and cost."""
+    """Facts of the frame and its cost."""
     frame = run.frames[at]
     facts = [f"frame {frame['frame']}, {_time(frame['stamp_s'])}, mode {run.facts['mode']}"]
     facts.append(f"{frame['proposals']} proposals, budget {run.budget}")
@@ -159,8 +159,8 @@ def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
 
 def _legend(axes: Axes, run: RecordedRun, at: int) -> Legend:
     """Colours of the classes, the states and, where the frame has truth, of what became of it."""
-    outlines = look.states(run.states) + (list(LEGEND.values()) if "truth" in run.frames[at] else [])
-    entries = [(entry, True) for entry in look.classes()] + [(entry, False) for entry in outlines]
+    outlines = theme.states(run.states) + (list(LEGEND.values()) if "truth" in run.frames[at] else [])
+    entries = [(entry, True) for entry in theme.classes()] + [(entry, False) for entry in outlines]
     patches = [Patch(fill=f, color=e["colour"], linewidth=2, label=e["name"].replace("_", " ")) for e, f in entries]
     style = {"facecolor": PAPER, "edgecolor": "none", "labelcolor": SOFT, "fontsize": _TEXT_PT}
     return axes.legend(handles=patches, loc="lower left", handlelength=1, handleheight=1, **style)
@@ -188,7 +188,7 @@ def _write(axes: Axes, labels: Iterable[Label], taken: list[Bbox]) -> None:
 
 
 def _time(stamp_s: float) -> str:
-    """Seconds from the begin of a recording, or a date."""
+    """Seconds since the start of a recording, or a date."""
     if stamp_s < _DATES_S:
         return f"{stamp_s:.2f} s"
     return f"{datetime.fromtimestamp(stamp_s, timezone.utc):%Y-%m-%d %H:%M:%S.%f}"[:-4]

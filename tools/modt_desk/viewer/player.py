@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from modt.sinks.output import writing
-from modt.viewer import look
+from modt.viewer import theme
 from modt.viewer.html_page import content, page
 from modt.viewer.packed import packed_cells, packed_table
 from modt.viewer.point_cells import Cells
@@ -17,9 +17,9 @@ from modt_desk.viewer.truth_marks import LEGEND
 
 SCRIPT = Path(__file__).parent / "recorded.js"
 POINT_BYTES = 20_000_000
-"""Of the points of a page, about."""
+"""Approximate size of the points of a page."""
 CELL_BYTES = 1.5
-"""Of a cell, compressed and in base64."""
+"""Size of a cell, compressed and in base64."""
 
 
 def most_cells(n_frames: int) -> int:
@@ -55,11 +55,11 @@ def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: 
 
 
 def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any]:
-    """What the page knows beside the columns."""
+    """Content of the page beside the columns."""
     poses = run.poses.round(4).tolist()
     frames = [_rounded(f | {"pose": pose}) for f, pose in zip(run.frames, poses, strict=True)]
     judged = any("truth" in frame for frame in run.frames)
-    return content(look.states(run.states), run.budget, step_cm) | {
+    return content(theme.states(run.states), run.budget, step_cm) | {
         "frames": frames,
         "truth": LEGEND if judged else None,
         "reach_m": reach_m(run.tracks),

@@ -1,4 +1,4 @@
-"""What a run has recorded of its frames."""
+"""The recorded frames of a run."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class RecordedRun:
 
     @property
     def numbers(self) -> list[int]:
-        """Of the frames."""
+        """Numbers of the frames."""
         return [recorded["frame"] for recorded in self.frames]
 
     @property
@@ -102,7 +102,7 @@ class RecordedRun:
 
     @property
     def budget(self) -> str:
-        """What a frame may spend on classification, in words."""
+        """Budget of a frame for classification, in words."""
         scheduler = self.config.scheduler
         limits = {
             "calls": scheduler.calls_per_frame,
@@ -119,7 +119,7 @@ class RecordedRun:
 
     @property
     def live(self) -> bool:
-        """Of a live source, which no one can open again."""
+        """Whether its source was live and cannot be read again."""
         return self.facts["stream"]["path"] is None and bool(self.facts.get("service", False))
 
     def position(self, frame: int) -> int:

@@ -20,11 +20,11 @@ NO_CELLS = Cells(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 STEP_CM = 4
-"""Least width of a cell."""
+"""Least width of a cell [cm]."""
 
 
 class Grid:
-    """Sweeps to cells, in which the segmenter of a profile says what is ground."""
+    """Converts sweeps to cells; the segmenter of a profile finds the ground."""
 
     def __init__(self, config: ProfileConfig) -> None:
         self._segmenter = Segmenter(config.segmentation, config.sensor, FieldOfView())
@@ -44,7 +44,7 @@ class Grid:
 
 
 def sweeps(numbers: Sequence[int], stream: Stream, grid: Grid, most: int) -> Iterator[Cells]:
-    """Cells of each frame, by ascending number, at most so many; none where the stream lacks the frame."""
+    """Cells of each frame, by ascending number, at most so many; none if the stream does not hold the frame."""
     frames = FramesByNumber(stream.between(0, numbers[-1] + 1))
     for number in numbers:
         frame = frames.get(number)

@@ -1,4 +1,4 @@
-"""How the class of a track was decided: a page of its states, its views, its motion, and the posterior after each."""
+"""Page of a track: its states, views and motion, and how its class followed from them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Row = dict[str, float]
 
 
 def rows_of(run: RecordedRun, id_: int) -> list[Row]:
-    """What is recorded of a track, frame by frame [m, rad, m/s].
+    """Recorded rows of a track, frame by frame [m, rad, m/s].
 
     Raises:
         MisuseError: there is no such track.

@@ -1,4 +1,4 @@
-"""What is true of the frames of a run, and what it made of it."""
+"""Truth of the frames of a run, and the outcome of each object."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from modt.geometry import inverse, transform_boxes
 from modt.sinks.tracks import BOX_KEYS
 from modt.sources.stream import Stream
 from modt.types import NONE, Float32, Int
-from modt.viewer.look import COLOURS, Entry
+from modt.viewer.theme import COLOURS, Entry
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.overlap import inside
 from modt_desk.evaluation.rows import Rows
@@ -19,17 +19,17 @@ from modt_desk.evaluation.run_record import LABELS, RunRecord
 from modt_desk.evaluation.truth import FrameTruth, Truth
 
 MARGIN_M = 0.02
-"""Around the boxes of proposals, which are rounded."""
+"""Margin around the boxes of proposals, because they are rounded."""
 ERROR = "#d6177f"
 """Colour of errors: missed objects, whose outline is dotted, and false tracks."""
 _OUTCOMES = {"found": COLOURS[7], "missed": ERROR, "not judged": COLOURS[5], "false": ERROR}
 LEGEND: dict[str, Entry] = {name: {"name": name, "colour": colour} for name, colour in _OUTCOMES.items()}
-"""What became of labelled objects; `false`: tracks that are said to be what they are not."""
+"""Outcomes of labelled objects; `false`: tracks that are reported as a wrong class."""
 DRAWN = [BOX_KEYS.index(key) for key in ("x", "y", "l", "w", "yaw")]
 
 
 def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int, dict[str, Any]]:
-    """By number of a labelled frame: `truth`, its objects, and `false`, ids of tracks said to be what they are not.
+    """Map each labelled frame, by number, to `truth`, its objects, and `false`, ids of tracks of a wrong class.
 
     Judged as by modt evaluate; where the run was made without --labels, a proposal has the points in its box.
 
@@ -56,7 +56,7 @@ def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int
 
 
 def _objects(truth: FrameTruth, rows: Rows) -> list[dict[str, Any]]:
-    """Those of a class, in the frame of the sensor; found: and said to be what they are."""
+    """Objects of a class in the frame of the sensor; found: detected with the right class."""
     boxes = transform_boxes(inverse(truth.T_box_sensor), truth.box)[:, DRAWN]
     found = rows["said"] == rows["class"]
     outcome = np.where(found, "found", np.where(rows["to_segment"] & rows["to_classify"], "missed", "not judged"))

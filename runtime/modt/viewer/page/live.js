@@ -1,7 +1,7 @@
-// ---- a run that is going on: frames come as events, the last ones are kept; who looks at the newest sees the next
+// ---- a live run: frames arrive as events, the last ones are kept; the view follows while it shows the newest
 
 const HISTORY = 600; // frames
-const packedSweeps = [], said = document.querySelector("header span");
+const packedSweeps = [], notice = document.querySelector("header span");
 let waiting = 0, done = Promise.resolve(), lost = false;
 
 const packedSweep = (at) => packedSweeps[at];
@@ -32,10 +32,10 @@ function forget(old) {
 }
 
 const source = new EventSource("events");
-source.onopen = () => (lost ? location.reload() : (said.textContent = "live"));
+source.onopen = () => (lost ? location.reload() : (notice.textContent = "live"));
 source.onerror = () => {
   lost = true;
-  said.textContent = "does not answer: the run has ended, or too many look at it";
+  notice.textContent = "does not answer: the run has ended, or too many look at it";
 };
 source.onmessage = (event) => {
   if (waiting > 2) return; // a page that cannot keep up misses frames

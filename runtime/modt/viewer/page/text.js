@@ -16,7 +16,7 @@ function showFrame() {
     ["number", `${frame.frame}`],
     ["proposals", frame.proposals],
     ["tracks, lost among them", `${rows.length}, ${rows.filter((row) => !row.seen).length}`],
-    ["said to be objects", rows.filter((row) => row.class && row.seen).length],
+    ["reported as objects", rows.filter((row) => row.class && row.seen).length],
     ["classified, deferred", `${frame.classifications}, ${frame.deferred}`],
     ["budget", run.budget],
     ["CPU time", cpu ? `${cpu.toFixed(1)} ms` : "not recorded"],

@@ -1,4 +1,4 @@
-"""What pages and pictures share: the width that is shown, and the colours of classes, states and stages."""
+"""Look shared by pages and pictures: extent, and colours of classes, states and stages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ THEME = f"""
 """Colours of pages, for light and dark screens."""
 
 REACH_M = 45.0
-"""Half of the width that is shown [m]."""
+"""Half of the visible width [m]."""
 _GREY = COLOURS[5]
 _STATE_COLOURS = {
     "unmatched": _GREY,
@@ -41,7 +41,7 @@ _STATE_COLOURS = {
 
 
 def classes() -> list[Entry]:
-    """Of the classes, in their order."""
+    """Legend of the classes, in their order."""
     return [{"name": name, "colour": spec.colour} for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)]
 
 
@@ -51,5 +51,5 @@ def states(names: Iterable[str]) -> list[Entry]:
 
 
 def stages(names: Sequence[str] = STAGES) -> list[Entry]:
-    """Of the stages of a frame."""
+    """Legend of the stages of a frame."""
     return [{"name": name, "colour": COLOURS[k % len(COLOURS)]} for k, name in enumerate(names)]
