@@ -41,12 +41,11 @@ from modt.reporting.summary import Summary
 from modt.sinks import run_directory
 from modt.sinks.background import Background
 from modt.sinks.datagrams import Datagrams
-from modt.sinks.frame_lines import FrameLines
 from modt.sinks.output import LineFile
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import RunDirectory
-from modt.sinks.tracks import SCHEMA
+from modt.sinks.tracks import SCHEMA, frame_line
 from modt.sources.live import live_stream
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PAUSE_S, PacketReader
@@ -233,9 +232,9 @@ class Faults:
 class InTurn(Background[Any]):
     """A background writer that works when it is given something."""
 
-    def __init__(self, name: str, writer: Any, faults: Faults) -> None:
+    def __init__(self, name: str, writer: Any, faults: Faults, encode: Callable[[Any], Any] | None = None) -> None:
         with patch("threading.Thread.start"):
-            super().__init__(name, writer, 128, retry_s=0.0, clock=lambda: faults.now_s)
+            super().__init__(name, writer, 128, encode=encode, retry_s=0.0, clock=lambda: faults.now_s)
 
     def _put(self, job: Callable[[], None]) -> None:
         try:
@@ -342,7 +341,7 @@ class FaultyRun:
 
             source = Turns(faults, reader, send)
             sinks = {
-                "file": FrameLines(InTurn("file", LineFile[str](folder / "sink.jsonl", mode="ab"), faults)),
+                "file": InTurn("file", LineFile[str](folder / "sink.jsonl", mode="ab"), faults, frame_line),
                 "unix": Datagrams("unix", socket.AF_UNIX, str(folder / "notify")),
             }
             recording = Recording(
