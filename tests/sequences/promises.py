@@ -18,6 +18,7 @@ from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
 from modt.sinks.records import line
 from modt.sinks.tracks import frame_line
+from modt.tracking.background_map import CAPACITY
 from modt.types import NONE, Budget, Frame, FrameResult
 
 LONGEST_UNSEEN = 10
@@ -154,7 +155,7 @@ class Run:
         """Nothing is remembered but what recent frames have shown, and a map of a fixed size."""
         tracker: Any = self.pipeline.tracker
         assert len(result.tracks) <= sum(self.proposals[-most_frames(self.config.tracking) :])
-        assert len(tracker.background_map._top) <= tracker.background_map.config.capacity
+        assert len(tracker.background_map._top) <= CAPACITY
         landmarks: Any = self.pipeline.odometry._landmarks  # type: ignore[attr-defined]
         assert set(landmarks._id.tolist()) <= self._before
 

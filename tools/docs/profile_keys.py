@@ -1,4 +1,4 @@
-"""Generate the keys of a profile from the configuration: tables in docs/profile-keys.md, and their JSON Schema."""
+"""Generate the page of profile keys and their JSON Schema."""
 
 from __future__ import annotations
 

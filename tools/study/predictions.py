@@ -56,8 +56,7 @@ class Regime:
 
 
 def _network(name: str) -> str:
-    points = "max_points: 400, min_points: 400, batch: 1"
-    return f"classification: {{model: {name}, {points}}}\nscheduler: {{calls_per_frame: null}}\n"
+    return f"classification: {{model: {name}, likelihood: network, max_points: 400}}\nscheduler: {{calls_per_frame: null}}\n"
 
 
 def _range(metres: float) -> str:

@@ -33,9 +33,14 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     drop_in = "grant what the unit withholds; drop-ins that are not named are removed; repeatable"
     p.add_argument("--with", action="append", default=[], choices=drop_ins(), dest="drop_ins", help=drop_in)
     p.add_argument("--prefix", type=Path, metavar="DIR", help="environment that holds bin/modt (default: this one)")
-    example = "sudo modt service install --source velodyne:// --with lan-sensor --options '--profile vlp-16'"
-    options.add_examples(p, example)
-    for parser in (p, actions.add_parser("remove", help="stop the service and remove what install wrote")):
+    options.add_examples(
+        p,
+        "modt service install --source velodyne:// --with lan-sensor   as root: a Velodyne on the robot's network",
+        "modt service install --options=--profile=vlp-16   with the profile of the sensor",
+    )
+    q = actions.add_parser("remove", help="stop the service and remove what install wrote")
+    options.add_examples(q, "modt service remove   as root: undo modt service install")
+    for parser in (p, q):
         root = "system image (default: this system)"
         parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help=root)
         parser.set_defaults(run=run)
