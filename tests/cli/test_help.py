@@ -52,7 +52,7 @@ def test_every_command_has_examples_that_its_parser_takes(parser):
     for line in lines:
         example, meaning = re.fullmatch(r"  (.*?) {2,}(\S.*)", line).groups()
         assert meaning
-        words = shlex.split(re.sub(r"\beval\b|\$\(|\)|\||>.*|\bsource\b", "", example), posix=True)
+        words = shlex.split(re.sub(r"\beval\b|\$\(|\)|\||>.*|(?<!-)\bsource\b", "", example), posix=True)
         words = words[0].split() if len(words) == 1 else words
         assert " ".join(words).startswith(parser.prog)
         assert vars(parser.parse_args(words[len(parser.prog.split()) :]))

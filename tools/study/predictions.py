@@ -56,7 +56,8 @@ class Regime:
 
 
 def _network(name: str) -> str:
-    return f"classification: {{model: {name}, likelihood: network, max_points: 400}}\nscheduler: {{calls_per_frame: null}}\n"
+    classification = f"{{model: {name}, likelihood: network, max_points: 400}}"
+    return f"classification: {classification}\nscheduler: {{calls_per_frame: null}}\n"
 
 
 def _range(metres: float) -> str:
