@@ -9,6 +9,7 @@ from hypothesis.extra.numpy import arrays
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES
 from modt.geometry import rotation_zyx, se3
+from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
 from modt.sinks.records import BROKEN, line
 from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
 from modt.types import NONE, Cut
@@ -123,6 +124,17 @@ def tracks_one_by_one(r):
 def test_a_line_is_what_json_makes_of_the_tracks_one_by_one(r):
     record = frame_record(r)
     assert frame_line(r) == line(record | {"tracks": list(tracks_one_by_one(r))})
+
+
+@given(st.integers(0, 2**32))
+def test_numbers_are_written_like_repr(seed):
+    rng = np.random.default_rng(seed)
+    lengths, likely = rng.normal(0, 10.0 ** rng.integers(-4, 7), 200), rng.random(200) ** rng.integers(1, 12)
+    for text, rounded in (
+        (rounded_to_3(lengths), np.round(lengths, 3)),
+        (probabilities(likely), np.round(likely, 6)),
+    ):
+        assert decode(join_columns(200, text, ",")) == "".join(f"{v!r}," for v in rounded.tolist())
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from functools import lru_cache
 
 import numpy as np
 
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES
+from modt.sinks import json_columns as text
 from modt.sinks.records import line
 from modt.types import NONE, FrameResult
 
@@ -22,7 +24,7 @@ TRACK = (
     f'{{"id":%d,"state":%s,"class":%s,"posterior":{PER_CLASS},"witness":{PER_CLASS},"viewed":%s,"final":%s,'
     f'"uncertain":%s,"proposal":%s,"points":%d,"age":%d,"missed":%d,"box":%s,"world":{WORLD}}}'
 )
-"""A track, written by one formatting; `json` would take twice the time."""
+"""Format of a track. Columns of text, `_by_columns`, give the same characters in a third of the CPU time."""
 BOOLEANS, CLASSES = ("false", "true"), tuple(map(json.dumps, CLASS_NAMES))
 UNCERTAIN = ("null", json.dumps(UNKNOWN_NEAR))
 NUMBER_BYTES = 32
@@ -37,7 +39,8 @@ class _Latest:
 
     def of(self, result: FrameResult) -> str:
         if result is not self.result:
-            self.line, self.result = f"{_head(result)},{_tracks(_rows(result))}", result
+            rows = _by_columns(result) if _in_tables(result) else ",".join(_rows(result))
+            self.line, self.result = f"{_head(result)},{_tracks(rows)}", result
         return self.line
 
 
@@ -65,7 +68,7 @@ def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
     if len(whole) <= max_bytes:
         return [whole]
     head = _head(result)
-    room = max_bytes - len(f'{head},"part":,"parts":,{_tracks([])}') - NUMBER_BYTES
+    room = max_bytes - len(f'{head},"part":,"parts":,{_tracks("")}') - NUMBER_BYTES
     parts: list[list[str]] = [[]]
     left = room
     for row in _rows(result):
@@ -74,7 +77,7 @@ def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
             parts.append([])
             left = room - len(row) - 1
         parts[-1].append(row)
-    return [f'{head},"part":{k},"parts":{len(parts)},{_tracks(rows)}' for k, rows in enumerate(parts)]
+    return [f'{head},"part":{k},"parts":{len(parts)},{_tracks(",".join(rows))}' for k, rows in enumerate(parts)]
 
 
 def _head(result: FrameResult) -> str:
@@ -92,8 +95,8 @@ def _head(result: FrameResult) -> str:
     return line(fields)[: -len("}\n")]
 
 
-def _tracks(rows: list[str]) -> str:
-    return f'"tracks":[{",".join(rows)}]}}\n'
+def _tracks(rows: str) -> str:
+    return f'"tracks":[{rows}]}}\n'
 
 
 def _rows(result: FrameResult) -> list[str]:
@@ -139,3 +142,67 @@ def _rows(result: FrameResult) -> list[str]:
             *(column.tolist() for column in columns), strict=True
         )
     ]
+
+
+TEXT_OF_CLASS, TEXT_OF_DOUBT, TEXT_OF_BOOLEAN = map(text.encode_table, (CLASSES, UNCERTAIN, BOOLEANS))
+NULL = text.encode("null")[0]
+
+
+def _in_tables(result: FrameResult) -> bool:
+    """Whether the tables of text hold every number; false for numbers that are not finite."""
+    tracks, boxes = result.tracks, result.proposals.box
+    lengths = all((np.abs(values) < text.LIMIT - 1).all() for values in (tracks.x, tracks.witness, boxes))
+    counts = all((values < text.LIMIT).all() for values in (tracks.id, tracks.points, tracks.age, tracks.missed))
+    return bool(len(boxes) and lengths and counts and (np.abs(tracks.posterior - 0.5) <= 0.5).all())
+
+
+def _by_columns(result: FrameResult) -> str:
+    """The rows joined by commas, made column by column."""
+    tracks = result.tracks
+    counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
+    id_, proposal, points, age, missed = text.integers(np.stack(counts))
+    box = _objects(BOX_KEYS, text.rounded_to_3(result.proposals.box[tracks.proposal]))
+    for value in (proposal, box):
+        value[tracks.proposal == NONE] = 0
+        value[tracks.proposal == NONE, 0] = NULL
+    columns = {
+        "id": id_,
+        "state": _states(result.state_names)[tracks.state],
+        "class": TEXT_OF_CLASS[tracks.object_class],
+        "posterior": _lists(text.probabilities(tracks.posterior)),
+        "witness": _lists(text.rounded_to_3(tracks.witness)),
+        "viewed": TEXT_OF_BOOLEAN[tracks.viewed.astype(np.int64)],
+        "final": TEXT_OF_BOOLEAN[tracks.final.astype(np.int64)],
+        "uncertain": TEXT_OF_DOUBT[unknown_near(result).astype(np.int64)],
+        "proposal": proposal,
+        "points": points,
+        "age": age,
+        "missed": missed,
+        "box": box,
+        "world": _objects(WORLD_KEYS, text.rounded_to_3(tracks.x)),
+    }
+    keyed = [part for key, column in columns.items() for part in (f',"{key}":', column)]
+    keyed[0] = ',{"id":'
+    return text.decode(text.join_columns(len(tracks), *keyed, "}"))[1:]
+
+
+@lru_cache
+def _states(names: tuple[str, ...]) -> text.Text:
+    """(S, w) text of the names of the states."""
+    return text.encode_table([json.dumps(name) for name in names])
+
+
+def _objects(keys: tuple[str, ...], values: text.Text) -> text.Text:
+    """(n, w) text of JSON objects with some keys and values (n, k, v)."""
+    return _enclosed([f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)], values, "}")
+
+
+def _lists(values: text.Text) -> text.Text:
+    """(n, w) text of JSON lists of values (n, k, v)."""
+    return _enclosed(["," if k else "[" for k in range(values.shape[1])], values, "]")
+
+
+def _enclosed(prefixes: list[str], values: text.Text, end: str) -> text.Text:
+    """(n, w) text of values (n, k, v), each after its prefix."""
+    parts = [part for k, prefix in enumerate(prefixes) for part in (prefix, values[:, k])]
+    return text.join_columns(len(values), *parts, end)
