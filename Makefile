@@ -1,5 +1,5 @@
 # Two commands, each does its own set-up on a machine that has Python 3.10 or later and make:
-#   make replay   the whole method on the embedded stream
+#   make replay   the whole method on the embedded stream, and a page that plays it
 #   make test     every check
 # For those who change it: `make quick` (the quick tests, a minute on two cores), `make check` (the checks short of the tests), `make format`, `make hooks` (checks at each commit).
 PYTHON ?= python3
@@ -11,7 +11,8 @@ BIN    := $(VENV)/bin
 replay: $(VENV)/.run
 	$(BIN)/modt replay --out runs/embedded
 	$(BIN)/modt-profile report runs/embedded
-	@echo "To look at it: $(BIN)/modt view runs/embedded, then open runs/embedded/view.html in a browser"
+	$(BIN)/modt view runs/embedded
+	@echo "To look at it: open runs/embedded/view.html in a browser"
 
 test: check
 	$(BIN)/python -m pytest
