@@ -61,7 +61,7 @@ class Witness:
 
 @dataclass(frozen=True)
 class Job:
-    """What a process is to do."""
+    """Task of one process."""
 
     target: Any
     seconds: float

@@ -81,7 +81,7 @@ def parse_address(text: str, schemes: Mapping[str, Scheme]) -> Address:
 
 
 def open_address(text: str, schemes: Mapping[str, Scheme], *arguments: object) -> Any:
-    """What the scheme's opener makes of an address and further arguments.
+    """Open an address by the opener of its scheme; returns what that opener returns.
 
     Raises:
         MisuseError: another scheme or option, a missing extra, or what cannot be opened.

@@ -1,4 +1,4 @@
-"""The table of object classes: all that the program knows of a class beside what its models learnt."""
+"""The table of object classes: everything that is known of a class outside the trained models."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class ObjectClass(IntEnum):
-    """What a proposal can be; the value is its index in every posterior and in CLASSES."""
+    """Class of a proposal; the value is its index in every posterior and in CLASSES."""
 
     BACKGROUND = 0
     CAR = 1

@@ -1,4 +1,4 @@
-"""What the stages hand to one another.
+"""Data that the stages exchange.
 
 Everything is a structure of arrays: a frame's work is vectorised over points, proposals and tracks. P is the
 number of proposals in a frame, M the number of tracks alive, N the number of points.
@@ -204,7 +204,7 @@ class Tracks:
     # Column of the scheduler
     waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
     # Column of the decision
-    object_class: Int = column(int)  # the class that is said
+    object_class: Int = column(int)  # the reported class
 
     def __len__(self) -> int:
         return len(self.id)
@@ -268,7 +268,7 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class TrackedFrame:
-    """What tracking hands to the stages after it."""
+    """Result of tracking, for the stages after it."""
 
     tracks: Tracks  # the live table
     proposals: Proposals  # of the frame, regrouped where the tracks know better; each belongs to one track
@@ -277,7 +277,7 @@ class TrackedFrame:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What one frame may spend on classification; None where nothing binds."""
+    """Limits of one frame's classification; None means no limit."""
 
     calls: int | None = None  # proposals classified
     cpu_ms: float | None = None  # CPU time by the cost model [ms]
@@ -289,7 +289,7 @@ UNLIMITED = Budget()
 
 @dataclass(frozen=True, slots=True)
 class FrameResult:
-    """What is known after a frame."""
+    """Result of a frame."""
 
     frame: Frame  # level, as are the frame of the sensor in all that follows and its pose
     T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp, as the odometry placed it

@@ -32,7 +32,7 @@ class NoCompilerError(Exception):
 
 
 def source_hash() -> str:
-    """Of the C sources: a library knows which it is made of."""
+    """Hash of the C sources. Each library holds that of the sources it was built from."""
     content = b"".join(path.read_bytes() for path in sorted(FOLDER.glob("*.[ch]")))
     return hashlib.sha256(content).hexdigest()[:16]
 
