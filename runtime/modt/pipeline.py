@@ -138,7 +138,7 @@ class Pipeline:
         return FrameResult(frame, T_world_sensor, proposals, final, names, chosen.deferred, classified)
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
-        """(R, 4) likelihoods; the ledger counts the points, and the scheduler learns the cost where the time is limited."""
+        """(R, 4) likelihoods. The ledger counts the points; where time is limited, the scheduler learns the cost."""
         cost, count = self.scheduler.cost, proposals.count[which]
         classify = self.classifier.classify
         likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
