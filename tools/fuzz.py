@@ -28,9 +28,9 @@ from typing import Any
 from tools.options import parser
 
 PATIENCE_S = 60.0
-"""After its seconds, until a process that does not answer is ended."""
+"""Time after its seconds before a process that does not answer is ended [s]."""
 MEMORY = Path("/dev/shm")
-"""Where the files are that an input is written to, if there is such a file system."""
+"""Folder of the files that inputs are written to, if there is such a file system."""
 Feed = Callable[[bytes], None]
 
 
@@ -43,7 +43,7 @@ class Witness:
         self._memory = mmap.mmap(-1, self.HEAD.size + self.MOST_BYTES)
 
     def see(self, raw: bytes) -> None:
-        """An input is about to be read."""
+        """Record an input that is about to be read."""
         kept = raw[: self.MOST_BYTES]
         self.HEAD.pack_into(self._memory, 0, self.executions + 1, len(kept))
         self._memory[self.HEAD.size : self.HEAD.size + len(kept)] = kept
@@ -109,7 +109,7 @@ def _instrumented(coverage: bool) -> AbstractContextManager[object]:
 
 
 def _supervise(job: Job) -> int:
-    """Run a job, tell of it, and return the number of its findings."""
+    """Run a job, report it, and return the number of its findings."""
     began = time.monotonic()
     process = multiprocessing.get_context("fork").Process(target=_fuzz, args=(job,))
     process.start()

@@ -45,10 +45,10 @@ class Scheme:
     """How the addresses of a scheme are opened.
 
     Attributes:
-        form: of its addresses, for messages and help.
-        opener: of an Address; it imports the modules that it needs, which may need an extra.
-        options: that its addresses may have.
-        extra: of modt, that it needs.
+        form: pattern of its addresses, for messages and help.
+        opener: function that opens an Address; it imports the modules that it needs, which may need an extra.
+        options: names of the options that its addresses may have.
+        extra: extra of modt that it needs.
     """
 
     form: str

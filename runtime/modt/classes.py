@@ -24,7 +24,7 @@ class ClassSpec:
         semantic_kitti: SemanticKITTI labels that count as the class.
         max_length_m, max_width_m: greatest size of one object, with room for the noise of its outline [m].
         person: is or carries a person: never part of a larger object.
-        missed_cost: of a missed object over that of a false one.
+        missed_cost: cost of a missed object, relative to a false one.
         point_change: relative change of the number of points that makes a view independent (alpha of Equation 4).
         colour: in pictures and pages.
     """

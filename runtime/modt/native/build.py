@@ -28,7 +28,7 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined",
 
 
 class NoCompilerError(Exception):
-    """There is none, or it fails; the message says which and why."""
+    """No C compiler, or one that fails; the message says which and why."""
 
 
 def source_hash() -> str:
