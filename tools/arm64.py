@@ -31,7 +31,7 @@ SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates,gcc,libc6
 PLATFORM = "aarch64-manylinux_2_28"
 LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
 LACKING = {"cyclonedds", "ruff", "mypy"}
-"""Packages of the extra [test] that have no wheel for this platform, or no use there."""
+"""Of the extra [test]: without a wheel for this platform, or of no use there."""
 TESTS = (
     *("golden", "segmentation", "odometry", "tracking", "desk/box_tracking", "geometry", "classification", "energy"),
     *("native", "sources", "sinks", "ros2", "app", "profile", "crash", "test_library.py", "test_pipeline.py"),
@@ -49,7 +49,7 @@ CPU part\t: 0xd08
 CPU revision\t: 3
 
 """
-"""Entry of /proc/cpuinfo for a core of a Raspberry Pi 4. ONNX Runtime ends where it reads that of the host."""
+"""Of /proc/cpuinfo on the core of a Raspberry Pi 4: that of the machine below ends ONNX Runtime."""
 BINFMT = Path("/proc/sys/fs/binfmt_misc")
 NAME = "modt-aarch64"
 MAGIC = r"\x7fELF\x02\x01\x01\x00\x00\x00\x00\x00\x00\x00\x00\x00\x02\x00\xb7\x00"

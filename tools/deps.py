@@ -27,7 +27,7 @@ from tools.options import parser
 ROOT = Path(__file__).resolve().parents[1]
 LOCK = ROOT / "systemd" / "requirements.txt"
 EXTRAS = ("velodyne", "ros2", "foxglove")
-"""Extras of the service's environment. `ouster` is left out, as it brings a web server and a viewer."""
+"""Of the service's environment; `ouster` is left out, it brings a web server and a viewer."""
 FAST = "not slow and not install and not kitti"
 OLDEST, NEWEST = "lowest-direct", "highest"
 EPOCH = "1700000000"

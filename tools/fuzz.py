@@ -28,9 +28,9 @@ from typing import Any
 from tools.options import parser
 
 PATIENCE_S = 60.0
-"""Time after its seconds before a process that does not answer is ended [s]."""
+"""After its seconds, until a process that does not answer is ended."""
 MEMORY = Path("/dev/shm")
-"""Folder of the files that inputs are written to, if there is such a file system."""
+"""Where the files are that an input is written to, if there is such a file system."""
 Feed = Callable[[bytes], None]
 
 
@@ -43,7 +43,7 @@ class Witness:
         self._memory = mmap.mmap(-1, self.HEAD.size + self.MOST_BYTES)
 
     def see(self, raw: bytes) -> None:
-        """Record an input that is about to be read."""
+        """An input is about to be read."""
         kept = raw[: self.MOST_BYTES]
         self.HEAD.pack_into(self._memory, 0, self.executions + 1, len(kept))
         self._memory[self.HEAD.size : self.HEAD.size + len(kept)] = kept
@@ -61,7 +61,7 @@ class Witness:
 
 @dataclass(frozen=True)
 class Job:
-    """Task of one process."""
+    """What a process is to do."""
 
     target: Any
     seconds: float
@@ -109,7 +109,7 @@ def _instrumented(coverage: bool) -> AbstractContextManager[object]:
 
 
 def _supervise(job: Job) -> int:
-    """Run a job, report it, and return the number of its findings."""
+    """Run a job, tell of it, and return the number of its findings."""
     began = time.monotonic()
     process = multiprocessing.get_context("fork").Process(target=_fuzz, args=(job,))
     process.start()

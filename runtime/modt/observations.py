@@ -96,7 +96,7 @@ def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKern
 
 @dataclass(frozen=True, slots=True)
 class StaticTracks:
-    """Tracks after a frame, as the odometry uses them; M rows in the order of their ids.
+    """What the odometry needs to know of the tracks after a frame; M rows in the order of their ids.
 
     Attributes:
         id: (M,) ascending.

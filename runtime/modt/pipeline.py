@@ -64,13 +64,13 @@ class Tracker(Protocol):
         """Name of each value of tracks.state."""
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """Tracks that a frame at this time may continue, as the odometry uses them."""
+        """What the odometry needs to know of the tracks that a frame at this time may continue."""
 
     def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """Predict, associate and update; afterwards every proposal belongs to one track."""
 
     def conclude(self, rows: Int, certain: Bool) -> Tracks:
-        """Fire the events of the frame's classifications; returns a copy of the tracks."""
+        """Tell the state machine of the frame's classifications; a copy of the tracks."""
 
 
 class Classifier(Protocol):
@@ -84,13 +84,13 @@ class Classifier(Protocol):
 
 
 class Fusion(Protocol):
-    """Choice of the views to classify, and their combination."""
+    """Which views count, and what they add up to."""
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks whose view of this frame is worth a classification."""
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Write the posterior of the rows; (R,) whether the class of each is confirmed now."""
+        """Write the posterior of the rows; (R,) whether each is certain now."""
 
 
 class Decision(Protocol):
@@ -98,10 +98,10 @@ class Decision(Protocol):
 
     @property
     def frequency(self) -> Float64:
-        """(4,) share of each class among the proposals of the stream."""
+        """(4,) of the classes among the proposals of the stream."""
 
     def decide(self, tracks: Tracks) -> None:
-        """Write the reported class of every track."""
+        """Write the class that is said of every track."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ class Pipeline:
         return FrameResult(frame, T_world_sensor, proposals, final, names, chosen.deferred, classified)
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
-        """(R, 4) likelihoods. The ledger counts the points; where time is limited, the scheduler learns the cost."""
+        """(R, 4) likelihoods; the ledger counts the points, and the scheduler is told the price of limited time."""
         cost, count = self.scheduler.cost, proposals.count[which]
         classify = self.classifier.classify
         likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
