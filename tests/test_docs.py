@@ -84,24 +84,24 @@ def test_the_way_in_names_the_steps_in_order():
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", DOCS / "library.md"], ids=lambda p: p.name)
-def test_the_examples_of_the_library_run(page, capsys, tmp_path, monkeypatch):
-    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+def test_the_example_of_the_library_runs(capsys, tmp_path, monkeypatch):
+    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "library.md").read_text(), re.DOTALL)
     frames = list(SyntheticStream("street", "vlp-16", 0.5, seed=3))
     scans = tmp_path / "DRIVE" / "velodyne_points" / "data"
     scans.mkdir(parents=True)
     for number, frame in enumerate(frames):
         frame.points.tofile(scans / f"{number:010}.bin")
     monkeypatch.chdir(tmp_path)
-    exec(code, {"sweeps": [(frame.stamp_s, frame.points, frame.T_world_sensor) for frame in frames]})
+    exec(code, {})
     assert {line.split()[1] for line in capsys.readouterr().out.splitlines()} & set(CLASS_NAMES)
 
 
-def test_modules_of_the_glossary_exist():
-    modules = re.findall(r"`([\w/]+\.py)`", (DOCS / "glossary.md").read_text())
+@pytest.mark.parametrize("page", ["glossary.md", "life-of-a-frame.md"])
+def test_modules_named_by_their_files_exist(page):
+    modules = re.findall(r"`([\w/]+\.py)`", (DOCS / page).read_text())
     places = (ROOT / "runtime" / "modt", ROOT / "tools")
     assert [module for module in modules if not any((place / module).is_file() for place in places)] == []
-    assert len(modules) > 30
+    assert len(modules) > 10
 
 
 def test_the_formats_name_every_field():

@@ -33,8 +33,8 @@ LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
 LACKING = {"cyclonedds", "ruff", "mypy"}
 """Of the extra [test]: without a wheel for this platform, or of no use there."""
 TESTS = (
-    *("golden", "segmentation", "odometry", "tracking", "box_tracking", "geometry", "classification", "energy"),
-    *("native", "sources", "sinks", "ros2", "service", "profile", "crash", "test_library.py", "test_pipeline.py"),
+    *("golden", "segmentation", "odometry", "tracking", "desk/box_tracking", "geometry", "classification", "energy"),
+    *("native", "sources", "sinks", "ros2", "app", "profile", "crash", "test_library.py", "test_pipeline.py"),
 )
 BEYOND = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
 """The emulator does not hand over the kernel's count of dropped datagrams."""

@@ -1,4 +1,4 @@
-"""modt: finds and tracks what moves around a robot, on one CPU core, and accounts for the energy that takes.
+"""modt: detects and tracks what moves around a robot, on one CPU core, and accounts for the energy that takes.
 
 Names are imported when they are first used: the command line pins the process to its core before NumPy loads.
 """

@@ -1,4 +1,4 @@
-"""The table of object classes: all that the program knows of a class beside what its models learnt."""
+"""The table of object classes: everything that is known of a class outside the trained models."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class ObjectClass(IntEnum):
-    """What a proposal can be; the value is its index in every posterior and in CLASSES."""
+    """Class of a proposal; the value is its index in every posterior and in CLASSES."""
 
     BACKGROUND = 0
     CAR = 1
@@ -24,7 +24,7 @@ class ClassSpec:
         semantic_kitti: SemanticKITTI labels that count as the class.
         max_length_m, max_width_m: greatest size of one object, with room for the noise of its outline [m].
         person: is or carries a person: never part of a larger object.
-        missed_cost: of a missed object over that of a false one.
+        missed_cost: cost of a missed object, relative to a false one.
         point_change: relative change of the number of points that makes a view independent (alpha of Equation 4).
         colour: in pictures and pages.
     """

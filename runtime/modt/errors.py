@@ -19,7 +19,7 @@ class ModtError(Exception):
         self.subject, self.cause, self.remedy = str(subject), cause, remedy
 
     def __reduce__(self) -> tuple[type[ModtError], tuple[str, str, str]]:
-        """Arguments to make it again from, in the process that waits for the one that failed."""
+        """Arguments from which a process makes this error again that waits for the process in which it was raised."""
         return type(self), (self.subject, self.cause, self.remedy)
 
 

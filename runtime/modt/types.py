@@ -1,4 +1,4 @@
-"""What the stages hand to one another.
+"""Data that the stages exchange.
 
 Everything is a structure of arrays: a frame's work is vectorised over points, proposals and tracks. P is the
 number of proposals in a frame, M the number of tracks alive, N the number of points.
@@ -31,9 +31,9 @@ Bool = NDArray[np.bool_]
 NONE = -1
 """Index of nothing: a track without a proposal, a proposal without a track."""
 UNRECORDED = -1.0
-"""Reflectance of a return of which none was recorded; any below 0 is none."""
+"""Reflectance of a return whose reflectance was not recorded; any value below 0 means the same."""
 N_REFLECTANCE = 5
-"""Numbers that tell of the reflectance of a proposal."""
+"""Number of statistics of a proposal's reflectance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +46,11 @@ class Frame:
         points: (N, 4) float32 x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1] or
             UNRECORDED. Finite throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
-        restarts: times that the odometry has begun anew, in a world of which the one before says nothing.
+        restarts: number of times that the odometry has begun anew in a world unrelated to the one before.
         turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
             ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
             stamp, compensated or by a sensor that does not turn.
-        steady_s: the time by a clock that nobody sets, where the one of the stamps may be [s]; None: the stamp.
+        steady_s: time by a clock that nobody sets [s], where that of the stamps may be set; None: the stamp.
         R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
         frame_id: name of the frame of the points in the messages they came in; "" where those name none.
     """
@@ -204,20 +204,20 @@ class Tracks:
     # Column of the scheduler
     waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
     # Column of the decision
-    object_class: Int = column(int)  # the class that is said
+    object_class: Int = column(int)  # the reported class
 
     def __len__(self) -> int:
         return len(self.id)
 
     @property
     def viewed(self) -> Bool:
-        """(M,) whether the network ever saw it."""
+        """(M,) whether the network has classified it at least once."""
         viewed: Bool = self.key_points > 0
         return viewed
 
     @property
     def inherited(self) -> Bool:
-        """(M,) whether the class is final without any view: that of a remembered background place."""
+        """(M,) whether the class is confirmed without any view, by a remembered background place."""
         inherited: Bool = self.final & ~self.viewed
         return inherited
 
@@ -268,7 +268,7 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class TrackedFrame:
-    """What tracking hands to the stages after it."""
+    """Result of tracking, for the stages after it."""
 
     tracks: Tracks  # the live table
     proposals: Proposals  # of the frame, regrouped where the tracks know better; each belongs to one track
@@ -277,7 +277,7 @@ class TrackedFrame:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What one frame may spend on classification; None where nothing binds."""
+    """Limits of one frame's classification; None means no limit."""
 
     calls: int | None = None  # proposals classified
     cpu_ms: float | None = None  # CPU time by the cost model [ms]
@@ -289,7 +289,7 @@ UNLIMITED = Budget()
 
 @dataclass(frozen=True, slots=True)
 class FrameResult:
-    """What is known after a frame."""
+    """Result of a frame."""
 
     frame: Frame  # level, as are the frame of the sensor in all that follows and its pose
     T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp, as the odometry placed it

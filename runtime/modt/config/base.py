@@ -37,13 +37,13 @@ def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
 def per_class(column: str, low: float, high: float, meaning: str, classes: tuple[ObjectClass, ...] = OBJECTS) -> Any:
     """Field of a number for each class; the defaults are a column of the class table."""
     values = tuple(getattr(CLASSES[c], column) for c in classes)
-    meaning = f"{meaning}: {', '.join(CLASS_NAMES[c] for c in classes)}"
+    meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in classes)}."
     return field(default=values, metadata={"low": low, "high": high, "length": len(classes), "meaning": meaning})
 
 
 def shares(high: float, meaning: str) -> Any:
     """Field of a share for each class of objects. The default is null."""
-    meaning = f"{meaning}: {', '.join(CLASS_NAMES[c] for c in OBJECTS)}"
+    meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in OBJECTS)}."
     return field(default=None, metadata={"low": 0.0001, "high": high, "length": len(OBJECTS), "meaning": meaning})
 
 

@@ -15,15 +15,22 @@ BATCH = 4
 class ClassificationConfig(StageConfig):
     """The network and its input (section V-A)."""
 
-    model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
+    model: str = field(
+        default="pointnet-kitti", metadata={"meaning": "Name of a model in models/, or path of an .onnx file."}
+    )
     likelihood: str = choice(
         "pooled",
         ("pooled", "network"),
-        "pooled: the network with the classifiers of box and reflectance, on a proposal's own points; "
-        "network: as in the paper the network alone, on max_points points, one proposal a call",
+        "How likely a view is for each class. pooled: by the network together with the classifiers of box and "
+        "reflectance, on the proposal's own points. network: as in the paper by the network alone, on exactly "
+        "max_points points, one proposal a call.",
     )
     max_points: int = number(
-        128, 8, 4096, "", "points of a proposal handed to the network; of more an even subsample"
+        128,
+        8,
+        4096,
+        "",
+        "Greatest number of points of a proposal that the network sees; larger ones are subsampled evenly.",
     )
 
     @property
@@ -39,52 +46,62 @@ class ClassificationConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SchedulerConfig(StageConfig):
-    """Budget of classification per frame; none: unlimited."""
+    """Budget of classification. Null means no limit, and the limit that is reached first applies."""
 
-    calls_per_frame: int | None = number(16, 0, 10000, "", "proposals classified in a frame")
+    calls_per_frame: int | None = number(16, 0, 10000, "", "Greatest number of proposals classified in a frame.")
     cpu_ms_per_frame: float | None = number(
-        None, 0.0, 10000.0, "ms", "CPU time of classification a frame, on average over a second"
+        None, 0.0, 10000.0, "ms", "CPU time that classification may take in a frame, on average over a second."
     )
     energy_mJ_per_frame: float | None = number(
-        None, 0.0, 100000.0, "mJ", "energy of classification a frame above idle, on average over a second"
+        None,
+        0.0,
+        100000.0,
+        "mJ",
+        "Energy above idling that classification may take in a frame, on average over a second.",
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionConfig(StageConfig):
-    """The class that is reported of a track."""
+    """The reported class of a track."""
 
     rule: str = choice(
         "adapted",
         ("adapted", "likeliest"),
-        "adapted: the class frequency of the stream counts, and a reported class is kept down to a share of its "
-        "threshold; likeliest: neither",
+        "How the class is chosen. adapted: posteriors are adapted to the class frequency of the stream, and a "
+        "reported class is kept down to a fraction of its threshold. likeliest: the class of the greatest posterior.",
     )
     missed_cost: tuple[float, ...] = per_class(
         "missed_cost",
         0.01,
         1000.0,
-        "cost of a missed object over that of a false one; reported from a probability of 1 / (1 + cost) on",
+        "Cost of a missed object, relative to a false one. Objects are reported from a posterior of 1 / (1 + cost).",
     )
     frequency: tuple[float, ...] | None = shares(
-        0.33, "frequency of the classes among proposals at the start; null: the one that the model assumes"
+        0.33, "Share of each class among the proposals at the start of a run. Null: as the model assumes."
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FusionConfig(StageConfig):
-    """Views, boxes and motion fused to a class, and final classes (section V-C, Figs. 10 and 11)."""
+    """Fusion of views, boxes and motion to a class, and its confirmation (section V-C, Figs. 10 and 11)."""
 
-    rule: str = choice("mean", ("mean", "product"), "how views are fused; product: Equation 6 of the paper")
-    object_threshold: float = number(0.9, 0.25, 1.0, "", "probability at which the class of an object is final")
-    min_object_probability: float = number(
-        0.1, 0.0, 1.0, "", "a track is classified from this probability of an object on, by its box and motion"
+    rule: str = choice(
+        "mean",
+        ("mean", "product"),
+        "How the views of a track are combined. mean: averaged. product: multiplied, Equation 6 of the paper.",
     )
-    start_frame: int = number(4, 1, 1000, "frames", "age of a track from which views are multiplied")
+    object_threshold: float = number(0.9, 0.25, 1.0, "", "Posterior from which the class of an object is confirmed.")
+    min_object_probability: float = number(
+        0.1, 0.0, 1.0, "", "Tracks that are less likely an object by their box and motion are not classified."
+    )
+    start_frame: int = number(
+        4, 1, 1000, "frames", "Age of a track from which its views are combined, with rule product."
+    )
     point_change: tuple[float, ...] = per_class(
         "point_change",
         0.0,
         10.0,
-        "relative change of points (Equation 4) from which a view is independent",
+        "Relative change of the number of points (Equation 4) from which a view is independent, with rule product.",
         tuple(CLASSES),
     )

@@ -9,6 +9,12 @@ from modt.config.base import StageConfig, number
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryConfig(StageConfig):
-    """Poses received by a socket, in effect with `--odometry udp://` and `unix://`."""
+    """Poses from another program, in effect with `--odometry udp://`, `unix://` and `ros2://`."""
 
-    max_speed_mps: float = number(60.0, 0.1, 1000.0, "m/s", "of the sensor; beyond it the sender has restarted")
+    max_speed_mps: float = number(
+        60.0,
+        0.1,
+        1000.0,
+        "m/s",
+        "Greatest speed of the sensor. A faster jump between two poses means that their sender has restarted.",
+    )

@@ -27,35 +27,56 @@ class SensorConfig(StageConfig):
     """Mount, range and resolution of the sensor."""
 
     height_m: float | None = number(
-        1.73, 0.05, 5.0, "m", "height of the sensor above the ground; null: estimated from the first sweeps"
+        1.73, 0.05, 5.0, "m", "Height of the sensor above the ground. Null: estimated from the first sweeps."
     )
     roll_deg: float | None = number(
         None,
         -180.0,
         180.0,
         "deg",
-        "roll of the mount, left side up; null: measured in the first sweep and corrected from 2 deg on",
+        "Roll of the mount, positive with the left side up. Null: measured in the first sweep, used from 2 deg on.",
     )
-    pitch_deg: float | None = number(None, -90.0, 90.0, "deg", "pitch of the mount, nose down; null: as roll_deg")
-    min_range_m: float = number(2.0, 0.0, 20.0, "m", "nearer points are left out: they are on the robot itself")
-    max_range_m: float = number(80.0, 1.0, 400.0, "m", "farther points are left out")
-    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "step between neighbouring beams, evenly spaced")
+    pitch_deg: float | None = number(
+        None, -90.0, 90.0, "deg", "Pitch of the mount, positive with the nose down. Null: measured as roll_deg is."
+    )
+    min_range_m: float = number(
+        2.0, 0.0, 20.0, "m", "Points nearer than this are left out, since they lie on the robot itself."
+    )
+    max_range_m: float = number(80.0, 1.0, 400.0, "m", "Points farther than this are left out.")
+    elevation_step_deg: float = number(
+        0.42, 0.01, 10.0, "deg", "Angle between neighbouring beams where they are evenly spaced."
+    )
     elevations_deg: tuple[float, ...] | None = numbers(
-        -90.0, 90.0, 512, "deg", "elevation of every beam, in any order; null: beams are evenly spaced"
+        -90.0, 90.0, 512, "deg", "Elevation of every beam, in any order. Null: the beams are evenly spaced."
     )
     elevation_span_deg: tuple[float, ...] | None = numbers(
-        -90.0, 90.0, 2, "deg", "elevations of the lowest and the highest beam; null: unknown"
+        -90.0,
+        90.0,
+        2,
+        "deg",
+        "Elevations of the lowest and the highest beam. Null: unknown, unless elevations_deg is set.",
     )
-    azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "step between neighbouring returns of a beam")
+    azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "Angle between neighbouring returns of a beam.")
     blind_sectors_deg: tuple[float, ...] | None = numbers(
-        -360.0, 360.0, 64, "deg", "sectors hidden by the robot: from, to of each, counter-clockwise", pairs=True
+        -360.0,
+        360.0,
+        64,
+        "deg",
+        "Sectors in which the robot hides the view, as pairs of bearings from and to, counter-clockwise. Null: none.",
+        pairs=True,
     )
-    blind_range_m: float = number(3.0, 0.1, 20.0, "m", "returns in blind_sectors_deg up to this range are left out")
+    blind_range_m: float = number(3.0, 0.1, 20.0, "m", "Points in blind_sectors_deg up to this range are left out.")
     period_s: float = number(
-        0.1, 0.001, 10.0, "s", "time between sweeps: for scans without time stamps, and the unit of max_missed"
+        0.1,
+        0.001,
+        10.0,
+        "s",
+        "Time between two sweeps. It dates scans without time stamps, and is the unit of tracking.max_missed.",
     )
     reflectance: str = choice(
-        "none", ("none", *REFLECTANCE_SCALES), "sensor whose scale the reflectance has; none: it is not used"
+        "none",
+        ("none", *REFLECTANCE_SCALES),
+        "Sensor on whose scale the reflectance is given. none: reflectance is not used.",
     )
 
     @property
@@ -90,13 +111,19 @@ class EnergyConfig(StageConfig):
     Energy of a window = idle_W x time + seg_J x segmentations + class_J x classifications + point_J x points.
     """
 
-    board: str = field(default="unknown", metadata={"meaning": "name of the board, for reports"})
-    idle_W: float = number(3.0, 0.0, 1000.0, "W", "power of the board while the process waits")
-    busy_W: float = number(7.0, 0.0, 1000.0, "W", "power of the board while the process computes on one core")
-    meter: str = field(default="none", metadata={"meaning": "meter of the calibration, for the record"})
-    seg_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one segmentation; null: not calibrated")
-    class_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one classification; null: not calibrated")
-    point_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one point classified; null: not calibrated")
+    board: str = field(default="unknown", metadata={"meaning": "Name of the board in reports."})
+    idle_W: float = number(3.0, 0.0, 1000.0, "W", "Power of the board while modt waits.")
+    busy_W: float = number(7.0, 0.0, 1000.0, "W", "Power of the board while modt computes on one core.")
+    meter: str = field(
+        default="none", metadata={"meaning": "Meter that the calibration was made with, for the record."}
+    )
+    seg_J: float | None = number(None, -1000.0, 1000.0, "J", "Energy of one segmentation. Null: not calibrated.")
+    class_J: float | None = number(
+        None, -1000.0, 1000.0, "J", "Energy of one classification, beside that of its points. Null: not calibrated."
+    )
+    point_J: float | None = number(
+        None, -1000.0, 1000.0, "J", "Energy of one point that is classified. Null: not calibrated."
+    )
 
     @property
     def active_W(self) -> float:
@@ -113,10 +140,14 @@ class EnergyConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopConfig(StageConfig):
-    """Limits of the live loop, in effect with `modt run`."""
+    """Limit of the live loop, in effect with `modt run`."""
 
     power_W: float | None = number(
-        None, 0.01, 1000.0, "W", "limit of the board's power, by its meter or else its model; null: none"
+        None,
+        0.01,
+        1000.0,
+        "W",
+        "Power of the board above which the loop sheds load, by its meter or else its model. Null: no limit.",
     )
 
 
@@ -124,16 +155,24 @@ class LoopConfig(StageConfig):
 class RecordingConfig(StageConfig):
     """Records of the live loop, in effect with `modt run`."""
 
-    keep: str = choice("all", ("all", "tracks", "ledger", "none"), "which records are written")
+    keep: str = choice(
+        "all",
+        ("all", "tracks", "ledger", "none"),
+        "Records that are written: tracks and ledger, one of the two, or none.",
+    )
     disk_mb: float = number(
-        2000.0, 1.0, 1e7, "MB", "of the records of this run and earlier ones; the oldest are deleted"
+        2000.0,
+        1.0,
+        1e7,
+        "MB",
+        "Size of all records in the run directory together, earlier runs included. The oldest are deleted.",
     )
     gb_per_day: float = number(
         10.0,
         0.01,
         1e5,
         "GB",
-        "written to the disk by the tracks, after the first 0.5 GB; frames beyond it are left out",
+        "Size of the tracks written in a day, after the first 0.5 GB of a run. Frames beyond it are left out evenly.",
     )
 
 

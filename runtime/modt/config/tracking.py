@@ -9,25 +9,34 @@ from modt.config.base import StageConfig, choice, mechanism, number
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperAssociationConfig(StageConfig):
-    """The paper's association cost (section III-B); in effect with association: paper."""
+    """Association cost of the paper (section III-B), in effect with `association: paper`."""
 
-    alpha: float = number(2.0, 0.0, 100.0, "", "weight of 1 - IoU, seen from above")
-    beta: float = number(0.01, 0.0, 10.0, "", "reward of like numbers of points")
-    gamma: float = number(0.1, 0.0, 10.0, "", "reward of like sizes")
-    t_da: float = number(0.95, 0.0, 100.0, "", "highest cost of an association")
+    alpha: float = number(2.0, 0.0, 100.0, "", "Weight of 1 - IoU of the boxes seen from above.")
+    beta: float = number(0.01, 0.0, 10.0, "", "Weight of similar numbers of points, which lower the cost.")
+    gamma: float = number(0.1, 0.0, 10.0, "", "Weight of similar sizes, which lower the cost.")
+    t_da: float = number(0.95, 0.0, 100.0, "", "Greatest cost of a match.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingConfig(StageConfig):
-    """Association and life of a track. Limits of a mechanism are constants beside it."""
+    """Association of proposals with tracks, and the end of a track."""
 
-    association: str = choice("kdop", ("kdop", "paper"), "cost by which proposals are matched with tracks")
+    association: str = choice(
+        "kdop",
+        ("kdop", "paper"),
+        "Cost by which proposals are matched with tracks. kdop: by their outlines. paper: as in the paper.",
+    )
     extensions: str = choice(
         "all",
         ("all", "none"),
-        "beside the paper: tracks split, merge and reunite proposals, may stand still, and background is remembered",
+        "Additions to the paper: tracks split, merge and reunite proposals, can be at rest, and leave remembered "
+        "background. none: switched off.",
     )
     max_missed: int = number(
-        8, 0, 100, "frames", "of sensor.period_s, unseen, before a track is deleted (N of a9 and a14)"
+        8,
+        0,
+        100,
+        "frames",
+        "Time without a proposal, in periods of the sensor, after which a track is deleted (N of rows a9 and a14).",
     )
     paper: PaperAssociationConfig = mechanism(PaperAssociationConfig)

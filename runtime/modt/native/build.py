@@ -28,11 +28,11 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined",
 
 
 class NoCompilerError(Exception):
-    """There is none, or it fails; the message says which and why."""
+    """No C compiler, or one that fails; the message says which and why."""
 
 
 def source_hash() -> str:
-    """Of the C sources: a library knows which it is made of."""
+    """Hash of the C sources. Each library holds that of the sources it was built from."""
     content = b"".join(path.read_bytes() for path in sorted(FOLDER.glob("*.[ch]")))
     return hashlib.sha256(content).hexdigest()[:16]
 

@@ -125,7 +125,7 @@ def around(tracks: Tracks, proposals: Proposals) -> dict[str, dict[str, Any]]:
 
 
 def summary_text(summary: dict[str, Any]) -> str:
-    """Objects around the robot, and the cost of finding them: counts, time by stage, and the state of the host."""
+    """Objects around the robot, and the cost of detecting them: counts, time by stage, and the state of the host."""
     run, stages, frames = summary.get("run", {}), dict(summary["stages"]), summary["frames"]
     tracks, objects = summary["tracks"], summary["foreground_tracks"]
     title = (
