@@ -38,15 +38,20 @@ def test_the_page_shows_what_tracking_adds_and_what_is_behind_the_paper():
 
 
 @pytest.mark.slow
-def test_the_modes_of_a_drive_have_cost_and_accuracy(tmp_path, monkeypatch):
+def test_the_table_has_a_row_for_each_sensor_and_for_the_recorded_drive(tmp_path, monkeypatch):
     writer = DriveWriter(tmp_path, CAMERA)
     for frame, truth in SyntheticStream("street", "hdl-64e", 0.4, seed=2).sweeps():
         writer.write(frame, truth)
     writer.close()
     monkeypatch.setattr(figures, "FIRST", 0)
+    monkeypatch.setattr(figures, "SENSORS", {"vlp-16": "VLP-16"})
+    monkeypatch.setattr(figures, "SEEDS", [2])
+    monkeypatch.setattr(figures, "SECONDS", 0.4)
     (drive,) = kitti_drives(tmp_path)
-    rows = [line.strip("| ").split(" | ") for line in figures.by_mode(drive, None)]
-    assert [len(cells) for cells in rows[2:]] == [5, 4, 4, 5]
-    compiled, numpy = ([float(cell.removesuffix(" ms")) for cell in cells[1:4]] for cells in rows[2:4])
-    assert min(compiled + numpy) > 0
-    assert rows[4][1] == "100.0 %"
+    *table, blank, sentence = figures.readme(drive.path, None, None).splitlines()
+    cells = [line.strip("| ").split(" | ") for line in table]
+    assert [row[0] for row in cells[2:]] == ["VLP-16, simulated", "HDL-64E, KITTI 0005, camera's view"]
+    assert {len(row) for row in (cells[0], *cells[2:])} == {5}
+    assert not blank
+    share = float(sentence.partition("CPU time ")[2].partition(" of")[0])
+    assert share > 0
