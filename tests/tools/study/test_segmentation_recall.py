@@ -6,14 +6,14 @@ import numpy as np
 
 from modt.classes import ObjectClass
 from modt.geometry import FieldOfView
-from tools.study.segmentation_recall import Tally, changed
+from tools.study.segmentation_recall import Tally
 from tools.train.synthetic_scans import simulated_scans
 
 
 def test_an_object_counts_if_found_in_one_proposal():
     (scan,) = simulated_scans(["street"], [3], [0.0], camera=False, sensors=["vlp-16"])
     tally = Tally()
-    tally.add(scan, scan.profile)
+    tally.add(scan)
     visible = [k for k, own in zip(scan.kinds, scan.objects, strict=True) if len(own) >= 20]
     assert tally.objects.tolist() == np.bincount(visible, minlength=4).tolist()
     assert tally.objects[ObjectClass.CAR] > 3
@@ -25,7 +25,5 @@ def test_an_object_counts_if_found_in_one_proposal():
 def test_nothing_is_found_of_an_empty_scan():
     (scan,) = simulated_scans(["street"], [3], [0.0], camera=False, sensors=["vlp-16"])
     tally = Tally()
-    tally.add(replace(scan, points=0 * scan.points, fov=FieldOfView()), scan.profile)
+    tally.add(replace(scan, points=0 * scan.points, fov=FieldOfView()))
     assert tally.found.sum() == 0 < tally.objects.sum()
-    coarse = changed(scan.profile, "segmentation.cell_m", 1.0)
-    assert coarse.segmentation.cell_m == 1.0
