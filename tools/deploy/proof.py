@@ -28,6 +28,8 @@ SCANS, PROFILE = "srv/modt/scans", "srv/modt/robot.yaml"
 PYTHON, LIBRARIES, PACKAGE = "/opt/modt/python", "/opt/modt/libraries", "/opt/modt/package"
 """Where the interpreter, its libraries and this checkout are seen: a home would be hidden from the unit."""
 INTERPRETER = f"{PYTHON}/bin/python{sys.version_info.major}.{sys.version_info.minor}"
+LIMIT_S = 120.0
+"""Time after which the proof ends without a verdict [s]."""
 TARGET = """
 [Unit]
 Requires=proof.service basic.target
@@ -85,9 +87,7 @@ def prepare(root: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = parser(__doc__)
-    options.add_argument("--timeout", type=float, default=120.0, help="in seconds (default: %(default)s)")
-    given = options.parse_args(arguments)
+    parser(__doc__).parse_args(arguments)
     if os.geteuid() or shutil.which("systemctl") is None:
         raise SystemExit("proof: needs root and systemd")
     with tempfile.TemporaryDirectory() as folder:
@@ -103,7 +103,7 @@ def main(arguments: list[str] | None = None) -> int:
         (base / "boot.sh").write_text(script)
         namespaces = ["--mount", "--pid", "--fork", "--kill-child", "--ipc", "--uts", "--cgroup", "--net"]
         command = ["unshare", *namespaces, "sh", str(base / "boot.sh")]
-        report, end_s, text = base / "report" / "report.txt", time.monotonic() + given.timeout, ""
+        report, end_s, text = base / "report" / "report.txt", time.monotonic() + LIMIT_S, ""
         system = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         try:
             while time.monotonic() < end_s and system.poll() is None and not text.endswith(END):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from itertools import chain
-from pathlib import Path
 
 from modt_desk.cli.completion import commands
-from tools.docs.sections import replace_section
+from tools.docs.sections import DOCS, replace_section, write
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "commands.md"
+DOCUMENT = DOCS / "commands.md"
 MARK = "tools.docs.commands"
 
 
@@ -43,8 +42,7 @@ def document() -> str:
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    DOCUMENT.write_text(document(), encoding="utf-8")
+    write(__doc__, DOCUMENT, document)
 
 
 if __name__ == "__main__":
