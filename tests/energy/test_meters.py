@@ -1,4 +1,3 @@
-import itertools
 import os
 import re
 import tempfile
@@ -8,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from modt.energy.meters import meter as meter_module
 from modt.energy.meters.discovery import (
     Discovery,
     discover,
@@ -16,7 +14,6 @@ from modt.energy.meters.discovery import (
     find_hwmon,
     find_pmic,
     find_powercap,
-    rail_power_W,
 )
 from modt.energy.meters.meter import Kind, Meter, MeterLostError, Scope, model_meter
 from modt.errors import MisuseError
@@ -83,23 +80,6 @@ def test_two_zones_that_show_one_counter_count_once(tmp_path: Path, second_uJ: i
     assert sum(meter.read() for meter in found.best.meters) == pytest.approx(sum_J)
     left = [c.why_not for c in found.candidates if "die-1" in c.name]
     assert left == ["shows the counter of powercap intel-rapl:0 (package-0-die-0)"][: len(left)]
-
-
-@pytest.mark.parametrize("mirrors", [True, False])
-def test_counters_are_compared_while_they_count(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mirrors: bool
-) -> None:
-    """A mirror is read later than the counter itself, and shows more; another counter may be near by chance."""
-    dies(tmp_path, 0, 0)
-    true_uJ, own = itertools.count(10**9, 50_000), meter_module.read_number
-
-    def read_number(path: Path) -> float:
-        if path.name != "energy_uj":
-            return own(path)
-        return float(next(true_uJ)) if mirrors or "rapl:0" in str(path) else 1_000_075_000.0
-
-    monkeypatch.setattr(meter_module, "read_number", read_number)
-    assert len(look(tmp_path).best.meters) == 1 + (not mirrors)
 
 
 def test_a_memory_mapped_zone_alone_is_the_package(tmp_path: Path) -> None:
@@ -271,12 +251,6 @@ def test_battery_counts_only_while_it_discharges(tmp_path: Path) -> None:
         battery.meters[0].read()
 
 
-def test_pmic_sums_rails_with_voltage_and_current() -> None:
-    assert rail_power_W(PMIC, set()) == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
-    with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
-        rail_power_W("error=2 error_msg=Invalid arguments", set())
-
-
 def script(folder: Path, body: str) -> str:
     path = folder / "vcgencmd"
     path.write_text(f"#!/bin/sh\n{body}\n")
@@ -288,7 +262,10 @@ def test_pmic_is_read_through_its_command(tmp_path: Path) -> None:
     (tmp_path / "adc").write_text(PMIC)
     (pmic,) = find_pmic(script(tmp_path, f"[ $1 = pmic_read_adc ] && cat {tmp_path}/adc"))
     assert pmic.usable
-    assert pmic.meters[0].read() == pytest.approx(rail_power_W(PMIC, set()))
+    assert pmic.meters[0].read() == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
+    (tmp_path / "adc").write_text("error=2 error_msg=Invalid arguments")
+    with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
+        pmic.meters[0].read()
     (tmp_path / "adc").unlink()
     with pytest.raises(MeterLostError):
         pmic.meters[0].read()

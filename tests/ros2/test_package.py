@@ -74,15 +74,6 @@ def test_the_layout_of_foxglove_shows_topics_of_modt():
     assert {"/modt/markers", "/modt/points", "/modt/detections"} <= named(text)
 
 
-def test_the_page_names_every_topic_and_no_other():
-    page = (ROOT / "docs" / "ros2.md").read_text()
-    known = PUBLISHED.keys() | figures()
-    assert PUBLISHED.keys() <= set(re.findall(r"`(/[\w/]+)`", page))
-    assert {name for name in named(page) if name not in known and f"{name}/" not in "".join(known)} == set()
-    for name, kind in PUBLISHED.items():
-        assert re.search(rf"`{name}` \| `{kind}`", page), name
-
-
 @pytest.fixture(name="launched")
 def launch_file(monkeypatch):
     """The launch file, and a function from arguments to the nodes that it starts."""

@@ -103,10 +103,6 @@ def paper(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "tracking.association", "paper"))
 
 
-def one_mJ(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(3, 1.0), changed(config, "scheduler.energy_mJ_per_frame", 1.0))
-
-
 def pose_socket(config: ProfileConfig, _folder: Path) -> str:
     """Poses with a gap, a flood, a leap, a pose of the future, and noise faster than the sensor."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -264,11 +260,6 @@ def test_a_key_has_an_effect(key, tmp_path):
 
 def test_every_scenario_is_of_a_key():
     assert all(any(key.path.startswith(path) for key in keys()) for path in SCENARIOS)
-
-
-@pytest.mark.parametrize("path", ["energy.idle_W", "energy.busy_W"])
-def test_the_powers_of_the_board_decide_on_a_budget_of_energy(path, tmp_path):
-    assert has_effect(next(key for key in keys() if key.path == path), one_mJ, tmp_path)
 
 
 ALL = sorted(set(SCENARIOS.values()), key=lambda scenario: scenario.__name__)

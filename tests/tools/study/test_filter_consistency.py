@@ -8,10 +8,8 @@ from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.study.filter_consistency import (
     BodyTrack,
     body_tracks,
-    consistency,
     errors,
     majority_bodies,
-    normalised,
     study,
 )
 
@@ -36,14 +34,6 @@ def test_errors_are_consistent_only_at_the_scale_of_their_covariance():
         for part in found.values():
             assert (part.low < part.mean < part.high) is fits
             assert (abs(part.beyond - 0.05) < 0.02) is fits
-
-
-def test_normalised_errors_equal_the_reference():
-    track = random_track(np.random.default_rng(1), 7, 1.0)
-    position, _ = errors(track)
-    reference = [e @ np.linalg.inv(P) @ e for e, P in zip(position, track.P[:, :2, :2], strict=True)]
-    np.testing.assert_allclose(normalised(position, track.P[:, :2, :2]), reference)
-    np.testing.assert_allclose(consistency([position], [track.P[:, :2, :2]]).mean, np.mean(reference))
 
 
 def test_a_fixed_point_of_a_turning_body_has_no_error():
