@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -73,9 +72,6 @@ class SimulatedMachine:
     def appear(self) -> None:
         self.zone.with_name("gone").rename(self.zone)
         self._show()
-
-    def remove(self) -> None:
-        shutil.rmtree(self.zone)
 
     def _show(self) -> None:
         if self.zone.is_dir():

@@ -12,7 +12,6 @@ from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import SINKS
 from modt.viewer import live_server
-from modt.viewer.live_frame import live_cells
 from modt.viewer.live_page import open_view
 from modt.viewer.live_server import MOST_CLIENTS, MOST_CONNECTIONS
 from modt.viewer.track_rows import COLUMNS, SCALED, result_rows
@@ -197,9 +196,3 @@ def test_rows_of_a_result_are_in_the_frame_of_the_sensor():
     assert [lost[key] for key in ("x", "y", "z", "l", "w", "h", "yaw")] == pytest.approx([3, 0, -1, 4, 2, 1.5, 0.5])
     assert rows.shape == (2, len(COLUMNS))
     assert [seen[name] for name in SCALED[-4:]] == [12.0, 1.0, 0.3, 2.0]
-
-
-def test_points_of_proposals_stand_out():
-    cells = live_cells(results.result(0, [5, 4], {0: 1}))
-    assert len(cells) >= 1
-    assert (cells.level > 0).any()

@@ -8,7 +8,6 @@ from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.study.filter_consistency import (
     BodyTrack,
     body_tracks,
-    errors,
     majority_bodies,
     study,
 )
@@ -34,15 +33,6 @@ def test_errors_are_consistent_only_at_the_scale_of_their_covariance():
         for part in found.values():
             assert (part.low < part.mean < part.high) is fits
             assert (abs(part.beyond - 0.05) < 0.02) is fits
-
-
-def test_a_fixed_point_of_a_turning_body_has_no_error():
-    heading = np.linspace(0, 2, 9)
-    pose = np.c_[np.zeros((9, 2)), heading, np.ones(9)]
-    x = pose.copy()
-    x[:, :2] = np.c_[np.cos(heading), np.sin(heading)]  # one metre ahead of the centre
-    position, _ = errors(BodyTrack("car, moving", x, np.tile(np.eye(4), (9, 1, 1)), pose))
-    np.testing.assert_allclose(position, 0, atol=1e-12)
 
 
 @pytest.fixture(scope="module", name="consistencies")
