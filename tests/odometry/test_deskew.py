@@ -14,7 +14,7 @@ from modt.odometry.registration import Landmarks, Registration
 from modt.placement import Placement, PlanarMotion
 from modt.types import Proposals
 from tests.odometry.odometry_scenes import constant_turn, constant_turn_pose, street
-from tests.tracking.tracking_scenes import Follower, box, frame_of
+from tests.tracking.tracking_scenes import Follower, frame_of
 
 PERIOD_S = 0.1
 
@@ -109,28 +109,6 @@ def test_registration_needs_the_shares_of_a_skewed_sweep(known, least_deg, most_
     registration = Registration()
     found = registration.correct(landmarks, observe(proposals, predicted).moved(step), share) @ predicted
     assert least_deg <= abs(np.rad2deg(yaw_of(inverse(true) @ found))) < most_deg
-
-
-@pytest.mark.parametrize("turn_s", [0.1, -0.1])
-def test_moving_proposals_as_a_whole_leaves_little_error(turn_s):
-    """Against the same points, each deskewed by its own time."""
-    speed, turn = 10.0, 0.3
-
-    def at(t):
-        return constant_turn_pose(t, speed, turn)
-
-    world = np.array([box(12, 4), box(-3, 8), box(-14, 4), box(-9, -9), box(2, -6), box(25, -12)])
-    frame, proposals = skewed(world, 0, turn_s, speed, turn, posed=True)
-    motion = PlanarMotion.between(at(-PERIOD_S), at(0), PERIOD_S)
-    deskewed = observe(proposals, at(0)).moved(corrected(proposals, turn_s, motion, at(0)))
-    true_frame, true_proposals = frame_of(world, 0, points=80)
-    true = observe(true_proposals, np.eye(4))
-    raw = observe(proposals, at(0))
-    assert np.abs(deskewed.centroid - true.centroid).max() < 0.03
-    assert np.abs(deskewed.kdop - true.kdop).max() < 0.08
-    assert np.abs(raw.centroid - true.centroid).max() > 0.3
-    np.testing.assert_allclose(deskewed.box[:, :2] - raw.box[:, :2], deskewed.centroid - raw.centroid)
-    assert len(frame.points) == len(true_frame.points)
 
 
 def drive(turn_s, known, posed=False, frames=25):

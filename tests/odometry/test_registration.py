@@ -167,24 +167,16 @@ OFFSET = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.02, 
 
 
 @settings(max_examples=20)
-@given(OFFSET, st.integers(0, 2**16))
-def test_correct_brings_observations_onto_their_landmarks(offset, seed):
-    world = street(seed, 60)
-    T = se3(rotation_zyx(0, 0, offset[2]), np.array([*offset[:2], 0.0]))
-    correction = Registration().correct(landmarks_of(world), observed(world, T))
-    np.testing.assert_allclose(correction @ T, np.eye(4), atol=0.01)
-
-
-@settings(max_examples=20)
-@given(OFFSET, st.integers(0, 2**16))
-def test_ends_that_come_into_view_do_not_bias_the_motion(offset, seed):
+@given(OFFSET, st.integers(0, 2**16), st.sampled_from([(0.0, 0.01), (0.3, 0.06)]))
+def test_observations_are_brought_onto_their_landmarks_though_ends_came_into_view(offset, seed, grown_within_m):
     """One end of every axis shows the motion; the other, at random, came into view."""
+    grown_m, within_m = grown_within_m
     world, rng = street(seed, 60), np.random.default_rng(seed)
     T = se3(rotation_zyx(0, 0, offset[2]), np.array([*offset[:2], 0.0]))
     grown, ahead = observed(world, T), rng.random((4, 60)) < 0.5
-    kdop = grown.kdop + np.concatenate([ahead, ~ahead]) * rng.exponential(0.3, (8, 60))
+    kdop = grown.kdop + np.concatenate([ahead, ~ahead]) * grown_m * rng.exponential(1.0, (8, 60))
     correction = Registration().correct(landmarks_of(world), replace(grown, kdop=kdop))
-    np.testing.assert_allclose(correction @ T, np.eye(4), atol=0.06)
+    np.testing.assert_allclose(correction @ T, np.eye(4), atol=within_m)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])

@@ -43,11 +43,6 @@ def test_the_exposure_is_small(analyze, drop_ins, most):
     assert float(found[1]) <= most
 
 
-def test_memory_and_tasks_are_bounded_and_a_fault_at_every_start_is_tried_rarely():
-    unit = (Path(__file__).parents[3] / "systemd" / "modt.service").read_text()
-    assert {"MemoryMax=1G", "TasksMax=64", "RestartSec=5"} <= set(unit.splitlines())
-
-
 @pytest.mark.parametrize("drop_ins", [(), ("lan-sensor", "ros2", "foxglove", "rapl", "raspberry-pi")])
 def test_the_unit_is_verified_in_silence(analyze, drop_ins):
     done = analyze(["verify"], *drop_ins)
