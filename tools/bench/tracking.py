@@ -23,9 +23,9 @@ from modt.types import Float64, Frame, Proposals
 from tools.options import parser
 
 POINTS = 80
-"""Points of a proposal."""
+"""Number of points of a proposal."""
 WARM_UP_FRAMES = 10
-"""Frames left out of the figures, while the number of tracks grows."""
+"""Frames left out while the number of tracks grows."""
 
 
 def scenery(n: int, rng: np.random.Generator) -> Float64:
@@ -37,7 +37,7 @@ def scenery(n: int, rng: np.random.Generator) -> Float64:
 
 
 def frames(n: int, count: int, alive: float, seed: int = 0) -> list[tuple[Frame, Proposals]]:
-    """Frames with random points on n of the alive * n boxes of a scene, chosen anew for each frame.
+    """Frames with random points on n of the alive * n boxes of a scene; each frame has its own choice of boxes.
 
     A box reappears before its track is deleted, so about alive * n tracks are alive.
     """

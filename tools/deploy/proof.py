@@ -1,9 +1,9 @@
-"""Proves the unit under a real systemd: in namespaces of its own, on a copy of this system that is then forgotten.
+"""Prove the unit under a real systemd, in namespaces of its own and on a throw-away copy of this system.
 
     sudo python -m tools.deploy.proof
 
-The unit is installed, started on a recording, reloaded, hung, killed and stopped; a probe in the same sandbox tries
-what it must not be able to do. Prints a line a step; the exit status is 0 if all went well. Needs root and systemd.
+The unit is installed, started on a recording, reloaded, hung, killed and stopped. A probe in the same sandbox tries
+what must be refused. Each step prints a line, and the exit status is 0 if all went well. Needs root and systemd.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 STEPS = Path(__file__).with_name("proof_steps.py")
 SCANS, PROFILE = "srv/modt/scans", "srv/modt/robot.yaml"
 PYTHON, LIBRARIES, PACKAGE = "/opt/modt/python", "/opt/modt/libraries", "/opt/modt/package"
-"""Where the interpreter, its libraries and this checkout are seen: a home would be hidden from the unit."""
+"""Places of the interpreter, its libraries and this checkout in the copy. The unit cannot see a home directory."""
 INTERPRETER = f"{PYTHON}/bin/python{sys.version_info.major}.{sys.version_info.minor}"
 LIMIT_S = 120.0
 """Time after which the proof ends without a verdict [s]."""
@@ -67,7 +67,7 @@ container=lxc exec chroot . /lib/systemd/systemd --unit=proof.target --show-stat
 
 
 def prepare(root: Path) -> None:
-    """Files of the copy: the unit as it is installed, a program, a recording, and what drives the proof."""
+    """Write the files of the copy: the installed unit, a program, a recording, and the driver of the proof."""
     source = f"/{SCANS}?loop=yes"
     Service(root, Path(PREFIX)).install([], source, f"--profile /{PROFILE}")
     scans = root / SCANS
@@ -110,7 +110,7 @@ def main(arguments: list[str] | None = None) -> int:
                 time.sleep(0.2)
                 text = report.read_text() if report.exists() else ""
         finally:
-            system.kill()  # and by --kill-child all that it has begun
+            system.kill()  # --kill-child ends all its processes
             system.wait()
     print(text.removesuffix(END), end="")
     whole = text.endswith(END)

@@ -21,7 +21,7 @@ def cells(parser: argparse.ArgumentParser, action: argparse.Action) -> tuple[str
 
 
 def page() -> str:
-    """A table of the options that commands share, and a list a command of its own."""
+    """A table of the options that commands share, and a list of the other options of each command."""
     parsers = [(command.summary, command.parser) for command in commands() if not command.names]
     rows = {p.prog: [cells(p, action) for action in p._actions if action.dest != "help"] for _, p in parsers}
     number = Counter(chain.from_iterable(rows.values()))

@@ -1,4 +1,4 @@
-"""Generate the keys of a profile from the configuration: tables in docs/profile-keys.md, and their JSON Schema."""
+"""Generate the page of profile keys and their JSON Schema."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MARK = "tools.docs.profile_keys"
 
 
 def page() -> str:
-    """A table a stage, below the first sentence on its configuration."""
+    """The first sentence on the configuration of each stage, and a table of its keys."""
     lines: list[str] = []
     for stage in fields(ProfileConfig):
         about = str(stage.default_factory.__doc__).partition("\n")[0]

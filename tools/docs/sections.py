@@ -11,10 +11,10 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def replace_section(text: str, mark: str, section: str) -> str:
-    """The document with another text between `<!-- mark -->` and `<!-- end of mark -->`.
+    """The document with a new text between `<!-- mark -->` and `<!-- end of mark -->`.
 
     Raises:
-        ValueError: the document lacks one of them.
+        ValueError: one of the marks is missing.
     """
     begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
     before, rest = text.split(begin)

@@ -2,9 +2,10 @@
 
     python -m tools.study.ego_drift DRIVE [DRIVE ...] [--frames A:B] [--no-kiss]
 
-DRIVE is a KITTI raw drive, recorded or written by `modt simulate`. Each estimate is compared with two references: the
-positions of the OXTS records, and their velocities integrated over time. Errors are those of the last pose: position
-in percent of the reference's path length, heading in degrees. For several drives, means of the magnitudes follow.
+DRIVE is a KITTI raw drive, recorded or written by `modt simulate`. Each estimate is compared with the positions
+of the OXTS records and with their velocities, integrated over time. The errors are those of the last pose, with the
+position in percent of the reference's path length and the heading in degrees. For several drives, means of the
+magnitudes follow.
 """
 
 from __future__ import annotations

@@ -116,11 +116,11 @@ class Consistency:
 
     Attributes:
         tracks, samples: their numbers.
-        mean: of the means of the tracks; equal to the degrees of freedom if consistent.
-        median: of all samples.
+        mean: mean of the tracks' means; equal to the degrees of freedom if consistent.
+        median: median of all samples.
         low, high: bounds of the mean at CONFIDENCE, for as many independent samples as tracks.
         beyond: share of samples above the chi-square quantile of CONFIDENCE; 1 - CONFIDENCE if consistent.
-        rms: of the length of the error.
+        rms: root mean square length of the error.
     """
 
     tracks: int
@@ -134,7 +134,7 @@ class Consistency:
 
 
 def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
-    """From the errors (n, 2) and covariances (n, 2, 2) of each track."""
+    """Summary of the errors (n, 2) and covariances (n, 2, 2) of the tracks."""
     each = [normalised(e, p) for e, p in zip(error, P, strict=True)]
     n, all_ = len(each), np.concatenate(each)
     low, high = chi2(DEGREES * n).ppf([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]) / n

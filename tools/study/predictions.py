@@ -1,4 +1,4 @@
-"""Blind predictions of gamma over regimes: calibrated on some streams, tested on others.
+"""Blind predictions of gamma over regimes, calibrated on some streams and tested on others.
 
     python -m tools.study.predictions WORK_DIR [--kitti ROOT] [--regimes NAME ...] [--repeat K] [--core N|none]
 
@@ -25,10 +25,10 @@ import numpy as np
 from tools.options import parser
 
 SECONDS, FRAMES = 5, "0:24"
-"""Frames of a simulated drive, and frames used of every stream."""
+"""Length of a simulated drive [s], and the frames of every stream that are used."""
 RECORDED = {"kitti-0005": "raw/2011_09_26/2011_09_26_drive_0005_sync"}
 COPIED = "the calibration's ratio"
-"""What the prediction has to be better than."""
+"""Rival of the prediction: the measured ratio of the calibration, copied."""
 BOUND = 0.10
 """Relative error within which predictions are counted."""
 
@@ -57,7 +57,8 @@ class Regime:
 
 
 def _network(name: str) -> str:
-    return f"classification: {{model: {name}, max_points: 400}}\nscheduler: {{calls_per_frame: null}}\n"
+    classification = f"{{model: {name}, likelihood: network, max_points: 400}}"
+    return f"classification: {classification}\nscheduler: {{calls_per_frame: null}}\n"
 
 
 def _range(metres: float) -> str:

@@ -33,13 +33,13 @@ class Tally:
     """Objects of a sensor by class, and proposals.
 
     Attributes:
-        objects, found: (4,) by class.
-        proposals: of all scans.
-        scans: number.
+        objects, detected: (4,) numbers by class.
+        proposals: number in all scans.
+        scans: number of scans.
     """
 
     objects: Int = field(default_factory=lambda: np.zeros(N_CLASSES, np.int64))
-    found: Int = field(default_factory=lambda: np.zeros(N_CLASSES, np.int64))
+    detected: Int = field(default_factory=lambda: np.zeros(N_CLASSES, np.int64))
     proposals: int = 0
     scans: int = 0
 
@@ -55,11 +55,11 @@ class Tally:
             shared = np.bincount(label[own] + 1, minlength=len(proposals) + 1)[1:]
             union = proposals.count + len(own) - shared
             self.objects[kind] += 1
-            self.found[kind] += bool(len(union)) and (shared / union).max() > 0.5
+            self.detected[kind] += bool(len(union)) and (shared / union).max() > 0.5
 
     def row(self, name: str) -> str:
         """Markdown."""
-        cells = [f"{100 * f / n:.1f} of {n}" if n else "-" for f, n in zip(self.found, self.objects, strict=True)]
+        cells = [f"{100 * f / n:.1f} of {n}" if n else "-" for f, n in zip(self.detected, self.objects, strict=True)]
         return f"| {name} | {' | '.join(cells[1:])} | {self.proposals / self.scans:.0f} |"
 
 
@@ -89,7 +89,7 @@ def main() -> None:
     print("| sensor |", " | ".join(CLASS_NAMES[1:]), "| proposals a scan |\n|---|---|---|---|---|")
     for name, tally in tallies.items():
         print(tally.row(name))
-    shares = [tally.found / np.where(tally.objects, tally.objects, np.nan) for tally in tallies.values()]
+    shares = [tally.detected / np.where(tally.objects, tally.objects, np.nan) for tally in tallies.values()]
     print("| mean |", " | ".join(f"{100 * v:.1f}" for v in np.nanmean(shares, axis=0)[1:]), "| |")
 
 
