@@ -35,12 +35,8 @@ def test_a_proposal_takes_the_class_of_the_object_it_overlaps_by_more_than_half(
 
 def test_unlabelled_proposals_are_unknown() -> None:
     unlabelled = np.isin(np.arange(40), [0, 1, 10, 11, 12]) | (np.arange(40) >= 20)  # 2, 3 and 10 of ten points
-    assert label(scan_of(POINTS, [], [], unlabelled), proposals_of(0, 10, 20, 30, 40)).unknown.tolist() == [
-        False,
-        True,
-        True,
-        True,
-    ]
+    labels = label(scan_of(POINTS, [], [], unlabelled), proposals_of(0, 10, 20, 30, 40))
+    assert labels.unknown.tolist() == [False, True, True, True]
 
 
 def test_detectable_objects_are_known_outside_the_annotated_region() -> None:
