@@ -1,3 +1,4 @@
+import itertools
 import os
 import re
 import tempfile
@@ -7,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from modt.energy.meters import meter as meter_module
 from modt.energy.meters.discovery import (
     Discovery,
     discover,
@@ -80,6 +82,23 @@ def test_two_zones_that_show_one_counter_count_once(tmp_path: Path, second_uJ: i
     assert sum(meter.read() for meter in found.best.meters) == pytest.approx(sum_J)
     left = [c.why_not for c in found.candidates if "die-1" in c.name]
     assert left == ["shows the counter of powercap intel-rapl:0 (package-0-die-0)"][: len(left)]
+
+
+@pytest.mark.parametrize("mirrors", [True, False])
+def test_counters_are_compared_while_they_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mirrors: bool
+) -> None:
+    """A mirror is read later than the counter itself, and shows more; another counter may be near by chance."""
+    dies(tmp_path, 0, 0)
+    true_uJ, own = itertools.count(10**9, 50_000), meter_module.read_number
+
+    def read_number(path: Path) -> float:
+        if path.name != "energy_uj":
+            return own(path)
+        return float(next(true_uJ)) if mirrors or "rapl:0" in str(path) else 1_000_075_000.0
+
+    monkeypatch.setattr(meter_module, "read_number", read_number)
+    assert len(look(tmp_path).best.meters) == 1 + (not mirrors)
 
 
 def test_a_memory_mapped_zone_alone_is_the_package(tmp_path: Path) -> None:

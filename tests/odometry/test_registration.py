@@ -229,6 +229,16 @@ def test_an_object_that_moves_is_no_established_landmark():
     np.testing.assert_allclose(landmarks.kdop.T, kdop)
 
 
+def test_landmarks_follow_their_ids_through_births_and_deaths():
+    landmark_map, kdop = LandmarkMap(), np.arange(24.0).reshape(3, 8)
+    for _ in range(4):
+        landmark_map.update(static_tracks(kdop, ids=[2, 5, 7]))
+    others = np.concatenate([kdop[1:], np.full((1, 8), 50.0)])
+    landmarks = landmark_map.update(static_tracks(others, ids=[5, 7, 9]))
+    assert landmarks.established.tolist() == [True, True, False]
+    np.testing.assert_allclose(landmarks.kdop.T, others)
+
+
 def test_only_candidates_are_landmarks_and_clear_forgets_them():
     landmark_map, kdop = LandmarkMap(), np.arange(16.0).reshape(2, 8)
     for _ in range(4):

@@ -13,6 +13,7 @@ from modt.config import (
     ValueRangeError,
 )
 from modt.errors import MisuseError
+from modt.segmentation.clustering import Clusterer
 
 
 @pytest.mark.parametrize("path", sorted(assets.folder("profiles").glob("*.yaml")), ids=lambda p: p.stem)
@@ -90,6 +91,13 @@ def test_configuration_made_in_code_is_checked_too():
 def test_cells_that_take_all_memory_are_refused(cell_m, range_m):
     with pytest.raises(MisuseError, match=r"segmentation\.cell_m: .* million cells .* give at least 0\.0\d+ m"):
         profile.parse(f"sensor: {{max_range_m: {range_m}}}\nsegmentation: {{cell_m: {cell_m}}}")
+
+
+@pytest.mark.parametrize(("cell_m", "range_m"), [(0.05, 400.0), (0.02, 80.0), (0.01, 20.0)])
+def test_the_grids_of_a_valid_profile_take_little_memory(cell_m, range_m):
+    config = profile.parse(f"sensor: {{max_range_m: {range_m}}}\nsegmentation: {{cell_m: {cell_m}}}")
+    clustering = Clusterer(config.sensor, config.segmentation)
+    assert clustering.coarse.number.nbytes + clustering.fine.number.nbytes < 2.5e8
 
 
 @pytest.mark.parametrize(
