@@ -1,4 +1,4 @@
-"""The rule that turns readings into joules: faults of real meters, and a model that knows the truth."""
+"""The rule that turns readings into joules, with faults of real meters and on a model that knows the truth."""
 
 import math
 from collections.abc import Iterator
@@ -95,7 +95,7 @@ def test_a_counter_is_ambiguous_over_an_interval_in_which_it_may_go_round() -> N
 
 
 def counted(random: np.random.Generator, energy_J: np.ndarray) -> Iterator[float | None]:
-    """What a counter shows at each time, by the true energy of each interval before it.
+    """Readings of a faulty counter, from the true energy of the interval before each.
 
     A fault is one that can be told: a value, alone among five, that no machine of several times the power reaches, a
     counter that stands still (and has, or has not, counted meanwhile), is gone, or begins anew far from its range.
@@ -123,7 +123,7 @@ def counted(random: np.random.Generator, energy_J: np.ndarray) -> Iterator[float
 
 
 def floor(joules: float) -> float:
-    """In steps of a counter."""
+    """Energy rounded down to a step of the counter [J]."""
     return math.floor(joules / 61e-6) * 61e-6
 
 

@@ -1,4 +1,4 @@
-"""Deskew: sweeps of a turning head on a moving carrier are brought back to one time."""
+"""Deskew of the sweeps of a turning head on a moving carrier to one time."""
 
 from dataclasses import replace
 
@@ -144,7 +144,7 @@ def test_stationary_objects_stay_in_place_though_their_sweeps_are_skewed():
 
 @given(st.floats(-15, 15), st.floats(-1, 1), st.sampled_from([0.1, -0.1]), st.floats(0, 2 * np.pi))
 def test_a_placement_deskews_positions_like_the_proposals_there(speed, yaw_rate, turn_s, bearing):
-    """Placement.deskew, for positions without points, agrees with the correction of a small proposal."""
+    """Placement.deskew corrects positions without points, as the correction of a small proposal does."""
     T = se3(rotation_zyx(0, 0, 0.7), np.array([3.0, -2.0, 0.0]))
     motion = PlanarMotion(complex(speed, 0.1 * speed), yaw_rate)
     proposals = one(9 * np.cos(bearing), 9 * np.sin(bearing), 0.0, 0.0)

@@ -27,7 +27,7 @@ def local(T, boxes):
 
 
 def drive(frames, pose=gentle_curve, given_pose=lambda i: None, world=None, restarts=lambda i: 0, points=150):
-    """Odometry and tracker after a drive past a world of boxes; given_pose(i) is what the odometry is handed."""
+    """Odometry and tracker after a drive past a world of boxes, with given_pose(i) as input of the odometry."""
     follower = Follower()
     world = street(n=N_OBJECTS) if world is None else world
     for i in range(frames):
@@ -38,7 +38,7 @@ def drive(frames, pose=gentle_curve, given_pose=lambda i: None, world=None, rest
 
 
 def pose_error(T, follower):
-    """Distance [m] and turn [degrees] between a pose and the one found."""
+    """Distance [m] and turn [degrees] between a pose and the estimated one."""
     error = inverse(T) @ follower.T_world_sensor
     return np.hypot(*error[:2, 3]), abs(np.rad2deg(yaw_of(error)))
 
@@ -127,7 +127,7 @@ def test_sudden_turns_are_followed(turns_rad, step_m, objects, most_m, most_deg)
 
 
 def test_the_error_of_one_frame_is_not_carried_on():
-    """Landmarks are mean positions: one wrong pose does not move the world."""
+    """Landmarks are mean positions, so that one wrong pose does not move the world."""
     rng = np.random.default_rng(5)
     jitter = np.zeros((80, N_OBJECTS, 7))
     jitter[..., :2] = rng.normal(0, 0.05, (80, N_OBJECTS, 2))
@@ -137,7 +137,7 @@ def test_the_error_of_one_frame_is_not_carried_on():
 
 
 def test_landmarks_restart_where_poses_end_again():
-    """A drift of the poses that were given meanwhile does not snap back."""
+    """A drift of the given poses does not snap back when they end."""
 
     def drifted(i):
         return se3(np.eye(3), np.array([0.15 * (i - 6) / 199, 0.0, 0.0])) if 6 <= i < 206 else None
@@ -153,7 +153,7 @@ def test_landmarks_restart_where_poses_end_again():
 
 
 def observed(boxes, T=None, seed=0):
-    """Observations of boxes of the world, placed by T; the points are the same whatever T."""
+    """Observations of boxes of the world, placed by T. The points do not depend on T."""
     _, proposals = frame_of(boxes, 0, points=150, seed=seed)
     return observe(proposals, np.eye(4) if T is None else T)
 
@@ -169,7 +169,7 @@ OFFSET = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.02, 
 @settings(max_examples=20)
 @given(OFFSET, st.integers(0, 2**16), st.sampled_from([(0.0, 0.01), (0.3, 0.06)]))
 def test_observations_are_brought_onto_their_landmarks_though_ends_came_into_view(offset, seed, grown_within_m):
-    """One end of every axis shows the motion; the other, at random, came into view."""
+    """One end of every axis shows the motion. The other end came into view at random."""
     grown_m, within_m = grown_within_m
     world, rng = street(seed, 60), np.random.default_rng(seed)
     T = se3(rotation_zyx(0, 0, offset[2]), np.array([*offset[:2], 0.0]))

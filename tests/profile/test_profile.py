@@ -1,4 +1,4 @@
-"""Profiles: strict, bounded, and back again."""
+"""Reading, checking and writing of profiles."""
 
 import pytest
 from hypothesis import given

@@ -81,7 +81,7 @@ def threads() -> set[str]:
 
 
 def alive(begun: set[str]) -> list[tuple[str, frozenset[int]]]:
-    """Names and cores of those threads that have not ended, as the one that joins a domain does."""
+    """Names and cores of the threads that have not ended. The thread that joins a domain ends early."""
     found = []
     for thread in begun:
         with suppress(FileNotFoundError, ProcessLookupError):

@@ -1,4 +1,4 @@
-"""The package modt_ros: its files agree with modt, and the node exchanges messages by rclpy, here a fake one."""
+"""The files of the package modt_ros agree with modt, and its node exchanges messages by a fake rclpy."""
 
 from __future__ import annotations
 

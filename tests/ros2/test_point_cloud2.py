@@ -1,4 +1,4 @@
-"""PointCloud2 messages of any layout, by comparison with an obvious reader; and hostile ones."""
+"""PointCloud2 messages of any layout, compared with a simple reader, and hostile messages."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_a_written_cloud_is_read_by_another_implementation():
 
 
 class TestTimes:
-    """Times of the points, of a head that turns clockwise once in 0.1 s, its seam behind."""
+    """Times of the points of a head that turns clockwise once in 0.1 s, with its seam behind."""
 
     def cloud(self, *, turn_s=0.1, seam=np.pi, field="time", kind="f4", unit=1e-9, begin=0.0):
         """Points all round, seen `turn_s / 2` before to after straight ahead."""

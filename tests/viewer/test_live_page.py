@@ -37,13 +37,13 @@ def live():
 
 
 def show(live, frame):
-    """A frame, and what it cost."""
+    """Write a frame and its line of the ledger."""
     live.write(frame)
     live.ledger(ledger(frame.frame.index))
 
 
 class Reader:
-    """One who reads the events."""
+    """Client that reads the events."""
 
     def __init__(self, live, path="/events", **headers):
         self.connection = http.client.HTTPConnection("127.0.0.1", live.port, timeout=WAIT_S)
@@ -97,7 +97,7 @@ def test_connections_are_bounded(patient, live, read):
 
 
 def asks_slowly(port):
-    """A byte every 20 ms, until it is left."""
+    """Send a byte every 20 ms until the server closes the connection."""
     ends_s = time.monotonic() + WAIT_S
     with socket.create_connection(("127.0.0.1", port), 0.02) as slow:
         slow.sendall(b"GET /")

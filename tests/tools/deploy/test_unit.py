@@ -1,4 +1,4 @@
-"""The unit, as systemd itself judges it."""
+"""Judgement of the unit by systemd itself."""
 
 import re
 import shutil

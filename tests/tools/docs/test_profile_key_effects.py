@@ -88,7 +88,7 @@ def efficient(config: ProfileConfig, _folder: Path) -> str:
 
 
 def product(config: ProfileConfig, _folder: Path) -> str:
-    """Views that are multiplied."""
+    """A street whose views are multiplied."""
     return long_street(changed(config, "fusion.rule", "product"), _folder)
 
 
@@ -97,7 +97,7 @@ def paper(config: ProfileConfig, _folder: Path) -> str:
 
 
 def report_of_a_run(config: ProfileConfig, folder: Path, *, metered: bool = True) -> str:
-    """What modt-profile report makes of a board with a calibration, and with a meter or without one."""
+    """Report of modt-profile on a run of a calibrated board, with a meter or without one."""
     coefficients = {"seg_J": 0.01, "class_J": 0.002, "point_J": 1e-5}
     given = dataclasses.asdict(config.energy)
     own = {name: value if given[name] is None else given[name] for name, value in coefficients.items()}
@@ -143,7 +143,7 @@ SCENARIOS: dict[str, Scenario] = {
     "energy.busy_W": report_without_meter,
     "energy.meter": described,
 }
-"""Scenario of the keys whose paths begin so, by the longest beginning."""
+"""Scenario of each key, by the longest beginning of its path."""
 
 
 TESTED_BESIDE = {
@@ -190,7 +190,7 @@ def others(key: Key) -> Iterator[Any]:
 
 
 DIGESTS: dict[Scenario, str] = {}
-"""Of the profile without a change."""
+"""Digest of each scenario with the unchanged profile."""
 
 
 def has_effect(key: Key, scenario: Scenario, folder: Path) -> bool:

@@ -1,4 +1,4 @@
-"""The judge of tracked boxes, on a frame by hand."""
+"""Judgement of tracked boxes on a hand-made frame."""
 
 from tools.study.box_tracking import association
 

@@ -43,7 +43,7 @@ def consistencies_on_crossings():
 
 @pytest.mark.slow
 def test_the_filter_is_nearly_consistent_for_walkers(consistencies):
-    """A mean of 2 is consistent; it is 5.5 with displacements from consecutive outlines alone."""
+    """A consistent filter has a mean of 2. Displacements from consecutive outlines alone give 5.5."""
     position, motion = consistencies["pedestrian, moving"]["position"], consistencies["pedestrian, moving"]["motion"]
     assert position.tracks >= 40
     assert position.mean < 1.2 * position.high
@@ -55,8 +55,8 @@ def test_the_filter_is_nearly_consistent_for_walkers(consistencies):
 
 @pytest.mark.slow
 def test_the_filter_is_nearly_consistent_for_standing_objects(consistencies):
-    """The visible part of partly occluded background moves along the occluder, what a single beam meets of it jumps
-    from sweep to sweep: errors that no filter models.
+    """The visible part of occluded background moves along the occluder, and the part that a single beam meets jumps
+    from sweep to sweep. No filter models such errors.
     """
     for kind, tracks, mean in (("pedestrian, standing", 10, 2.0), ("background, standing", 60, 12.0)):
         position = consistencies[kind]["position"]
