@@ -1,4 +1,4 @@
-"""Lists the commands under tools/."""
+"""List the commands under tools/."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ROOT = Path(__file__).parent
 
 
 def commands() -> Iterator[tuple[str, str]]:
-    """Module and first docstring line of each command, that is of each module with a `main`; imports none of them."""
+    """Module and first docstring line of each module with a `main`. None is imported."""
     for path in sorted([*ROOT.glob("[!_]*.py"), *ROOT.glob("*/*.py")]):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):

@@ -1,11 +1,11 @@
-"""Run the tests on an emulated 64-bit Arm: a Debian of its own, with aarch64 wheels from the package index.
+"""Run the tests on an emulated 64-bit Arm, in a Debian of its own with aarch64 wheels from the package index.
 
     sudo python -m tools.arm64 [FOLDER] [--tests tests/golden tests/tracking …]
 
-Needs root, debootstrap, qemu-user-static (apt install), uv and the extra "wheels" (pip install): the tests run on
-the kernels that an aarch64 wheel has. The userland in FOLDER is kept, so that a second run begins at once. The
-emulator is registered with the kernel while this runs. It is some 20 times slower than the machine: the default is
-the perception stages, the golden replays, the readers and the writers.
+It needs root, debootstrap, qemu-user-static (apt install), uv and the extra "wheels" (pip install), because the tests
+run on the kernels of an aarch64 wheel. The userland in FOLDER is kept, so that a second run begins at once. The
+emulator is registered with the kernel while this runs. It is some 20 times slower than the machine, and by default
+only the tests of perception, golden replays, readers and writers run.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ ROOT = Path(__file__).resolve().parents[1]
 SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates,gcc,libc6-dev"
 PLATFORM = "aarch64-manylinux_2_28"
 LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
-LACKING = {"cyclonedds", "ruff", "mypy"}
-"""Of the extra [test]: without a wheel for this platform, or of no use there."""
+LEFT_OUT = {"cyclonedds", "ruff", "mypy"}
+"""Packages of the extra [test] that have no wheel for this platform, or no use there."""
 TESTS = (
     *("golden", "segmentation", "odometry", "tracking", "desk/box_tracking", "geometry", "classification", "energy"),
     *("native", "sources", "sinks", "ros2", "app", "profile", "crash", "test_library.py", "test_pipeline.py"),
 )
-BEYOND = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
-"""The emulator does not hand over the kernel's count of dropped datagrams."""
+NOT_EMULATED = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
+"""Test that fails because the emulator does not pass on the kernel's count of dropped datagrams."""
 QEMU = Path("/usr/bin/qemu-aarch64-static")
 CPU = "cortex-a72"
 CORE = """processor\t: {number}
@@ -49,7 +49,7 @@ CPU part\t: 0xd08
 CPU revision\t: 3
 
 """
-"""Of /proc/cpuinfo on the core of a Raspberry Pi 4: that of the machine below ends ONNX Runtime."""
+"""/proc/cpuinfo of a Raspberry Pi 4. ONNX Runtime ends on that of the host."""
 BINFMT = Path("/proc/sys/fs/binfmt_misc")
 NAME = "modt-aarch64"
 MAGIC = r"\x7fELF\x02\x01\x01\x00\x00\x00\x00\x00\x00\x00\x00\x00\x02\x00\xb7\x00"
@@ -57,7 +57,7 @@ MASK = r"\xff\xff\xff\xff\xff\xff\xff\x00\xff\xff\xff\xff\xff\xff\xff\xff\xfe\xf
 
 
 def run(*command: object) -> None:
-    """Run a command; its failure ends this one."""
+    """Run a command, and end with an error if it fails."""
     done = subprocess.run([*map(str, command)], check=False)
     if done.returncode:
         raise SystemExit(f"arm64: {command[0]} ended with status {done.returncode}")
@@ -65,7 +65,7 @@ def run(*command: object) -> None:
 
 @contextmanager
 def emulator() -> Iterator[None]:
-    """Have the kernel run Arm programs by the emulator."""
+    """Context in which the kernel runs Arm programs by the emulator."""
     if not (BINFMT / "register").exists():
         run("mount", "-t", "binfmt_misc", "binfmt_misc", BINFMT)
     known = any("aarch64" in entry.name for entry in BINFMT.iterdir())
@@ -80,7 +80,7 @@ def emulator() -> Iterator[None]:
 
 @contextmanager
 def mounted(what: object, where: Path, *options: str) -> Iterator[None]:
-    """Mount something within a context."""
+    """Context in which something is mounted."""
     run("mount", *options, what, where)
     try:
         yield
@@ -89,13 +89,13 @@ def mounted(what: object, where: Path, *options: str) -> Iterator[None]:
 
 
 def install(root: Path) -> None:
-    """The userland, and the libraries as wheels."""
+    """Install the userland, and the libraries as wheels."""
     if not (root / "usr/bin/python3").exists():
         run("debootstrap", "--arch=arm64", "--variant=minbase", f"--include={PACKAGES}", SUITE, root)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = [*project["dependencies"], *project["optional-dependencies"]["test"]]
     wanted = [
-        name for name in wanted if name.split(">")[0] not in LACKING and not name.startswith(("types-", "scipy-"))
+        name for name in wanted if name.split(">")[0] not in LEFT_OUT and not name.startswith(("types-", "scipy-"))
     ]
     uv = shutil.which("uv") or Path(sys.executable).with_name("uv")
     form = ["--only-binary", ":all:", "--python-platform", PLATFORM, "--python-version", PYTHON]
@@ -103,7 +103,7 @@ def install(root: Path) -> None:
 
 
 def compile_kernels(folder: Path) -> Path:
-    """A copy of modt.native with the libraries of this platform, by the compiler of the wheels."""
+    """Copy modt.native, and compile its libraries for this platform with the compiler of the wheels."""
     shutil.copytree(build.FOLDER, folder, ignore=shutil.ignore_patterns("*.so", "__pycache__"), dirs_exist_ok=True)
     try:
         build.compile_all(folder, "aarch64")
@@ -135,7 +135,7 @@ def main() -> int:
         stack.enter_context(mounted(cores, root / "proc/cpuinfo", "--bind"))
         environment = {"QEMU_CPU": CPU, "HOME": "/root", "PATH": "/usr/sbin:/usr/bin", "PYTHONDONTWRITEBYTECODE": "1"}
         environment["PYTHONPATH"] = "/opt/modt/runtime"
-        chosen = ["-m", "not slow and not install and not kitti", "--durations", "10", "--deselect", BEYOND]
+        chosen = ["-m", "not slow and not install and not kitti", "--durations", "10", "--deselect", NOT_EMULATED]
         tests = [*chosen, "-p", "no:cacheprovider", *given.tests]
         inside = f"cd /opt/modt && exec python3 -m pytest {' '.join(map(repr, tests))}"
         return subprocess.run(["chroot", str(root), "sh", "-c", inside], check=False, env=environment).returncode

@@ -1,4 +1,4 @@
-"""A Chromium without a window, driven through a pipe by its DevTools protocol."""
+"""Control of a Chromium without a window, by its DevTools protocol through a pipe."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ OPTIONS = (
 
 
 def find() -> str | None:
-    """Path of an installed Chromium or Chrome, None without one."""
+    """Path of an installed Chromium or Chrome, or None."""
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
 class Browser:
-    """Commands to a browser that reads them at one descriptor and answers at another."""
+    """A browser that reads commands at one descriptor and answers at another."""
 
     def __init__(self, to: int, back: int) -> None:
         self._to, self._back, self._buffer, self._number = to, back, b"", 0
@@ -43,11 +43,11 @@ class Browser:
         self.events: list[dict[str, Any]] = []
 
     def call(self, method: str, session: str | None = None, **params: Any) -> dict[str, Any]:
-        """The result of a command; events that come before it are kept.
+        """Send a command and return its result. Events that come before it are kept.
 
         Raises:
-            RuntimeError: it is refused.
-            TimeoutError: no answer.
+            RuntimeError: the browser refuses it.
+            TimeoutError: the browser does not answer.
         """
         self._number += 1
         message = {"id": self._number, "method": method, "params": params} | (
@@ -77,7 +77,7 @@ class Browser:
 
 
 class Tab:
-    """A page in a browser, of some size."""
+    """A page in a browser."""
 
     def __init__(self, browser: Browser, url: str, width: int, height: int, *, dark: bool, first: str = "") -> None:
         self._browser = browser
@@ -93,14 +93,14 @@ class Tab:
         self.call("Page.navigate", url=url)
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
-        """The result of a command to the page."""
+        """Send a command to the page and return its result."""
         return self._browser.call(method, self._session, **params)
 
     def value(self, expression: str) -> Any:
         """Value of an expression or of its promise.
 
         Raises:
-            RuntimeError: it throws.
+            RuntimeError: the expression throws.
         """
         found = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         if "exceptionDetails" in found:
@@ -111,7 +111,7 @@ class Tab:
         """Wait for a condition.
 
         Raises:
-            TimeoutError: it does not come to hold.
+            TimeoutError: the condition does not hold in time.
         """
         end_s = time.monotonic() + within_s
         while not self.value(f"(() => {{ try {{ return Boolean({condition}) }} catch {{ return false }} }})()"):
@@ -120,8 +120,8 @@ class Tab:
             time.sleep(0.02)
 
     def failures(self) -> list[str]:
-        """Errors and warnings of its console so far, and exceptions that nobody has caught."""
-        self.value("0")  # takes what has come until now
+        """Errors and warnings of the page's console so far, and its uncaught exceptions."""
+        self.value("0")  # receives the events so far
         found = []
         for event in self._browser.events:
             method, params = event.get("method"), event.get("params", {})
@@ -136,25 +136,25 @@ class Tab:
         return found
 
     def point(self, x: float, y: float, *, click: bool = False) -> None:
-        """Move the mouse there [CSS pixels], and click."""
+        """Move the mouse to a place [CSS pixels], and click there on request."""
         for kind in ("mouseMoved", *(("mousePressed", "mouseReleased") if click else ())):
             button = {} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **button)
 
     def press(self, key: str) -> None:
-        """A key, by its name in JavaScript."""
+        """Press and release a key, named as in JavaScript."""
         text = {"text": key} if len(key) == 1 else {}
         self.call("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
         self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
 
     def close(self) -> None:
-        """Leave the page."""
+        """Close the page."""
         self._browser.call("Target.closeTarget", targetId=self._target)
 
 
 @contextmanager
 def browser(path: str) -> Iterator[Browser]:
-    """An executable, started, and ended at the end."""
+    """Start a browser, and end it on leaving the context."""
     to_browser, from_browser = os.pipe(), os.pipe()
     # Above the descriptors 3 and 4, at which the browser expects them.
     ends = [fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 10) for fd in (*to_browser, *from_browser)]

@@ -1,4 +1,4 @@
-"""Check and record what modt depends on: bounds, lock, bill of materials, known weaknesses, and the wheel itself.
+"""Check the bounds, lock, bill of materials and known weaknesses of the dependencies, and the wheel itself.
 
     python -m tools.deps oldest [--python 3.10]   # the fast tests with the lowest versions of pyproject.toml
     python -m tools.deps newest [--python 3.14]   # … and with the newest
@@ -27,7 +27,7 @@ from tools.options import parser
 ROOT = Path(__file__).resolve().parents[1]
 LOCK = ROOT / "systemd" / "requirements.txt"
 EXTRAS = ("velodyne", "ros2", "foxglove")
-"""Of the service's environment; `ouster` is left out, it brings a web server and a viewer."""
+"""Extras of the service's environment. `ouster` is left out because it brings a web server and a viewer."""
 FAST = "not slow and not install and not kitti"
 OLDEST, NEWEST = "lowest-direct", "highest"
 EPOCH = "1700000000"
@@ -45,7 +45,7 @@ def _uv(*arguments: object, check: bool = True) -> subprocess.CompletedProcess[s
 
 
 def tested(resolution: str, version: str) -> int:
-    """Run the fast tests with the lowest or highest versions allowed; prints which."""
+    """Run the fast tests with the lowest or highest versions allowed, and print these."""
     with tempfile.TemporaryDirectory() as folder:
         python = Path(folder) / "venv" / "bin" / "python"
         _uv("venv", "--quiet", "--python", version, python.parents[1])
@@ -57,7 +57,7 @@ def tested(resolution: str, version: str) -> int:
 
 
 def lock() -> int:
-    """Write the lock of the service's environment, of every platform and Python that is allowed."""
+    """Write the lock of the service's environment for every supported platform and Python."""
     extras = [word for name in EXTRAS for word in ("--extra", name)]
     form = ["--universal", "--generate-hashes", "--no-annotate", "--python-version", "3.10", "--no-header"]
     done = _uv("pip", "compile", "--quiet", "--upgrade", *form, *extras, "pyproject.toml")
@@ -76,7 +76,7 @@ def sbom() -> int:
 
 
 def audit() -> int:
-    """Print the known weaknesses of what is locked; a package that nobody could be asked about counts as one."""
+    """Print the known weaknesses of the lock. A package that the index has no answer for counts as one."""
     form = ["--no-deps", "--disable-pip", "--progress-spinner", "off", "--format", "json"]
     done = _uv("tool", "run", "pip-audit", "--requirement", LOCK, *form, check=False)
     if not done.stdout.startswith("{"):
@@ -93,7 +93,7 @@ def audit() -> int:
 
 
 def wheel() -> int:
-    """Build the wheel in two places at two times; whether both are the same."""
+    """Build the wheel in two places at two times, and compare both."""
     digests = set()
     for _ in range(2):
         with tempfile.TemporaryDirectory() as folder:

@@ -2,9 +2,9 @@
 
     python -m tools.fuzz [TARGET ...] --seconds 60 --seed 1
 
-By atheris, which is led by coverage, where the extra [fuzz] is installed; else by random mutations. What should not
-have left a reader is written to --out with its input; then the exit status is 1. What covers more is kept there too,
-and a later run goes on from it.
+Where the extra [fuzz] is installed, atheris mutates the inputs, led by coverage; else the mutations are random. An
+error that no reader may raise is written to --out with its input, and the exit status is 1. Inputs that cover more
+code are kept there too, and a later run begins with them.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from typing import Any
 from tools.options import parser
 
 PATIENCE_S = 60.0
-"""After its seconds, until a process that does not answer is ended."""
+"""Time after which a process that exceeds its seconds is ended [s]."""
 MEMORY = Path("/dev/shm")
-"""Where the files are that an input is written to, if there is such a file system."""
+"""File system in memory for the inputs, used where it exists."""
 Feed = Callable[[bytes], None]
 
 
 class Witness:
-    """How many inputs a process has read, and the last one, in memory that outlives it."""
+    """Number of inputs that a process has read, and the last input, in memory that outlives it."""
 
     HEAD, MOST_BYTES = struct.Struct("<QQ"), 1 << 24
 
@@ -43,25 +43,25 @@ class Witness:
         self._memory = mmap.mmap(-1, self.HEAD.size + self.MOST_BYTES)
 
     def see(self, raw: bytes) -> None:
-        """An input is about to be read."""
+        """Note an input that is about to be read."""
         kept = raw[: self.MOST_BYTES]
         self.HEAD.pack_into(self._memory, 0, self.executions + 1, len(kept))
         self._memory[self.HEAD.size : self.HEAD.size + len(kept)] = kept
 
     @property
     def executions(self) -> int:
-        """Inputs that were seen."""
+        """Number of inputs noted."""
         return int(self.HEAD.unpack_from(self._memory)[0])
 
     @property
     def last(self) -> bytes:
-        """The last of them."""
+        """Last input noted."""
         return self._memory[self.HEAD.size :][: self.HEAD.unpack_from(self._memory)[1]]
 
 
 @dataclass(frozen=True)
 class Job:
-    """What a process is to do."""
+    """Task of a process."""
 
     target: Any
     seconds: float
@@ -100,7 +100,7 @@ def main() -> None:
 
 
 def _instrumented(coverage: bool) -> AbstractContextManager[object]:
-    """Within it, what is imported of the package tells what it covers."""
+    """Context in which imported modules of the package report their coverage."""
     if not coverage:
         return nullcontext()
     import atheris
@@ -109,7 +109,7 @@ def _instrumented(coverage: bool) -> AbstractContextManager[object]:
 
 
 def _supervise(job: Job) -> int:
-    """Run a job, tell of it, and return the number of its findings."""
+    """Run a job, print its summary, and return the number of its findings."""
     began = time.monotonic()
     process = multiprocessing.get_context("fork").Process(target=_fuzz, args=(job,))
     process.start()
@@ -151,7 +151,7 @@ def _fuzz(job: Job) -> None:
 
             def feed(raw: bytes) -> None:
                 if time.monotonic() > ends:
-                    os._exit(0)  # at once: what libraries do at an exit may wait for threads that a fork has not
+                    os._exit(0)  # exit handlers of libraries may wait for threads that a fork does not have
                 job.witness.see(raw)
                 found = execute(call, raw, job.target.refusals)
                 if found is not None and found.place not in places:
@@ -168,7 +168,7 @@ def _fuzz(job: Job) -> None:
 
 
 def _by_coverage(job: Job, seeds: Any, feed: Feed) -> None:
-    """Mutations of atheris, and as many of ours, which know of texts."""
+    """Feed mutations of atheris, and as many of the project's own, which know texts."""
     import atheris
 
     from tests.fuzz.mutation import mutated

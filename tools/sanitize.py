@@ -1,4 +1,4 @@
-"""The tests of the compiled kernels under AddressSanitizer and UndefinedBehaviorSanitizer.
+"""Run the tests of the compiled kernels under AddressSanitizer and UndefinedBehaviorSanitizer.
 
     python -m tools.sanitize [-- PYTEST-OPTION ...]
 

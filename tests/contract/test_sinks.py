@@ -18,7 +18,7 @@ FILES = {
     "kitti": lambda root: KittiResults(root / "kitti" / "0000.txt", None),
     "labels": lambda root: PointLabels(root / "labels"),
 }
-"""Sinks of a run directory: what is written is in the file."""
+"""Sinks of a run directory, whose files hold a frame when write returns."""
 ADDRESSES = {
     "file": lambda root: open_sink(f"file://{root}/lines.jsonl"),
     "mcap": lambda root: open_sink(f"mcap://{root}/run.mcap"),
@@ -27,7 +27,7 @@ ADDRESSES = {
     "foxglove": lambda root: open_sink("foxglove://:0"),
     "view": lambda root: open_sink("view://:0"),
 }
-"""Sinks that are asked for by their address, of those without a reader."""
+"""Sinks by their addresses, where nobody reads."""
 EXTRAS = {"mcap": "foxglove", "foxglove": "foxglove"}
 FRAMES = [
     result(0, [], {}),
@@ -115,5 +115,5 @@ def test_nobody_who_reads_and_the_lines_of_the_ledger_hold_nothing_up(kind, tmp_
 
 
 def test_every_scheme_has_its_contract_tested():
-    elsewhere = {"stdout", "ros2"}  # test_frame_lines.py, and beside its sink
-    assert ADDRESSES.keys() | elsewhere == SINKS.keys()
+    other_tests = {"stdout", "ros2"}  # test_frame_lines.py, and beside its sink
+    assert ADDRESSES.keys() | other_tests == SINKS.keys()

@@ -1,8 +1,7 @@
-"""A machine that draws power: its clocks advance with its work, and its sysfs files with its clocks."""
+"""A simulated machine that draws power. Its clocks advance with its work, and its sysfs files with its clocks."""
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from modt.energy.windows import Clocks
 
 
 class SimulatedMachine:
-    """Counts energy in a powercap file as hardware does: in steps, and round and round."""
+    """Machine that counts energy in a powercap file as hardware does, in steps and with overflow."""
 
     def __init__(
         self,
@@ -50,7 +49,7 @@ class SimulatedMachine:
         return Ledger(lambda: self.now_ns, lambda: self.cpu_ns)
 
     def work(self, seconds: float, joules: float, items: int = 0) -> range:
-        """Computes for a while; the energy comes on top of the idle power and shows after the next wait."""
+        """Compute for a while. The energy comes on top of the idle power and shows after the next wait."""
         self.cpu_ns += round(seconds * 1e9)
         self.true_J += joules
         self._pass(seconds)
@@ -74,9 +73,6 @@ class SimulatedMachine:
         self.zone.with_name("gone").rename(self.zone)
         self._show()
 
-    def remove(self) -> None:
-        shutil.rmtree(self.zone)
-
     def _show(self) -> None:
         if self.zone.is_dir():
             steps = np.floor(1e6 * self.true_J / self.step_uJ)
@@ -84,7 +80,7 @@ class SimulatedMachine:
 
 
 def write_zone(path: Path, name: str, wrap_uJ: int | None = 262_143_328_850, energy_uJ: int = 1000) -> None:
-    """A powercap zone as the kernel lays it out."""
+    """Write a powercap zone as the kernel does."""
     path.mkdir(parents=True, exist_ok=True)
     (path / "name").write_text(f"{name}\n")
     (path / "energy_uj").write_text(f"{energy_uJ}\n")

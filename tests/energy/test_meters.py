@@ -16,7 +16,6 @@ from modt.energy.meters.discovery import (
     find_hwmon,
     find_pmic,
     find_powercap,
-    rail_power_W,
 )
 from modt.energy.meters.meter import Kind, Meter, MeterLostError, Scope, model_meter
 from modt.errors import MisuseError
@@ -89,7 +88,7 @@ def test_two_zones_that_show_one_counter_count_once(tmp_path: Path, second_uJ: i
 def test_counters_are_compared_while_they_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mirrors: bool
 ) -> None:
-    """A mirror is read later than the counter itself, and shows more; another counter may be near by chance."""
+    """A mirror is read after the counter itself and shows more. Another counter may be near by chance."""
     dies(tmp_path, 0, 0)
     true_uJ, own = itertools.count(10**9, 50_000), meter_module.read_number
 
@@ -175,7 +174,7 @@ NX = {"VDD_IN": (5000, 1000), "VDD_CPU_GPU_CV": (5000, 300), "VDD_SOC": (5000, 2
 
 
 def board(sys: Path, rails: dict[str, tuple[int, int]], model: str = "") -> Discovery:
-    """A Jetson of these rails (mV, mA), three a chip."""
+    """A Jetson with these rails (mV, mA), three on each chip."""
     for n, (label, (mV, mA)) in enumerate(rails.items()):
         k = n % 3 + 1
         channel = {f"in{k}_label": label, f"in{k}_input": mV, f"curr{k}_input": mA, f"in{k}_enable": 1}
@@ -214,7 +213,7 @@ def test_the_module_of_a_board_by_its_table(
 
 
 def test_rails_beside_a_module_are_listed_and_never_added(tmp_path: Path) -> None:
-    """VIN_SYS_5V0 feeds the memory's rail; NC is not connected, and VDD_GPU_SOC is switched off."""
+    """VIN_SYS_5V0 feeds the memory's rail, NC is not connected, and VDD_GPU_SOC is switched off."""
     found = board(tmp_path, AGX_ORIN | {"NC": (0, 0), "VDDQ_VDD2_1V8AO": (5000, 200)})
     assert found.choose("hwmon ina3221 VIN_SYS_5V0").meters[0].facts.scope is Scope.RAIL
     assert watts_of(found, "hwmon ina3221 VIN_SYS_5V0") == pytest.approx(4.5)
@@ -271,12 +270,6 @@ def test_battery_counts_only_while_it_discharges(tmp_path: Path) -> None:
         battery.meters[0].read()
 
 
-def test_pmic_sums_rails_with_voltage_and_current() -> None:
-    assert rail_power_W(PMIC, set()) == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
-    with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
-        rail_power_W("error=2 error_msg=Invalid arguments", set())
-
-
 def script(folder: Path, body: str) -> str:
     path = folder / "vcgencmd"
     path.write_text(f"#!/bin/sh\n{body}\n")
@@ -288,7 +281,10 @@ def test_pmic_is_read_through_its_command(tmp_path: Path) -> None:
     (tmp_path / "adc").write_text(PMIC)
     (pmic,) = find_pmic(script(tmp_path, f"[ $1 = pmic_read_adc ] && cat {tmp_path}/adc"))
     assert pmic.usable
-    assert pmic.meters[0].read() == pytest.approx(rail_power_W(PMIC, set()))
+    assert pmic.meters[0].read() == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
+    (tmp_path / "adc").write_text("error=2 error_msg=Invalid arguments")
+    with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
+        pmic.meters[0].read()
     (tmp_path / "adc").unlink()
     with pytest.raises(MeterLostError):
         pmic.meters[0].read()

@@ -24,7 +24,7 @@ def fresh(machine: SimulatedMachine) -> Windows:
 
 
 def windows_of(machine: SimulatedMachine) -> Windows:
-    """Windows over the machine's counter, after the first one, which compares with nothing."""
+    """Windows over the machine's counter, after the first window, which has no earlier reading."""
     windows = fresh(machine)
     machine.wait(0.1)
     assert windows.close()["marks"] == ["first"]
@@ -32,7 +32,7 @@ def windows_of(machine: SimulatedMachine) -> Windows:
 
 
 def second(machine: SimulatedMachine, ledger: Ledger, windows: Windows, frame: int = 0) -> dict[str, Any]:
-    """A second of work: one frame that fills one window."""
+    """Work for a second, as one frame that fills one window."""
     ledger.run("segmentation", machine.work, 0.25, 0.5, 3)
     machine.wait(0.75)
     line = windows.add(ledger.close_frame(frame))
@@ -133,7 +133,7 @@ def test_parts_of_every_window_sum_to_it(tmp_path_factory: Any, frames: list[tup
 
 
 def test_the_first_window_of_a_counter_is_short(machine: SimulatedMachine) -> None:
-    """It takes a measured power to judge a reading by; a power sample needs none."""
+    """A counter's reading is judged by the power measured before. A power sample needs no earlier one."""
     ledger, windows = machine.ledger(), fresh(machine)
     machine.wait(0.1)
     line = windows.add(ledger.close_frame(0))

@@ -17,7 +17,7 @@ GATE_M, SIGMA_M = 2.0, 0.3
 
 
 class NearestCentroid:
-    """Matches centroids within two metres; the cost is their distance."""
+    """Association of centroids within two metres, with their distance as cost."""
 
     def match(self, tracks, observations):
         distance = np.linalg.norm(tracks.x[:, None, :2] - observations.centroid[None], axis=2)

@@ -8,12 +8,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import onnx
+import onnx.parser
 import pytest
 import yaml
-from onnx import TensorProto, helper, numpy_helper
 
-SHARES = np.array([0.02, 0.02, 0.02, 0.02, 0.92], np.float32)
 VALUE = "    CYCLIST = 3\n"
 ROW = '    ObjectClass.CYCLIST: ClassSpec(("Cyclist",)'
 
@@ -38,20 +36,17 @@ def a_package_with_trucks(tmp_path_factory):
 
 @pytest.fixture(scope="module", name="profile")
 def a_profile_with_a_model_of_five_outputs(source):
-    nodes = [
-        helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0),
-        helper.make_node("MatMul", ["pooled", "zeros"], ["nothing"]),
-        helper.make_node("Add", ["nothing", "shares"], ["probability"]),
-    ]
-    weights = {"zeros": np.zeros((3, 5), np.float32), "shares": SHARES}
-    graph = helper.make_graph(
-        nodes,
-        "trucks",
-        [helper.make_tensor_value_info("points", TensorProto.FLOAT, ["batch", "n", 3])],
-        [helper.make_tensor_value_info("probability", TensorProto.FLOAT, ["batch", 5])],
-        [numpy_helper.from_array(value, name) for name, value in weights.items()],
-    )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    zeros = ", ".join("0" * 15)
+    model = onnx.parser.parse_model(f"""
+        <ir_version: 8, opset_import: ["": 17]>
+        trucks (float[batch, n, 3] points) => (float[batch, 5] probability)
+        <float[3, 5] zeros = {{{zeros}}}, float[5] shares = {{0.02, 0.02, 0.02, 0.02, 0.92}}>
+        {{
+            pooled = ReduceMax <axes = [1], keepdims = 0> (points)
+            nothing = MatMul (pooled, zeros)
+            probability = Add (nothing, shares)
+        }}
+    """)
     onnx.save(model, source / "models" / "trucks.onnx")
     profile = source / "profiles" / "trucks.yaml"
     vlp_16 = yaml.safe_load((source / "profiles" / "vlp-16.yaml").read_text())

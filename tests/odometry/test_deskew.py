@@ -1,4 +1,4 @@
-"""Deskew: sweeps of a turning head on a moving carrier are brought back to one time."""
+"""Deskew of the sweeps of a turning head on a moving carrier to one time."""
 
 from dataclasses import replace
 
@@ -12,9 +12,9 @@ from modt.observations import observe
 from modt.odometry.odometry import delays
 from modt.odometry.registration import Landmarks, Registration
 from modt.placement import Placement, PlanarMotion
-from modt.types import Frame, Proposals
+from modt.types import Proposals
 from tests.odometry.odometry_scenes import constant_turn, constant_turn_pose, street
-from tests.tracking.tracking_scenes import Follower, box, frame_of
+from tests.tracking.tracking_scenes import Follower, frame_of
 
 PERIOD_S = 0.1
 
@@ -96,26 +96,6 @@ def test_the_delay_across_the_seam_is_the_mean_over_the_bearings(distance, side,
     assert found == pytest.approx(-mean / (2 * np.pi), abs=1e-3)
 
 
-@given(st.floats(0, 20), st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.2, 0.2), st.sampled_from([0.1, -0.1]))
-def test_a_correction_moves_each_observation_by_its_share(speed, turn, faster, turns_more, turn_s):
-    """Placing it by the corrected pose and the motion that led there moves it as far."""
-    proposals = skewed(np.array([box(12, 4), box(-3, 8), box(-9, -9), box(2, -6)]), 0, turn_s, 0, 0, True)[1]
-    before = constant_turn_pose(0, 0, 0)
-
-    def place(after):
-        step = corrected(proposals, turn_s, PlanarMotion.between(before, after, PERIOD_S), after)
-        return observe(proposals, after).centroid + step
-
-    predicted, after = (
-        constant_turn_pose(PERIOD_S, speed, turn),
-        constant_turn_pose(PERIOD_S, speed + faster, turn + turns_more),
-    )
-    placed = np.c_[place(predicted), np.zeros((4, 2))] + [0, 0, 0, 1]
-    whole = (placed @ (after @ inverse(predicted)).T - placed)[:, :2]
-    expected = (1.0 + delays(proposals, turn_s) / PERIOD_S)[:, None] * whole
-    np.testing.assert_allclose(place(after) - place(predicted), expected, atol=0.01)
-
-
 @pytest.mark.parametrize(("known", "least_deg", "most_deg"), [(True, 0.0, 0.02), (False, 0.03, 1.0)])
 def test_registration_needs_the_shares_of_a_skewed_sweep(known, least_deg, most_deg):
     world = street(n=120)
@@ -129,28 +109,6 @@ def test_registration_needs_the_shares_of_a_skewed_sweep(known, least_deg, most_
     registration = Registration()
     found = registration.correct(landmarks, observe(proposals, predicted).moved(step), share) @ predicted
     assert least_deg <= abs(np.rad2deg(yaw_of(inverse(true) @ found))) < most_deg
-
-
-@pytest.mark.parametrize("turn_s", [0.1, -0.1])
-def test_moving_proposals_as_a_whole_leaves_little_error(turn_s):
-    """Against the same points, each deskewed by its own time."""
-    speed, turn = 10.0, 0.3
-
-    def at(t):
-        return constant_turn_pose(t, speed, turn)
-
-    world = np.array([box(12, 4), box(-3, 8), box(-14, 4), box(-9, -9), box(2, -6), box(25, -12)])
-    frame, proposals = skewed(world, 0, turn_s, speed, turn, posed=True)
-    motion = PlanarMotion.between(at(-PERIOD_S), at(0), PERIOD_S)
-    deskewed = observe(proposals, at(0)).moved(corrected(proposals, turn_s, motion, at(0)))
-    true_frame, true_proposals = frame_of(world, 0, points=80)
-    true = observe(true_proposals, np.eye(4))
-    raw = observe(proposals, at(0))
-    assert np.abs(deskewed.centroid - true.centroid).max() < 0.03
-    assert np.abs(deskewed.kdop - true.kdop).max() < 0.08
-    assert np.abs(raw.centroid - true.centroid).max() > 0.3
-    np.testing.assert_allclose(deskewed.box[:, :2] - raw.box[:, :2], deskewed.centroid - raw.centroid)
-    assert len(frame.points) == len(true_frame.points)
 
 
 def drive(turn_s, known, posed=False, frames=25):
@@ -184,22 +142,9 @@ def test_stationary_objects_stay_in_place_though_their_sweeps_are_skewed():
     assert distance.max() < 0.3
 
 
-def test_sweeps_without_skew_are_not_changed():
-    trackers = [Follower() for _ in range(2)]
-    for i in range(8):
-        T = constant_turn_pose(0.1 * i, 8.0, 0.6)
-        frame, proposals = frame_of(street(n=30), i, None if i % 2 else T, points=40)
-        trackers[0].follow(frame, proposals)
-        trackers[1].follow(
-            Frame(frame.index, frame.stamp_s, frame.points, frame.T_world_sensor, turn_s=0.0), proposals
-        )
-        for (name, a), (_, b) in zip(trackers[0].tracks.columns(), trackers[1].tracks.columns(), strict=True):
-            assert a.tobytes() == b.tobytes(), name
-
-
 @given(st.floats(-15, 15), st.floats(-1, 1), st.sampled_from([0.1, -0.1]), st.floats(0, 2 * np.pi))
 def test_a_placement_deskews_positions_like_the_proposals_there(speed, yaw_rate, turn_s, bearing):
-    """Placement.deskew, for positions without points, agrees with the correction of a small proposal."""
+    """Placement.deskew corrects positions without points, as the correction of a small proposal does."""
     T = se3(rotation_zyx(0, 0, 0.7), np.array([3.0, -2.0, 0.0]))
     motion = PlanarMotion(complex(speed, 0.1 * speed), yaw_rate)
     proposals = one(9 * np.cos(bearing), 9 * np.sin(bearing), 0.0, 0.0)

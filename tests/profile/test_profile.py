@@ -1,4 +1,4 @@
-"""Profiles: strict, bounded, and back again."""
+"""Reading, checking and writing of profiles."""
 
 import pytest
 from hypothesis import given
@@ -38,14 +38,10 @@ def test_dump_and_parse_are_inverse():
         ("sensor:\n  height_m: 1.0\n  heigth: 2\n", ["p.yaml:3", "'heigth'", "'height_m'"]),
         ("segmentation:\n  min_points: 5\n  cell_m: 99\n", ["p.yaml:3", "cell_m", "out of range"]),
         ("segmentation:\n  min_points: 2.5\n", ["p.yaml:2", "min_points", "whole number"]),
-        ("segmentation:\n  min_points: true\n", ["p.yaml:2", "min_points"]),
         ("tracking:\n  association: magic\n", ["p.yaml:2", "'magic'", "paper"]),
         ("fusion:\n  point_change: [1, 2]\n", ["p.yaml:2", "point_change", "4 values"]),
         ("sensor:\n  elevations_deg: [1]\n", ["p.yaml:2", "elevations_deg", "2 to 512 values"]),
-        ("sensor:\n  elevations_deg: [1, 91]\n", ["p.yaml:2", "elevations_deg", "91 is out of range"]),
         ("sensor:\n  blind_sectors_deg: [1, 2, 3]\n", ["p.yaml:2", "blind_sectors_deg", "no pairs"]),
-        ("sensor:\n  elevations_deg: 1\n", ["p.yaml:2", "elevations_deg", "2 to 512 values"]),
-        ("fusion:\n  object_threshold: high\n", ["p.yaml:2", "object_threshold"]),
         ("fusion: 3\n", ["p.yaml:1", "no mapping"]),
         ("a: [1\n", ["p.yaml:", "no YAML"]),
         ("sensor: {}\nsensor: {}\n", ["p.yaml:2", "twice"]),

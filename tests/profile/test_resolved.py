@@ -11,7 +11,7 @@ from modt.errors import MisuseError
 
 @pytest.fixture
 def write(tmp_path, monkeypatch):
-    """Profiles of some texts, by their names in the working directory."""
+    """Write profiles into the working directory."""
     monkeypatch.chdir(tmp_path)
 
     def written(**texts):

@@ -1,4 +1,4 @@
-"""As much of rclpy, and of the packages of its messages, as the node uses; topics lead to this process itself."""
+"""Fake of the parts of rclpy and of the message packages that the node uses. Topics lead back to this process."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Node:
 
 
 def install(monkeypatch):
-    """Have imports find it; returns the one node."""
+    """Put the fake in the place of rclpy, and return its one node."""
     node, spinning = Node(), threading.Event()
     executor = SimpleNamespace(add_node=lambda node: None, spin=spinning.set)
     modules = {

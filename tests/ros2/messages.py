@@ -1,4 +1,4 @@
-"""ROS 2 messages as another implementation, `rosbags`, encodes and decodes them."""
+"""ROS 2 messages encoded and decoded by another implementation, `rosbags`."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def encode(message: Any, *, little: bool = True) -> bytes:
 
 
 def decode(message: bytes, name: str) -> Any:
-    """The message in bytes that hold nothing else but padding."""
+    """Decode bytes that hold one message and at most padding."""
     decoded = store().deserialize_cdr(message, name)
     assert 0 <= len(message) - len(encode(decoded)) < 4
     return decoded
 
 
 def made(kind: str, /, **values: Any) -> Any:
-    """A message of a type by its name, as `nav_msgs/Odometry`; fields that are not given are zero or empty."""
+    """A message of a named type, such as `nav_msgs/Odometry`. Fields that are not given are zero or empty."""
     full = kind.replace("/", "/msg/") if "/msg/" not in kind else kind
     return store().types[full](**{name: values.get(name, _blank(*form)) for name, form in store().fielddefs[full][1]})
 

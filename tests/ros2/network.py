@@ -21,7 +21,7 @@ DEADLINE_S = 60.0
 
 @pytest.fixture
 def loopback(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """NEAR and FAR are domains that meet; what was opened on them is closed with the test."""
+    """Join the domains NEAR and FAR, which meet, until the test ends."""
     pytest.importorskip("cyclonedds")
     from modt.ros2.dds import participant
 

@@ -1,4 +1,4 @@
-"""The package modt_ros: its files agree with modt, and the node exchanges messages by rclpy, here a fake one."""
+"""The files of the package modt_ros agree with modt, and its node exchanges messages by a fake rclpy."""
 
 from __future__ import annotations
 
@@ -72,15 +72,6 @@ def test_the_layout_of_foxglove_shows_topics_of_modt():
     assert panels == layout["configById"].keys()
     assert named(text) <= PUBLISHED.keys() | figures()
     assert {"/modt/markers", "/modt/points", "/modt/detections"} <= named(text)
-
-
-def test_the_page_names_every_topic_and_no_other():
-    page = (ROOT / "docs" / "ros2.md").read_text()
-    known = PUBLISHED.keys() | figures()
-    assert PUBLISHED.keys() <= set(re.findall(r"`(/[\w/]+)`", page))
-    assert {name for name in named(page) if name not in known and f"{name}/" not in "".join(known)} == set()
-    for name, kind in PUBLISHED.items():
-        assert re.search(rf"`{name}` \| `{kind}`", page), name
 
 
 @pytest.fixture(name="launched")

@@ -1,4 +1,4 @@
-"""PointCloud2 messages of any layout, by comparison with an obvious reader; and hostile ones."""
+"""PointCloud2 messages of any layout, compared with a simple reader, and hostile messages."""
 
 from __future__ import annotations
 
@@ -90,13 +90,6 @@ def test_points_that_are_not_finite_count_as_no_return():
     assert np.isfinite(cloud.points).all()
 
 
-@pytest.mark.parametrize("row_step", [0, 1])
-def test_the_length_of_a_single_row_does_not_matter(row_step):
-    message = messages.cloud(messages.xyzi(20))
-    message.row_step = row_step
-    assert len(read_cloud(messages.encode(message)).points) == 20
-
-
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
@@ -114,13 +107,6 @@ def test_sizes_that_do_not_fit_are_refused(changes, reason):
     with pytest.raises(MessageError) as caught:
         read_cloud(messages.encode(message))
     assert caught.value.reason == reason
-
-
-def test_a_field_beyond_the_point_is_not_there():
-    message = messages.cloud(messages.xyzi(20))
-    message.fields[2].offset = 13
-    with pytest.raises(MessageError, match="no x, y, z of floating point among x, y, intensity"):
-        read_cloud(messages.encode(message))
 
 
 @pytest.mark.parametrize("datatype", [4, 9, 255])
@@ -162,7 +148,7 @@ def test_a_written_cloud_is_read_by_another_implementation():
 
 
 class TestTimes:
-    """Times of the points, of a head that turns clockwise once in 0.1 s, its seam behind."""
+    """Times of the points of a head that turns clockwise once in 0.1 s, with its seam behind."""
 
     def cloud(self, *, turn_s=0.1, seam=np.pi, field="time", kind="f4", unit=1e-9, begin=0.0):
         """Points all round, seen `turn_s / 2` before to after straight ahead."""

@@ -21,7 +21,7 @@ for (const name of ["fillText", "fill", "arc", "putImageData"]) {
   };
 }
 """
-"""Keeps what is drawn since the points were."""
+"""Script that records the drawing calls since the last points."""
 SHOWN = """({
   frame: Number(canvas.dataset.frame),
   at: state.at,
@@ -48,7 +48,7 @@ class Chromium:
         self._browser = started
 
     def opened(self, page: Path, *actions: str, width: int = 1280, height: int = 800, dark: bool = False):
-        """What a page shows after some actions: slide:K, key:NAME, hover:X,Y or click:X,Y [m, sensor frame]."""
+        """Contents of a page after actions: slide:K, key:NAME, hover:X,Y or click:X,Y [m, sensor frame]."""
         with self.tab(page.resolve().as_uri(), width=width, height=height, dark=dark) as tab:
             for action in actions:
                 act(tab, *action.split(":"))
@@ -65,7 +65,7 @@ class Chromium:
 
 
 def act(tab: Tab, kind: str, what: str) -> None:
-    """One action on a page."""
+    """Perform one action on a page."""
     if kind == "slide":
         tab.value(f"slider.value = {what}; slider.dispatchEvent(new Event('input'))")
         tab.until(f"state.at === {what} && canvas.dataset.frame === String(frames[{what}].frame)")

@@ -19,7 +19,7 @@ def unpacked(text: str) -> np.ndarray:
 
 
 def sums(data: np.ndarray, n_bytes: int) -> np.ndarray:
-    """Numbers of the planes of their differences, as the page adds them up: modulo 2^32."""
+    """Numbers from the byte planes of their differences, summed modulo 2^32 as in the page."""
     parts = data.reshape(n_bytes, -1).astype(np.int64)
     total = np.cumsum(sum(part << (8 * k) for k, part in enumerate(parts)))
     return (total + 2**31) % 2**32 - 2**31
@@ -38,7 +38,7 @@ def table(text: str, n_columns: int) -> np.ndarray:
 
 
 class Page:
-    """What lies in a page."""
+    """Contents of a page."""
 
     def __init__(self, path: Path) -> None:
         self.text = path.read_text(encoding="utf-8")
@@ -48,5 +48,5 @@ class Page:
         self.points = [cells(text) for name, text in found.items() if name.startswith("points-")]
 
     def column(self, name: str) -> np.ndarray:
-        """Of the tracks."""
+        """A column of the tracks."""
         return self.tracks[:, [column for column, _ in self.run["columns"]].index(name)]

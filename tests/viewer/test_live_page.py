@@ -12,7 +12,6 @@ from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import SINKS
 from modt.viewer import live_server
-from modt.viewer.live_frame import live_cells
 from modt.viewer.live_page import open_view
 from modt.viewer.live_server import MOST_CLIENTS, MOST_CONNECTIONS
 from modt.viewer.track_rows import COLUMNS, SCALED, result_rows
@@ -38,13 +37,13 @@ def live():
 
 
 def show(live, frame):
-    """A frame, and what it cost."""
+    """Write a frame and its line of the ledger."""
     live.write(frame)
     live.ledger(ledger(frame.frame.index))
 
 
 class Reader:
-    """One who reads the events."""
+    """Client that reads the events."""
 
     def __init__(self, live, path="/events", **headers):
         self.connection = http.client.HTTPConnection("127.0.0.1", live.port, timeout=WAIT_S)
@@ -98,7 +97,7 @@ def test_connections_are_bounded(patient, live, read):
 
 
 def asks_slowly(port):
-    """A byte every 20 ms, until it is left."""
+    """Send a byte every 20 ms until the server closes the connection."""
     ends_s = time.monotonic() + WAIT_S
     with socket.create_connection(("127.0.0.1", port), 0.02) as slow:
         slow.sendall(b"GET /")
@@ -197,9 +196,3 @@ def test_rows_of_a_result_are_in_the_frame_of_the_sensor():
     assert [lost[key] for key in ("x", "y", "z", "l", "w", "h", "yaw")] == pytest.approx([3, 0, -1, 4, 2, 1.5, 0.5])
     assert rows.shape == (2, len(COLUMNS))
     assert [seen[name] for name in SCALED[-4:]] == [12.0, 1.0, 0.3, 2.0]
-
-
-def test_points_of_proposals_stand_out():
-    cells = live_cells(results.result(0, [5, 4], {0: 1}))
-    assert len(cells) >= 1
-    assert (cells.level > 0).any()

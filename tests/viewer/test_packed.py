@@ -23,3 +23,12 @@ def test_a_table_comes_back_with_numbers_of_either_sign():
 def test_nothing_is_packed_too():
     none = np.zeros(0, np.int64)
     assert [len(part) for part in pages.cells(packed_cells(Cells(none, none)))] == [0, 0]
+
+
+def test_thinned_cells_lose_ground_first():
+    cells = Cells(np.arange(100), np.where(np.arange(100) % 4 == 0, 3, 0))
+    assert len(cells.thinned(1000)) == 100
+    for most, standing in ((60, 25), (10, 10), (0, 0)):
+        some = cells.thinned(most)
+        assert (len(some), np.count_nonzero(some.level)) == (most, standing)
+        assert (np.diff(some.cell) > 0).all()

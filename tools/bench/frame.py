@@ -2,11 +2,11 @@
 
     python -m tools.bench.frame DRIVE [--frames N] [--write] [--against FILE]
 
-All run in one thread, frame by frame in random order, on the full circle: the pipelines on compiled kernels and on
-NumPy, Patchwork++ (ground only; extra "bench") and the yardstick, sorting 100,000 numbers. Ratios are of medians,
-with 95 % intervals from resampled frames. --write puts the table into docs/segmentation.md. --against compares the
-ratios to the yardstick with those of an earlier output and fails where one is larger by more than --tolerance: what a
-busy machine slows, it slows alike.
+The pipelines on compiled kernels and on NumPy, Patchwork++ (ground only; extra "bench") and the yardstick, sorting
+100,000 numbers, run in one thread on the full circle, in random order on each frame. Ratios are of medians, with 95 %
+intervals from resampled frames. --write puts the table into docs/segmentation.md. --against compares the ratios to
+the yardstick with those of an earlier output, and fails where one is larger by more than --tolerance. A busy machine
+slows the yardstick as well.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from tools.docs.sections import replace_section
 from tools.options import parser
 
 FIRST = 10
-"""Frames left out, while tracks begin."""
+"""Frames left out while tracks begin."""
 MODES = ("accurate", "efficient")
 PART = "segmentation in it"
 BASELINE, YARDSTICK = "Patchwork++: ground alone", "sorting 100,000 numbers"
@@ -44,7 +44,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "segmentation.md"
 _NUMBERS = np.random.default_rng(0).random(100_000)
 
 Work = Callable[[Frame], float]
-"""CPU time of its work on a frame [ms]."""
+"""Work on a frame, which returns its CPU time [ms]."""
 Rows = dict[str, dict[str, float]]
 
 
@@ -61,7 +61,7 @@ def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
 
 
 def contenders() -> dict[str, Work]:
-    """Work that is timed, by name."""
+    """Timed work by name."""
     found: dict[str, Work] = {YARDSTICK: partial(timed, lambda _: np.sort(_NUMBERS))}
     if find_spec("pypatchworkpp"):
         patchwork = import_module("pypatchworkpp")
@@ -82,10 +82,10 @@ def contenders() -> dict[str, Work]:
 
 
 def measure(frames: list[Frame], work: dict[str, Work]) -> dict[str, Float64]:
-    """CPU times of all on every frame but the first ones [ms].
+    """CPU times of all work on every frame but the first ones [ms].
 
-    The order is drawn anew for each frame: who runs first finds the points outside the cache. What is part of another
-    is read when all have run.
+    The order is random on each frame, because the first to run finds the points outside the cache. The parts of other
+    work are read when all have run.
     """
     times: dict[str, list[float]] = {name: [] for name in work}
     whole, parts = ([name for name in work if name.startswith(PART) is part] for part in (False, True))
@@ -107,7 +107,7 @@ def ratio(of: Float64, to: Float64) -> tuple[float, float, float]:
 
 
 def summary(times: dict[str, Float64]) -> Rows:
-    """Median [ms], and ratios to the baseline and to the yardstick."""
+    """Median of each work [ms], and its ratios to the baseline and to the yardstick."""
     rows: Rows = {}
     for name, ms in times.items():
         rows[name] = {"median_ms": float(np.median(ms)), "to_yardstick": ratio(ms, times[YARDSTICK])[0]}
@@ -127,7 +127,7 @@ def table(rows: Rows) -> str:
 
 
 def regressions(rows: Rows, earlier: Rows, tolerance: float) -> list[str]:
-    """Rows that take longer than before by more than the tolerance."""
+    """Rows whose ratio to the yardstick has grown by more than the tolerance."""
     found = []
     for name in rows.keys() & earlier.keys():
         change = rows[name]["to_yardstick"] / earlier[name]["to_yardstick"] - 1

@@ -1,7 +1,9 @@
-"""CPU time of the tracker by number of proposals, on a static scene and a moving sensor.
+"""CPU time of odometry and tracking by number of proposals, on a static scene and a moving sensor.
 
-Printed with poses and without, where odometry estimates them, and as frames per second of `modt track`. The reference
-workload, sorting 100,000 numbers, relates figures of different machines.
+    python -m tools.bench.tracking [--proposals N ...] [--alive 1.7] [--frames 40]
+
+A line has the times with poses and without, where odometry estimates them. The time that sorting 100,000 numbers
+takes relates figures of different machines.
 """
 
 from __future__ import annotations
@@ -9,25 +11,21 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.odometry.odometry import Odometry
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import Float64, Frame, Proposals
-from modt_desk.box_tracking.detections import Detections, files, read
-from modt_desk.cli import track
 from tools.options import parser
 
 POINTS = 80
-"""Points of a proposal."""
+"""Number of points of a proposal."""
 WARM_UP_FRAMES = 10
-"""Frames left out of the figures, while the number of tracks grows."""
+"""Frames left out while the number of tracks grows."""
 
 
 def scenery(n: int, rng: np.random.Generator) -> Float64:
@@ -39,7 +37,7 @@ def scenery(n: int, rng: np.random.Generator) -> Float64:
 
 
 def frames(n: int, count: int, alive: float, seed: int = 0) -> list[tuple[Frame, Proposals]]:
-    """Frames with random points on n of the alive * n boxes of a scene, chosen anew for each frame.
+    """Frames with random points on n of the alive * n boxes of a scene; each frame has its own choice of boxes.
 
     A box reappears before its track is deleted, so about alive * n tracks are alive.
     """
@@ -78,28 +76,6 @@ def stages_ms(scene: list[tuple[Frame, Proposals]]) -> tuple[float, float, float
     return float(odometry_ms), float(tracking_ms), float(np.mean(alive[WARM_UP_FRAMES:]))
 
 
-def traffic(cars: int, count: int, seed: int = 0) -> Detections:
-    """Detections of cars in lanes, 10 % missed, 20 % with a low score."""
-    rng = np.random.default_rng(seed)
-    frame, car = (a.ravel() for a in np.meshgrid(np.arange(count), np.arange(cars), indexing="ij"))
-    x = 5 + (car * 60 / cars + 0.8 * frame) % 60
-    box = np.zeros((len(frame), 7))
-    box[:, :3] = np.stack([x, 3.5 * (car % 4 - 1.5), np.full(len(x), -1.0)], axis=1) + rng.normal(0, 0.1, (len(x), 3))
-    box[:, 3:6] = [4.2, 1.8, 1.5]
-    detected = rng.random(len(frame)) < 0.9
-    score = np.where(rng.random(len(frame)) < 0.2, -1.0, 5.0)
-    object_class = np.full(len(frame), ObjectClass.CAR)
-    return Detections("traffic", frame, object_class, np.zeros((len(frame), 4)), score, box).take(detected)
-
-
-def box_frames_per_s(sequences: list[Detections]) -> float:
-    """Frames of `modt track` per second of CPU time."""
-    began = time.process_time()
-    for sequence in sequences:
-        track.follow(sequence, None, 0.1)
-    return sum(s.n_frames for s in sequences) / (time.process_time() - began)
-
-
 def sort_ms() -> float:
     """Median CPU time of the reference workload [ms]."""
     numbers, times = np.random.default_rng(0).random(100_000), []
@@ -115,7 +91,6 @@ def main() -> None:
     options.add_argument("--proposals", type=int, nargs="+", default=[50, 100, 150, 250, 500, 1000])
     options.add_argument("--alive", type=float, default=1.7, help="tracks per proposal (default: %(default)g)")
     options.add_argument("--frames", type=int, default=40)
-    options.add_argument("--detections", type=Path, help="input of `modt track` (default: 8 cars in lanes)")
     arguments = options.parse_args()
     for n in arguments.proposals:
         scene = frames(n, arguments.frames, arguments.alive)
@@ -130,9 +105,6 @@ def main() -> None:
             "sort_cpu_ms": sort_ms(),
         }
         print(json.dumps({k: round(v, 3) for k, v in line.items()}), flush=True)
-    given = arguments.detections
-    rate = box_frames_per_s(read(files(given)) if given else [traffic(8, 500)])
-    print(json.dumps({"box_frames_per_s": round(rate), "sort_cpu_ms": round(sort_ms(), 3)}))
 
 
 if __name__ == "__main__":

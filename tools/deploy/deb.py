@@ -1,9 +1,7 @@
-"""Make a Debian package of a wheel and its libraries, for the Python of one distribution.
-
-    python -m tools.deploy.deb dist/modt-….whl --architecture arm64 --python 3.10    # Ubuntu 22.04, JetPack 6
+"""Debian package of a wheel and its libraries, for the Python of one distribution.
 
 The program and its libraries lie in /opt/modt/lib, apart from those of the system. `modt service install` sets up the
-service; removing the package removes it. Needs dpkg-deb, uv and a package index, on a machine of either kind.
+service, and removing the package removes it. Needs dpkg-deb, uv and a package index.
 """
 
 from __future__ import annotations
@@ -14,8 +12,6 @@ import sys
 import tempfile
 import zipfile
 from pathlib import Path
-
-from tools.options import parser
 
 ARCHITECTURES = {"x86_64": "amd64", "aarch64": "arm64"}
 """Debian's name of each machine."""
@@ -45,7 +41,7 @@ if [ "$1" = remove ]; then /opt/modt/bin/modt service remove; fi
 
 
 def build_deb(wheel: Path, out: Path, architecture: str, python: str, *, libraries: bool = True) -> Path:
-    """Write the package; without libraries it needs those of the system."""
+    """Write the package. Without its libraries it needs those of the system."""
     version = wheel.name.split("-")[1]
     made = out / f"modt_{version}_{architecture}_python{python}.deb"
     with tempfile.TemporaryDirectory() as folder:
@@ -85,22 +81,3 @@ def _write(path: Path, text: str, mode: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
     path.chmod(mode)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    options = parser(__doc__)
-    options.add_argument("wheel", type=Path, help="a wheel of modt for that machine")
-    options.add_argument(
-        "--architecture", choices=ARCHITECTURES.values(), default="amd64", help="default: %(default)s"
-    )
-    options.add_argument("--python", default="3.10", metavar="VERSION", help="of the system (default: %(default)s)")
-    options.add_argument("--out", type=Path, default=Path("dist"), help="folder (default: %(default)s)")
-    options.add_argument("--no-libraries", action="store_true", help="leave the libraries to the system")
-    given = options.parse_args(arguments)
-    libraries = not given.no_libraries
-    print(build_deb(given.wheel, given.out, given.architecture, given.python, libraries=libraries))
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

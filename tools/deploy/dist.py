@@ -1,10 +1,10 @@
-"""Make a release: wheels for every machine, the lock, Debian packages if asked for, checksums and a page.
+"""Make a release of wheels, the lock, Debian packages on request, checksums and a page.
 
     python -m tools.deploy.dist [--out dist] [--deb 3.10 --deb 3.12]
 
-Needs the extra "wheels": `ziglang` is the cross compiler. The libraries link nothing: a wheel serves glibc and musl.
-With `--target native` the compiler of this machine makes a wheel for this machine alone. `--deb VERSION` packs the
-wheels and their libraries for that Python (`tools.deploy.deb`).
+It needs the extra "wheels", whose `ziglang` is the cross compiler. The compiled kernels link no library, so that a
+wheel serves glibc and musl. With `--target native` the compiler of this machine makes a wheel for this machine alone.
+`--deb VERSION` packs the wheels and their libraries for that Python.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SUMS, PAGE, LOCK = "SHA256SUMS", "release.md", "requirements.txt"
 
 
 def build_wheel(out: Path, target: str | None) -> Path:
-    """A wheel for a machine of TARGETS, for this one if none is given."""
+    """A wheel for a machine of TARGETS, or for this machine."""
     before = set(out.glob("*.whl"))
     command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(out), str(ROOT)]
     subprocess.run(command, check=True, env=os.environ | ({} if target is None else {"MODT_TARGET": target}))
@@ -47,7 +47,7 @@ def changes(text: str, version: str) -> str:
 
 
 def page(files: list[Path], digests: dict[str, str]) -> str:
-    """The release page: how to install, what has changed, and the files."""
+    """The release page, with the installation, the changes and the files."""
     wheels = [path.name for path in files if path.suffix == ".whl"]
     debs = [path.name for path in files if path.suffix == ".deb"]
     lines = [f"# modt {modt.__version__}", "", "Choose the file of your machine, check it, and install it:", ""]

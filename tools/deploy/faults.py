@@ -1,4 +1,4 @@
-"""Faults of a live source and its surroundings, and the counter that must report each."""
+"""Faults of a live source and its surroundings, each with the counter that must report it."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ while True:
     time.sleep(0.02)
 """
 HOG_PRIORITY = 20
-"""Above the priority of the loop."""
+"""Real-time priority above that of the loop."""
 FULL_DISK = "full disk"
 """The one fault that may cost records."""
 Sweeps = Sequence[Sweep]
 
 
 class World:
-    """Switches that the faults turn.
+    """State of the surroundings, which the faults change.
 
     Attributes:
-        disk_full, meter_lost, stage_broken: the fault is active.
-        back_s: time by which the sensor's clock was set back so far [s].
+        disk_full, meter_lost, stage_broken: whether the fault is active.
+        back_s: sum of the steps back of the sensor's clock [s].
     """
 
     def __init__(self, core: int | None, hogs: int, *, fifo: bool) -> None:
@@ -51,7 +51,7 @@ class World:
         self._hogs: list[subprocess.Popen[bytes]] = []
 
     def set_hogs(self, on: bool) -> None:
-        """Begin or end processes that compute on the core of the loop."""
+        """Start or end processes that compute on the core of the loop."""
         while on and len(self._hogs) < self._n_hogs:
             hog = subprocess.Popen([sys.executable, "-c", HOG])
             if self._fifo:
@@ -65,7 +65,7 @@ class World:
             hog.wait()
 
     def install(self) -> None:
-        """Put the switches of disk and stages into this process."""
+        """Have the writers and stages of this process obey the switches."""
         write, step, world = LineFile.write, Pipeline.step, self
 
         def full(file: LineFile[Any], item: Any) -> None:
@@ -84,7 +84,7 @@ class World:
         Pipeline.step = broken  # type: ignore[method-assign, assignment]
 
     def meters(self, clock: Callable[[], float]) -> Discovery:
-        """A meter of 5 W that may be lost."""
+        """Discovery of a meter of 5 W that can be lost."""
 
         def read() -> float:
             if self.meter_lost:
@@ -103,7 +103,7 @@ class Fault:
         seconds: duration.
         counter: the counter that reports it.
         sweeps: turns a sweep into faulty ones, by a random generator.
-        switch: turns it on and off in the world.
+        switch: turns the fault on and off in the world.
         silent_if_steady: no report is needed while results stay regular.
     """
 
@@ -136,7 +136,7 @@ def _loss(sweep: Sweep, rng: np.random.Generator) -> Sweeps:
 
 
 def _other_sensor(sweep: Sweep, _rng: np.random.Generator) -> Sweeps:
-    """One beam in eight, a tenth nearer."""
+    """Every eighth beam, at nine tenths of the range."""
     tangent = sweep.points[:, 2] / np.maximum(np.hypot(sweep.points[:, 0], sweep.points[:, 1]), 0.1)
     return (_with_points(sweep, sweep.points[np.floor(tangent * 140) % 8 == 0] * [0.9, 0.9, 0.9, 1.0]),)
 
@@ -163,7 +163,7 @@ def _hangup(_world: World, on: bool) -> None:
 
 
 def _late_frames(session: Any) -> int:
-    """Frames that began late, and steps of the ladder; a hog need not cost a deadline."""
+    """Frames that began late, and steps of the ladder. A hog need not cost a deadline."""
     lateness = session.deadlines.timing.late_or_later()
     late = max((n for ms, n in zip(lateness["ms"], lateness["frames"], strict=True) if ms > LATE_MS), default=0)
     return int(late) + session.deadlines.changes.total()

@@ -1,9 +1,9 @@
-"""Proves the unit under a real systemd: in namespaces of its own, on a copy of this system that is then forgotten.
+"""Prove the unit under a real systemd, in namespaces of its own and on a throw-away copy of this system.
 
     sudo python -m tools.deploy.proof
 
-The unit is installed, started on a recording, reloaded, hung, killed and stopped; a probe in the same sandbox tries
-what it must not be able to do. Prints a line a step; the exit status is 0 if all went well. Needs root and systemd.
+The unit is installed, started on a recording, reloaded, hung, killed and stopped. A probe in the same sandbox tries
+what must be refused. Each step prints a line, and the exit status is 0 if all went well. Needs root and systemd.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ ROOT = Path(__file__).resolve().parents[2]
 STEPS = Path(__file__).with_name("proof_steps.py")
 SCANS, PROFILE = "srv/modt/scans", "srv/modt/robot.yaml"
 PYTHON, LIBRARIES, PACKAGE = "/opt/modt/python", "/opt/modt/libraries", "/opt/modt/package"
-"""Where the interpreter, its libraries and this checkout are seen: a home would be hidden from the unit."""
+"""Places of the interpreter, its libraries and this checkout in the copy. The unit cannot see a home directory."""
 INTERPRETER = f"{PYTHON}/bin/python{sys.version_info.major}.{sys.version_info.minor}"
+LIMIT_S = 120.0
+"""Time after which the proof ends without a verdict [s]."""
 TARGET = """
 [Unit]
 Requires=proof.service basic.target
@@ -65,7 +67,7 @@ container=lxc exec chroot . /lib/systemd/systemd --unit=proof.target --show-stat
 
 
 def prepare(root: Path) -> None:
-    """Files of the copy: the unit as it is installed, a program, a recording, and what drives the proof."""
+    """Write the files of the copy: the installed unit, a program, a recording, and the driver of the proof."""
     source = f"/{SCANS}?loop=yes"
     Service(root, Path(PREFIX)).install([], source, f"--profile /{PROFILE}")
     scans = root / SCANS
@@ -85,9 +87,7 @@ def prepare(root: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = parser(__doc__)
-    options.add_argument("--timeout", type=float, default=120.0, help="in seconds (default: %(default)s)")
-    given = options.parse_args(arguments)
+    parser(__doc__).parse_args(arguments)
     if os.geteuid() or shutil.which("systemctl") is None:
         raise SystemExit("proof: needs root and systemd")
     with tempfile.TemporaryDirectory() as folder:
@@ -103,14 +103,14 @@ def main(arguments: list[str] | None = None) -> int:
         (base / "boot.sh").write_text(script)
         namespaces = ["--mount", "--pid", "--fork", "--kill-child", "--ipc", "--uts", "--cgroup", "--net"]
         command = ["unshare", *namespaces, "sh", str(base / "boot.sh")]
-        report, end_s, text = base / "report" / "report.txt", time.monotonic() + given.timeout, ""
+        report, end_s, text = base / "report" / "report.txt", time.monotonic() + LIMIT_S, ""
         system = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         try:
             while time.monotonic() < end_s and system.poll() is None and not text.endswith(END):
                 time.sleep(0.2)
                 text = report.read_text() if report.exists() else ""
         finally:
-            system.kill()  # and by --kill-child all that it has begun
+            system.kill()  # --kill-child ends all its processes
             system.wait()
     print(text.removesuffix(END), end="")
     whole = text.endswith(END)

@@ -1,4 +1,4 @@
-"""The steps of tools.deploy.proof, run by systemd inside the copy of the system; needs nothing but Python."""
+"""The steps of tools.deploy.proof, which systemd runs inside the copy of the system with Python alone."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ ALLOWED, REFUSED = "write its state", "not permitted to this copy of the system"
 
 
 class Report:
-    """A line a step, on disk at once."""
+    """Report of the proof, each line on disk at once."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / "report.txt"
 
-    def say(self, what: str, good: bool, figure: str = "") -> None:
+    def add(self, what: str, good: bool, figure: str = "") -> None:
         """Add a line."""
         with self._path.open("a") as file:
             file.write(f"{'ok' if good else 'fail':<5} {what}{': ' if figure else ''}{figure}\n")
@@ -69,7 +69,7 @@ def shown(name: str) -> str:
 
 
 def until(holds: Callable[[], bool], seconds: float) -> float | None:
-    """Seconds until something holds, None if it does not in time."""
+    """Time until a condition holds [s], None if it does not hold in time."""
     begin_s = time.monotonic()
     while time.monotonic() - begin_s < seconds:
         if holds():
@@ -79,7 +79,7 @@ def until(holds: Callable[[], bool], seconds: float) -> float | None:
 
 
 def figure(seconds: float | None) -> str:
-    """Text of a time."""
+    """A time as text."""
     return "never" if seconds is None else f"{seconds:.2f} s"
 
 
@@ -89,7 +89,7 @@ def active() -> bool:
 
 
 def restarted(before: str) -> bool:
-    """Whether another process is up, and has recorded some frames."""
+    """Whether a new process is up and has recorded some frames."""
     try:
         status = json.loads((RECORDS / "status.json").read_text())
     except (OSError, ValueError):
@@ -99,7 +99,7 @@ def restarted(before: str) -> bool:
 
 
 def reload(text: str) -> str:
-    """Reload with a profile; the last lines of the journal of the unit."""
+    """Reload with a profile, and return the state of the loop."""
     PROFILE.write_text(text)
     systemctl("reload", UNIT)
     until(lambda: active() and shown("SubState") == "running", 5.0)
@@ -113,47 +113,47 @@ def steps(folder: Path) -> None:
     begin_s = time.monotonic()
     systemctl("start", UNIT)
     ready_s = time.monotonic() - begin_s
-    report.say("starts, and notifies that it is ready", active(), figure(ready_s))
+    report.add("starts, and notifies that it is ready", active(), figure(ready_s))
     took_s = until(lambda: "Hz" in shown("StatusText"), 10.0)
-    report.say("reports its status", took_s is not None, shown("StatusText"))
+    report.add("reports its status", took_s is not None, shown("StatusText"))
     pid = shown("MainPID")
     status = Path(f"/proc/{pid}/status").read_text()
     fields = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
-    report.say("runs as a user of its own", not fields["Uid"].startswith("0\t"), fields["Uid"])
-    report.say("runs with a filter of system calls", fields["Seccomp"] == "2")
+    report.add("runs as a user of its own", not fields["Uid"].startswith("0\t"), fields["Uid"])
+    report.add("runs with a filter of system calls", fields["Seccomp"] == "2")
     threads = os.listdir(f"/proc/{pid}/task")
     prompt = sum(os.sched_getscheduler(int(thread)) & 7 == os.SCHED_FIFO for thread in threads)
     permitted = resource.getrlimit(resource.RLIMIT_RTPRIO)[1] > 0
     receiver = "the receiver too" if prompt == 2 else "the receiver not" if permitted else f"the receiver {REFUSED}"
-    report.say("runs at real-time priority", prompt == 1 + permitted, receiver)
+    report.add("runs at real-time priority", prompt == 1 + permitted, receiver)
     permitted = resource.getrlimit(resource.RLIMIT_MEMLOCK)[1] == resource.RLIM_INFINITY
     locked = fields["VmLck"].strip() if permitted else REFUSED
-    report.say("keeps its memory", locked != "0 kB", locked)
-    said = reload(profile + "\nscheduler: {calls_per_frame: 3}\n")
-    report.say("reloads a profile", "'reloads': 1" in said and shown("MainPID") == pid)
-    said = reload(profile + "\nscheduler: {calls_per_fraem: 3}\n")
-    report.say("refuses an invalid profile", "'refused_reloads': 1" in said and shown("MainPID") == pid)
+    report.add("keeps its memory", locked != "0 kB", locked)
+    loop = reload(profile + "\nscheduler: {calls_per_frame: 3}\n")
+    report.add("reloads a profile", "'reloads': 1" in loop and shown("MainPID") == pid)
+    loop = reload(profile + "\nscheduler: {calls_per_fraem: 3}\n")
+    report.add("refuses an invalid profile", "'refused_reloads': 1" in loop and shown("MainPID") == pid)
     PROFILE.write_text(profile)
     os.kill(int(pid), signal.SIGSTOP)
     took_s = until(lambda: restarted(pid), 40.0)
-    report.say("is killed when it hangs, and comes back", took_s is not None, figure(took_s))
+    report.add("is killed when it hangs, and comes back", took_s is not None, figure(took_s))
     pid = shown("MainPID")
     os.kill(int(pid), signal.SIGKILL)
     took_s = until(lambda: restarted(pid), 10.0)
-    report.say("comes back after kill -9", took_s is not None, figure(took_s))
+    report.add("comes back after kill -9", took_s is not None, figure(took_s))
     kept = sorted(path.name for path in RECORDS.resolve().parent.iterdir())
-    report.say("keeps the records of all three", {"run", "run~1", "run~2"} <= set(kept), " ".join(kept))
+    report.add("keeps the records of all three", {"run", "run~1", "run~2"} <= set(kept), " ".join(kept))
     begin_s = time.monotonic()
     systemctl("stop", UNIT)
     stop_s = time.monotonic() - begin_s
-    report.say("stops within a second", stop_s < 1.0 and shown("Result") == "success", figure(stop_s))
+    report.add("stops within a second", stop_s < 1.0 and shown("Result") == "success", figure(stop_s))
     probe(report)
     with (folder / "report.txt").open("a") as file:
         file.write(END)
 
 
 def probe(report: Report) -> None:
-    """What a process can do in the sandbox of the unit."""
+    """Report the attempts of a process in the sandbox of the unit."""
     Path("/srv/modt/probe.py").write_text(PROBE)
     drop_in = Path(f"/run/systemd/system/{UNIT}.d/probe.conf")
     drop_in.parent.mkdir(parents=True)
@@ -166,7 +166,7 @@ def probe(report: Report) -> None:
     systemctl("start", UNIT)
     for name, outcome in json.loads(out.read_text() or "{}").items():
         permitted = outcome == "done"
-        report.say(f"sandbox: {name}", permitted == (name == ALLOWED), outcome)
+        report.add(f"sandbox: {name}", permitted == (name == ALLOWED), outcome)
 
 
 if __name__ == "__main__":
@@ -174,4 +174,4 @@ if __name__ == "__main__":
         steps(Path(sys.argv[1]))
     except Exception as error:
         journal = subprocess.run(["journalctl", "-u", UNIT, "-n", "30"], capture_output=True, text=True, check=False)
-        Report(Path(sys.argv[1])).say(f"{error!r}\n{journal.stdout}", False)
+        Report(Path(sys.argv[1])).add(f"{error!r}\n{journal.stdout}", False)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from itertools import chain
-from pathlib import Path
 
 from modt_desk.cli.completion import commands
-from tools.docs.sections import replace_section
+from tools.docs.sections import DOCS, replace_section, write
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "commands.md"
+DOCUMENT = DOCS / "commands.md"
 MARK = "tools.docs.commands"
 
 
@@ -22,7 +21,7 @@ def cells(parser: argparse.ArgumentParser, action: argparse.Action) -> tuple[str
 
 
 def page() -> str:
-    """A table of the options that commands share, and a list a command of its own."""
+    """A table of the options that commands share, and a list of the other options of each command."""
     parsers = [(command.summary, command.parser) for command in commands() if not command.names]
     rows = {p.prog: [cells(p, action) for action in p._actions if action.dest != "help"] for _, p in parsers}
     number = Counter(chain.from_iterable(rows.values()))
@@ -43,8 +42,7 @@ def document() -> str:
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    DOCUMENT.write_text(document(), encoding="utf-8")
+    write(__doc__, DOCUMENT, document)
 
 
 if __name__ == "__main__":

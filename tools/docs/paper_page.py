@@ -18,17 +18,17 @@ _TRACKS = ("objects", "N_go of objects", "discontinuities", "mis-associations", 
 _BETTER_LOW = ("beta", "mis-associations", "discontinuities")
 _BETTER_HIGH = ("AP ", "N_go of objects")
 _MARGIN = 1.05
-"""A figure that is better low is behind the paper's above this multiple of it."""
+"""Factor above which a figure that should be low counts as worse than the paper's."""
 
 
 def section(rows: Sequence[Row], about: str) -> str:
-    """Both tables, and what is behind the paper."""
+    """Both tables, and the figures that are worse than the paper's."""
     lines = [about, "", *_precisions(rows), "", *_tracks(rows), "", "## Where this falls short", "", *_behind(rows)]
     return "\n".join(lines)
 
 
 def _precisions(rows: Sequence[Row]) -> Iterator[str]:
-    """What tracking adds to average precision, a row for each table, group of drives and profile."""
+    """Average precision without and with tracking, a row for each table, group of drives and profile."""
     yield f"| average precision without tracking, with it [%] | {' | '.join(CLASSES)} |"
     yield "|---|" + "---|" * len(CLASSES)
     for name in _PRECISIONS:
@@ -57,7 +57,7 @@ def _line(
 
 
 def _tracks(rows: Sequence[Row]) -> Iterator[str]:
-    """Table VI, on recorded drives by the labels alone."""
+    """Table VI on recorded drives, judged by the labels alone."""
     own = [row for row in rows if row.experiment == "table6" and row.kind == KITTI]
     yield f"| tracks | {' | '.join(_TRACKS)} |"
     yield "|---|" + "---|" * len(_TRACKS)
@@ -76,7 +76,7 @@ def _cells(name: str, of: dict[str, float | None]) -> str:
 
 
 def _behind(rows: Sequence[Row]) -> Iterator[str]:
-    """A list of the figures that are worse than the paper's, by labels alone."""
+    """List of the figures that are worse than the paper's, judged by the labels alone."""
     found: dict[str, list[str]] = {}
     for row in rows:
         if row.paper is None or row.value is None:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import fields
-from pathlib import Path
 
 from modt import assets
 from modt.config import ProfileConfig
 from modt.profile.yaml_text import value_text
 from modt_desk.cli.profile_schema import FILE, keys, schema_text
-from tools.docs.sections import replace_section
+from tools.docs.sections import DOCS, replace_section, write
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "profile-keys.md"
+DOCUMENT = DOCS / "profile-keys.md"
 SCHEMA = assets.folder("profiles") / FILE
 MARK = "tools.docs.profile_keys"
 
 
 def page() -> str:
-    """A table a stage, below the first sentence on its configuration."""
+    """The first sentence on the configuration of each stage, and a table of its keys."""
     lines: list[str] = []
     for stage in fields(ProfileConfig):
         about = str(stage.default_factory.__doc__).partition("\n")[0]
@@ -44,8 +42,7 @@ def document() -> str:
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    DOCUMENT.write_text(document(), encoding="utf-8")
+    write(__doc__, DOCUMENT, document)
     SCHEMA.write_text(schema_text(), encoding="utf-8")
 
 

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
+from tools.options import parser
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
 
 def replace_section(text: str, mark: str, section: str) -> str:
-    """The document with another text between `<!-- mark -->` and `<!-- end of mark -->`.
+    """The document with a new text between `<!-- mark -->` and `<!-- end of mark -->`.
 
     Raises:
-        ValueError: the document lacks one of them.
+        ValueError: one of the marks is missing.
     """
     begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
     before, rest = text.split(begin)
     _, after = rest.split(end)
     return f"{before}{begin}\n{section}\n{end}{after}"
+
+
+def write(about: str | None, page: Path, document: Callable[[], str]) -> None:
+    """Run a command without options that brings a page up to date."""
+    parser(about).parse_args()
+    page.write_text(document(), encoding="utf-8")

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 from modt.tracking.states import ACCURATE, EFFICIENT, Transition
-from tools.docs.sections import replace_section
+from tools.docs.sections import DOCS, replace_section, write
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "states.md"
+DOCUMENT = DOCS / "states.md"
 SHARED = tuple(t for t in EFFICIENT.transitions if t in ACCURATE.transitions and t.label.startswith("e"))
 TABLES = {
     **{m.title: tuple(t for t in m.transitions if t not in SHARED) for m in (EFFICIENT, ACCURATE)},
@@ -32,8 +29,7 @@ def document() -> str:
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    DOCUMENT.write_text(document(), encoding="utf-8")
+    write(__doc__, DOCUMENT, document)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,11 @@
 
     python -m tools.study.boards [--rating MIPS] [--sensors NAME ...] [--seeds 600:602] [--seconds 4] [--write]
 
-The work of a frame is counted and timed here, on simulated streets, full circle, and scaled by the single-threaded
-rating of the 7-Zip benchmark: that of this machine is measured (`7z b -mmt=1`, package p7zip-full), those of the
-boards are published. That benchmark is integers, branches and cache misses, as most of a frame is; the network is
-not. Expect half to twice as much, and measure on the board: `modt-profile calibrate DRIVE`. --write puts the table
-into docs/deployment.md.
+The work of a frame is counted and timed on this machine, on the full circle of simulated streets. Its time is scaled
+by the single-threaded rating of the 7-Zip benchmark, which is measured here (`7z b -mmt=1`, package p7zip-full) and
+published for the boards. The benchmark is integers, branches and cache misses, as most of a frame is, but not the
+network. Expect half to twice as much, and measure on the board with `modt-profile calibrate DRIVE`. --write puts the
+table into docs/deployment.md.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ where there are several."""
 MODES = ("accurate", "efficient")
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "deployment.md"
 _FIRST = 10
-"""Frames left out, while tracks begin."""
+"""Frames left out while tracks begin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +57,10 @@ class Work:
 
 
 def rating_of(output: str) -> int:
-    """Rating of one fully used thread, from what `7z b -mmt=1` prints [MIPS].
+    """Rating of one fully used thread in the output of `7z b -mmt=1` [MIPS].
 
     Raises:
-        ValueError: it is not there.
+        ValueError: the output has no rating.
     """
     total = re.search(r"^Tot:\s+\d+\s+(\d+)\s+\d+\s*$", output, re.MULTILINE)
     if total is None:
@@ -110,7 +110,7 @@ def table(works: Sequence[Work], rating: int) -> str:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("--rating", type=int, help="of this machine [MIPS] (default: measured)")
+    options.add_argument("--rating", type=int, help="rating of this machine [MIPS] (default: measured)")
     options.add_argument("--sensors", nargs="+", choices=SENSORS, default=["hdl-64e", "os1-64", "vlp-16", "mid-360"])
     options.add_argument("--seeds", type=number_range, default=(600, 602), metavar="A:B")
     options.add_argument("--seconds", type=float, default=4.0)

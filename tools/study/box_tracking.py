@@ -1,11 +1,11 @@
-"""HOTA, MOTA and IDF1 of `modt track` on KITTI tracking sequences, and the cut chosen on the other sequences.
+"""HOTA, MOTA and IDF1 of `modt track` on KITTI tracking sequences, by threshold of the detection score.
 
     python -m tools.study.box_tracking --detections FOLDER... --labels label_02 [--online] [--cut MIN:MAX:STEP]
 
-Matches are by 3D IoU; as in KITTI, boxes on neighbouring classes, on objects that do not count, in DontCare areas and
-of less than 25 pixels are left out, and sequences without objects of the class. `as written` is by the default cut,
-`best cut` by the one of highest HOTA, `left out` judges each sequence by the cut that is best on all others. The
-sequence of drive 0005 takes no part.
+Matches are by 3D IoU. As in KITTI, boxes on neighbouring classes, on objects that do not count, in DontCare areas and
+of less than 25 pixels are left out, and so are sequences without objects of the class. `as written` uses the default
+threshold, `best cut` the one of highest HOTA, and `left out` judges each sequence by the threshold that is best on
+all others. The sequence of drive 0005 takes no part.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ def association(kind: str, truth: Sequence[Sequence[str]], tracked: Sequence[Seq
     return Association(id_[counts], track[~free], iou[counts][:, ~free])
 
 
-def judge(sequences: Sequence[Detections], labels: Path, sure: float | None, *, online: bool) -> dict[str, Judged]:
+def judge(sequences: Sequence[Detections], labels: Path, cut: float | None, *, online: bool) -> dict[str, Judged]:
     """Scores by class."""
     out: dict[str, Judged] = {kind: {} for kind in NEIGHBOURS}
     for sequence in sequences:
         truth = objects((labels / f"{sequence.name}.txt").read_text(encoding="utf-8"))
-        tracked = objects(follow(sequence, None, 0.1, sure, online=online)[0])
+        tracked = objects(follow(sequence, None, 0.1, cut, online=online)[0])
         frames = range(max([*truth, *tracked], default=-1) + 1)
         for kind, judged in out.items():
             judged[sequence.name] = [association(kind, truth.get(f, []), tracked.get(f, [])) for f in frames]
@@ -99,7 +99,7 @@ def main() -> None:
     options.add_argument("--labels", type=Path, required=True)
     options.add_argument("--online", action="store_true")
     options.add_argument(
-        "--cut", type=lambda text: np.arange(*map(float, text.split(":"))), help="cuts to choose from"
+        "--cut", type=lambda text: np.arange(*map(float, text.split(":"))), help="thresholds to choose from"
     )
     arguments = options.parse_args()
     sequences = [s for s in merge([read(files(path)) for path in arguments.detections]) if s.name != TEST]

@@ -11,6 +11,7 @@ from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
 from modt.sources.recognise import open_stream
 from modt.types import Frame
+from modt_desk.evaluation.further_objects import with_further
 from modt_desk.evaluation.rules import CUBOID_RULES, Rules
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role
 from modt_desk.evaluation.truth_files import open_truth
@@ -41,10 +42,18 @@ def simulated(scene: str, sensor: str, seconds: float, seed: int) -> Drive:
     return Drive(stream.info.name, load(sensor), frames)
 
 
-def labelled(path: Path, profile: str = DEFAULT) -> Drive:
-    """A labelled recording, its scans in `scans/` if there is such a folder; in the camera's view if it has one."""
+def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None) -> Drive:
+    """A labelled recording, in the camera's view if it has one.
+
+    Args:
+        path: its folder, with the scans in `scans/` or beside the labels.
+        profile: of its sensor.
+        further: table of objects that the labels leave out (docs/evaluation.md).
+    """
     scans = path / "scans"
     stream, truth = open_stream(scans if scans.is_dir() else path), open_truth(path)
+    if further is not None:
+        truth = with_further(truth, further, KITTI_TYPES)
     fov = FieldOfView() if stream.info.camera is None else FieldOfView.of_camera(stream.info.camera)
     frames = [(frame, truth.frames[frame.index]) for frame in stream if frame.index in truth.frames]
     return Drive(path.name, load(profile), frames, truth.rules, fov)

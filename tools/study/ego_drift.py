@@ -2,18 +2,19 @@
 
     python -m tools.study.ego_drift DRIVE [DRIVE ...] [--frames A:B] [--no-kiss]
 
-DRIVE is a KITTI raw drive, recorded or written by `modt simulate`. Each estimate is compared with two references: the
-positions of the OXTS records, and their velocities integrated over time. Errors are those of the last pose: position
-in percent of the reference's path length, heading in degrees. For several drives, means of the magnitudes follow.
+DRIVE is a KITTI raw drive, recorded or written by `modt simulate`. Each estimate is compared with the positions
+of the OXTS records and with their velocities, integrated over time. The errors are those of the last pose, with the
+position in percent of the reference's path length and the heading in degrees. For several drives, means of the
+magnitudes follow.
 """
 
 from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Iterable
 from datetime import datetime
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +22,12 @@ import numpy as np
 from modt.app import assembly
 from modt.cli.options import frames as frame_range
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
-from modt.observations import Located, StaticTracks
-from modt.pipeline import Odometry
 from modt.profile import load
 from modt.sources import kitti_calibration, oxts
 from modt.sources.pose_source import NoPoses
 from modt.sources.recognise import open_scans
 from modt.sources.stream import Stream
-from modt.types import Float64, Frame, Proposals
+from modt.types import Float64
 from tools.options import parser
 
 VN, VE, VU = 6, 7, 10
@@ -59,38 +58,13 @@ def drift(estimate: Float64, reference: Float64) -> dict[str, float]:
     }
 
 
-class PoseRecorder:
-    """Odometry that stores the pose of each frame.
-
-    Args:
-        odometry: wrapped.
-
-    Attributes:
-        poses: (4, 4) of each frame.
-    """
-
-    def __init__(self, odometry: Odometry) -> None:
-        self.odometry = odometry
-        self.poses: list[Float64] = []
-
-    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
-        """Delegate and store the pose."""
-        located = self.odometry.locate(frame, proposals, static_tracks)
-        self.poses.append(located.placement.T_world_sensor)
-        return located
-
-
 def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     """(n, 4, 4) poses estimated from proposals, without odometry."""
     profile, mode = load(), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assembly.pipeline(mode, profile, fov)
-    recorder = PoseRecorder(pipeline.odometry)
-    pipeline = replace(pipeline, odometry=recorder)
-    for frame in map(NoPoses().place, stream):
-        pipeline.step(frame, mode.budget(profile))
-    return np.array(recorder.poses)
+    pipeline, budget = assembly.pipeline(mode, profile, fov), mode.budget(profile)
+    return np.array([pipeline.step(frame, budget).T_world_sensor for frame in map(NoPoses().place, stream)])
 
 
 def by_kiss_icp(stream: Stream) -> Float64:
@@ -127,15 +101,6 @@ def integrated(drive: Path, indices: Iterable[int]) -> Float64:
     return np.array([se3(rotation_zyx(*angles), at) @ T_imu_sensor for angles, at in poses])
 
 
-def has_kiss_icp() -> bool:
-    """Whether the extra `kiss` is installed."""
-    try:
-        import kiss_icp  # noqa: F401
-    except ImportError:
-        return False
-    return True
-
-
 def study(drive: Path, span: tuple[int, int | None], *, kiss: bool) -> dict[str, dict[str, float]]:
     """Drift of each estimate against each reference, by name."""
     stream = open_scans(drive).between(*span)
@@ -163,7 +128,7 @@ def main() -> None:
     options.add_argument("--frames", type=frame_range, default=(0, None), metavar="A:B")
     options.add_argument("--no-kiss", action="store_true", help="without KISS-ICP")
     arguments = options.parse_args()
-    kiss = has_kiss_icp() and not arguments.no_kiss
+    kiss = find_spec("kiss_icp") is not None and not arguments.no_kiss
     if not kiss:
         print("without KISS-ICP" + ("" if arguments.no_kiss else ": not installed; pip install '.[kiss]'"))
     magnitudes: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))

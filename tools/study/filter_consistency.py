@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +25,7 @@ from modt.classes import CLASS_NAMES
 from modt.cli.options import frames as number_range
 from modt.geometry import FieldOfView, wrap
 from modt.profile import load
-from modt.types import NONE, Float64, FrameResult, Int, Proposals
-from modt_desk.simulation.simulator import Truth
+from modt.types import NONE, Float64, Int, Proposals
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt_desk.simulation.world import MOVING_MPS
 from tools.options import parser
@@ -42,48 +41,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class JudgedFrame:
-    """Result and truth of a frame.
-
-    Attributes:
-        result: of the pipeline.
-        truth: of the sweep.
-        body: (P,) body with most points of each proposal, NONE for the ground.
-        share: (P,) of its points on that body.
-    """
-
-    result: FrameResult
-    truth: Truth
-    body: Int
-    share: Float64
-
-
-def replay(stream: SyntheticStream, profile_name: str, *, camera: bool = False) -> Iterator[JudgedFrame]:
-    """Run a stream in mode `efficient`, in the camera's view or over the full circle."""
-    profile, mode = load(profile_name), assembly.MODES["efficient"]
-    assert stream.info.camera is not None
-    fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assembly.pipeline(mode, profile, fov)
-    for frame, truth in stream.sweeps():
-        result = pipeline.step(frame, mode.budget(profile))
-        yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance))
-
-
-def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, Float64]:
-    """(P,) body with most points of each proposal, NONE for the ground, and (P,) its share of the points."""
-    n = len(proposals)
-    if not n:
-        return np.zeros(0, np.int64), np.zeros(0)
-    bodies, number = np.unique(instance[proposals.members], return_inverse=True)
-    of = np.repeat(np.arange(n), proposals.count)
-    counts = np.bincount(of * len(bodies) + number, minlength=n * len(bodies)).reshape(n, len(bodies))
-    best = counts.argmax(axis=1)
-    body = np.where(bodies[best] < 0, NONE, bodies[best])
-    return body, counts.max(axis=1) / proposals.count
-
-
-@dataclass(frozen=True, slots=True)
-class TrackLife:
+class BodyTrack:
     """States of a track on one body, and the true poses, over n frames.
 
     Attributes:
@@ -98,36 +56,50 @@ class TrackLife:
     pose: Float64
 
 
-def lives(stream: SyntheticStream, frames: Iterable[JudgedFrame]) -> list[TrackLife]:
-    """Tracks of a drive that were on one body for at least MIN_FRAMES frames."""
-    world = stream.simulator.world
+def body_tracks(stream: SyntheticStream, profile_name: str, *, camera: bool = False) -> list[BodyTrack]:
+    """Tracks that were on one body for at least MIN_FRAMES frames, in mode `efficient`."""
+    profile, mode, world = load(profile_name), assembly.MODES["efficient"], stream.simulator.world
+    assert stream.info.camera is not None
+    fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
+    pipeline, budget = assembly.pipeline(mode, profile, fov), mode.budget(profile)
     records: dict[tuple[int, int, bool], list[tuple[Float64, Float64, Float64]]] = defaultdict(list)
-    for s in frames:
-        tracks, poses = s.result.tracks, world.poses(s.result.frame.stamp_s)
-        rows = np.flatnonzero((tracks.proposal >= 0) & (tracks.hits >= MIN_HITS))
-        for row in rows:
-            proposal = tracks.proposal[row]
-            if s.body[proposal] >= 0 and s.share[proposal] >= MIN_SHARE:
-                body = int(s.body[proposal])
-                moving = bool(poses[body, 4] > MOVING_MPS)
-                key = (int(tracks.id[row]), body, moving)
-                records[key].append((tracks.x[row], tracks.P[row], poses[body, [0, 1, 3, 4]]))
+    for frame, truth in stream.sweeps():
+        result = pipeline.step(frame, budget)
+        body, share = majority_bodies(result.proposals, truth.instance)
+        tracks, poses = result.tracks, world.poses(frame.stamp_s)
+        for row in np.flatnonzero((tracks.proposal >= 0) & (tracks.hits >= MIN_HITS)):
+            k = int(body[tracks.proposal[row]])
+            if k >= 0 and share[tracks.proposal[row]] >= MIN_SHARE:
+                key = (int(tracks.id[row]), k, bool(poses[k, 4] > MOVING_MPS))
+                records[key].append((tracks.x[row].copy(), tracks.P[row].copy(), poses[k, [0, 1, 3, 4]]))
     out = []
-    for (_, body, moving), states in records.items():
+    for (_, k, moving), states in records.items():
         if len(states) >= MIN_FRAMES:
-            name = CLASS_NAMES[world.bodies[body].kind.object_class]
+            name = CLASS_NAMES[world.bodies[k].kind.object_class]
             x, P, pose = (np.array(column) for column in zip(*states, strict=True))
-            out.append(TrackLife(f"{name}, {'moving' if moving else 'standing'}", x, P, pose))
+            out.append(BodyTrack(f"{name}, {'moving' if moving else 'standing'}", x, P, pose))
     return out
 
 
-def errors(life: TrackLife) -> tuple[Float64, Float64]:
+def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, Float64]:
+    """(P,) body with most points of each proposal, NONE for the ground, and (P,) its share of the points."""
+    n = len(proposals)
+    if not n:
+        return np.zeros(0, np.int64), np.zeros(0)
+    bodies, number = np.unique(instance[proposals.members], return_inverse=True)
+    of = np.repeat(np.arange(n), proposals.count)
+    counts = np.bincount(of * len(bodies) + number, minlength=n * len(bodies)).reshape(n, len(bodies))
+    best = counts.argmax(axis=1)
+    return np.where(bodies[best] < 0, NONE, bodies[best]), counts.max(axis=1) / proposals.count
+
+
+def errors(track: BodyTrack) -> tuple[Float64, Float64]:
     """(n, 2) position errors [m], and (n, 2) errors of heading [rad] and speed [m/s]."""
-    c, s = np.cos(life.pose[:, 2]), np.sin(life.pose[:, 2])
+    c, s = np.cos(track.pose[:, 2]), np.sin(track.pose[:, 2])
     R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
-    off = life.x[:, :2] - life.pose[:, :2]
+    off = track.x[:, :2] - track.pose[:, :2]
     point = np.einsum("nji,nj->ni", R, off).mean(axis=0)
-    motion = life.x[:, 2:] - life.pose[:, 2:]
+    motion = track.x[:, 2:] - track.pose[:, 2:]
     motion[:, 0] = wrap(motion[:, 0])
     return off - R @ point, motion
 
@@ -144,11 +116,11 @@ class Consistency:
 
     Attributes:
         tracks, samples: their numbers.
-        mean: of the means of the tracks; equal to the degrees of freedom if consistent.
-        median: of all samples.
+        mean: mean of the tracks' means; equal to the degrees of freedom if consistent.
+        median: median of all samples.
         low, high: bounds of the mean at CONFIDENCE, for as many independent samples as tracks.
         beyond: share of samples above the chi-square quantile of CONFIDENCE; 1 - CONFIDENCE if consistent.
-        rms: of the length of the error.
+        rms: root mean square length of the error.
     """
 
     tracks: int
@@ -162,7 +134,7 @@ class Consistency:
 
 
 def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
-    """From the errors (n, 2) and covariances (n, 2, 2) of each track."""
+    """Summary of the errors (n, 2) and covariances (n, 2, 2) of the tracks."""
     each = [normalised(e, p) for e, p in zip(error, P, strict=True)]
     n, all_ = len(each), np.concatenate(each)
     low, high = chi2(DEGREES * n).ppf([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]) / n
@@ -172,15 +144,15 @@ def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
     return Consistency(n, len(all_), mean, median, float(low), float(high), beyond, rms)
 
 
-def study(all_lives: Sequence[TrackLife]) -> dict[str, dict[str, Consistency]]:
+def study(tracks: Sequence[BodyTrack]) -> dict[str, dict[str, Consistency]]:
     """Consistency of the position, and of the motion of moving bodies, by kind."""
     out: dict[str, dict[str, Consistency]] = {}
-    for kind in sorted({life.kind for life in all_lives}):
-        chosen = [life for life in all_lives if life.kind == kind]
-        position, motion = zip(*(errors(life) for life in chosen), strict=True)
-        out[kind] = {"position": consistency(position, [life.P[:, :2, :2] for life in chosen])}
+    for kind in sorted({track.kind for track in tracks}):
+        chosen = [track for track in tracks if track.kind == kind]
+        position, motion = zip(*(errors(track) for track in chosen), strict=True)
+        out[kind] = {"position": consistency(position, [track.P[:, :2, :2] for track in chosen])}
         if kind.endswith("moving"):
-            out[kind]["motion"] = consistency(motion, [life.P[:, 2:, 2:] for life in chosen])
+            out[kind]["motion"] = consistency(motion, [track.P[:, 2:, 2:] for track in chosen])
     return out
 
 
@@ -192,11 +164,11 @@ def main() -> None:
     options.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
     options.add_argument("--fov", choices=("camera", "full"), default="full")
     arguments = options.parse_args()
-    found: list[TrackLife] = []
+    found: list[BodyTrack] = []
     for seed in range(*arguments.seeds):
         for scene in arguments.scene:
             stream = SyntheticStream(scene, arguments.sensor, arguments.seconds, seed)
-            found += lives(stream, replay(stream, arguments.sensor, camera=arguments.fov == "camera"))
+            found += body_tracks(stream, arguments.sensor, camera=arguments.fov == "camera")
     for kind, parts in study(found).items():
         for part, c in parts.items():
             line: dict[str, Any] = {"tracks": c.tracks, "samples": c.samples, "nees": round(c.mean, 3)}

@@ -1,26 +1,21 @@
-"""Objects that the segmentation finds, by sensor: labelled scans, thinned ones, and simulated sweeps.
+"""Recall of the segmentation by sensor, on labelled scans, thinned ones and simulated sweeps.
 
     python -m tools.study.segmentation_recall [--kitti ROOT] [--seeds 500:505] [--sensors NAME ...]
-                                             [--set KEY=VALUE ...]
 
-An object of 20 points or more is found if a proposal shares more than half of the points of both together. --set
-changes keys of every profile (segmentation.cell_m=0.12).
+An object of 20 points or more is detected if it shares more than half of all points with one proposal.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.cli.options import frames as number_range
-from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Int
 from modt_desk.simulation.sensors import SENSORS
@@ -38,18 +33,19 @@ class Tally:
     """Objects of a sensor by class, and proposals.
 
     Attributes:
-        objects, found: (4,) by class.
-        proposals: of all scans.
-        scans: number.
+        objects, detected: (4,) numbers by class.
+        proposals: number in all scans.
+        scans: number of scans.
     """
 
     objects: Int = field(default_factory=lambda: np.zeros(N_CLASSES, np.int64))
-    found: Int = field(default_factory=lambda: np.zeros(N_CLASSES, np.int64))
+    detected: Int = field(default_factory=lambda: np.zeros(N_CLASSES, np.int64))
     proposals: int = 0
     scans: int = 0
 
-    def add(self, scan: Scan, config: ProfileConfig) -> None:
+    def add(self, scan: Scan) -> None:
         """Segment a scan and count."""
+        config = scan.profile
         proposals = Segmenter(config.segmentation, config.sensor, scan.fov).segment(scan.points)
         label = proposals.label(len(scan.points))
         self.proposals, self.scans = self.proposals + len(proposals), self.scans + 1
@@ -59,11 +55,11 @@ class Tally:
             shared = np.bincount(label[own] + 1, minlength=len(proposals) + 1)[1:]
             union = proposals.count + len(own) - shared
             self.objects[kind] += 1
-            self.found[kind] += bool(len(union)) and (shared / union).max() > 0.5
+            self.detected[kind] += bool(len(union)) and (shared / union).max() > 0.5
 
     def row(self, name: str) -> str:
         """Markdown."""
-        cells = [f"{100 * f / n:.1f} of {n}" if n else "-" for f, n in zip(self.found, self.objects, strict=True)]
+        cells = [f"{100 * f / n:.1f} of {n}" if n else "-" for f, n in zip(self.detected, self.objects, strict=True)]
         return f"| {name} | {' | '.join(cells[1:])} | {self.proposals / self.scans:.0f} |"
 
 
@@ -77,37 +73,23 @@ def labelled(root: Path) -> Iterator[Scan]:
     yield from pandaset_scans(root / "pandaset")
 
 
-def changed(config: Any, path: str, value: Any) -> Any:
-    """The configuration with another value of a key."""
-    head, _, rest = path.partition(".")
-    return replace(config, **{head: changed(getattr(config, head), rest, value) if rest else value})
-
-
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--kitti", type=Path, metavar="ROOT")
     options.add_argument("--seeds", type=number_range, default=(500, 505), metavar="A:B")
     options.add_argument("--sensors", nargs="*", choices=SENSORS, default=list(SENSORS), metavar="NAME")
-    options.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE")
     args = options.parse_args()
     tallies: dict[str, Tally] = defaultdict(Tally)
-
-    def add(name: str, scan: Scan) -> None:
-        config = scan.profile
-        for key, value in (pair.split("=") for pair in args.set):
-            config = changed(config, key, yaml.safe_load(value))
-        tallies[name].add(scan, config)
-
     for scan in labelled(args.kitti) if args.kitti else ():
-        add(scan.sensor, scan)
+        tallies[scan.sensor].add(scan)
     for sensor in args.sensors:
         scans = simulated_scans(SCENES, range(*args.seeds), TIMES_S, camera=False, sensors=[sensor])
         for scan in scans:
-            add(f"{sensor}, simulated", scan)
+            tallies[f"{sensor}, simulated"].add(scan)
     print("| sensor |", " | ".join(CLASS_NAMES[1:]), "| proposals a scan |\n|---|---|---|---|---|")
     for name, tally in tallies.items():
         print(tally.row(name))
-    shares = [tally.found / np.where(tally.objects, tally.objects, np.nan) for tally in tallies.values()]
+    shares = [tally.detected / np.where(tally.objects, tally.objects, np.nan) for tally in tallies.values()]
     print("| mean |", " | ".join(f"{100 * v:.1f}" for v in np.nanmean(shares, axis=0)[1:]), "| |")
 
 

@@ -3,9 +3,10 @@
     python -m tools.study.sensors [--sensors NAME ...] [--modes MODE ...] [--scene street crossing] [--seeds 450:453]
                                   [--seconds 6] [--camera] [--recording TRUTH --profile PROFILE]
 
-Of objects of 20 points or more within 60 m [%]: found (point IoU over 1/2); called (found, and said to be what it
-is); precision of what is called; life of the tracks, of the ideal. Calibration error of the class's posterior. The
-default seeds are those of the documents' tables: nothing is settled on them.
+The table has, for objects of 20 points or more within 60 m [%]: detected (point IoU over 1/2), recall (detected with
+the right class), precision, average precision, and track length (share of the labelled frames that one track covers).
+The calibration error is that of the class's posterior. The default seeds are those of README.md, and no choice of
+this project is made on them.
 """
 
 from __future__ import annotations
@@ -41,25 +42,31 @@ def run(drive: Drive, config: ProfileConfig, mode_name: str, fov: FieldOfView, n
     return collect(judged(), drive.rules, number)
 
 
-def row(name: str, mode: str, found: Evaluation) -> str:
-    """Markdown."""
+def by_class(found: Evaluation) -> list[list[float | None]]:
+    """Share detected, recall, precision and average precision of each class."""
     whole = found.ranges[ALL]
     scores = [whole.classification[c] for c in CLASSES]
-    segmentation = [whole.segmentation[c].recall if c in whole.segmentation else None for c in CLASSES]
-    shares = (
-        segmentation,
+    detected = [whole.segmentation[c].recall if c in whole.segmentation else None for c in CLASSES]
+    return [
+        detected,
         [s.recall for s in scores],
         [s.precision for s in scores],
         [s.average_precision for s in scores],
-    )
-    columns = [[str(s.segmentable) for s in scores], *([_percent(v) for v in values] for values in shares)]
+    ]
+
+
+def row(name: str, mode: str, found: Evaluation) -> str:
+    """Markdown."""
+    scores = [found.ranges[ALL].classification[c] for c in CLASSES]
+    columns = [[str(s.segmentable) for s in scores], *([percent(v) for v in values] for values in by_class(found))]
     columns.append(["-" if s.calibration_error is None else f"{s.calibration_error:.3f}" for s in scores])
     tracks = found.tracks.get(ALL)
-    life = "-" if tracks is None else f"{_percent(tracks.life.ratio)} | {tracks.discontinuities}"
-    return f"| {name} | {mode} | {' | '.join(' / '.join(c) for c in columns)} | {life} | {_percent(found.beta)} |"
+    length = "-" if tracks is None else f"{percent(tracks.life.ratio)} | {tracks.discontinuities}"
+    return f"| {name} | {mode} | {' | '.join(' / '.join(c) for c in columns)} | {length} | {percent(found.beta)} |"
 
 
-def _percent(share: float | None) -> str:
+def percent(share: float | None) -> str:
+    """Whole percent, "-" for None."""
     return "-" if share is None else f"{100 * share:.0f}"
 
 
@@ -74,12 +81,12 @@ def main() -> None:
     options.add_argument("--recording", type=Path, metavar="TRUTH", help="in place of simulated drives")
     options.add_argument("--profile", default=profile.DEFAULT, help="of the recording")
     args = options.parse_args()
-    print("| sensor | mode | objects | found | called | precision | AP | calibration | life | breaks | beta |")
+    print("| sensor | mode | objects | detected | recall | precision | AP | calibration | length | breaks | beta |")
     print("|" + "---|" * 11)
     if args.recording:
-        drive = labelled(args.recording)
+        drive = labelled(args.recording, args.profile)
         for mode in args.modes:
-            rows = [run(drive, profile.load(args.profile), mode, drive.fov, 0)]
+            rows = [run(drive, drive.profile, mode, drive.fov, 0)]
             print(row(drive.name, mode, evaluation(rows)), flush=True)
         return
     fov = FieldOfView.of_camera(CAMERA) if args.camera else FieldOfView()

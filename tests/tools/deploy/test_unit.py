@@ -1,4 +1,4 @@
-"""The unit, as systemd itself judges it."""
+"""Judgement of the unit by systemd itself."""
 
 import re
 import shutil
@@ -41,11 +41,6 @@ def test_the_exposure_is_small(analyze, drop_ins, most):
     found = re.search(r"exposure level for modt.service: ([\d.]+)", done.stdout)
     assert found, done.stderr
     assert float(found[1]) <= most
-
-
-def test_memory_and_tasks_are_bounded_and_a_fault_at_every_start_is_tried_rarely():
-    unit = (Path(__file__).parents[3] / "systemd" / "modt.service").read_text()
-    assert {"MemoryMax=1G", "TasksMax=64", "RestartSec=5"} <= set(unit.splitlines())
 
 
 @pytest.mark.parametrize("drop_ins", [(), ("lan-sensor", "ros2", "foxglove", "rapl", "raspberry-pi")])

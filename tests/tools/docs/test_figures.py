@@ -1,5 +1,7 @@
 """Figures of the README and of the page on the paper."""
 
+import re
+
 import pytest
 
 from modt_desk.experiments.drives import kitti_drives
@@ -38,15 +40,19 @@ def test_the_page_shows_what_tracking_adds_and_what_is_behind_the_paper():
 
 
 @pytest.mark.slow
-def test_the_modes_of_a_drive_have_cost_and_accuracy(tmp_path, monkeypatch):
+def test_the_table_has_a_row_for_each_sensor_and_the_text_the_cpu_time_of_the_modes(tmp_path, monkeypatch):
     writer = DriveWriter(tmp_path, CAMERA)
     for frame, truth in SyntheticStream("street", "hdl-64e", 0.4, seed=2).sweeps():
         writer.write(frame, truth)
     writer.close()
     monkeypatch.setattr(figures, "FIRST", 0)
+    monkeypatch.setattr(figures, "SENSORS", {"vlp-16": "VLP-16"})
+    monkeypatch.setattr(figures, "SEEDS", [2])
+    monkeypatch.setattr(figures, "SECONDS", 0.4)
     (drive,) = kitti_drives(tmp_path)
-    rows = [line.strip("| ").split(" | ") for line in figures.by_mode(drive, None)]
-    assert [len(cells) for cells in rows[2:]] == [5, 4, 4, 5]
-    compiled, numpy = ([float(cell.removesuffix(" ms")) for cell in cells[1:4]] for cells in rows[2:4])
-    assert min(compiled + numpy) > 0
-    assert rows[4][1] == "100.0 %"
+    table, _, text = figures.readme(drive.path, None, None).partition("\n\n")
+    heads, _, row = (line.strip("| ").split(" | ") for line in table.splitlines())
+    assert (len(heads), len(row), row[0]) == (5, 5, "VLP-16, simulated")
+    shares = re.findall(r"(\d\.\d\d) \(`(\w+)`\)", text)
+    assert [name for _, name in shares] == ["accurate", "efficient"]
+    assert all(float(share) > 0 for share, _ in shares)

@@ -10,33 +10,26 @@ import dataclasses
 import hashlib
 import itertools
 import json
-import socket
 from collections.abc import Callable, Iterator
 from functools import cache
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
 import yaml
 
 from modt import profile
-from modt.app import assembly, inputs, kernel_choice
-from modt.app.ladder import Ladder
+from modt.app import assembly, inputs
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
-from modt.sinks.recording import AtOnce, Recording
-from modt.sinks.run_directory import MARK, RunDirectory
-from modt.sources.pose_socket import PoseSocket
 from modt.types import Frame
 from modt_desk.cli.profile_schema import Key, keys
 from modt_desk.reporting.run_report import run_tree
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.desk.reporting.test_run_report import write_run
-from tests.results import result
 
 pytestmark = pytest.mark.slow
 
@@ -95,7 +88,7 @@ def efficient(config: ProfileConfig, _folder: Path) -> str:
 
 
 def product(config: ProfileConfig, _folder: Path) -> str:
-    """Views that are multiplied."""
+    """A street whose views are multiplied."""
     return long_street(changed(config, "fusion.rule", "product"), _folder)
 
 
@@ -103,31 +96,8 @@ def paper(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "tracking.association", "paper"))
 
 
-def one_mJ(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(3, 1.0), changed(config, "scheduler.energy_mJ_per_frame", 1.0))
-
-
-def pose_socket(config: ProfileConfig, _folder: Path) -> str:
-    """Poses with a gap, a flood, a leap, a pose of the future, and noise faster than the sensor."""
-    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    source = PoseSocket(here, config.odometry, "test")
-    empty, placed = np.zeros((0, 4), np.float32), []
-    for k in range(40):
-        stamps = [0.1 * k, 0.1 * k + 0.005, *([0.1 * k + 0.006 + 1e-5 * n for n in range(40)] if k == 20 else [])]
-        for stamp in [] if 5 <= k < 8 else stamps:
-            x = 5.0 * stamp + (4.0 if k >= 12 else 0.0) + (0.35 if stamp > 0.1 * k and k < 5 else 0.0)
-            there.send(json.dumps({"stamp": stamp, "x": x, "y": 0.0, "yaw": 0.0}).encode())
-        if k == 30:
-            there.send(b'{"stamp": 40.0, "x": 0, "y": 0, "yaw": 0}')
-        placed.append(str(source.place(Frame(k, 0.1 * k, empty)).T_world_sensor))
-    report = source.report()
-    source.close()
-    there.close()
-    return f"{placed}{report}"
-
-
 def report_of_a_run(config: ProfileConfig, folder: Path, *, metered: bool = True) -> str:
-    """What modt-profile report makes of a board with a calibration, and with a meter or without one."""
+    """Report of modt-profile on a run of a calibrated board, with a meter or without one."""
     coefficients = {"seg_J": 0.01, "class_J": 0.002, "point_J": 1e-5}
     given = dataclasses.asdict(config.energy)
     own = {name: value if given[name] is None else given[name] for name, value in coefficients.items()}
@@ -161,56 +131,32 @@ def far_blind(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "sensor.blind_range_m", 20.0))
 
 
-def live(config: ProfileConfig, _folder: Path) -> str:
-    """The ladder of a board whose windows are of 1 and 3 W."""
-    ladder, said = Ladder(config.loop.power_W), []
-    for k, watts in enumerate((1.0, 3.0, 3.0, 3.0, 1.0)):
-        ladder.power(2.0 * k, watts)
-        said.append(ladder.step.name)
-    return str(said)
-
-
-def recorded(config: ProfileConfig, folder: Path) -> str:
-    """Which records are kept, and how many bytes of them, half a day after the first 0.5 GB are spent."""
-    folder.mkdir(parents=True, exist_ok=True)
-    times_s = iter([0.0, 1.0, 43_200.0])
-    recording = Recording(
-        RunDirectory(folder / "run"), config.recording, AtOnce(), lambda: f"{MARK}\n", lambda: next(times_s, 43_200.0)
-    )
-    recording._allowed_bytes = -4e9
-    for k in range(2):
-        recording.ledger({"frame": k, "filler": "x" * 1_000_000})
-        recording.write(result(k, [5], {0: 1}))
-    recording.finish()
-    return str(sorted((str(p.relative_to(folder)), p.stat().st_size) for p in folder.rglob("*") if p.is_file()))
-
-
-def kernels(config: ProfileConfig, _folder: Path) -> str:
-    """Which kernels are used where compiled ones are at hand."""
-    with (
-        mock.patch.dict("os.environ", {kernel_choice.VARIABLE: ""}),
-        mock.patch.object(kernel_choice, "load", return_value=(mock.MagicMock(), "baseline")),
-    ):
-        return kernel_choice.choose(config.segmentation.kernels).name
-
-
 SCENARIOS: dict[str, Scenario] = {
     "": street,
     "sensor.period_s": scan_folder,
     "sensor.blind_range_m": near_blind,
     "sensor.blind_sectors_deg": far_blind,
-    "segmentation.kernels": kernels,
     "tracking.paper.": paper,
     "fusion.start_frame": product,
     "fusion.point_change": product,
-    "odometry.": pose_socket,
     "energy.": report_of_a_run,
     "energy.busy_W": report_without_meter,
     "energy.meter": described,
-    "loop.": live,
-    "recording.": recorded,
 }
-"""Scenario of the keys whose paths begin so, by the longest beginning."""
+"""Scenario of each key, by the longest beginning of its path."""
+
+
+TESTED_BESIDE = {
+    "segmentation.kernels": "app/test_kernel_choice.py",
+    "odometry.max_speed_mps": "sources/test_pose_socket.py",
+    "loop.power_W": "app/test_ladder.py",
+    "recording.": "sinks/test_recording.py",
+}
+"""Tests of the keys that no scenario of perception or energy shows, by the beginning of their paths."""
+
+
+def is_tested_beside(key: Key) -> bool:
+    return key.path.startswith(tuple(TESTED_BESIDE))
 
 
 def scenario_of(key: Key) -> Scenario:
@@ -244,7 +190,7 @@ def others(key: Key) -> Iterator[Any]:
 
 
 DIGESTS: dict[Scenario, str] = {}
-"""Of the profile without a change."""
+"""Digest of each scenario with the unchanged profile."""
 
 
 def has_effect(key: Key, scenario: Scenario, folder: Path) -> bool:
@@ -257,18 +203,19 @@ def has_effect(key: Key, scenario: Scenario, folder: Path) -> bool:
     )
 
 
-@pytest.mark.parametrize("key", list(keys()), ids=lambda key: key.path)
+@pytest.mark.parametrize("key", [key for key in keys() if not is_tested_beside(key)], ids=lambda key: key.path)
 def test_a_key_has_an_effect(key, tmp_path):
     assert has_effect(key, scenario_of(key), tmp_path)
 
 
+@pytest.mark.parametrize("key", list(filter(is_tested_beside, keys())), ids=lambda key: key.path)
+def test_a_key_without_a_scenario_is_named_by_its_own_test(key):
+    (file,) = (file for path, file in TESTED_BESIDE.items() if key.path.startswith(path))
+    assert key.path.rpartition(".")[2] in (Path(__file__).parents[2] / file).read_text(encoding="utf-8")
+
+
 def test_every_scenario_is_of_a_key():
     assert all(any(key.path.startswith(path) for key in keys()) for path in SCENARIOS)
-
-
-@pytest.mark.parametrize("path", ["energy.idle_W", "energy.busy_W"])
-def test_the_powers_of_the_board_decide_on_a_budget_of_energy(path, tmp_path):
-    assert has_effect(next(key for key in keys() if key.path == path), one_mJ, tmp_path)
 
 
 ALL = sorted(set(SCENARIOS.values()), key=lambda scenario: scenario.__name__)

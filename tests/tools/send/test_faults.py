@@ -9,11 +9,8 @@ def applied(**shares):
     return list(PacketFaults(**shares).applied(PACKETS))
 
 
-def test_without_faults_nothing_changes():
+def test_a_seed_decides_on_the_faults_and_without_shares_there_are_none():
     assert applied() == PACKETS
-
-
-def test_a_seed_tells_the_faults():
     shares = {"lost": 0.1, "duplicated": 0.1, "reordered": 0.1, "garbage": 0.1}
     assert applied(**shares, seed=1) == applied(**shares, seed=1) != applied(**shares, seed=2)
 

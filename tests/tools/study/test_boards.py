@@ -2,7 +2,7 @@
 
 import pytest
 
-from tools.study.boards import BOARDS, Work, rating_of, table, work_of
+from tools.study.boards import BOARDS, Work, rating_of, table
 
 PRINTED = """
 Avr:       711    25   3041    751  |      11690    28   3598   1021
@@ -22,12 +22,3 @@ def test_times_are_scaled_by_the_ratings():
     assert cells[:5] == ["os1-64, accurate", "65,536", "120", "3.2", "6.0 ms"]
     assert cells[5] == "24 ms"
     assert len(cells) == 5 + len(BOARDS)
-
-
-@pytest.mark.slow
-def test_work_is_counted():
-    work = work_of("vlp-16", "efficient", [600], 1.3)
-    assert work.points > 5000
-    assert 5 < work.proposals < 500
-    assert 0 <= work.calls < work.proposals
-    assert work.cpu_ms > 0

@@ -1,8 +1,6 @@
-"""The judge of tracked boxes, on a frame by hand."""
+"""Judgement of tracked boxes on a hand-made frame."""
 
-import numpy as np
-
-from tools.study.box_tracking import association, inside
+from tools.study.box_tracking import association
 
 PLACE = "1.7 0.6 0.8 {x} 1.6 20 0"
 
@@ -24,9 +22,3 @@ def test_boxes_on_what_does_not_count_are_left_out():
     assert list(found.track) == [7, 11]
     assert found.similarity[0, 0] > 0.7
     assert found.similarity[0, 1] == 0
-
-
-def test_an_image_box_is_inside_by_more_than_half():
-    boxes = np.array([[0.0, 0, 10, 10], [6, 0, 16, 10], [4, 0, 14, 10]])
-    assert list(inside(boxes, np.array([[0.0, 0, 10, 10]]))) == [True, False, True]
-    assert list(inside(boxes, np.zeros((0, 4)))) == [False] * 3

@@ -1,31 +1,19 @@
-"""What counts as found."""
-
-from dataclasses import replace
+"""Recall of the segmentation."""
 
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.geometry import FieldOfView
-from tools.study.segmentation_recall import Tally, changed
+from tools.study.segmentation_recall import Tally
 from tools.train.synthetic_scans import simulated_scans
 
 
-def test_an_object_counts_if_found_in_one_proposal():
+def test_objects_of_a_scan_are_counted_by_class():
     (scan,) = simulated_scans(["street"], [3], [0.0], camera=False, sensors=["vlp-16"])
     tally = Tally()
-    tally.add(scan, scan.profile)
+    tally.add(scan)
     visible = [k for k, own in zip(scan.kinds, scan.objects, strict=True) if len(own) >= 20]
     assert tally.objects.tolist() == np.bincount(visible, minlength=4).tolist()
     assert tally.objects[ObjectClass.CAR] > 3
-    assert tally.found[ObjectClass.CAR] > 0.5 * tally.objects[ObjectClass.CAR]
-    assert (tally.found <= tally.objects).all()
+    assert tally.detected[ObjectClass.CAR] > 0.5 * tally.objects[ObjectClass.CAR]
+    assert (tally.detected <= tally.objects).all()
     assert tally.row("x").startswith("| x | ")
-
-
-def test_nothing_is_found_of_an_empty_scan():
-    (scan,) = simulated_scans(["street"], [3], [0.0], camera=False, sensors=["vlp-16"])
-    tally = Tally()
-    tally.add(replace(scan, points=0 * scan.points, fov=FieldOfView()), scan.profile)
-    assert tally.found.sum() == 0 < tally.objects.sum()
-    coarse = changed(scan.profile, "segmentation.cell_m", 1.0)
-    assert coarse.segmentation.cell_m == 1.0

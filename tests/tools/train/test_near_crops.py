@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classes import ObjectClass
 from modt.classification.crops import Crops
 from modt.types import Cut
 from tests.tools.train.datasets import data_of
-from tools.train import build_near_crops
-from tools.train.dataset import Sensors, load
+from tools.train.dataset import Sensors
 from tools.train.near_batches import NearSource, varied
-from tools.train.near_cut import MIN_POINTS, cut_flags, cut_near
+from tools.train.near_cut import MIN_POINTS, cut_near
 from tools.train.near_scans import HEIGHT_M, near_scans
 
 
@@ -44,22 +39,6 @@ def test_crops_cut_near_lie_between_the_beams_and_keep_their_places_above_the_gr
     assert (above_m < 1.81).all()
     top_m = np.maximum.reduceat(above_m, cut.offsets[:-1])
     assert ((flags & Cut.TOP) > 0)[top_m < 1.79].all()
-
-
-@pytest.mark.slow
-def test_near_crops_are_built_with_their_labels_and_flags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "near.npz"
-    monkeypatch.setattr(sys, "argv", ["build_near_crops", str(path), "--worlds", "12"])
-    build_near_crops.main()
-    data = load(path)
-    assert data.provenance[0]["near"] == 12
-    assert len(data.sensor_names) == 11
-    people = (data.label == ObjectClass.PEDESTRIAN) & data.trainable
-    assert people.sum() > 10
-    flags = cut_flags(data)
-    assert 0.2 < ((flags & Cut.TOP) > 0)[people].mean() < 0.95
-    of_unknown_beams = data.sensor == data.sensor_names.index("hdl-64e")
-    assert not (flags[of_unknown_beams] & (Cut.TOP | Cut.BOTTOM)).any()
 
 
 def test_each_scan_is_seen_from_a_low_mount_of_its_own() -> None:
