@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 from shapely.geometry import Polygon
 
 from modt.geometry import corners
-from modt_desk.box_tracking.overlap import birds_eye_intersection, iou_3d
+from modt_desk.box_tracking.whole_tracks import birds_eye_intersection, iou_3d
 
 BOXES = arrays(np.float64, (4, 7), elements=st.floats(0, 1)).map(
     lambda u: np.concatenate([6 * u[:, :3] - 3, 0.05 + 5 * u[:, 3:6], 8 * u[:, 6:] - 4], axis=1)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt_desk.energy.equations import EnergyModel
+from modt_desk.energy.savings import EnergyModel
 
 PAPER = EnergyModel(e_seg=31.0, e_class=6.5, n=40.0, n_go=34.9)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from modt_desk.energy.nonnegative import nonnegative_fit
+from modt_desk.energy.board_fit import nonnegative_fit
 
 
 @pytest.mark.parametrize("true", [[2.0, 3.0, 1e-4], [2.0, -3.0, 1e-4], [-1.0, 3.0, -1.0]])

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt_desk.energy.equations import EnergyModel
-from modt_desk.energy.savings import Counts, OtherCosts, UnitCosts, reconcile
+from modt_desk.energy.savings import Counts, EnergyModel, OtherCosts, UnitCosts, reconcile
 
 COSTS = UnitCosts(seg=5e-3, track=1e-3, class_call=1e-4, class_item=2e-4, class_point=1e-6)
 NOTHING, SAME = OtherCosts(0.0, 0.0), OtherCosts(1e-3, 0.0)

@@ -7,9 +7,8 @@ import pytest
 
 from modt.sources.scan_stream import ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
-from modt_desk.evaluation.by_stamp import by_stamp
 from modt_desk.evaluation.rules import KITTI_RULES
-from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Truth
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Truth, by_stamp
 
 INFO = StreamInfo("drive", "folder", 0, None, 0.1, None, has_poses=False)
 

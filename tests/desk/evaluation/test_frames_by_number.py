@@ -1,6 +1,6 @@
 """Frames of a stream by their numbers."""
 
-from modt_desk.evaluation.frames_by_number import FramesByNumber
+from modt_desk.evaluation.run_record import FramesByNumber
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from modt.profile import load
 from modt_desk.experiments.figures import ObjectLives
-from modt_desk.experiments.replays import NetworkReplay
+from modt_desk.experiments.judged import NetworkReplay
 from tests.desk.experiments.drives import short_drives
 
 DRIVE = short_drives(1, frames=6)[0]

@@ -8,7 +8,7 @@ from modt.profile import load
 from modt.segmentation.kernels import NUMPY
 from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.experiments.replays import NetworkReplay
+from modt_desk.experiments.judged import NetworkReplay
 from modt_desk.experiments.segmented import segmented
 from tests.desk.experiments.drives import short_drives
 

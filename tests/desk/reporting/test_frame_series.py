@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt_desk.reporting.frame_series import FrameSeries
+from modt_desk.reporting.run_sums import FrameSeries
 
 
 @given(st.lists(st.integers(0, 100), min_size=1, max_size=200))

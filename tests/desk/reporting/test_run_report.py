@@ -11,9 +11,8 @@ from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
 from modt.pipeline import STAGES
-from modt_desk.reporting.document import TERMS
+from modt_desk.reporting.document import TERMS, document_page
 from modt_desk.reporting.energy_plots import stage_energy_mJ
-from modt_desk.reporting.page import document_page
 from modt_desk.reporting.quantity import to_json
 from modt_desk.reporting.run_report import run_document, run_plots, run_tree
 from modt_desk.reporting.run_sums import FrameSums

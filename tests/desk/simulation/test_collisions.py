@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt_desk.simulation.collisions import overlapping, without_collisions
+from modt_desk.simulation.builder import overlapping, without_collisions
 from modt_desk.simulation.motion import Path
 
 place = st.floats(-4, 4)

@@ -5,7 +5,7 @@ import pytest
 
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_desk.viewer.extent import reach_m
+from modt_desk.viewer.recorded_tracks import reach_m
 
 
 def rows(x, y, seen=1):

@@ -120,7 +120,7 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
     if arguments.html is not None:
-        from modt_desk.reporting.page import save
+        from modt_desk.reporting.document import save
         from modt_desk.viewer.evaluation_page import evaluation_page
 
         save(arguments.html, evaluation_page(sensors))

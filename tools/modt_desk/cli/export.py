@@ -102,7 +102,7 @@ class Export:
             MisuseError: it is gone.
         """
         from modt.app.inputs import Request, stream
-        from modt_desk.evaluation.level_stream import LevelStream
+        from modt_desk.evaluation.run_record import LevelStream
 
         if self.run.live:
             return None

@@ -62,9 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     from modt.sinks.output import writing
     from modt.sources.recognise import open_stream
-    from modt_desk.sensor_fit.findings import Recording
+    from modt_desk.sensor_fit.findings import Recording, doubts, profile_text
     from modt_desk.sensor_fit.fit import FINDERS, fit
-    from modt_desk.sensor_fit.profile_text import doubts, profile_text
 
     stream = open_stream(arguments.path, capture=dict(arguments.capture))
     name = arguments.name or stream.info.name.replace(" ", "-")

@@ -82,7 +82,7 @@ def tell(arguments: argparse.Namespace) -> int:
         MisuseError: no run, or no such track.
         ModtError: the file cannot be written.
     """
-    from modt_desk.reporting.page import save
+    from modt_desk.reporting.document import save
     from modt_desk.viewer.recorded_run import RecordedRun
     from modt_desk.viewer.track_page import rows_of, track_page, views
 
@@ -111,8 +111,8 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None, stre
     Raises:
         MisuseError: labels are given that cannot be used.
     """
-    from modt_desk.evaluation.by_stamp import by_stamp
     from modt_desk.evaluation.run_record import RunRecord
+    from modt_desk.evaluation.truth import by_stamp
     from modt_desk.evaluation.truth_files import labels_beside, open_truth
     from modt_desk.viewer.truth_marks import truth_marks
 
@@ -139,7 +139,7 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None, stre
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:
     """The stream of a run, None if it was live or cannot be found."""
     from modt.app import inputs
-    from modt_desk.evaluation.level_stream import LevelStream, recorded_mount
+    from modt_desk.evaluation.run_record import LevelStream, recorded_mount
 
     if recorded.live:
         return None

@@ -9,8 +9,7 @@ import numpy as np
 from modt.energy.meters.meter import Kind
 from modt_desk.comparison.prediction_report import against_table
 from modt_desk.reporting import energy_plots, svg
-from modt_desk.reporting.document import Document, Table
-from modt_desk.reporting.page import Plot
+from modt_desk.reporting.document import Document, Plot, Table
 
 
 def compare_document(tree: dict[str, Any]) -> Document:

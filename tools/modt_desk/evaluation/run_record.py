@@ -1,10 +1,10 @@
-"""A recorded run, read back frame by frame beside its truth."""
+"""A recorded run, read back frame by frame beside its truth and its source."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,53 @@ from modt.profile import from_yaml
 from modt.sinks.records import BROKEN, read_records
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
-from modt.sources.stream import Stream
-from modt.types import Float32, Float64, Int
+from modt.sources.stream import Faults, Stream, StreamInfo
+from modt.types import Float32, Float64, Frame, Int, Self
 from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.evaluation.frames_by_number import FramesByNumber
-from modt_desk.evaluation.level_stream import recorded_mount
 from modt_desk.evaluation.truth import Truth
+
+
+def recorded_mount(facts: dict[str, Any]) -> Mount:
+    """The mount of the sensor of a run, by the content of its run.yaml."""
+    sensor = facts.get("profile", {}).get("sensor", {})
+    return Mount.of(sensor.get("roll_deg"), sensor.get("pitch_deg"))
+
+
+class LevelStream:
+    """The frames of a stream, and its camera, for level points."""
+
+    def __init__(self, stream: Stream, mount: Mount) -> None:
+        self._stream, self._mount = stream, mount
+        camera = stream.info.camera
+        self.info: StreamInfo = replace(stream.info, camera=camera and mount.camera(camera))
+        self.faults: Faults = stream.faults
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames."""
+        return map(self._mount.level, self._stream)
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last."""
+        return type(self)(self._stream.between(first, last), self._mount)
+
+
+class FramesByNumber:
+    """Gives frames by ascending number and skips those between."""
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
+        self._frames: Iterator[Frame] | None = None  # begins with the first number that is asked for
+        self._next: Frame | None = None
+
+    def get(self, number: int) -> Frame | None:
+        """The frame, None if the stream does not hold it."""
+        if self._frames is None:
+            self._frames = iter(self._stream.between(number, None))
+            self._next = next(self._frames, None)
+        while self._next is not None and self._next.index < number:
+            self._next = next(self._frames, None)
+        return self._next if self._next is not None and self._next.index == number else None
+
 
 LABELS = "labels"
 Record = tuple[str, dict[str, Any]]

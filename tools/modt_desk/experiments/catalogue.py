@@ -13,8 +13,7 @@ from modt.config import ProfileConfig
 from modt.errors import MisuseError
 from modt_desk.experiments.estimate import Estimate, ratio
 from modt_desk.experiments.figures import Figure, ObjectLives, curves, efficiencies, lives, precisions
-from modt_desk.experiments.judged import Judged
-from modt_desk.experiments.replays import LabelReplay, NetworkReplay, Replay
+from modt_desk.experiments.judged import Judged, LabelReplay, NetworkReplay, Replay
 
 Label = tuple[str, float | None]
 """Variant, and the value that is swept."""

@@ -8,10 +8,9 @@ import numpy as np
 
 from modt.energy.meters.meter import Kind
 from modt.types import Float64
-from modt_desk.energy.equations import EnergyModel
+from modt_desk.energy.savings import EnergyModel
 from modt_desk.reporting import svg
-from modt_desk.reporting.document import Table
-from modt_desk.reporting.page import Plot
+from modt_desk.reporting.document import Plot, Table
 from modt_desk.reporting.quantity import Quantity
 
 _MAX_LIFE = 1000.0

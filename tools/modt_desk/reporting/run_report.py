@@ -27,12 +27,11 @@ from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
 from modt.types import Float64
-from modt_desk.energy.nonnegative import nonnegative_fit
+from modt_desk.energy.board_fit import nonnegative_fit
 from modt_desk.energy.run_energy import EnergySums, run_energy
 from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt_desk.reporting import energy_plots, svg
-from modt_desk.reporting.document import Cell, Document, Table
-from modt_desk.reporting.page import Plot
+from modt_desk.reporting.document import Cell, Document, Plot, Table
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
 from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_desk.reporting.run_sums import COLUMNS, FrameSums

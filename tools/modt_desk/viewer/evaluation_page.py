@@ -10,7 +10,7 @@ from modt.classes import CLASS_NAMES, CLASSES
 from modt_desk.evaluation.evaluation import ALL, RANGES_M, Evaluation
 from modt_desk.evaluation.report import report
 from modt_desk.reporting import svg
-from modt_desk.reporting.page import Plot, page, plots, preformatted, tiles
+from modt_desk.reporting.document import Plot, page, plots, preformatted, tiles
 
 _COLOURS = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)}
 _MIDDLE_M = {name: (low + high) / 2 for name, (low, high) in RANGES_M.items() if name != ALL}

@@ -13,8 +13,8 @@ from modt.sinks.output import writing
 from modt.sources.stream import Stream
 from modt.types import Float32, Float64
 from modt.viewer.theme import COLOURS, LIGHT
-from modt_desk.evaluation.frames_by_number import FramesByNumber
 from modt_desk.evaluation.overlap import inside
+from modt_desk.evaluation.run_record import FramesByNumber
 from modt_desk.evaluation.unlabelled import Mover
 
 PICTURES = 10

@@ -1,4 +1,4 @@
-"""The recorded tracks of a run as one table of `modt.viewer.track_rows`, sorted by track."""
+"""The recorded tracks of a run as one table of `modt.viewer.track_rows`, sorted by track, and their extent."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from modt.classes import CLASS_NAMES
 from modt.geometry import wrap
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import Float64, Int
-from modt.viewer.track_rows import COLUMNS, scaled
+from modt.viewer.theme import REACH_M
+from modt.viewer.track_rows import COLUMNS, SCALE, scaled
 
 
 def frame_rows(at: int, record: dict[str, Any], states: list[str]) -> list[list[float]]:
@@ -63,3 +64,21 @@ def _fill_lost(rows: Float64, poses: Float64) -> None:
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     rows[lost, x], rows[lost, x + 1] = c * dx + s * dy, c * dy - s * dx
     rows[lost, yaw] = wrap(rows[lost, yaw] + then[:, 2] - pose[:, 2])
+
+
+_SIDE_M = 32.0
+"""Half the height of a picture whose half width is REACH_M."""
+RINGS_M = {6.0: 2, 10.0: 5, 15.0: 5, 20.0: 10, 30.0: 10, REACH_M: 20}
+"""Ranges that a picture may reach, and the distance of the rings in it."""
+_NEARLY = 0.95
+"""Share of the tracked boxes that must be visible."""
+
+
+def reach_m(tracks: Int) -> float:
+    """Half the width of a picture that shows nearly all of (R, COLUMNS) rows of tracks; REACH_M at most."""
+    seen = tracks[tracks[:, COLUMNS.index("seen")] > 0]
+    if not len(seen):
+        return REACH_M
+    x, y = (np.abs(seen[:, COLUMNS.index(name)]) / SCALE[name] for name in ("x", "y"))
+    needed = np.quantile(np.maximum(x, y * REACH_M / _SIDE_M), _NEARLY)
+    return next((reach for reach in RINGS_M if reach >= needed), REACH_M)

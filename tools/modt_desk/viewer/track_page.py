@@ -14,7 +14,7 @@ from modt.sources.stream import Stream
 from modt.types import Float32
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.reporting import svg
-from modt_desk.reporting.page import Plot, page, plots, tiles
+from modt_desk.reporting.document import Plot, page, plots, tiles
 from modt_desk.viewer.crop_picture import crop_picture
 from modt_desk.viewer.recorded_run import RecordedRun
 
