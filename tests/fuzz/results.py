@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from argparse import Namespace
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ import numpy as np
 from modt.app import assembly
 from modt.pipeline import STAGES
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt_desk.cli.export import FORMS, Export
 from modt_desk.comparison.compare_report import SCHEMA as COMPARE_SCHEMA
 from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.prediction import forecast
@@ -24,6 +22,7 @@ from modt_desk.comparison.prediction_report import (
     read_calibration,
     read_prediction,
 )
+from modt_desk.evaluation.export import FORMS, Export
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.reporting.quantity import estimate, to_json
 from modt_desk.viewer.recorded_run import RecordedRun
@@ -105,12 +104,11 @@ def exported_run(folder: Path) -> Feed:
     run, out = folder / "run", folder / "out"
     run.mkdir()
     (run / "run.yaml").write_text(DESCRIPTION + "recognition: {used: vlp-16}\nservice: true\n")
-    asked = Namespace(no_points=True, frames=(0, None), capture=())
 
     def read() -> None:
         recorded = RunRecord.open(run)
         for form in ("csv", "kitti"):
-            FORMS[form](Export(recorded, asked), out)
+            FORMS[form](Export(recorded, points=False), out)
 
     return of_file(run / "tracks.jsonl", read, json_lines(frames()))
 

@@ -21,7 +21,7 @@ from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import Float64, Frame, Proposals
 from modt_desk.box_tracking.detections import Detections, files, read
-from modt_desk.cli import track
+from modt_desk.box_tracking.sequences import follow
 from tools.options import parser
 
 POINTS = 80
@@ -96,7 +96,7 @@ def box_frames_per_s(sequences: list[Detections]) -> float:
     """Frames of `modt track` per second of CPU time."""
     began = time.process_time()
     for sequence in sequences:
-        track.follow(sequence, None, 0.1)
+        follow(sequence, None, 0.1)
     return sum(s.n_frames for s in sequences) / (time.process_time() - began)
 
 

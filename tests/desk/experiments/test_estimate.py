@@ -38,7 +38,7 @@ def judged(n_objects: int, n_frames: int, seed: int = 0) -> Judged:
         to_call=True,
         said=np.where(score > 0.5, CAR, 0),
     )
-    calls = table(CALL, n_objects, track=np.arange(n_objects), points=10)
+    calls = table(CALL, n_objects, track=np.arange(n_objects))
     return Judged(np.zeros(n_frames, FRAME), objects, proposals, calls)
 
 

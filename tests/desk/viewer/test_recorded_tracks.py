@@ -4,6 +4,7 @@ import pytest
 from modt.classes import CLASS_NAMES
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.viewer.track_rows import COLUMNS
+from modt_desk.evaluation.recorded_result import recorded_result
 from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
 
@@ -23,9 +24,15 @@ def posts(x):
     return [track(k, (y, x, 0, 1, 1, 1, 0), (0.0, y, 0, 0)) for k, y in ((7, 5.0), (8, -9.0))]
 
 
+def recorded(at, *tracks, **more):
+    """The result of a line of tracks.jsonl."""
+    counts = {"proposals": 1, "classifications": 0, "deferred": 0, "T_world_sensor": np.eye(4)[:3].ravel().tolist()}
+    return recorded_result({"frame": at, "stamp_s": 0.0, "tracks": [*tracks], **counts, **more})
+
+
 def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     seen, lost = track(3, (4, 0, -1, 4.5, 1.8, 1.5, 0.5), (0, 4, 0, 1.0)), track(3, None, (0, 6, 0, 1.0), "lost")
-    records = [{"tracks": [*posts(0.0), seen], "classified": [3]}, {"tracks": [lost, *posts(1.0)], "classified": []}]
+    records = [recorded(0, *posts(0.0), seen, classified=[3]), recorded(1, lost, *posts(1.0))]
     states: list[str] = []
     poses = np.array([[0, 0, np.pi / 2], [1, 0, np.pi / 2]])
     table = track_table((frame_rows(at, record, states) for at, record in enumerate(records)), poses)
@@ -40,11 +47,12 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
 
 def test_an_earlier_record_is_read():
     old = [{key: value for key, value in post.items() if key != "witness"} for post in posts(0.0)]
-    table = track_table([frame_rows(0, {"tracks": old}, [])], np.zeros((1, 3)))
+    table = track_table([frame_rows(0, recorded(0, *old), [])], np.zeros((1, 3)))
     for name in ("classified", "motion_car"):
         assert not table[:, COLUMNS.index(name)].any()
 
 
-@pytest.mark.parametrize("frames", [[], [[]]])
+@pytest.mark.parametrize("frames", [0, 1])
 def test_no_track_is_no_row(frames):
-    assert track_table(frames, np.zeros((len(frames), 3))).shape == (0, len(COLUMNS))
+    rows = [frame_rows(at, recorded(at), []) for at in range(frames)]
+    assert track_table(rows, np.zeros((frames, 3))).shape == (0, len(COLUMNS))

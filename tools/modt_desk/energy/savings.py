@@ -2,10 +2,10 @@
 
 All energies share one unit, which cancels in gamma: joules where a meter was read, CPU seconds otherwise.
 
-Equation 3 has two costs and one track length. A real run adds: tracks that end unclassified, views beyond the first in
-`accurate` mode and after a track was lost, views that cost more or less than the average proposal, and the cost of
-tracking, scheduling and fusion, which both sides pay. Each is one parameter here, neutral in the paper; replacing
-the neutral values one by one gives the terms, whose sum is the whole deviation by construction.
+Equation 3 has two costs and one track length. A real run adds: tracks that end unclassified, views beyond the first
+in `accurate` mode and after a track was lost, views that cost more or less than the average proposal, and the cost of
+tracking, scheduling and fusion, which both sides pay. Each is one parameter here, neutral in the paper. Replacing the
+neutral values one by one gives the terms, whose sum is the whole deviation by construction.
 """
 
 from __future__ import annotations

@@ -97,12 +97,11 @@ def lives(judged: Judged, variant: str, at: float | None = None) -> Iterator[Fig
 
 @dataclass(frozen=True, slots=True)
 class TrackLives:
-    """(n,) of each track: frames with a proposal, most of them on objects or not, calls, and points classified."""
+    """(n,) of each track: frames with a proposal, most of them on objects or not, and calls."""
 
     frames: Int
     on_object: Bool
     calls: Int
-    points: Int
 
     @classmethod
     def of(cls, judged: Judged) -> TrackLives:
@@ -113,17 +112,12 @@ class TrackLives:
         on_object = 2 * np.bincount(unit[rows["owner"] > 0], minlength=len(names)) > frames
         number = {name: k for k, name in enumerate(names.tolist())}
         own = np.array([number[name] for name in judged.calls[["drive", "track"]].tolist()], np.int64)
-        calls, points = (np.bincount(own, weights, len(names)) for weights in (None, judged.calls["points"]))
-        return cls(frames, on_object, calls.astype(np.int64), points.astype(np.int64))
-
-    def take(self, which: Bool) -> TrackLives:
-        """Some of them."""
-        return TrackLives(self.frames[which], self.on_object[which], self.calls[which], self.points[which])
+        return cls(frames, on_object, np.bincount(own, minlength=len(names)))
 
 
 def efficiencies(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
     """beta, of all proposals and of those of objects."""
     tracks = TrackLives.of(judged)
-    objects = tracks.take(tracks.on_object)
+    of = tracks.on_object
     yield Figure(variant, at, "beta", ratio(tracks.calls, tracks.frames))
-    yield Figure(variant, at, "beta of objects", ratio(objects.calls, objects.frames))
+    yield Figure(variant, at, "beta of objects", ratio(tracks.calls[of], tracks.frames[of]))

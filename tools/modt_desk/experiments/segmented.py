@@ -16,7 +16,7 @@ from modt.app import assembly, kernel_choice
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals
+from modt.types import Bool, Float32, Float64, Frame, Proposals
 from modt_desk.evaluation.overlap import PAD_M, ObjectPoints, in_box_frame, inside
 from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.truth import FrameTruth
@@ -86,7 +86,7 @@ def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
 
 
 class PlayedBack:
-    """Segmenter and classifier of a pipeline; the network sees only what the tracker has regrouped.
+    """Segmenter and classifier of a pipeline that gives the proposals of a segmented drive.
 
     Args:
         drive: segmented drive that is played back.
@@ -94,35 +94,13 @@ class PlayedBack:
     """
 
     def __init__(self, drive: SegmentedDrive, range_m: float = np.inf) -> None:
-        self._frames, self._network, self._range_m = iter(drive.frames), drive.network, range_m
-
-    def facts(self) -> dict[str, str]:
-        """Facts of the network."""
-        return self._network.facts()
+        self._frames, self._range_m = iter(drive.frames), range_m
+        self.classify, self.facts = drive.network.classify, drive.network.facts
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of the next frame."""
-        self._now = next(self._frames)
-        own = self._now.proposals
-        self._row = {first: row for row, first in enumerate(own.members[own.offsets[:-1]].tolist())}
-        return own.take(np.flatnonzero(within(own, self._range_m)))
-
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) likelihoods of the proposals given by index."""
-        rows = np.array([self._row_of(proposals, k) for k in which.tolist()], np.int64)
-        likelihood: Float64 = self._now.likelihood[rows]
-        new = np.flatnonzero(rows == NONE)
-        if len(new):
-            likelihood[new] = self._network.classify(points, proposals, which[new])
-        return likelihood
-
-    def _row_of(self, proposals: Proposals, k: int) -> int:
-        """The proposal of the segmentation that has the same points and box, NONE where there is none."""
-        own, members = self._now.proposals, proposals.members[proposals.offsets[k] : proposals.offsets[k + 1]]
-        row = self._row.get(int(members[0]), NONE)
-        of_row = own.members[own.offsets[row] : own.offsets[row + 1]]
-        same = np.array_equal(members, of_row) and np.array_equal(proposals.box[k], own.box[row])
-        return row if same else NONE
+        proposals = next(self._frames).proposals
+        return proposals.take(np.flatnonzero(within(proposals, self._range_m)))
 
 
 def within(proposals: Proposals, range_m: float) -> Bool:

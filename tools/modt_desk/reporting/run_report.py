@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from modt import profile
 from modt.classification.scheduler import padded_size
-from modt.config import ClassificationConfig, EnergyConfig, ProfileConfig
+from modt.config import ClassificationConfig, EnergyConfig
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.ledger import Line
 from modt.energy.meters.meter import Kind
@@ -24,7 +23,7 @@ from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE, STAGES
 from modt.sinks.records import read_records
-from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
+from modt.sinks.run_directory import LEDGER, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
 from modt.types import Float64
 from modt_desk.energy.board_fit import nonnegative_fit
@@ -34,7 +33,7 @@ from modt_desk.reporting import energy_plots, svg
 from modt_desk.reporting.document import Cell, Document, Plot, Table
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
 from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
-from modt_desk.reporting.run_sums import COLUMNS, FrameSums
+from modt_desk.reporting.run_sums import COLUMNS, FrameSums, run_facts
 
 SCHEMA = "modt.report/2"
 _CONVENTIONAL = "conventional"
@@ -50,7 +49,7 @@ def run_tree(run: Path) -> dict[str, Any]:
     Raises:
         MisuseError: not a run directory, or without a complete frame so far.
     """
-    facts = _facts(run)
+    facts = run_facts(run)
     limits, mode = facts["profile"]["classification"], facts["mode"]
     board = EnergyConfig(**{key: facts["profile"]["energy"][key] for key in _BOARD})
     sums = FrameSums(padded_size(ClassificationConfig(**{key: limits[key] for key in _LIMITS})))
@@ -93,21 +92,6 @@ def run_tree(run: Path) -> dict[str, Any]:
 
 def _frames(run: Path) -> Iterator[Line]:
     return read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})
-
-
-def _facts(run: Path) -> dict[str, Any]:
-    """Content of run.yaml, with defaults for keys missing in its profile."""
-    path = run / RUN
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise MisuseError(path, "missing or unreadable", "give the directory of a run of modt") from None
-    facts = profile.from_yaml(text, path)
-    if not isinstance(facts, dict) or facts.get("schema") != "modt.run/1":
-        raise MisuseError(path, "describes no run of this version", "give the directory of a run of modt")
-    for stage, values in profile.dump(ProfileConfig()).items():
-        facts["profile"][stage] = values | (facts["profile"].get(stage) or {})
-    return facts
 
 
 def _energy(sums: EnergySums, idle_W: float) -> dict[str, Any]:

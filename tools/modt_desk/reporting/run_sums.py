@@ -4,18 +4,42 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from modt import profile
 from modt.classes import CLASS_NAMES, ObjectClass
+from modt.config import ProfileConfig
+from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, STAGES
 from modt.reporting.histogram import Histogram
+from modt.sinks.run_directory import RUN
 from modt.types import Float64, Int
 from modt_desk.energy.savings import Counts
 
+SCHEMA, GIVE = "modt.run/1", "give the directory of a run"
 POINTS = 512
 """Points held at most; an even number."""
+
+
+def run_facts(run: Path) -> dict[str, Any]:
+    """Content of a run's run.yaml, with defaults for keys missing in its profile.
+
+    Raises:
+        MisuseError: it is missing, or describes no run.
+    """
+    path = run / RUN
+    try:
+        facts = profile.from_yaml(path.read_text(encoding="utf-8"), path)
+        if facts["schema"] != SCHEMA:
+            raise MisuseError(path, f"describes no run of this version ({facts['schema']})", GIVE)
+        for stage, values in profile.dump(ProfileConfig()).items():
+            facts["profile"][stage] = values | (facts["profile"].get(stage) or {})
+    except (OSError, UnicodeDecodeError, AttributeError, TypeError, KeyError) as error:
+        raise MisuseError(path, f"describes no run ({error})", GIVE) from None
+    return dict(facts)
 
 
 class FrameSeries:

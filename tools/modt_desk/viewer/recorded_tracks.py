@@ -2,50 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 
-from modt.classes import CLASS_NAMES
 from modt.geometry import wrap
-from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.types import Float64, Int
+from modt.types import Float64, FrameResult, Int
 from modt.viewer.theme import REACH_M
-from modt.viewer.track_rows import COLUMNS, SCALE, scaled
+from modt.viewer.track_rows import COLUMNS, SCALE, result_rows, scaled
 
 
-def frame_rows(at: int, record: dict[str, Any], states: list[str]) -> list[list[float]]:
-    """Rows of a line of tracks.jsonl in units of the line; names of states are added to `states`."""
-    classified, rows = set(record.get("classified", ())), []
-    for track in record["tracks"]:
-        state = str(track["state"])
-        if state not in states:
-            states.append(state)
-        box = track["box"] or dict.fromkeys(BOX_KEYS, 0.0)
-        rows.append(
-            [
-                track["id"],
-                at,
-                states.index(state),
-                CLASS_NAMES.index(track["class"]),
-                track["box"] is not None,
-                track["final"],
-                track["id"] in classified,
-                track["points"],
-                *track["posterior"],
-                *track.get("witness", [0.0] * len(CLASS_NAMES)),  # earlier runs have none
-                *(box[key] for key in BOX_KEYS),
-                *(track["world"][key] for key in WORLD_KEYS),
-            ]
-        )
+def frame_rows(at: int, result: FrameResult, states: list[str]) -> Float64:
+    """(M, COLUMNS) rows of a recorded result; names of states are added to `states`."""
+    states += [name for name in result.state_names if name not in states]
+    number = np.array([states.index(name) for name in result.state_names], np.int64)
+    rows = result_rows(result)
+    rows[:, COLUMNS.index("at")], rows[:, COLUMNS.index("state")] = at, number[result.tracks.state]
     return rows
 
 
-def track_table(frames: Iterable[Sequence[Sequence[float]]], poses: Float64) -> Int:
+def track_table(frames: Iterable[Float64], poses: Float64) -> Int:
     """(R, COLUMNS) table of the rows of F frames, and of (F, 3) planar poses of the sensor."""
-    parts = [np.array(rows, np.float64).reshape(-1, len(COLUMNS)) for rows in frames]
-    rows = np.concatenate(parts) if parts else np.zeros((0, len(COLUMNS)))
+    rows = np.concatenate([np.zeros((0, len(COLUMNS))), *frames])
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     _fill_lost(rows, poses)
     return scaled(rows)
