@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from modt.classes import CLASS_NAMES
 from modt.errors import install
 from modt_desk.evaluation.evaluation import ALL, Evaluation
+from modt_desk.reporting.quantity import aligned
 
 CLASS_TABLES = (
     ("average precision [%] by range [m]", "average_precision", "objects"),
@@ -84,12 +85,7 @@ def _completeness(e: Evaluation) -> str:
 
 def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
     """The title and lines of aligned columns, the first to the left."""
-    lines = [[str(cell) for cell in row] for row in (("", *head), *rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    yield from ("", f"  {title}")
-    for first, *row in lines:
-        cells = (f"{cell:>{width}}" for cell, width in zip(row, widths[1:], strict=True))
-        yield "  ".join([f"  {first:<{widths[0]}}", *cells])
+    yield from ("", f"  {title}", *aligned([[str(cell) for cell in row] for row in (("", *head), *rows)]))
 
 
 def _number(value: float | None, digits: int = 1) -> str:

@@ -61,10 +61,7 @@ def _owner(made: SegmentedFrame) -> list[int]:
 class IdealTracking:
     """Segmenter, odometry, tracker and classifier of a pipeline that return what is known of a drive.
 
-    Args:
-        drive: segmented drive that is replayed.
-        config: profile of the tracker that follows background and further fragments.
-        range_m: range of interest; proposals beyond it are left out.
+    The tracker of the profile follows background and further fragments; proposals beyond a range are left out.
     """
 
     state_names = ("followed",)

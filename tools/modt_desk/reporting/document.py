@@ -6,14 +6,14 @@ The page is for light and dark screens and for print.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
 from modt.sinks.output import writing
 from modt.viewer.theme import COLOURS, THEME
-from modt_desk.reporting.quantity import LEGEND, Quantity
+from modt_desk.reporting.quantity import LEGEND, Quantity, aligned
 
 Cell = str | Quantity
 TERMS = (
@@ -52,20 +52,13 @@ class Document:
             lines += _wrapped(f"{name}: {value.text()}; {note}")
         lines += ["", *(f"  {fact}" for fact in self.about)]
         for table in self.tables:
-            lines += ["", *_aligned(table)]
+            rows = [[c.marked() if isinstance(c, Quantity) else c for c in row] for row in (table.head, *table.rows)]
+            lines += ["", *aligned(rows)]
         return "\n".join([*lines, "", *_wrapped(self.test), "", *(f"  {term}" for term in TERMS)])
 
 
 def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, 96, initial_indent="  ", subsequent_indent="    ")
-
-
-def _aligned(table: Table) -> Iterator[str]:
-    rows = [[c.marked() if isinstance(c, Quantity) else c for c in row] for row in (table.head, *table.rows)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for first, *others in rows:
-        cells = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
-        yield "  ".join([f"  {first:<{widths[0]}}", *cells])
 
 
 _STYLE = """
