@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt_desk.box_tracking import constant_velocity
+from modt_desk.box_tracking import box_tracker
 
 STATES = arrays(np.float64, (3, 4), elements=st.floats(-50, 50, allow_subnormal=False))
 PLACES = arrays(np.float64, (3, 2), elements=st.floats(-50, 50, allow_subnormal=False))
@@ -26,7 +26,7 @@ def full_covariance(P):
 @given(STATES, FACTORS, st.floats(0, 2), st.floats(0.1, 20))
 def test_prediction_equals_the_full_kalman_filter(x, factors, dt_s, acceleration):
     P = packed_covariance(factors)
-    moved, grown = constant_velocity.predict(x, P, acceleration, dt_s)
+    moved, grown = box_tracker.predict(x, P, acceleration, dt_s)
     F = np.kron([[1, dt_s], [0, 1]], np.eye(2))
     push = acceleration * np.kron([[dt_s**2 / 2], [dt_s]], np.eye(2))
     for i in range(len(x)):
@@ -39,7 +39,7 @@ def test_prediction_equals_the_full_kalman_filter(x, factors, dt_s, acceleration
 @given(STATES, FACTORS, PLACES, VARIANCES)
 def test_update_equals_the_full_kalman_filter(x, factors, z, variance):
     P = packed_covariance(factors)
-    after, squeezed = constant_velocity.update(x, P, z, variance)
+    after, squeezed = box_tracker.update(x, P, z, variance)
     H = np.eye(2, 4)
     for i in range(len(x)):
         K = full_covariance(P[i]) @ H.T @ np.linalg.inv(H @ full_covariance(P[i]) @ H.T + variance[i] * np.eye(2))

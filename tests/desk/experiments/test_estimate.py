@@ -8,8 +8,7 @@ from modt.types import NONE
 from modt_desk.evaluation.class_score import class_scores
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, table
 from modt_desk.evaluation.truth import Role
-from modt_desk.experiments.estimate import Estimate, ratio
-from modt_desk.experiments.figures import ObjectLives, TrackLives, curves, precisions
+from modt_desk.experiments.figures import Estimate, ObjectLives, TrackLives, curves, precisions, ratio
 from modt_desk.experiments.judged import CALL, FRAME, Judged
 
 CAR = int(ObjectClass.CAR)

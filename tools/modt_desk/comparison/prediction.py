@@ -17,7 +17,7 @@ from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.gamma import RunCosts, blocks
 from modt_desk.energy.board_fit import nonnegative_fit
 from modt_desk.energy.savings import EnergyModel
-from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
+from modt_desk.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK
 
 Runs = dict[str, RunCosts]
 """A stream's runs: tracking-by-detection first, the run of varied load last, the modes between."""

@@ -11,8 +11,16 @@ import numpy as np
 
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
-from modt_desk.experiments.estimate import Estimate, ratio
-from modt_desk.experiments.figures import Figure, ObjectLives, curves, efficiencies, lives, precisions
+from modt_desk.experiments.figures import (
+    Estimate,
+    Figure,
+    ObjectLives,
+    curves,
+    efficiencies,
+    lives,
+    precisions,
+    ratio,
+)
 from modt_desk.experiments.judged import Judged, LabelReplay, NetworkReplay, Replay
 
 Label = tuple[str, float | None]

@@ -18,8 +18,7 @@ from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Rows, table
 from modt_desk.evaluation.truth import Role
 from modt_desk.experiments.drives import Drive
-from modt_desk.experiments.ideal_tracker import IdealTracking
-from modt_desk.experiments.segmented import PlayedBack, SegmentedDrive, segmented
+from modt_desk.experiments.segmented import IdealTracking, PlayedBack, SegmentedDrive, segmented
 
 FRAME = np.dtype([("drive", int), ("proposals", int)])
 CALL = np.dtype([("drive", int), ("track", int)])

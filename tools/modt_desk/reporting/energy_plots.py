@@ -1,4 +1,4 @@
-"""Plots, tables and sentences that the reports of a run and of a comparison share."""
+"""Plots, tables, sentences and terms of gamma that the reports of a run and of a comparison share."""
 
 from __future__ import annotations
 
@@ -7,11 +7,31 @@ from typing import Any
 import numpy as np
 
 from modt.energy.meters.meter import Kind
+from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
 from modt.types import Float64
-from modt_desk.energy.savings import EnergyModel
+from modt_desk.energy.savings import EnergyModel, Reconciliation
 from modt_desk.reporting import svg
 from modt_desk.reporting.document import Plot, Table
-from modt_desk.reporting.quantity import Quantity
+from modt_desk.reporting.quantity import Quantity, estimate
+
+SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
+TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]
+SCHEDULE = [STAGES.index(SCHEDULING), STAGES.index(FUSION)]
+
+
+def reconciliation_tree(found: Reconciliation, gamma: float | None) -> dict[str, Any]:
+    """The paper's figures, the reconciled gamma, and the terms from N_go to the gamma of the runs."""
+    return {
+        "a": estimate(found.paper.a),
+        "gamma_short": estimate(found.paper.n_go),
+        "gamma_equation_3": estimate(found.paper.gamma),
+        "gamma_reconciled": estimate(found.model.gamma),
+        "terms": [
+            {"name": term.name, "change": estimate(term.change), "gamma": estimate(term.gamma)}
+            for term in found.explain(1.0 if gamma is None else gamma)
+        ],
+    }
+
 
 _MAX_LIFE = 1000.0
 """Upper end of the N_go axis of the curve of Equation 3 [frames]."""

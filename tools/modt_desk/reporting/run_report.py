@@ -31,8 +31,8 @@ from modt_desk.energy.run_energy import EnergySums, run_energy
 from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt_desk.reporting import energy_plots, svg
 from modt_desk.reporting.document import Cell, Document, Plot, Table
+from modt_desk.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
-from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_desk.reporting.run_sums import COLUMNS, FrameSums, run_facts
 
 SCHEMA = "modt.report/2"
