@@ -3,9 +3,10 @@ import pytest
 
 from modt.classes import CLASS_NAMES
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.viewer.track_rows import COLUMNS
+from modt.viewer.theme import REACH_M
+from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.evaluation.recorded_result import recorded_result
-from modt_desk.viewer.recorded_tracks import frame_rows, track_table
+from modt_desk.viewer.recorded_tracks import frame_rows, reach_m, track_table
 
 
 def track(id_, box, world, state="tracked", class_="car"):
@@ -56,3 +57,24 @@ def test_an_earlier_record_is_read():
 def test_no_track_is_no_row(frames):
     rows = [frame_rows(at, recorded(at), []) for at in range(frames)]
     assert track_table(rows, np.zeros((frames, 3))).shape == (0, len(COLUMNS))
+
+
+def rows(x, y, seen=1):
+    table = np.zeros((len(x), len(COLUMNS)), np.int64)
+    for name, values in {"x": x, "y": y}.items():
+        table[:, COLUMNS.index(name)] = np.multiply(values, SCALE[name])
+    table[:, COLUMNS.index("seen")] = seen
+    return table
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "reach"),
+    [([3, -4], [0, 1], 6.0), ([3, 1], [0, 12], 20.0), ([-25], [2], 30.0), ([80], [2], REACH_M), ([], [], REACH_M)],
+)
+def test_a_room_is_shown_larger_than_a_street(x, y, reach):
+    assert reach_m(rows(x, y)) == reach
+
+
+def test_a_single_track_far_away_and_lost_ones_do_not_count():
+    far, lost = rows([60], [0]), rows([60] * 50, [0] * 50, seen=0)
+    assert reach_m(np.concatenate([rows(np.linspace(-8, 8, 40), np.zeros(40)), far, lost])) == 10.0
