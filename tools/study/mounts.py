@@ -125,7 +125,7 @@ def shares(objects: Rows, kind: ObjectClass, band_m: tuple[float, float]) -> str
     ]
     if not len(wanted):
         return "-"
-    found, called = (100 * np.mean(of) for of in (wanted["outcome"] == Found.FOUND, wanted["said"] == kind))
+    found, called = (100 * np.mean(of) for of in (wanted["outcome"] == Found.DETECTED, wanted["reported"] == kind))
     return f"{len(wanted)}: {found:.0f} / {called:.0f}"
 
 

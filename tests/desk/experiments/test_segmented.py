@@ -9,7 +9,7 @@ from modt.segmentation.kernels import NUMPY
 from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.experiments.drives import simulated_drives
-from modt_desk.experiments.figures import ObjectLives
+from modt_desk.experiments.figures import ObjectLengths
 from modt_desk.experiments.judged import NetworkReplay
 from modt_desk.experiments.segmented import segmented
 
@@ -56,7 +56,7 @@ def test_the_ideal_tracker_never_breaks_a_life_that_it_follows():
     found = ideal.objects[ideal.objects["outcome"] == 0]
     for id_ in np.unique(found["id"]):
         assert len(np.unique(found["track"][found["id"] == id_])) == 1
-    assert ObjectLives.of(ideal).followed.sum() > 0
+    assert ObjectLengths.of(ideal).followed.sum() > 0
 
 
 def test_with_an_ideal_tracker_tracking_by_detection_calls_every_proposal():

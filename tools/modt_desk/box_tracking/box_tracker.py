@@ -194,8 +194,8 @@ class BoxTracker:
     def _report(self) -> BoxTracks:
         rows = np.flatnonzero(self._source != NONE)
         confidence = self._score[rows] + AGE_BONUS * np.log(self._hits[rows])
-        sure = confidence >= self.config.report_above
-        rows = rows[sure]
+        reported = confidence >= self.config.report_above
+        rows = rows[reported]
         box = self._box[rows]
         box[:, :2] = self._x[rows, :2]
-        return BoxTracks(self._id[rows], box, confidence[sure], self._source[rows])
+        return BoxTracks(self._id[rows], box, confidence[reported], self._source[rows])

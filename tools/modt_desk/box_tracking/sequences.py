@@ -19,19 +19,25 @@ from modt_desk.box_tracking.whole_tracks import TrackedBoxes, bridged, confident
 
 
 def follow(
-    detections: Detections, poses: Float64 | None, period_s: float, sure: float | None = None, *, online: bool = False
+    detections: Detections,
+    poses: Float64 | None,
+    period_s: float,
+    least_confidence: float | None = None,
+    *,
+    online: bool = False,
 ) -> tuple[str, int]:
     """KITTI tracking results of a sequence, and the number of its tracks.
 
-    Tracks are judged whole: by their mean confidence, and by whether a surer one of another class follows the same
-    object; their short gaps are filled. Online, each frame is written as the tracker reports it. The (n, 4, 4) poses
-    are T_world_camera, None without ego-motion; the minimum confidence is that of the type where none is given.
+    Tracks are judged whole: by their mean confidence, and by whether a more confident one of another class follows
+    the same object. Their short gaps are filled. Online, each frame is written as the tracker reports it. The
+    (n, 4, 4) poses are T_world_camera, None without ego-motion. Where no minimum confidence is given, it is that of
+    the type.
     """
     T = None if poses is None else T_LEVEL_CAMERA @ poses @ inverse(T_LEVEL_CAMERA)
     classes = []
     for number, object_class in enumerate(DETECTED):
         config = BOX_CLASSES[object_class]
-        least = config.keep_above if sure is None else sure
+        least = config.keep_above if least_confidence is None else least_confidence
         tracker = BoxTracker(replace(config, report_above=least if online else min(least, config.report_above)))
         found = _reports(tracker, detections.take(detections.object_class == object_class), T, period_s)
         found = replace(found, id=found.id * len(DETECTED) + number)

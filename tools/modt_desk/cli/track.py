@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
         lines.write(text)
         lines.close()
     if not ids and any(map(len, sequences)):
-        logging.getLogger("modt").warning("no track is sure enough; lower --sure to write more")
+        logging.getLogger("modt").warning("no track is confident enough; lower --sure to write more")
     if not arguments.quiet:
         rate = f"{frames / spent_s:.0f} frames a second of CPU time" if spent_s else "no time"
         print(f"{len(sequences)} sequences, {frames} frames, {ids} tracks, {rate}: {arguments.out}")

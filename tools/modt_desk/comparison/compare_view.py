@@ -90,6 +90,6 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
             energy_plots.stage_energy(f"{mode}: energy by stage", mJ, frames, basis, top_mJ)
             for mode, mJ in energy_mJ.items()
         ),
-        *(energy_plots.life_histogram(f"{mode}: life of tracks", series[mode]["lives"]) for mode in others),
+        *(energy_plots.length_histogram(f"{mode}: lengths of tracks", series[mode]["lives"]) for mode in others),
         ("Classifications a frame", svg.lines(classified, "frame", "classified"), "counted"),
     ]

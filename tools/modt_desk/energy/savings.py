@@ -23,7 +23,7 @@ class EnergyModel:
     e_seg: float  # E(seg), of one segmentation
     e_class: float  # E(class), of one classification by tracking-by-detection
     n: float  # N_obj + N_bg, proposals a frame
-    n_go: float  # N_go, mean life of a track in frames
+    n_go: float  # N_go, mean length of a track in frames
     classified_share: float = 1.0  # of the tracks, at least once
     repeats: float = 0.0  # further classifications a track, without those after a loss
     reacquired: float = 0.0  # further classifications a track after it was lost

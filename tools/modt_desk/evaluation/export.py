@@ -27,7 +27,7 @@ T = TypeVar("T")
 Frames = tuple[int, int | None]
 Capture = Sequence[tuple[str, str]]
 PLAIN = ("id", "state", "class", "viewed", "final", "proposal", "points", "age", "missed")
-"""Columns that are called as in tracks.jsonl."""
+"""Columns that have their name from tracks.jsonl."""
 UNITS = {"yaw": "rad", "heading": "rad", "speed_mps": ""}  # of the others: m
 NO_BOX = dict.fromkeys(BOX_KEYS)
 

@@ -178,7 +178,7 @@ def curves(judged: Judged, variant: str, at: float | None = None) -> Iterator[Fi
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectLives:
+class ObjectLengths:
     """(n,) of each labelled object: frames to follow it in, frames followed, and discontinuities."""
 
     wanted: Int
@@ -186,7 +186,7 @@ class ObjectLives:
     breaks: Int
 
     @classmethod
-    def of(cls, judged: Judged) -> ObjectLives:
+    def of(cls, judged: Judged) -> ObjectLengths:
         """As in the judgement of runs."""
         rows = judged.objects
         rows = rows[rows["to_follow"] & (rows["class"] > 0) & (rows["role"] != Role.IGNORED) & (rows["id"] != NONE)]
@@ -198,9 +198,9 @@ class ObjectLives:
         return cls(*(np.bincount(which, minlength=len(names)) for which in (unit, own, broken)))
 
 
-def lives(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
-    """Life of the tracks of objects, and what ends it early."""
-    found = ObjectLives.of(judged)
+def track_lengths(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
+    """Lengths of the tracks of objects, and what ends it early."""
+    found = ObjectLengths.of(judged)
     if not len(found.wanted):
         return
     scores = track_scores(judged.objects, judged.proposals)["all"]
@@ -214,7 +214,7 @@ def lives(judged: Judged, variant: str, at: float | None = None) -> Iterator[Fig
 
 
 @dataclass(frozen=True, slots=True)
-class TrackLives:
+class TrackWork:
     """(n,) of each track: frames with a proposal, most of them on objects or not, and calls."""
 
     frames: Int
@@ -222,7 +222,7 @@ class TrackLives:
     calls: Int
 
     @classmethod
-    def of(cls, judged: Judged) -> TrackLives:
+    def of(cls, judged: Judged) -> TrackWork:
         """Table of all tracks."""
         rows = judged.proposals
         names, unit = np.unique(rows[["drive", "track"]], return_inverse=True)
@@ -235,7 +235,7 @@ class TrackLives:
 
 def efficiencies(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
     """beta, of all proposals and of those of objects."""
-    tracks = TrackLives.of(judged)
+    tracks = TrackWork.of(judged)
     of = tracks.on_object
     yield Figure(variant, at, "beta", ratio(tracks.calls, tracks.frames))
     yield Figure(variant, at, "beta of objects", ratio(tracks.calls[of], tracks.frames[of]))

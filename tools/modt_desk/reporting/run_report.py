@@ -139,7 +139,7 @@ def _series(sums: FrameSums, e1_s: Float64) -> dict[str, Any]:
         "cpu_ms": {stage: (1e3 * column[stage]).round(4).tolist() for stage in STAGES},
         "e1_cpu_ms": (1e3 * e1_s).round(4).tolist(),
         **{name: column[name].tolist() for name in ("classified", "deferred", "proposals")},
-        "lives": sums.lives.occurrences(),
+        "lives": sums.lengths.occurrences(),
     }
 
 
@@ -186,16 +186,18 @@ def run_document(tree: dict[str, Any]) -> Document:
     of_e1 = "E1 is computed from this run's own costs; modt-profile compare runs the baseline"
     if tree["mode"] == "conventional":
         of_e1 = "this is tracking-by-detection itself: nothing was saved; run the other modes, or compare"
-    said = {key: value.marked() for key, value in saved.items() if isinstance(value, Quantity)}
+    marked = {key: value.marked() for key, value in saved.items() if isinstance(value, Quantity)}
     apart = [
         f"{name} {tree['parts_J'][name].scaled(1e3, 'mJ').marked()}" for name in _APART if name in tree["parts_J"]
     ]
     gross = f"with {', '.join(apart)}; power {tree['power_W'].marked()}"
     computed = (
-        f"computed from this run: {said['gamma_reconciled']} in full, {said['gamma_equation_3']} by Equation 3, "
-        f"{said['gamma_short']} by N_go alone; a = {said['a']}"
+        f"computed from this run: {marked['gamma_reconciled']} in full, {marked['gamma_equation_3']} by Equation 3, "
+        f"{marked['gamma_short']} by N_go alone; a = {marked['a']}"
     )
-    counts = f"{said['proposals']} proposals a frame, N_go {said['N_go']}, {said['views']} classifications a track"
+    counts = (
+        f"{marked['proposals']} proposals a frame, N_go {marked['N_go']}, {marked['views']} classifications a track"
+    )
     share = f"{ledger['overhead_share'].scaled(100, '%').marked()} of the CPU time"
     results = [
         (
@@ -253,7 +255,7 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
         energy_plots.stage_energy("Energy by stage", parts_mJ, frames, basis),
         energy_plots.cumulative_energy(energy_mJ, each, f"E2: {basis}; E1: estimated", dashed=baseline),
         energy_plots.gamma_curve(saved["a"], saved["proposals"], point, "dot: this run"),
-        energy_plots.life_histogram("Life of tracks", series["lives"]),
+        energy_plots.length_histogram("Lengths of tracks", series["lives"]),
         ("Use of the budget", svg.lines(budget, "frame", "proposals"), "counted"),
     ]
 

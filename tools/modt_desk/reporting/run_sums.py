@@ -97,10 +97,10 @@ class FrameSums:
         self.stages: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger's columns
         self.overhead_ns = self.cpu_ns = 0
         self.marks: set[str] = set()
-        self.lives = Histogram()  # frames with a proposal, of the tracks that ended
+        self.lengths = Histogram()  # frames with a proposal, of the tracks that ended
         self.foreground = self.tracks = self.classified_tracks = 0
         self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)  # of calls, items, points and CPU s
-        self._life: dict[int, int] = {}  # of the tracks alive
+        self._length: dict[int, int] = {}  # of the tracks alive
         self._viewed: set[int] = set()
 
     def add(self, line: dict[str, Any], record: dict[str, Any]) -> None:
@@ -121,7 +121,7 @@ class FrameSums:
 
     def finish(self) -> None:
         """Count the lengths of the tracks that have not ended."""
-        self._end(self._life.keys())
+        self._end(self._length.keys())
 
     def column(self, name: str) -> float:
         """Sum of a column of the series over all frames."""
@@ -145,13 +145,13 @@ class FrameSums:
     def _add_tracks(self, tracks: list[dict[str, Any]]) -> int:
         """Points of all proposals as the network would process them, padding included."""
         alive = {track["id"] for track in tracks}
-        self._end(self._life.keys() - alive)
+        self._end(self._length.keys() - alive)
         seen = [track for track in tracks if track["proposal"] is not None]
         self.foreground += sum(track["class"] != _BACKGROUND for track in seen)
         for track in seen:
-            life = self._life.get(track["id"], 0)
-            self.tracks += not life
-            self._life[track["id"]] = life + 1
+            length = self._length.get(track["id"], 0)
+            self.tracks += not length
+            self._length[track["id"]] = length + 1
         viewed = {track["id"] for track in tracks if track["viewed"]}
         self.classified_tracks += len(viewed - self._viewed)
         self._viewed = (self._viewed | viewed) & alive
@@ -160,4 +160,4 @@ class FrameSums:
 
     def _end(self, ids: Iterable[int]) -> None:
         for id_ in tuple(ids):
-            self.lives.add(self._life.pop(id_))
+            self.lengths.add(self._length.pop(id_))

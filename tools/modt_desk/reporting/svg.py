@@ -53,8 +53,8 @@ def _marks(scale: _Scale, k: int, trace: Trace) -> Iterator[str]:
     """Circles with their values."""
     style = f' style="fill:{trace.colour}"' if trace.colour else ""
     for a, b, u, v in zip(scale.x(trace.x), scale.y(trace.y), trace.x, trace.y, strict=True):
-        said = f"{escape(trace.name)}: {format_number(float(u))}, {format_number(float(v))}"
-        yield f'<circle class="c{k}"{style} cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{said}</title></circle>'
+        text = f"{escape(trace.name)}: {format_number(float(u))}, {format_number(float(v))}"
+        yield f'<circle class="c{k}"{style} cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{text}</title></circle>'
 
 
 def areas(x: Float64, parts: dict[str, Float64], x_label: str, y_label: str, at_least: float = 0.0) -> str:
