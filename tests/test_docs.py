@@ -10,8 +10,7 @@ import pytest
 from modt.classes import CLASS_NAMES
 from modt.reporting.summary import Summary
 from modt_desk.evaluation.class_score import ClassScore
-from modt_desk.evaluation.evaluation import Evaluation, RangeScore
-from modt_desk.evaluation.segmentation_score import SegmentationScore
+from modt_desk.evaluation.evaluation import Evaluation, RangeScore, SegmentationScore
 from modt_desk.evaluation.track_score import TrackScore
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests import results

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from argparse import Namespace
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,6 @@ import numpy as np
 
 from modt.app import assembly
 from modt.pipeline import STAGES
-from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt_desk.cli.export import FORMS, Export
 from modt_desk.comparison.compare_report import SCHEMA as COMPARE_SCHEMA
 from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.prediction import forecast
@@ -24,13 +21,14 @@ from modt_desk.comparison.prediction_report import (
     read_calibration,
     read_prediction,
 )
+from modt_desk.evaluation.export import FORMS, Export
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.reporting.quantity import estimate, to_json
 from modt_desk.viewer.recorded_run import RecordedRun
 from modt_desk.viewer.track_page import rows_of, track_page
 from tests.desk.comparison.test_prediction import CALIBRATION, FRAMES, TEST
-from tests.desk.reporting.test_run_report import ledger_line, track, window, write_run
-from tests.fuzz.runs import DESCRIPTION, described
+from tests.desk.reporting.test_run_report import ledger_line, window, write_run
+from tests.fuzz.runs import DESCRIPTION, described, frame_record
 from tests.fuzz.target import Feed, of_file, target
 
 ITSELF = {"stream": "elsewhere", "path": "/elsewhere"}
@@ -68,15 +66,6 @@ def predictions(folder: Path) -> Feed:
     return of_file(path, lambda: against(read_prediction(path, ABOUT), modes, savings), json.dumps(tree))
 
 
-def frames() -> list[dict[str, Any]]:
-    """Two records of a track that is seen and one that is lost."""
-    seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
-    lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
-    facts = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
-    facts["T_world_sensor"] = np.eye(4)[:3].ravel().tolist()
-    return [{**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]} for k in range(2)]
-
-
 def json_lines(records: Iterable[dict[str, Any]]) -> bytes:
     """A line a record."""
     return "".join(json.dumps(record) + "\n" for record in records).encode()
@@ -96,7 +85,7 @@ def viewed_run(folder: Path) -> Feed:
         found = RecordedRun.read(run)
         track_page(found, rows_of(found, 3), {})
 
-    return [b"---\n".join([json_lines(seed), json_lines(frames())])], call
+    return [b"---\n".join([json_lines(seed), json_lines(map(frame_record, range(2)))])], call
 
 
 @target()
@@ -104,15 +93,14 @@ def exported_run(folder: Path) -> Feed:
     """Its tracks as a table, and as KITTI's results."""
     run, out = folder / "run", folder / "out"
     run.mkdir()
-    (run / "run.yaml").write_text(DESCRIPTION + "recognition: {used: vlp-16}\nservice: true\n")
-    asked = Namespace(no_points=True, frames=(0, None), capture=())
+    (run / "run.yaml").write_text(DESCRIPTION + "service: true\n")
 
     def read() -> None:
         recorded = RunRecord.open(run)
         for form in ("csv", "kitti"):
-            FORMS[form](Export(recorded, asked), out)
+            FORMS[form](Export(recorded, points=False), out)
 
-    return of_file(run / "tracks.jsonl", read, json_lines(frames()))
+    return of_file(run / "tracks.jsonl", read, json_lines(map(frame_record, range(2))))
 
 
 TARGETS = (calibrations, predictions, viewed_run, exported_run)

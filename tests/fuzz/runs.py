@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -18,11 +19,12 @@ from modt.classification.pointnet import PointNet
 from modt.cli import status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.sinks.run_directory import STATUS
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt_desk.cli import profile_report
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.evaluation.truth_files import open_truth
 from tests.desk.evaluation.test_truth_files import tracklets
-from tests.desk.reporting.test_run_report import write_run
+from tests.desk.reporting.test_run_report import track, write_run
 from tests.fuzz.target import Feed, of_file, target
 from tests.sources import layouts
 
@@ -32,6 +34,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 """Nine to the ninth words."""
 DESCRIPTION = "schema: modt.run/1\nstream: {name: street, path: null}\nmode: efficient\nfov: full\nprofile: {}\n"
+DESCRIPTION += "recognition: {used: vlp-16}\n"
 SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.splitlines())}]}}\n"
 
 
@@ -105,6 +108,15 @@ def described(run: Path) -> Path:
     return run
 
 
+def frame_record(k: int) -> dict[str, Any]:
+    """The record of a frame with a track that is seen and one that is lost."""
+    seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
+    lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
+    counts = {"proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
+    facts = {"schema": "modt.frame/3", "T_world_sensor": np.eye(4)[:3].ravel().tolist(), **counts}
+    return {**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]}
+
+
 @target()
 def run_description(folder: Path) -> Feed:
     path = write_run(folder / "run", frames=5) / "run.yaml"
@@ -131,19 +143,17 @@ def judged_run(folder: Path) -> Feed:
     (run / "labels").mkdir(parents=True)
     for index in range(4):
         (run / "labels" / f"{index:06d}.label").write_bytes(np.full(50, 1 << 16, np.uint32).tobytes())
-    seen = {"id": 3, "proposal": 0, "class": "car", "posterior": [0.1, 0.7, 0.1, 0.1]}
-    record = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "tracks": [seen]}
-    lines = "".join(json.dumps({**record, "frame": index}) + "\n" for index in range(4))
-    described = "stream: {path: here}\nfov: camera\nrecognition: {used: vlp-16}\n"
+    lines = "".join(json.dumps(frame_record(index)) + "\n" for index in range(4))
+    facts = DESCRIPTION.replace("full", "camera")
 
     def call(raw: bytes) -> None:
-        facts, _, found = raw.partition(b"---\n")
-        (run / "run.yaml").write_bytes(facts)
+        about, _, found = raw.partition(b"---\n")
+        (run / "run.yaml").write_bytes(about)
         (run / "tracks.jsonl").write_bytes(found)
         for _ in RunRecord.open(run).frames(truth):
             pass
 
-    return [f"{described}---\n{lines}".encode()], call
+    return [f"{facts}---\n{lines}".encode()], call
 
 
 @target()
@@ -151,9 +161,7 @@ def labels_of_points(folder: Path) -> Feed:
     truth = open_truth(tracklets(layouts.raw_drive(folder), ("Car", 1, [8, 9])))
     run = folder / "run"
     (run / "labels").mkdir(parents=True)
-    (run / "run.yaml").write_text("stream: {path: here}\nfov: full\nrecognition: {used: vlp-16}\n")
-    record = {"schema": "modt.frame/3", "frame": 1, "proposals": 1, "classifications": 0, "tracks": []}
-    (run / "tracks.jsonl").write_text(json.dumps(record) + "\n")
+    (described(run) / "tracks.jsonl").write_text(json.dumps(frame_record(1)) + "\n")
     seed = np.full(50, 1 << 16, np.uint32).tobytes()
     return of_file(run / "labels" / "000001.label", lambda: list(RunRecord.open(run).frames(truth)), seed)
 

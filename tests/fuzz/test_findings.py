@@ -19,7 +19,7 @@ from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from tests.desk.reporting.test_run_report import ledger_line
 from tests.fuzz.execution import limits
-from tests.fuzz.runs import SENSOR_BOMB, network
+from tests.fuzz.runs import DESCRIPTION, SENSOR_BOMB, network
 from tests.fuzz.targets import TARGETS
 from tests.sources import bags
 from tests.sources.layouts import CAMERA
@@ -87,7 +87,7 @@ FOUND = {
     "a nested calibration": ("calibrations", "[" * 5000),
     "a run of infinite proposals": (
         "judged_run",
-        "stream: {path: here}\nfov: full\nrecognition: {used: vlp-16}\n---\n"
+        f"{DESCRIPTION}---\n"
         '{"schema": "modt.frame/3", "frame": 1, "proposals": 1e999, "classifications": 1, "tracks": []}\n',
     ),
     "a run whose costs have no frame": (

@@ -13,9 +13,9 @@ from modt import profile
 from modt.config import ProfileConfig
 from modt_desk.simulation import kinds, scenery
 from modt_desk.simulation.builder import SceneBuilder
-from modt_desk.simulation.furniture import chair, pallets, shelf, table
 from modt_desk.simulation.materials import Material
 from modt_desk.simulation.motion import Path
+from modt_desk.simulation.scenery import chair, pallets, shelf, table
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.simulator import Simulator
 from modt_desk.simulation.solids import Solids, box, cylinder

@@ -9,6 +9,7 @@ from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt_desk.box_tracking.detections import T_LEVEL_CAMERA, Detections, boxes_to_kitti, read
+from modt_desk.box_tracking.sequences import follow
 from modt_desk.cli import track
 
 
@@ -100,9 +101,9 @@ def test_online_the_results_of_a_frame_do_not_depend_on_later_frames(scene, data
     score = np.array([s for _, _, s in rows], np.float64)
     whole = Detections("a", frame, np.full(len(rows), ObjectClass.CAR), np.zeros((len(rows), 4)), score, box)
     until = data.draw(st.integers(0, len(scene) - 1))
-    online = track.follow(whole, None, 0.1, online=True)[0].splitlines()
+    online = follow(whole, None, 0.1, online=True)[0].splitlines()
     early = [line for line in online if int(line.split()[0]) <= until]
-    assert track.follow(whole.take(frame <= until), None, 0.1, online=True)[0].splitlines() == early
+    assert follow(whole.take(frame <= until), None, 0.1, online=True)[0].splitlines() == early
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from modt.types import UNLIMITED, Frame
 from modt_desk.comparison.compare_report import Basis, compare_tree
 from modt_desk.comparison.compare_view import compare_document, compare_plots
 from modt_desk.comparison.comparison import ModeRun, interleave
+from modt_desk.reporting.document import document_page
 from modt_desk.reporting.energy_plots import stage_energy_mJ
-from modt_desk.reporting.page import document_page
 from modt_desk.reporting.quantity import to_json
 from tests.desk.reporting.test_run_report import KINDS, figures
 from tests.results import CAR, result

@@ -97,14 +97,6 @@ def test_counts_and_costs_are_of_the_same_repetition() -> None:
     np.testing.assert_allclose(disturbed.cost, 1.1 * passes[1].cpu_s())
 
 
-def test_unit_costs_are_never_negative() -> None:
-    load = varied()
-    load.cost[:, STAGES.index("classification")] = 5e-3 - 1e-4 * load.counts[:, COUNTS.index("classified")]
-    found = unit_costs(load)
-    assert min(found.class_call, found.class_item, found.class_point) == 0.0
-    assert found.class_call > 0.0
-
-
 def test_quantity_without_a_value_is_unavailable() -> None:
     assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
     assert quantity(float("nan")).value is None

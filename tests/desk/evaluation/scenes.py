@@ -44,7 +44,7 @@ def frame(
         classified=classified,
         track=np.array(ids, np.int64),
         of_track=np.array(of_track, np.int64),
-        said=np.array([CLASS_NAMES.index(name) for name in names], np.int64),
+        reported=np.array([CLASS_NAMES.index(name) for name in names], np.int64),
         posterior=np.array([SURE[n] for n in names]).reshape(-1, 4) if posteriors is None else posteriors,
         truth=truth,
         **more,

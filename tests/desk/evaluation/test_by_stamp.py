@@ -7,9 +7,10 @@ import pytest
 
 from modt.sources.scan_stream import ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
-from modt_desk.evaluation.by_stamp import by_stamp
 from modt_desk.evaluation.rules import KITTI_RULES
-from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Truth
+from modt_desk.evaluation.run_record import FramesByNumber
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Truth, by_stamp
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 INFO = StreamInfo("drive", "folder", 0, None, 0.1, None, has_poses=False)
 
@@ -32,3 +33,9 @@ def test_frames_have_the_labels_and_the_scan_of_their_stamp(origin_s):
 def test_without_scans_there_are_no_stamps():
     bare = Truth({}, None, KITTI_RULES)
     assert by_stamp(bare, {0: 0.0}) is bare
+
+
+def test_frames_are_found_and_those_between_passed_over():
+    frames = FramesByNumber(SyntheticStream(seconds=0.6, sensor="vlp-16").between(1, 5))
+    found = [frames.get(number) for number in (0, 2, 2, 4, 5, 9)]
+    assert [None if frame is None else frame.index for frame in found] == [None, 2, 2, 4, None, None]

@@ -79,7 +79,7 @@ def test_an_object_that_is_not_called_what_it_is(tmp_path):
     scene = frame(
         truth, [(blob(40, 10), 0), (blob(40, 20), 1), (blob(40, 30), NONE)], [(7, 0, "car"), (8, 1, "cyclist")]
     )
-    assert judge(scene, KITTI_RULES)[0]["called"].tolist() == [ObjectClass.CAR, ObjectClass.CYCLIST, NONE]
+    assert judge(scene, KITTI_RULES)[0]["reported_by_match"].tolist() == [ObjectClass.CAR, ObjectClass.CYCLIST, NONE]
     assert score([scene]).ranges["all"].classification["car"].objects_called == pytest.approx(1 / 3)
 
 

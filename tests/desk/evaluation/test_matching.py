@@ -26,7 +26,7 @@ def counting(*what):
 @pytest.mark.parametrize(
     ("blobs", "outcome"),
     [
-        ([(blob(40, 10), 0)], Outcome.FOUND),
+        ([(blob(40, 10), 0)], Outcome.DETECTED),
         ([(blob(40, 10), 0), (blob(50, 10, 5), 0)], Outcome.MERGED),
         ([(blob(19, 10), 0), (blob(19, 9.8), 1), (blob(2, 10), NONE)], Outcome.SPLIT),
         ([(blob(28, 10), 0), (blob(12, 10), NONE), (blob(27, 10, 5), 0)], Outcome.PARTIAL),
@@ -46,7 +46,7 @@ def test_points_near_the_ground_are_of_the_box_but_not_of_the_object():
     objects, proposals, _ = judge(
         frame(cars(10.0), [(blob(40, 10), 0), (low, 1)], [(7, 0, "car"), (8, 1, "car")]), KITTI_RULES
     )
-    assert objects["outcome"].tolist() == [Outcome.FOUND]
+    assert objects["outcome"].tolist() == [Outcome.DETECTED]
     assert proposals["label"].tolist() == [CAR, BACKGROUND]
     assert proposals["owner"].tolist() == [CAR, CAR]
 
@@ -87,13 +87,13 @@ def test_beyond_the_labelled_sector_nothing_is_judged_but_life():
     truth = FrameTruth.of(KITTI_TYPES, [0], ["Car"], [car(1.0, 10.0)])
     objects, proposals, _ = judge(frame(truth, [(blob(30, 1, 10), 0)], [(7, 0, "car")]), KITTI_RULES)
     assert objects[["to_segment", "to_classify", "to_follow"]].tolist() == [(True, False, True)]
-    assert not proposals["to_call"][0]
+    assert not proposals["to_report"][0]
 
 
 def test_parked_cars_outside_their_labels():
     nothing = FrameTruth.of(KITTI_TYPES, [], [], [], parked=np.array([car(10.0)]))
     scene = frame(nothing, [(blob(30, 10), 0), (blob(30, 30), 1)], [(7, 0, "car"), (8, 1, "car")])
-    for column in ("to_classify", "to_call", "to_associate"):
+    for column in ("to_classify", "to_report", "to_associate"):
         assert judge(scene, KITTI_RULES)[1][column].tolist() == [False, True]
         assert judge(scene, counting("parked"))[1][column].tolist() == [True, True]
     labelled = dataclasses.replace(scene, truth=dataclasses.replace(cars(10.0), parked=nothing.parked))
@@ -104,8 +104,8 @@ def test_dontcare_regions():
     region = Regions(np.array([[490.0, 0.0, 510.0, 360.0]]), AHEAD_CAMERA)
     nothing = FrameTruth.of(KITTI_TYPES, [], [], [], regions=region)
     scene = frame(nothing, [(blob(30, 20), 0), (blob(30, 20, 5), 1)], [(7, 0, "car"), (8, 1, "car")])
-    assert judge(scene, KITTI_RULES)[1]["to_call"].tolist() == [False, True]
-    assert judge(scene, counting("dontcare"))[1]["to_call"].tolist() == [True, True]
+    assert judge(scene, KITTI_RULES)[1]["to_report"].tolist() == [False, True]
+    assert judge(scene, counting("dontcare"))[1]["to_report"].tolist() == [True, True]
 
 
 def test_roles_of_labelled_types():
@@ -119,19 +119,19 @@ def test_roles_of_labelled_types():
     assert of_van["label"][0] == CAR
     van, of_van = rows(PAPER_TYPES, "Van")
     assert not van[["to_segment", "to_classify", "to_follow"]].tolist()[0][0]
-    assert of_van[["to_classify", "to_call", "to_associate"]].tolist() == [(False, False, False)]
+    assert of_van[["to_classify", "to_report", "to_associate"]].tolist() == [(False, False, False)]
     bus, of_bus = rows(PANDASET_TYPES, "Bus")
     assert bus[["to_segment", "to_classify", "to_follow"]].tolist() == [(True, False, True)]
-    assert (of_bus["to_classify"][0], of_bus["to_call"][0], of_bus["owner"][0]) == (False, True, CAR)
+    assert (of_bus["to_classify"][0], of_bus["to_report"][0], of_bus["owner"][0]) == (False, True, CAR)
     tram, of_tram = rows(KITTI_TYPES, "Tram")
     assert tram[["to_segment", "to_classify", "to_follow"]].tolist() == [(True, False, False)]
-    assert (of_tram["to_classify"][0], of_tram["to_call"][0], of_tram["owner"][0]) == (True, True, BACKGROUND)
+    assert (of_tram["to_classify"][0], of_tram["to_report"][0], of_tram["owner"][0]) == (True, True, BACKGROUND)
 
 
 def test_range():
     far = frame(cars(70.0), [(blob(30, 70), 0)], [(7, 0, "car")])
     assert not judge(far, CUBOID_RULES)[0]["to_follow"][0]
-    assert not judge(far, CUBOID_RULES)[1]["to_call"][0]
+    assert not judge(far, CUBOID_RULES)[1]["to_report"][0]
     assert judge(far, KITTI_RULES)[0]["to_follow"][0]
 
 

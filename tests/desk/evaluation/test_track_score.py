@@ -1,10 +1,7 @@
 import sys
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.types import NONE
 from modt_desk.evaluation.evaluation import collect, evaluation, score
@@ -72,18 +69,6 @@ def test_drives_are_pooled_and_their_identities_kept_apart():
     assert (found.drives, found.frames, found.tracks["all"].life.objects) == (2, 6, 2)
     assert found.tracks["all"].discontinuities == 0
     assert found.metrics["car"]["HOTA"] == pytest.approx(1)
-
-
-@pytest.mark.slow
-@given(st.lists(st.sampled_from([None, 1, 2, 3]), min_size=1, max_size=12))
-def test_life_agrees_with_the_definition(history):
-    found = tracked(history, ["-"] * len(history))
-    seen = [track for track in history if track is not None]
-    breaks = sum(a != b for a, b in pairwise(seen))
-    assert found.discontinuities == breaks
-    assert found.life.life == len(seen) / (1 + breaks)
-    assert found.life.ideal == len(history)
-    assert found.life_as_seen.life == (len(seen) / (1 + breaks) if seen else None)
 
 
 def association(truth, tracks, similarity=1.0):

@@ -3,11 +3,9 @@ import pytest
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.types import NONE
-from modt_desk.evaluation.evaluation import score
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import Role
 from modt_desk.evaluation.truth_files import open_truth
-from tests.desk.evaluation.scenes import frame
 from tests.sources import layouts
 
 ITEM = """<item><objectType>{type}</objectType><h>1.5</h><w>2</w><l>4</l><first_frame>{first}</first_frame>
@@ -141,12 +139,3 @@ def test_real_labels(kitti_root):
     assert len(open_truth(kitti_root / "object" / "training").frames) > 100
     assert len(open_truth(kitti_root / "pandaset").frames) == 9
     assert len(open_truth(kitti_root / "pandaset_002").frames) == 40
-
-
-@pytest.mark.kitti
-def test_the_objects_of_drive_0005_as_the_paper_counts_them(kitti_root):
-    truth = open_truth(kitti_root / "tracking" / "label_02" / "0000.txt", paper=True)
-    assert len(truth.frames) == 154
-    found = score(frame(labels, [], [], index=index) for index, labels in truth.frames.items()).tracks
-    assert sum(found[name].labelled.objects for name in ("Car", "Pedestrian", "Cyclist")) == 12
-    assert (found["all"].labelled.objects, round(found["all"].labelled.ideal, 1)) == (12, 34.9)  # Table III

@@ -8,8 +8,7 @@ from modt.types import NONE
 from modt_desk.evaluation.class_score import class_scores
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, table
 from modt_desk.evaluation.truth import Role
-from modt_desk.experiments.estimate import Estimate, ratio
-from modt_desk.experiments.figures import ObjectLives, TrackLives, curves, precisions
+from modt_desk.experiments.figures import Estimate, ObjectLengths, TrackWork, curves, precisions, ratio
 from modt_desk.experiments.judged import CALL, FRAME, Judged
 
 CAR = int(ObjectClass.CAR)
@@ -35,10 +34,10 @@ def judged(n_objects: int, n_frames: int, seed: int = 0) -> Judged:
         label=np.where(right, CAR, 0),
         owner=np.where(right, CAR, 0),
         to_classify=True,
-        to_call=True,
-        said=np.where(score > 0.5, CAR, 0),
+        to_report=True,
+        reported=np.where(score > 0.5, CAR, 0),
     )
-    calls = table(CALL, n_objects, track=np.arange(n_objects), points=10)
+    calls = table(CALL, n_objects, track=np.arange(n_objects))
     return Judged(np.zeros(n_frames, FRAME), objects, proposals, calls)
 
 
@@ -71,12 +70,12 @@ def test_ratio_is_one_of_sums_and_resamples_whole_objects():
 def test_lives_of_objects_count_breaks_and_frames_without_a_track():
     objects = table(OBJECT, 6, id=[1, 1, 1, 1, 2, 2], frame=[0, 1, 2, 3, 0, 1], **{"class": CAR}, to_follow=True)
     objects["track"] = [7, NONE, 8, 8, 9, 9]
-    found = ObjectLives.of(Judged(np.zeros(0, FRAME), objects, np.zeros(0, PROPOSAL), np.zeros(0, CALL)))
+    found = ObjectLengths.of(Judged(np.zeros(0, FRAME), objects, np.zeros(0, PROPOSAL), np.zeros(0, CALL)))
     assert (found.wanted.tolist(), found.followed.tolist(), found.breaks.tolist()) == ([4, 2], [3, 2], [1, 0])
 
 
 def test_lives_of_tracks_tell_objects_from_background():
-    found = TrackLives.of(judged(3, 10))
+    found = TrackWork.of(judged(3, 10))
     assert found.on_object.tolist() == [True] * 3 + [False] * 3
     assert found.calls.tolist() == [1] * 3 + [0] * 3
 
@@ -87,7 +86,7 @@ def test_further_objects_count_for_precision_alone():
     made.objects["to_follow"] = made.objects["role"] != Role.FURTHER
     car = next(f for f in precisions(made, "x") if f.quantity == "AP car").estimate
     assert car.n == 5
-    assert len(ObjectLives.of(made).wanted) == 3
+    assert len(ObjectLengths.of(made).wanted) == 3
 
 
 def test_a_curve_falls_from_the_most_probable_to_the_last_found():

@@ -8,11 +8,10 @@ from modt.profile import load
 from modt.segmentation.kernels import NUMPY
 from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.experiments.replays import NetworkReplay
+from modt_desk.experiments.drives import simulated_drives
+from modt_desk.experiments.figures import ObjectLengths
+from modt_desk.experiments.judged import NetworkReplay
 from modt_desk.experiments.segmented import segmented
-from tests.desk.experiments.drives import short_drives
-
-DRIVE = short_drives(1)[0]
 
 
 def test_a_segmented_drive_keeps_the_points_that_matter():
@@ -46,3 +45,29 @@ def test_a_replay_of_the_points_that_matter_is_judged_as_the_whole_sweeps_are(na
     for name in found.objects.dtype.names:
         assert found.objects[name].tolist() == whole.objects[name].tolist(), name
     assert len(found.calls) == whole.classified
+
+
+DRIVE = simulated_drives(1, 0.6)[0]
+
+
+@pytest.mark.slow
+def test_the_ideal_tracker_never_breaks_a_life_that_it_follows():
+    ideal = NetworkReplay(load("hdl-64e"), ideal=True).judged(DRIVE)
+    found = ideal.objects[ideal.objects["outcome"] == 0]
+    for id_ in np.unique(found["id"]):
+        assert len(np.unique(found["track"][found["id"] == id_])) == 1
+    assert ObjectLengths.of(ideal).followed.sum() > 0
+
+
+def test_with_an_ideal_tracker_tracking_by_detection_calls_every_proposal():
+    replay = NetworkReplay(load("hdl-64e"), "conventional", ideal=True)
+    found = replay.judged(DRIVE)
+    assert len(found.calls) == found.frames["proposals"].sum()
+
+
+def test_beyond_the_range_of_interest_there_is_nothing():
+    for ideal in (True, False):
+        replay = NetworkReplay(load("hdl-64e"), ideal=ideal, range_m=20.0)
+        found = replay.judged(DRIVE).proposals
+        assert len(found)
+        assert found["range_m"][found["label"] == 0].max() <= 25.0

@@ -3,24 +3,26 @@ from __future__ import annotations
 import pytest
 
 from modt_desk.experiments.catalogue import EXPERIMENTS, chosen
+from modt_desk.experiments.drives import simulated_drives
 from modt_desk.experiments.segmented import _segmented
 from modt_desk.experiments.study import Row, Study
-from tests.desk.experiments.drives import short_drives
 
 
 def rows(jobs: int) -> list[Row]:
-    return Study(chosen(["table5"]), short_drives(2, 3), [()]).rows(jobs, lambda name: None)
+    return Study(chosen(["table5"]), simulated_drives(2, 0.3), [()]).rows(jobs, lambda name: None)
 
 
 def test_a_replay_that_experiments_share_is_made_once():
-    apart = [Study([EXPERIMENTS[name]], short_drives(1), [()]).tasks() for name in ("table5", "fig14", "table6")]
-    together = Study(chosen(["table5", "fig14", "table6"]), short_drives(1), [()]).tasks()
+    apart = [
+        Study([EXPERIMENTS[name]], simulated_drives(1, 0.4), [()]).tasks() for name in ("table5", "fig14", "table6")
+    ]
+    together = Study(chosen(["table5", "fig14", "table6"]), simulated_drives(1, 0.4), [()]).tasks()
     assert [len(tasks) for tasks in apart] == [2, 2, 2]
     assert len(together) == 3, "conventional, accurate and efficient"
 
 
 def test_drives_and_profiles_have_tasks_of_their_own():
-    study = Study(chosen(["fig11"]), short_drives(2), [(), ("small-robot",)])
+    study = Study(chosen(["fig11"]), simulated_drives(2, 0.4), [(), ("small-robot",)])
     assert len(study.tasks()) == 4 * len(Study(study.experiments, study.drives[:1], [()]).tasks())
 
 
@@ -28,7 +30,7 @@ def test_drives_and_profiles_have_tasks_of_their_own():
 def test_a_drive_is_segmented_once_for_each_profile():
     _segmented.cache_clear()
     done = []
-    Study(chosen(["table5", "fig11"]), short_drives(2, 2), [(), ("paper",)]).rows(1, done.append)
+    Study(chosen(["table5", "fig11"]), simulated_drives(2, 0.2), [(), ("paper",)]).rows(1, done.append)
     assert _segmented.cache_info().misses == 4
     assert len(done) == _segmented.cache_info().misses + _segmented.cache_info().hits
 

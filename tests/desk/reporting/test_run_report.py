@@ -3,20 +3,24 @@ import pickle
 import re
 import xml.etree.ElementTree as ElementTree
 
+import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from modt import profile
+from modt.app.timing import Timing
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
 from modt.pipeline import STAGES
-from modt_desk.reporting.document import TERMS
+from modt.sinks.run_directory import SUMMARY
+from modt_desk.reporting.document import TERMS, document_page
 from modt_desk.reporting.energy_plots import stage_energy_mJ
-from modt_desk.reporting.page import document_page
 from modt_desk.reporting.quantity import to_json
-from modt_desk.reporting.run_report import run_document, run_plots, run_tree
-from modt_desk.reporting.run_sums import FrameSums
+from modt_desk.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
+from modt_desk.reporting.run_sums import FrameSeries, FrameSums
 
 
 def run_text(tree):
@@ -304,3 +308,37 @@ def test_run_without_a_frame_is_refused(run):
     (run / "ledger.jsonl").write_text("")
     with pytest.raises(MisuseError, match="no whole frame"):
         run_tree(run)
+
+
+def test_how_many_are_as_late_or_later(tmp_path):
+    timing = Timing()
+    for ms in (0.2, 0.2, 3.0, 40.0):
+        timing.add(0.0, 1e-3 * ms, 0.05, 0.1)
+    found = timing.late_or_later()
+    assert found["ms"] == pytest.approx([0.2, 3.0, 40.0], rel=0.03)
+    assert found["frames"] == [4, 2, 1]
+    (tmp_path / SUMMARY).write_text(json.dumps({"lateness": found}))
+    ((title, svg, _),) = lateness_plots(tmp_path)
+    assert (title, svg.count("<polyline")) == ("Lateness", 1)
+
+
+@pytest.mark.parametrize("summary", [None, {}, {"lateness": Timing().late_or_later()}])
+def test_no_lateness_is_no_plot(summary, tmp_path):
+    if summary is not None:
+        (tmp_path / SUMMARY).write_text(json.dumps(summary))
+    assert lateness_plots(tmp_path) == []
+
+
+@given(st.lists(st.integers(0, 100), min_size=1, max_size=200))
+def test_points_hold_the_sums_of_their_frames(values: list[int]) -> None:
+    series = FrameSeries(1, points=8)
+    for value in values:
+        series.add([value])
+    frames, means = series.frames, series.means[:, 0]
+    assert len(frames) == len(means) <= 8
+    ends = np.cumsum(frames)
+    assert ends[-1] == series.count == len(values)
+    assert set(frames[:-1].tolist()) <= {series.frames_a_point}
+    expected = [np.mean(part) for part in np.split(np.array(values), ends[:-1])]
+    np.testing.assert_allclose(means, expected)
+    assert series.total[0] == pytest.approx(sum(values))

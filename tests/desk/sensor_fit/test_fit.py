@@ -10,9 +10,8 @@ from modt import assets, profile
 from modt.config import ProfileConfig
 from modt.sensor_fit.beams import cell_m
 from modt.sources.recognise import open_stream
-from modt_desk.sensor_fit.findings import Finding, Recording
+from modt_desk.sensor_fit.findings import Finding, Recording, doubts, profile_text
 from modt_desk.sensor_fit.fit import FINDERS, fit
-from modt_desk.sensor_fit.profile_text import doubts, profile_text
 from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording, with_mast, with_scale
 

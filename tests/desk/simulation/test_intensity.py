@@ -9,8 +9,8 @@ from modt_desk.simulation.materials import (
     Material,
 )
 from modt_desk.simulation.raycast import RayCaster
-from modt_desk.simulation.returns import Receiver
 from modt_desk.simulation.sensors import sensor
+from modt_desk.simulation.simulator import Receiver
 from modt_desk.simulation.solids import box
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt_desk.simulation.vehicles import car, car_size, van, van_size

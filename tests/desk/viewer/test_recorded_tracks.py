@@ -3,8 +3,10 @@ import pytest
 
 from modt.classes import CLASS_NAMES
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.viewer.track_rows import COLUMNS
-from modt_desk.viewer.recorded_tracks import frame_rows, track_table
+from modt.viewer.theme import REACH_M
+from modt.viewer.track_rows import COLUMNS, SCALE
+from modt_desk.evaluation.recorded_result import recorded_result
+from modt_desk.viewer.recorded_tracks import frame_rows, reach_m, track_table
 
 
 def track(id_, box, world, state="tracked", class_="car"):
@@ -23,9 +25,15 @@ def posts(x):
     return [track(k, (y, x, 0, 1, 1, 1, 0), (0.0, y, 0, 0)) for k, y in ((7, 5.0), (8, -9.0))]
 
 
+def recorded(at, *tracks, **more):
+    """The result of a line of tracks.jsonl."""
+    counts = {"proposals": 1, "classifications": 0, "deferred": 0, "T_world_sensor": np.eye(4)[:3].ravel().tolist()}
+    return recorded_result({"frame": at, "stamp_s": 0.0, "tracks": [*tracks], **counts, **more})
+
+
 def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     seen, lost = track(3, (4, 0, -1, 4.5, 1.8, 1.5, 0.5), (0, 4, 0, 1.0)), track(3, None, (0, 6, 0, 1.0), "lost")
-    records = [{"tracks": [*posts(0.0), seen], "classified": [3]}, {"tracks": [lost, *posts(1.0)], "classified": []}]
+    records = [recorded(0, *posts(0.0), seen, classified=[3]), recorded(1, lost, *posts(1.0))]
     states: list[str] = []
     poses = np.array([[0, 0, np.pi / 2], [1, 0, np.pi / 2]])
     table = track_table((frame_rows(at, record, states) for at, record in enumerate(records)), poses)
@@ -40,11 +48,33 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
 
 def test_an_earlier_record_is_read():
     old = [{key: value for key, value in post.items() if key != "witness"} for post in posts(0.0)]
-    table = track_table([frame_rows(0, {"tracks": old}, [])], np.zeros((1, 3)))
+    table = track_table([frame_rows(0, recorded(0, *old), [])], np.zeros((1, 3)))
     for name in ("classified", "motion_car"):
         assert not table[:, COLUMNS.index(name)].any()
 
 
-@pytest.mark.parametrize("frames", [[], [[]]])
+@pytest.mark.parametrize("frames", [0, 1])
 def test_no_track_is_no_row(frames):
-    assert track_table(frames, np.zeros((len(frames), 3))).shape == (0, len(COLUMNS))
+    rows = [frame_rows(at, recorded(at), []) for at in range(frames)]
+    assert track_table(rows, np.zeros((frames, 3))).shape == (0, len(COLUMNS))
+
+
+def rows(x, y, seen=1):
+    table = np.zeros((len(x), len(COLUMNS)), np.int64)
+    for name, values in {"x": x, "y": y}.items():
+        table[:, COLUMNS.index(name)] = np.multiply(values, SCALE[name])
+    table[:, COLUMNS.index("seen")] = seen
+    return table
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "reach"),
+    [([3, -4], [0, 1], 6.0), ([3, 1], [0, 12], 20.0), ([-25], [2], 30.0), ([80], [2], REACH_M), ([], [], REACH_M)],
+)
+def test_a_room_is_shown_larger_than_a_street(x, y, reach):
+    assert reach_m(rows(x, y)) == reach
+
+
+def test_a_single_track_far_away_and_lost_ones_do_not_count():
+    far, lost = rows([60], [0]), rows([60] * 50, [0] * 50, seen=0)
+    assert reach_m(np.concatenate([rows(np.linspace(-8, 8, 40), np.zeros(40)), far, lost])) == 10.0

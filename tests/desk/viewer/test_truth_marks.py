@@ -17,8 +17,8 @@ def test_an_object_is_drawn_where_the_sensor_sees_it():
     T = se3(np.eye(3), np.array([10.0, 0.0, 0.0]))
     boxes = [[14, 2, 0, 4, 2, 1.5, 0.1], [15, 2, 0, 1, 1, 1.5, 0], [16, 2, 0, 4, 2, 1.5, 0], [0, 0, 0, 1, 1, 1, 0]]
     truth = FrameTruth.of(KITTI_TYPES, [1, 2, 3, 4], ["Car", "Pedestrian", "Car", "Tram"], boxes, T_box_sensor=T)
-    rows = np.zeros(4, [("said", int), ("class", int), ("to_segment", bool), ("to_classify", bool)])
-    rows["class"], rows["said"], rows["to_segment"], rows["to_classify"] = (
+    rows = np.zeros(4, [("reported", int), ("class", int), ("to_segment", bool), ("to_classify", bool)])
+    rows["class"], rows["reported"], rows["to_segment"], rows["to_classify"] = (
         truth.object_class, [1, 1, -1, 1], [1, 1, 0, 1], [1, 1, 1, 1],
     )  # fmt: skip
     objects = _objects(truth, rows)

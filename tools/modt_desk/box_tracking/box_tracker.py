@@ -2,7 +2,7 @@
 
 The box of a detection covers the whole object, so its centre is the measured position; its score sets the variance of
 that position. Detections of high score are associated first; the others may continue a track but not start one. The
-motion model is linear, without a heading: without ego-motion every track shares the rotation of the sensor.
+Kalman filter is linear, without a heading: without ego-motion every track shares the rotation of the sensor.
 """
 
 from __future__ import annotations
@@ -15,7 +15,29 @@ from scipy.optimize import linear_sum_assignment
 from modt.classes import ObjectClass
 from modt.geometry import wrap
 from modt.types import NONE, Bool, Float64, Int
-from modt_desk.box_tracking import constant_velocity
+
+
+def predict(x: Float64, P: Float64, acceleration_sigma_mps2: float, dt_s: float) -> tuple[Float64, Float64]:
+    """States (M, 4) and covariances (M, 3) after dt_s, with white acceleration constant within dt_s.
+
+    A state is x, y, vx, vy in m and m/s. Both axes share one covariance: var(position), cov(position, velocity),
+    var(velocity).
+    """
+    predicted = x.copy()
+    predicted[:, :2] += dt_s * x[:, 2:]
+    pp, pv, vv = P.T
+    q = (acceleration_sigma_mps2 * dt_s) ** 2
+    covariance = [pp + 2 * dt_s * pv + dt_s**2 * vv + dt_s**2 / 4 * q, pv + dt_s * vv + dt_s / 2 * q, vv + q]
+    return predicted, np.stack(covariance, axis=1)
+
+
+def update(x: Float64, P: Float64, z: Float64, variance: Float64) -> tuple[Float64, Float64]:
+    """States and covariances after measured positions z (M, 2) of variance (M,) [m2] along each axis."""
+    gain = P[:, :2] / (P[:, 0] + variance)[:, None]  # of position and velocity
+    nu = z - x[:, :2]
+    updated = x + np.concatenate([gain[:, :1] * nu, gain[:, 1:] * nu], axis=1)
+    return updated, P - np.stack([gain[:, 0] * P[:, 0], gain[:, 0] * P[:, 1], gain[:, 1] * P[:, 1]], axis=1)
+
 
 POSITION_SIGMA_M, SCORE_SCALE = 0.2, 10.0
 """Standard deviation of a detected centre of score zero, and the increase of the score that divides it by e."""
@@ -110,7 +132,7 @@ class BoxTracker:
     def _predict(self, stamp_s: float) -> None:
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
-        self._x, self._P = constant_velocity.predict(self._x, self._P, ACCELERATION_SIGMA_MPS2, dt_s)
+        self._x, self._P = predict(self._x, self._P, ACCELERATION_SIGMA_MPS2, dt_s)
         # A gate that widened while a track is missed would end by taking the detection of something else.
         np.copyto(self._reach, self._P[:, 0], where=self._missed == 0)
 
@@ -137,7 +159,7 @@ class BoxTracker:
     def _update(self, rows: Int, columns: Int, boxes: Float64, variance: Float64, score: Float64) -> None:
         measured = boxes.take(columns, axis=0)
         x, P = self._x.take(rows, axis=0), self._P.take(rows, axis=0)
-        self._x[rows], self._P[rows] = constant_velocity.update(x, P, measured[:, :2], variance[columns])
+        self._x[rows], self._P[rows] = update(x, P, measured[:, :2], variance[columns])
         self._missed[rows] = 0
         self._source[rows] = columns
         hits = self._hits[rows] + 1
@@ -172,8 +194,8 @@ class BoxTracker:
     def _report(self) -> BoxTracks:
         rows = np.flatnonzero(self._source != NONE)
         confidence = self._score[rows] + AGE_BONUS * np.log(self._hits[rows])
-        sure = confidence >= self.config.report_above
-        rows = rows[sure]
+        reported = confidence >= self.config.report_above
+        rows = rows[reported]
         box = self._box[rows]
         box[:, :2] = self._x[rows, :2]
-        return BoxTracks(self._id[rows], box, confidence[sure], self._source[rows])
+        return BoxTracks(self._id[rows], box, confidence[reported], self._source[rows])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from modt.cli.options import add_examples
-from modt.errors import MisuseError, install
+from modt.errors import MisuseError
 from modt_desk.cli import experiments
 from modt_desk.evaluation.rules import IGNORABLE
 
@@ -120,7 +120,7 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
     if arguments.html is not None:
-        from modt_desk.reporting.page import save
+        from modt_desk.reporting.document import save
         from modt_desk.viewer.evaluation_page import evaluation_page
 
         save(arguments.html, evaluation_page(sensors))
@@ -135,17 +135,14 @@ def list_unlabelled(arguments: argparse.Namespace) -> None:
     """Print the tracks that move like road users and have no label; write their pictures and their table.
 
     Raises:
-        MisuseError: the run or its labels cannot be used, or Matplotlib is not installed.
+        MisuseError: the run or its labels cannot be used.
         ModtError: a file cannot be written.
     """
     from modt.sinks.output import writing
     from modt_desk.evaluation.unlabelled import listing, unlabelled, write_table
+    from modt_desk.viewer.crop_picture import save_mover_page
 
     folder: Path = arguments.unlabelled
-    try:
-        from modt_desk.viewer.film_strip import save_film_strips
-    except ModuleNotFoundError as error:
-        raise MisuseError(folder, f"needs {error.name}", install("view")) from None
     record, truth = opened(arguments, *arguments.pairs)
     movers = unlabelled(record, truth)
     if not movers:
@@ -156,6 +153,6 @@ def list_unlabelled(arguments: argparse.Namespace) -> None:
     table = folder / "further.csv"
     write_table(table, movers)
     if truth.scans is not None:
-        save_film_strips(folder, movers, truth.scans)
+        save_mover_page(folder / "tracks.html", movers, truth.scans)
     print("\n".join(listing(movers)))
     print(f"\npictures and rows in {folder}: keep the rows of real road users, then give --further {table}")

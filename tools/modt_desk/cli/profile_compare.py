@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_desk.comparison.compare_view import compare_document, compare_plots
     from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
-    from modt_desk.reporting.page import document_page, save
+    from modt_desk.reporting.document import document_page, save
     from modt_desk.reporting.quantity import to_json
 
     request = inputs.Request.of(arguments)

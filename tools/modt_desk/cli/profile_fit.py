@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MOST_FRAMES = 1000
 """Frames of a recording of which the sweeps are taken."""
 MIN_PROPOSALS = 1000
-"""For a frequency of the classes that is sure."""
+"""Least number of proposals for a reliable frequency of the classes."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -53,7 +53,7 @@ def class_frequencies(recording: Recording, config: ProfileConfig) -> Iterator[F
         found += len(pipeline.step(Frame(number, recording.stamps_s[0] + number, points)).proposals)
     frequency = tuple(round(float(share), 4) for share in pipeline.decision.frequency[1:])
     evidence = f"cars, pedestrians, cyclists among {found} proposals, by their posteriors"
-    yield Finding("decision", "frequency", frequency, evidence, sure=found >= MIN_PROPOSALS)
+    yield Finding("decision", "frequency", frequency, evidence, reliable=found >= MIN_PROPOSALS)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -62,9 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     from modt.sinks.output import writing
     from modt.sources.recognise import open_stream
-    from modt_desk.sensor_fit.findings import Recording
+    from modt_desk.sensor_fit.findings import Recording, doubts, profile_text
     from modt_desk.sensor_fit.fit import FINDERS, fit
-    from modt_desk.sensor_fit.profile_text import doubts, profile_text
 
     stream = open_stream(arguments.path, capture=dict(arguments.capture))
     name = arguments.name or stream.info.name.replace(" ", "-")
@@ -89,6 +88,6 @@ def run(arguments: argparse.Namespace) -> int:
         out.write_text(text, encoding="utf-8")
     print(text)
     for doubt in doubts(findings):
-        print(f"  not sure of {doubt}")
+        print(f"  to be checked: {doubt}")
     print(f"  written to {out}; use it as --profile {out}")
     return 0

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt.sinks.records import records_of
-    from modt_desk.reporting.page import document_page, save
+    from modt_desk.reporting.document import document_page, save
     from modt_desk.reporting.quantity import to_json
     from modt_desk.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
 

@@ -18,8 +18,8 @@ from modt_desk.comparison.comparison import COUNTS, Repetition, total
 from modt_desk.energy.board_fit import usable_windows
 from modt_desk.energy.run_energy import EnergySums, run_energy
 from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
+from modt_desk.reporting.energy_plots import reconciliation_tree
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
-from modt_desk.reporting.reconciliation import reconciliation_tree
 
 SCHEMA = "modt.compare/3"
 _COUNTING = "Energy is assumed power times CPU time: the reconciliation tests counts and unit costs, not the physics."

@@ -9,8 +9,7 @@ import numpy as np
 from modt.energy.meters.meter import Kind
 from modt_desk.comparison.prediction_report import against_table
 from modt_desk.reporting import energy_plots, svg
-from modt_desk.reporting.document import Document, Table
-from modt_desk.reporting.page import Plot
+from modt_desk.reporting.document import Document, Plot, Table
 
 
 def compare_document(tree: dict[str, Any]) -> Document:
@@ -91,6 +90,6 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
             energy_plots.stage_energy(f"{mode}: energy by stage", mJ, frames, basis, top_mJ)
             for mode, mJ in energy_mJ.items()
         ),
-        *(energy_plots.life_histogram(f"{mode}: life of tracks", series[mode]["lives"]) for mode in others),
+        *(energy_plots.length_histogram(f"{mode}: lengths of tracks", series[mode]["lives"]) for mode in others),
         ("Classifications a frame", svg.lines(classified, "frame", "classified"), "counted"),
     ]

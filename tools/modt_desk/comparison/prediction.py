@@ -15,9 +15,9 @@ from scipy import stats
 from modt.types import Float64, Int, Self
 from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.gamma import RunCosts, blocks
-from modt_desk.energy.equations import EnergyModel
-from modt_desk.energy.nonnegative import nonnegative_fit
-from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
+from modt_desk.energy.board_fit import nonnegative_fit
+from modt_desk.energy.savings import EnergyModel
+from modt_desk.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK
 
 Runs = dict[str, RunCosts]
 """A stream's runs: tracking-by-detection first, the run of varied load last, the modes between."""

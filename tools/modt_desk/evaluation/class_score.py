@@ -34,26 +34,26 @@ class ClassScore:
 
 def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
     """The score of each class."""
-    judged, called = proposals[proposals["to_classify"]], proposals[proposals["to_call"]]
+    judged, reporting = proposals[proposals["to_classify"]], proposals[proposals["to_report"]]
     scores = {}
     for c, name in enumerate(CLASS_NAMES[1:], 1):
         of_class = objects[(objects["class"] == c) & np.isin(objects["role"], CLASSIFIED)]
         wanted = of_class[of_class["to_segment"]]
         counted = of_class[of_class["to_classify"]]
-        n, correct = len(counted), int((wanted["said"] == c).sum())
-        said = called["said"] == c
+        n, correct = len(counted), int((wanted["reported"] == c).sum())
+        as_class = reporting["reported"] == c
         score, hit = judged["posterior"][:, c], judged["label"] == c
         curve = precision_recall(score, hit, n)
         scores[name] = ClassScore(
             objects=n,
             average_precision=_area(*curve[1:]) if n else None,
             curve=_sampled(*curve) if n else (),
-            called=int(said.sum()),
-            precision=ratio(int((said & (called["owner"] == c)).sum()), int(said.sum())),
-            objects_called=ratio(int((counted["called"] == c).sum()), n),
+            called=int(as_class.sum()),
+            precision=ratio(int((as_class & (reporting["owner"] == c)).sum()), int(as_class.sum())),
+            objects_called=ratio(int((counted["reported_by_match"] == c).sum()), n),
             segmentable=len(wanted),
             recall=ratio(correct, len(wanted)),
-            recall_of_found=ratio(correct, int((wanted["outcome"] == Outcome.FOUND).sum())),
+            recall_of_found=ratio(correct, int((wanted["outcome"] == Outcome.DETECTED).sum())),
             calibration_error=expected_calibration_error(score, hit),
         )
     return scores

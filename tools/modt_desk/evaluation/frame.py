@@ -22,7 +22,7 @@ class JudgedFrame:
     classified: int  # proposals classified in the frame
     track: Int  # (M,) identities
     of_track: Int  # (M,) proposals
-    said: Int  # (M,) classes
+    reported: Int  # (M,) classes
     posterior: Float64  # (M, 4)
     truth: FrameTruth
     fov: FieldOfView = field(default_factory=FieldOfView)
@@ -40,7 +40,7 @@ class JudgedFrame:
             classified=len(result.classified),
             track=tracks.id[seen],
             of_track=tracks.proposal[seen],
-            said=tracks.object_class[seen],
+            reported=tracks.object_class[seen],
             posterior=tracks.posterior[seen],
             truth=truth,
             fov=FieldOfView() if fov is None else fov,

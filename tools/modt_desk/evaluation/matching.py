@@ -29,21 +29,21 @@ def judge(
     overlap = Overlap.of(frame, points)
     row = np.full(len(overlap.size), NONE, np.int64)
     row[frame.of_track] = np.arange(len(frame.track))
-    track, said = (np.append(column, NONE)[row] for column in (frame.track, frame.said))
+    track, reported = (np.append(column, NONE)[row] for column in (frame.track, frame.reported))
     objects = _objects(frame, overlap, rules)
     pairs = overlap.iou > 0.5 if rules.by_iou else overlap.most_of_object & overlap.most_of_proposal
     proposals = _proposals(frame, overlap, objects, pairs, rules)
     objects["drive"] = proposals["drive"] = drive
     objects["frame"] = proposals["frame"] = frame.index
-    objects["said"] = np.where(objects["outcome"] == Outcome.FOUND, said[overlap.best], NONE)
-    objects["called"] = np.where(pairs, said[overlap.best], NONE)
+    objects["reported"] = np.where(objects["outcome"] == Outcome.DETECTED, reported[overlap.best], NONE)
+    objects["reported_by_match"] = np.where(pairs, reported[overlap.best], NONE)
     objects["track"] = np.where(overlap.most > 0, track[overlap.best], NONE)
-    proposals["track"], proposals["said"] = track, said
+    proposals["track"], proposals["reported"] = track, reported
     proposals["posterior"] = np.append(frame.posterior, np.zeros((1, N_CLASSES)), axis=0)[row]
     associations = []
     for c in range(1, len(CLASS_NAMES)):
         i = np.flatnonzero(objects["to_classify"] & objects["to_follow"] & (objects["class"] == c))
-        k = np.flatnonzero(proposals["to_associate"] & (said == c))
+        k = np.flatnonzero(proposals["to_associate"] & (reported == c))
         shared = overlap.shared[np.ix_(i, k)]
         union = overlap.count[i, None] + overlap.size[k] - shared
         associations.append(Association(objects["id"][i], track[k], shared / np.maximum(union, 1)))
@@ -90,7 +90,7 @@ def _has_points(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Bool:
 def _outcome(overlap: Overlap) -> Int:
     """(n,) `Outcome` of each object."""
     conditions = {
-        Outcome.FOUND: overlap.iou > 0.5,
+        Outcome.DETECTED: overlap.iou > 0.5,
         Outcome.MISSED: overlap.shared.sum(axis=1) <= 0.5 * overlap.count,
         Outcome.SPLIT: overlap.most < 0.5 * overlap.count,
         Outcome.MERGED: ~overlap.most_of_proposal,
@@ -135,7 +135,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
             unknown |= most(inside(placed, box, PARKED_PAD_M))
     if "dontcare" in rules.ignored and truth.regions is not None:
         unknown |= most(truth.regions.contains(points))
-    to_call = judged & ~(unknown & (owner == 0)) & (role != Role.IGNORED)
+    to_report = judged & ~(unknown & (owner == 0)) & (role != Role.IGNORED)
     no_object = label == 0
     return table(
         PROPOSAL,
@@ -144,8 +144,8 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
         label=label,
         owner=owner,
         to_classify=judged & ~((unknown | neutral) & no_object),
-        to_call=to_call,
-        to_associate=to_call & ~(neutral & no_object) & ~further,
+        to_report=to_report,
+        to_associate=to_report & ~(neutral & no_object) & ~further,
     )
 
 

@@ -40,6 +40,8 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     tracks.key_points[:] = [row["viewed"] for row in rows]
     tracks.final[:] = [row["final"] for row in rows]
     tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]
+    if (tracks.proposal < NONE).any():
+        raise ValueError("a track's proposal is none of the frame's")
     for key, column in (("points", tracks.points), ("age", tracks.age), ("missed", tracks.missed)):
         column[:] = [row[key] for row in rows]
     tracks.x[:] = _table([row["world"] for row in rows], WORLD_KEYS)

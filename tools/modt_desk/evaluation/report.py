@@ -7,16 +7,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from modt.classes import CLASS_NAMES
 from modt.errors import install
 from modt_desk.evaluation.evaluation import ALL, Evaluation
+from modt_desk.reporting.quantity import aligned
 
 CLASS_TABLES = (
     ("average precision [%] by range [m]", "average_precision", "objects"),
-    ("precision of the classes that tracks were given [%]", "precision", "called"),
-    ("objects that are called what they are [%]", "objects_called", "objects"),
+    ("precision of the reported classes [%]", "precision", "called"),
+    ("objects reported with their class [%]", "objects_called", "objects"),
     ("recall with the right class [%]", "recall", "segmentable"),
 )
 """Title, figure and the count that it is a share of."""
 FAILURES = ("merged", "split", "partial", "missed", "cut")
-TRACKS = ["objects", "life", "ideal", "ratio", "life as seen", "its ideal", "labelled", "breaks", "taken", "mixed"]
+TRACKS = ["objects", "length", "ideal", "ratio", "as seen", "its ideal", "labelled", "breaks", "taken", "mixed"]
 METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")
 EVENTS = ("id_switches", "fragmentations")
 LEGEND = "  Rows car, pedestrian, cyclist: classes (vans as cars, unless --classes paper); others: types of labels."
@@ -51,14 +52,14 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
     errors = {"proposals": e.calibration_error, "objects": e.calibration_error_of_objects}
     errors |= {c: score.calibration_error for c, score in whole.classification.items()}
     yield from _table("calibration error [%]", [*errors], [["", *map(_percent, errors.values())]])
-    lives = []
+    rows = []
     for kind, t in e.tracks.items():
         figures = (t.life.life, t.life.ideal, t.life_as_seen.life, t.life_as_seen.ideal, t.labelled.ideal)
-        life, ideal, *others = (_number(value) for value in figures)
+        length, ideal, *others = (_number(value) for value in figures)
         counts = (t.discontinuities, t.taken_over, t.mis_associations)
-        lives.append([kind, t.life.objects, life, ideal, _number(t.life.ratio, 2), *others, *counts])
-    if lives:
-        yield from _table("tracks: mean life [frames], and counts", TRACKS, [row for row in lives if row[1]])
+        rows.append([kind, t.life.objects, length, ideal, _number(t.life.ratio, 2), *others, *counts])
+    if rows:
+        yield from _table("tracks: mean length [frames], and counts", TRACKS, [row for row in rows if row[1]])
         measured = (e.metrics or {}).items()
         rows = [[k, *(_percent(m[n]) for n in METRICS), *(_number(m[n], 0) for n in EVENTS)] for k, m in measured]
         if rows:
@@ -84,12 +85,7 @@ def _completeness(e: Evaluation) -> str:
 
 def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
     """The title and lines of aligned columns, the first to the left."""
-    lines = [[str(cell) for cell in row] for row in (("", *head), *rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    yield from ("", f"  {title}")
-    for first, *row in lines:
-        cells = (f"{cell:>{width}}" for cell, width in zip(row, widths[1:], strict=True))
-        yield "  ".join([f"  {first:<{widths[0]}}", *cells])
+    yield from ("", f"  {title}", *aligned([[str(cell) for cell in row] for row in (("", *head), *rows)]))
 
 
 def _number(value: float | None, digits: int = 1) -> str:

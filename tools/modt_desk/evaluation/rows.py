@@ -20,7 +20,7 @@ Rows = NDArray[np.void]
 class Outcome(IntEnum):
     """Outcome of the segmentation of an object (docs/evaluation.md)."""
 
-    FOUND = 0
+    DETECTED = 0
     MERGED = 1
     SPLIT = 2
     PARTIAL = 3
@@ -41,8 +41,8 @@ OBJECT = np.dtype(
         ("to_classify", bool),  # judged for average precision
         ("to_follow", bool),  # judged for the length of its track
         ("outcome", int),
-        ("said", int),  # reported class of the proposal that detects it, NONE without one
-        ("called", int),  # reported class of the proposal that stands for it, NONE without one
+        ("reported", int),  # reported class of the proposal that detects it, NONE without one
+        ("reported_by_match", int),  # reported class of the proposal that stands for it, NONE without one
         ("track", int),  # track of its best proposal, NONE without one
     ]
 )
@@ -53,11 +53,11 @@ PROPOSAL = np.dtype(
         ("track", int),
         ("range_m", float),  # of the object that it stands for; of none, the mean of its points
         ("posterior", float, N_CLASSES),
-        ("said", int),  # reported class
+        ("reported", int),  # reported class
         ("label", int),  # class of the object that it stands for, BACKGROUND for none
         ("owner", int),  # class of the object in whose box most of its points lie, BACKGROUND for none
         ("to_classify", bool),  # judged for average precision
-        ("to_call", bool),  # judged for the reported class
+        ("to_report", bool),  # judged for the reported class
         ("to_associate", bool),  # judged for HOTA, CLEAR and Identity
     ]
 )

@@ -1,30 +1,66 @@
-"""A recorded run, read back frame by frame beside its truth."""
+"""A recorded run, read back frame by frame beside its truth and its source."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modt.classes import CLASS_NAMES
+from modt.app import inputs
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.placement import LEVEL, Mount
-from modt.profile import from_yaml
+from modt.placement import Mount
 from modt.sinks.records import BROKEN, read_records
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
-from modt.sources.stream import Stream
-from modt.types import Float32, Float64, Int
+from modt.sources.stream import Faults, Stream, StreamInfo
+from modt.types import Float32, Frame, Int, Self
 from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.evaluation.frames_by_number import FramesByNumber
-from modt_desk.evaluation.level_stream import recorded_mount
+from modt_desk.evaluation.recorded_result import recorded_result
 from modt_desk.evaluation.truth import Truth
+from modt_desk.reporting.run_sums import GIVE, run_facts
+
+
+class LevelStream:
+    """The frames of a stream, and its camera, for level points."""
+
+    def __init__(self, stream: Stream, mount: Mount) -> None:
+        self._stream, self._mount = stream, mount
+        camera = stream.info.camera
+        self.info: StreamInfo = replace(stream.info, camera=camera and mount.camera(camera))
+        self.faults: Faults = stream.faults
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames."""
+        return map(self._mount.level, self._stream)
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last."""
+        return type(self)(self._stream.between(first, last), self._mount)
+
+
+class FramesByNumber:
+    """Gives frames by ascending number and skips those between."""
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
+        self._frames: Iterator[Frame] | None = None  # begins with the first number that is asked for
+        self._next: Frame | None = None
+
+    def get(self, number: int) -> Frame | None:
+        """The frame, None if the stream does not hold it."""
+        if self._frames is None:
+            self._frames = iter(self._stream.between(number, None))
+            self._next = next(self._frames, None)
+        while self._next is not None and self._next.index < number:
+            self._next = next(self._frames, None)
+        return self._next if self._next is not None and self._next.index == number else None
+
 
 LABELS = "labels"
 Record = tuple[str, dict[str, Any]]
@@ -38,11 +74,10 @@ class RunRecord:
     """The directory of a run."""
 
     path: Path
+    facts: dict[str, Any]  # content of run.yaml
     stream: Path | None  # where its scans lay, None for the embedded stream
-    fov: str  # camera or full
     sensor: str  # name of its profile
-    live: bool  # whether its source was live and cannot be read again
-    mount: Mount = LEVEL  # mount of its sensor
+    mount: Mount  # mount of its sensor
 
     @classmethod
     def open(cls, path: Path) -> RunRecord:
@@ -51,16 +86,34 @@ class RunRecord:
         Raises:
             MisuseError: it is none.
         """
-        described = path / RUN
+        facts = run_facts(path)
         try:
-            facts = from_yaml(described.read_text(encoding="utf-8"), described)
-            stream, fov, sensor = facts["stream"]["path"], facts["fov"], facts["recognition"]["used"]
-            stream, sensor = Path(stream) if stream else None, Path(sensor).stem
-            live = stream is None and bool(facts.get("service", False))
-            mount = recorded_mount(facts)
-        except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
-            raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        return cls(path, stream, fov, sensor, live, mount)
+            _ = facts["mode"], facts["fov"], facts["stream"]["name"]
+            stream, sensor = facts["stream"]["path"], Path(facts["recognition"]["used"]).stem
+            placed = facts["profile"]["sensor"]
+            mount = Mount.of(placed["roll_deg"], placed["pitch_deg"])
+            return cls(path, facts, Path(stream) if stream else None, sensor, mount)
+        except (TypeError, KeyError) as error:
+            raise MisuseError(path / RUN, f"describes no run ({error})", GIVE) from None
+
+    @property
+    def live(self) -> bool:
+        """Whether its source was live and cannot be read again."""
+        return self.stream is None and bool(self.facts.get("service", False))
+
+    def source(
+        self, capture: Sequence[tuple[str, str]], frames: tuple[int, int | None] = (0, None)
+    ) -> LevelStream | None:
+        """The stream that the run read, opened again and level; None where it was live.
+
+        Raises:
+            MisuseError: it is gone.
+        """
+        if self.live:
+            return None
+        return LevelStream(
+            inputs.stream(inputs.Request(path=self.stream, capture=capture, frames=frames)), self.mount
+        )
 
     def records(self) -> Iterator[Record]:
         """The record of every frame.
@@ -106,16 +159,16 @@ class RunRecord:
         if stream is None:
             raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
         camera = stream.info.camera
-        if self.fov == "camera" and camera is None:
+        if self.facts["fov"] == "camera" and camera is None:
             raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
-        fov = FieldOfView.of_camera(camera) if self.fov == "camera" and camera is not None else FieldOfView()
+        fov = FieldOfView.of_camera(camera) if self.facts["fov"] == "camera" and camera is not None else FieldOfView()
         sweeps = FramesByNumber(stream)
         for place, record in self.records() if records is None else records:
             try:
-                index = int(record["frame"])
-                found = _found(record)
+                result, n_classified = recorded_result(record), int(record["classifications"])
             except BROKEN as error:
                 raise broken(place, error) from None
+            index = result.frame.index
             labels = truth.frames.get(index)
             if labels is None:
                 cause = f"frame {index} is not in the truth, which has {len(truth.frames)} frames"
@@ -129,7 +182,8 @@ class RunRecord:
             if len(proposals) != len(points):
                 cause = f"{len(proposals)} labels for a scan of {len(points)} points"
                 raise MisuseError(self._labels(index), cause, "give the truth of the run's own recording")
-            yield JudgedFrame(index, points, proposals, *found, labels, fov)
+            judged = JudgedFrame.of_result(result, labels, fov)
+            yield replace(judged, points=points, proposal=proposals, classified=n_classified)
 
     def proposals(self, index: int) -> Int:
         """(N,) proposal of each point of a frame, NONE where it belongs to none.
@@ -151,15 +205,3 @@ class RunRecord:
 def broken(place: str, error: Exception) -> MisuseError:
     """The error of an incomplete record."""
     return MisuseError(place, f"no record of a frame ({error!r})", "run it again")
-
-
-def _found(record: dict[str, Any]) -> tuple[int, int, Int, Int, Int, Float64]:
-    """Proposals and those classified; identity, proposal, class and posterior of the tracks that are seen."""
-    n_proposals, n_classified = int(record["proposals"]), int(record["classifications"])
-    seen = [track for track in record["tracks"] if track["proposal"] is not None]
-    said = [CLASS_NAMES.index(track["class"]) for track in seen]
-    posterior = np.array([track["posterior"] for track in seen], np.float64).reshape(-1, len(CLASS_NAMES))
-    ids, proposals = (np.array([track[key] for track in seen], np.int64) for key in ("id", "proposal"))
-    if len(proposals) and not 0 <= proposals.min() <= proposals.max() < n_proposals:
-        raise ValueError("a track's proposal is none of the frame's")
-    return n_proposals, n_classified, ids, proposals, np.array(said, np.int64), posterior

@@ -21,7 +21,7 @@ MIN_FRAMES_OWNED = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Life:
+class Length:
     """Mean number of frames for which a track follows an object (N_go), beside that of faultless tracking."""
 
     objects: int  # objects counted
@@ -31,9 +31,9 @@ class Life:
     ratio: float | None  # life / ideal
 
 
-def _life(objects: int, frames: int, followed: int, discontinuities: int) -> Life:
-    life, ideal = ratio(followed, objects + discontinuities), ratio(frames, objects)
-    return Life(objects, frames, life, ideal, ratio(life or 0.0, ideal or 0.0))
+def _length(objects: int, frames: int, followed: int, discontinuities: int) -> Length:
+    length, ideal = ratio(followed, objects + discontinuities), ratio(frames, objects)
+    return Length(objects, frames, length, ideal, ratio(length or 0.0, ideal or 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +44,9 @@ class TrackScore:
     earlier, this counts as returned; if not, but the track existed before, as taken over; if it is new, as neither.
     """
 
-    life: Life  # over the frames in which the object has points enough to be followed, whether it is or not
-    life_as_seen: Life  # over the objects and frames that are followed
-    labelled: Life  # over all labelled frames, whatever points the object has there; Table III gives this ideal
+    life: Length  # over the frames in which the object has points enough to be followed, whether it is or not
+    life_as_seen: Length  # over the objects and frames that are followed
+    labelled: Length  # over all labelled frames, whatever points the object has there; Table III gives this ideal
     followed: float | None  # share of the frames in which an object is followed
     discontinuities: int  # times that another track than before follows an object
     taken_over: int  # of these, by an existing track of something else
@@ -81,9 +81,9 @@ def _score(all_rows: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
     frames_of = Counter(seen[["drive", "track", "id"]].tolist())
     owned = Counter((drive, track) for (drive, track, _), n in frames_of.items() if n >= MIN_FRAMES_OWNED)
     return TrackScore(
-        life=_life(_count(rows), len(rows), len(seen), breaks),
-        life_as_seen=_life(len(histories), len(seen), len(seen), breaks),
-        labelled=_life(_count(all_rows), len(all_rows), len(seen), breaks),
+        life=_length(_count(rows), len(rows), len(seen), breaks),
+        life_as_seen=_length(len(histories), len(seen), len(seen), breaks),
+        labelled=_length(_count(all_rows), len(all_rows), len(seen), breaks),
         followed=ratio(len(seen), len(rows)),
         discontinuities=breaks,
         taken_over=taken,

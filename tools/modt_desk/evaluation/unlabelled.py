@@ -53,7 +53,7 @@ class Mover:
 
     track: int
     type_: str  # KITTI's type that its size and speed suggest
-    called: str  # class that the run gave it most often
+    reported: str  # class that the run gave it most often
     frame: Int  # (n,)
     box: Float64  # (n, 7) sensor frame, along the motion, all of one size
     gone_m: float  # from its first place to its last
@@ -94,7 +94,7 @@ def listing(movers: Sequence[Mover]) -> Iterator[str]:
     for m in movers:
         span, size = f"{m.frame[0]} to {m.frame[-1]}", " x ".join(f"{side:.1f}" for side in m.box[0, 3:6].tolist())
         motion = f"{m.gone_m:6.1f}  {m.straightness:8.2f}  {m.speed_mps:3.1f}"
-        yield f"{m.track:5}   {span:11} {motion}  {size:16}  {m.type_:10}  {m.called}"
+        yield f"{m.track:5}   {span:11} {motion}  {size:16}  {m.type_:10}  {m.reported}"
 
 
 def moving(stamp_s: Float64, world: Float64) -> Bool:
@@ -159,7 +159,7 @@ def _mover(track: int, sightings: list[Sighting], T_sensor_level: Float64) -> Mo
         return None
     part = slice(rows[0], rows[-1] + 1)
     stamp_s, world = stamp_s[part], world[part]
-    frames, _, boxes, poses, called = zip(*sightings[part], strict=True)
+    frames, _, boxes, poses, classes = zip(*sightings[part], strict=True)
     step = ((stamp_s - stamp_s[0]) // STEP_S).astype(np.int64)
     path = np.array([world[step == k, :2].mean(axis=0) for k in np.unique(step)])
     gone_m = float(np.hypot(*(world[-1, :2] - world[0, :2])))
@@ -176,7 +176,7 @@ def _mover(track: int, sightings: list[Sighting], T_sensor_level: Float64) -> Mo
     return Mover(
         track=track,
         type_=_type(length, width, speed_mps),
-        called=Counter(called).most_common(1)[0][0],
+        reported=Counter(classes).most_common(1)[0][0],
         frame=np.array(frames),
         box=transform_boxes(T_sensor_level, box),
         gone_m=gone_m,

@@ -11,10 +11,17 @@ import numpy as np
 
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
-from modt_desk.experiments.estimate import Estimate, ratio
-from modt_desk.experiments.figures import Figure, ObjectLives, curves, efficiencies, lives, precisions
-from modt_desk.experiments.judged import Judged
-from modt_desk.experiments.replays import LabelReplay, NetworkReplay, Replay
+from modt_desk.experiments.figures import (
+    Estimate,
+    Figure,
+    ObjectLengths,
+    curves,
+    efficiencies,
+    precisions,
+    ratio,
+    track_lengths,
+)
+from modt_desk.experiments.judged import Judged, LabelReplay, NetworkReplay, Replay
 
 Label = tuple[str, float | None]
 """Variant, and the value that is swept."""
@@ -84,15 +91,15 @@ def _tracked(config: ProfileConfig) -> dict[Label, Replay]:
     return {(mode, None): NetworkReplay(config, mode) for mode in ("accurate", "efficient")}
 
 
-def _ideal_lives(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
-    wanted = ObjectLives.of(judged).wanted
+def _ideal_lengths(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
+    wanted = ObjectLengths.of(judged).wanted
     yield Figure(variant, at, "objects", Estimate(len(wanted)))
     yield Figure(variant, at, "N_go", ratio(wanted, np.ones(len(wanted))))
 
 
 def _betas_of_labels(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
     for range_m in RANGES_M:
-        wanted = ObjectLives.of(judged.within(range_m)).wanted
+        wanted = ObjectLengths.of(judged.within(range_m)).wanted
         yield Figure(variant, range_m, "beta", ratio(np.ones(len(wanted)), wanted))
 
 
@@ -103,7 +110,7 @@ def _swept(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
 
 
 def _followed(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
-    yield from lives(judged, variant, at)
+    yield from track_lengths(judged, variant, at)
     yield from efficiencies(judged, variant, at)
 
 
@@ -112,7 +119,7 @@ _ALL = (
         "table3",
         "Table III: N_go of the labels",
         _labels,
-        _ideal_lives,
+        _ideal_lengths,
         scans=False,
         note="Labelled frames an object: Car, Pedestrian, Cyclist; vans and sitting people left out.",
     ),

@@ -1,12 +1,14 @@
-"""Segmentation and classification of a drive, which all settings of tracking and fusion share.
+"""Segmentation and classification of a drive, which all settings of tracking and fusion share, and its playback.
 
 A frame keeps only the points of its proposals and those near the boxes of labelled objects: neither stage nor
-judgement looks at the others.
+judgement looks at the others. With the ideal tracker, proposals of a labelled object have its identity, whatever lies
+between. The labels say nothing of background: its proposals, and further fragments of an object, are followed by the
+tracking stage.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 
@@ -14,10 +16,16 @@ import numpy as np
 
 from modt.app import assembly, kernel_choice
 from modt.classification.pointnet import PointNet
-from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
+from modt.config import ClassificationConfig, ProfileConfig, SensorConfig, TrackingConfig
 from modt.geometry import FieldOfView
-from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals
-from modt_desk.evaluation.overlap import PAD_M, ObjectPoints, in_box_frame, inside
+from modt.observations import Located, StaticTracks, observe
+from modt.odometry.odometry import Odometry
+from modt.placement import Placement
+from modt.tracking.states import ACCURATE
+from modt.tracking.tracker import Tracker
+from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.overlap import PAD_M, ObjectPoints, Overlap, in_box_frame, inside
 from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.truth import FrameTruth
 from modt_desk.experiments.drives import Drive
@@ -85,8 +93,49 @@ def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
     return kept
 
 
+def within(proposals: Proposals, range_m: float) -> Bool:
+    """(P,) proposals within a range."""
+    near: Bool = np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m
+    return near
+
+
+@lru_cache(maxsize=2)
+def _ideal_tracks(drive: SegmentedDrive, tracking: TrackingConfig, period_s: float) -> tuple[Int, ...]:
+    """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
+    return tuple(_tracks(drive, Tracker(tracking, ACCURATE, regroupings=(), period_s=period_s), Odometry()))
+
+
+def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: Odometry) -> Iterator[Int]:
+    rows: dict[tuple[str, int], int] = {}
+    for made in drive.frames:
+        frame, proposals = made.frame, made.proposals
+        located = odometry.locate(frame, proposals, tracker.static_tracks)
+        tracks = tracker.follow(frame.stamp_s, proposals, located).tracks
+        own = tracks.id[tracks.row_of_proposal(len(proposals))].tolist()
+        keys = [
+            ("object", owner) if owner != NONE else ("other", i) for owner, i in zip(_owner(made), own, strict=True)
+        ]
+        yield np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
+
+
+def _owner(made: SegmentedFrame) -> list[int]:
+    """(P,) identity of the object whose proposal each is, NONE for none."""
+    truth, n = made.truth, len(made.proposals)
+    none = np.zeros(0, np.int64)
+    of_points = made.proposals.label(len(made.frame.points))
+    blank = JudgedFrame(
+        made.frame.index, made.frame.points, of_points, n, 0, none, none, none, np.zeros((0, 4)), truth
+    )
+    overlap = Overlap.of(blank, made.objects)
+    found = np.flatnonzero((overlap.most > 0) & overlap.most_of_proposal)
+    owner = np.full(n + 1, NONE, np.int64)
+    owner[overlap.best[found]] = truth.id[found]
+    owners: list[int] = owner[:n].tolist()
+    return owners
+
+
 class PlayedBack:
-    """Segmenter and classifier of a pipeline; the network sees only what the tracker has regrouped.
+    """Segmenter and classifier of a pipeline that gives the proposals of a segmented drive.
 
     Args:
         drive: segmented drive that is played back.
@@ -94,38 +143,68 @@ class PlayedBack:
     """
 
     def __init__(self, drive: SegmentedDrive, range_m: float = np.inf) -> None:
-        self._frames, self._network, self._range_m = iter(drive.frames), drive.network, range_m
+        self._frames, self._range_m = iter(drive.frames), range_m
+        self._network = drive.network
+
+    def segment(self, points: Float32) -> Proposals:
+        """Proposals of the next frame."""
+        self._now = next(self._frames)
+        self._which = np.flatnonzero(within(self._now.proposals, self._range_m))
+        return self._now.proposals.take(self._which)
+
+    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
+        """(R, 4) likelihoods of the network."""
+        return self._network.classify(points, proposals, which)
 
     def facts(self) -> dict[str, str]:
         """Facts of the network."""
         return self._network.facts()
 
-    def segment(self, points: Float32) -> Proposals:
-        """Proposals of the next frame."""
-        self._now = next(self._frames)
-        own = self._now.proposals
-        self._row = {first: row for row, first in enumerate(own.members[own.offsets[:-1]].tolist())}
-        return own.take(np.flatnonzero(within(own, self._range_m)))
+
+class IdealTracking(PlayedBack):
+    """Segmenter, odometry, tracker and classifier of a pipeline that return what is known of a drive.
+
+    The tracker of the profile follows background and further fragments; proposals beyond a range are left out.
+    """
+
+    state_names = ("followed",)
+
+    def __init__(self, drive: SegmentedDrive, config: ProfileConfig, range_m: float = np.inf) -> None:
+        super().__init__(drive, range_m)
+        rows = _ideal_tracks(drive, config.tracking, config.sensor.period_s)
+        self._rows = iter(rows)
+        self._tracks = Tracks.blank(1 + max((int(row.max(initial=-1)) for row in rows), default=-1))
+        self._tracks.id[:] = np.arange(len(self._tracks))
+
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
+        """At the origin: nothing is associated by position."""
+        origin = Placement(np.eye(4))
+        return Located(origin, observe(proposals, origin.T_world_sensor))
+
+    def static_tracks(self, stamp_s: float) -> StaticTracks:
+        """Never asked for.
+
+        Raises:
+            NotImplementedError: always.
+        """
+        raise NotImplementedError
+
+    def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+        """The table with a row for each track of the drive."""
+        t, rows = self._tracks, next(self._rows)[self._which]
+        t.proposal[:] = NONE
+        t.proposal[rows] = np.arange(len(rows))
+        t.points[rows] = proposals.count
+        t.hits[rows] += 1
+        t.age += t.hits > 0
+        t.missed = np.where(t.proposal == NONE, t.missed + 1, 0)
+        return TrackedFrame(t, proposals, (t.proposal != NONE) & ~t.final)
+
+    def conclude(self, rows: Int, certain: Bool) -> Tracks:
+        """A certain class is final."""
+        self._tracks.final[rows] = certain
+        return self._tracks.copy()
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) likelihoods of the proposals given by index."""
-        rows = np.array([self._row_of(proposals, k) for k in which.tolist()], np.int64)
-        likelihood: Float64 = self._now.likelihood[rows]
-        new = np.flatnonzero(rows == NONE)
-        if len(new):
-            likelihood[new] = self._network.classify(points, proposals, which[new])
-        return likelihood
-
-    def _row_of(self, proposals: Proposals, k: int) -> int:
-        """The proposal of the segmentation that has the same points and box, NONE where there is none."""
-        own, members = self._now.proposals, proposals.members[proposals.offsets[k] : proposals.offsets[k + 1]]
-        row = self._row.get(int(members[0]), NONE)
-        of_row = own.members[own.offsets[row] : own.offsets[row + 1]]
-        same = np.array_equal(members, of_row) and np.array_equal(proposals.box[k], own.box[row])
-        return row if same else NONE
-
-
-def within(proposals: Proposals, range_m: float) -> Bool:
-    """(P,) proposals within a range."""
-    near: Bool = np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m
-    return near
+        """(R, 4) known likelihoods."""
+        return self._now.likelihood[self._which[which]]

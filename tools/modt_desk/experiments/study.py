@@ -12,8 +12,7 @@ from modt_desk.experiments import paper
 from modt_desk.experiments.catalogue import Experiment, Label
 from modt_desk.experiments.drives import Drive, KittiDrive
 from modt_desk.experiments.figures import Figure
-from modt_desk.experiments.judged import Judged
-from modt_desk.experiments.replays import Replay
+from modt_desk.experiments.judged import Judged, Replay
 
 DIGITS = 6
 DEFAULT = "default"

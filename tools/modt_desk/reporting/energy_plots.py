@@ -1,4 +1,4 @@
-"""Plots, tables and sentences that the reports of a run and of a comparison share."""
+"""Plots, tables, sentences and terms of gamma that the reports of a run and of a comparison share."""
 
 from __future__ import annotations
 
@@ -7,14 +7,33 @@ from typing import Any
 import numpy as np
 
 from modt.energy.meters.meter import Kind
+from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
 from modt.types import Float64
-from modt_desk.energy.equations import EnergyModel
+from modt_desk.energy.savings import EnergyModel, Reconciliation
 from modt_desk.reporting import svg
-from modt_desk.reporting.document import Table
-from modt_desk.reporting.page import Plot
-from modt_desk.reporting.quantity import Quantity
+from modt_desk.reporting.document import Plot, Table
+from modt_desk.reporting.quantity import Quantity, estimate
 
-_MAX_LIFE = 1000.0
+SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
+TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]
+SCHEDULE = [STAGES.index(SCHEDULING), STAGES.index(FUSION)]
+
+
+def reconciliation_tree(found: Reconciliation, gamma: float | None) -> dict[str, Any]:
+    """The paper's figures, the reconciled gamma, and the terms from N_go to the gamma of the runs."""
+    return {
+        "a": estimate(found.paper.a),
+        "gamma_short": estimate(found.paper.n_go),
+        "gamma_equation_3": estimate(found.paper.gamma),
+        "gamma_reconciled": estimate(found.model.gamma),
+        "terms": [
+            {"name": term.name, "change": estimate(term.change), "gamma": estimate(term.gamma)}
+            for term in found.explain(1.0 if gamma is None else gamma)
+        ],
+    }
+
+
+_MAX_N_GO = 1000.0
 """Upper end of the N_go axis of the curve of Equation 3 [frames]."""
 
 
@@ -44,11 +63,11 @@ def cumulative_energy(energy_mJ: dict[str, Float64], each: Float64, note: str, d
     return ("Cumulative energy, E1 against E2", svg.lines(traces, "frame", "J"), note)
 
 
-def life_histogram(title: str, lives: dict[str, list[int]]) -> Plot:
+def length_histogram(title: str, lengths: dict[str, list[int]]) -> Plot:
     """Histogram of track lengths [frames], by the occurrences of each length."""
-    life = np.array(lives["values"], float)
-    edges = np.linspace(0.5, max(life.max(initial=1.0), 1.0) + 0.5, 31)
-    heights = np.histogram(life, edges, weights=np.array(lives["counts"], float))[0]
+    length = np.array(lengths["values"], float)
+    edges = np.linspace(0.5, max(length.max(initial=1.0), 1.0) + 0.5, 31)
+    heights = np.histogram(length, edges, weights=np.array(lengths["counts"], float))[0]
     return (title, svg.bars(edges, heights, "frames seen", "tracks"), "counted")
 
 
@@ -56,11 +75,11 @@ def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quanti
     """Equation 3 over N_go at a and n, the short form, and (N_go, gamma) of each run."""
     traces = []
     if a.value is not None and n.value is not None:
-        life = np.geomspace(1.0, _MAX_LIFE, 100)
-        curve = np.array([EnergyModel(1.0, a.value, n.value, n_go).gamma for n_go in life.tolist()])
-        short = life[life <= 10 * curve[-1]]
+        length = np.geomspace(1.0, _MAX_N_GO, 100)
+        curve = np.array([EnergyModel(1.0, a.value, n.value, n_go).gamma for n_go in length.tolist()])
+        short = length[length <= 10 * curve[-1]]
         traces = [
-            svg.Trace("Equation 3 at this a and n", life, curve),
+            svg.Trace("Equation 3 at this a and n", length, curve),
             svg.Trace("gamma = N_go", short, short, dashed=True),
         ]
         traces += [

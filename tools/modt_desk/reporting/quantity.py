@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -100,3 +101,11 @@ def to_json(tree: Any) -> Any:
     if isinstance(tree, dict):
         return {key: to_json(value) for key, value in tree.items()}
     return [to_json(value) for value in tree] if isinstance(tree, list | tuple) else tree
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Lines of aligned columns, the first to the left."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for first, *others in rows:
+        cells = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
+        yield "  ".join([f"  {first:<{widths[0]}}", *cells])

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from modt import profile
 from modt.classification.scheduler import padded_size
-from modt.config import ClassificationConfig, EnergyConfig, ProfileConfig
+from modt.config import ClassificationConfig, EnergyConfig
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.ledger import Line
 from modt.energy.meters.meter import Kind
@@ -24,18 +23,17 @@ from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE, STAGES
 from modt.sinks.records import read_records
-from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
+from modt.sinks.run_directory import LEDGER, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
 from modt.types import Float64
-from modt_desk.energy.nonnegative import nonnegative_fit
+from modt_desk.energy.board_fit import nonnegative_fit
 from modt_desk.energy.run_energy import EnergySums, run_energy
 from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt_desk.reporting import energy_plots, svg
-from modt_desk.reporting.document import Cell, Document, Table
-from modt_desk.reporting.page import Plot
+from modt_desk.reporting.document import Cell, Document, Plot, Table
+from modt_desk.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
-from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
-from modt_desk.reporting.run_sums import COLUMNS, FrameSums
+from modt_desk.reporting.run_sums import COLUMNS, FrameSums, run_facts
 
 SCHEMA = "modt.report/2"
 _CONVENTIONAL = "conventional"
@@ -51,7 +49,7 @@ def run_tree(run: Path) -> dict[str, Any]:
     Raises:
         MisuseError: not a run directory, or without a complete frame so far.
     """
-    facts = _facts(run)
+    facts = run_facts(run)
     limits, mode = facts["profile"]["classification"], facts["mode"]
     board = EnergyConfig(**{key: facts["profile"]["energy"][key] for key in _BOARD})
     sums = FrameSums(padded_size(ClassificationConfig(**{key: limits[key] for key in _LIMITS})))
@@ -94,21 +92,6 @@ def run_tree(run: Path) -> dict[str, Any]:
 
 def _frames(run: Path) -> Iterator[Line]:
     return read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})
-
-
-def _facts(run: Path) -> dict[str, Any]:
-    """Content of run.yaml, with defaults for keys missing in its profile."""
-    path = run / RUN
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise MisuseError(path, "missing or unreadable", "give the directory of a run of modt") from None
-    facts = profile.from_yaml(text, path)
-    if not isinstance(facts, dict) or facts.get("schema") != "modt.run/1":
-        raise MisuseError(path, "describes no run of this version", "give the directory of a run of modt")
-    for stage, values in profile.dump(ProfileConfig()).items():
-        facts["profile"][stage] = values | (facts["profile"].get(stage) or {})
-    return facts
 
 
 def _energy(sums: EnergySums, idle_W: float) -> dict[str, Any]:
@@ -156,7 +139,7 @@ def _series(sums: FrameSums, e1_s: Float64) -> dict[str, Any]:
         "cpu_ms": {stage: (1e3 * column[stage]).round(4).tolist() for stage in STAGES},
         "e1_cpu_ms": (1e3 * e1_s).round(4).tolist(),
         **{name: column[name].tolist() for name in ("classified", "deferred", "proposals")},
-        "lives": sums.lives.occurrences(),
+        "lives": sums.lengths.occurrences(),
     }
 
 
@@ -203,16 +186,18 @@ def run_document(tree: dict[str, Any]) -> Document:
     of_e1 = "E1 is computed from this run's own costs; modt-profile compare runs the baseline"
     if tree["mode"] == "conventional":
         of_e1 = "this is tracking-by-detection itself: nothing was saved; run the other modes, or compare"
-    said = {key: value.marked() for key, value in saved.items() if isinstance(value, Quantity)}
+    marked = {key: value.marked() for key, value in saved.items() if isinstance(value, Quantity)}
     apart = [
         f"{name} {tree['parts_J'][name].scaled(1e3, 'mJ').marked()}" for name in _APART if name in tree["parts_J"]
     ]
     gross = f"with {', '.join(apart)}; power {tree['power_W'].marked()}"
     computed = (
-        f"computed from this run: {said['gamma_reconciled']} in full, {said['gamma_equation_3']} by Equation 3, "
-        f"{said['gamma_short']} by N_go alone; a = {said['a']}"
+        f"computed from this run: {marked['gamma_reconciled']} in full, {marked['gamma_equation_3']} by Equation 3, "
+        f"{marked['gamma_short']} by N_go alone; a = {marked['a']}"
     )
-    counts = f"{said['proposals']} proposals a frame, N_go {said['N_go']}, {said['views']} classifications a track"
+    counts = (
+        f"{marked['proposals']} proposals a frame, N_go {marked['N_go']}, {marked['views']} classifications a track"
+    )
     share = f"{ledger['overhead_share'].scaled(100, '%').marked()} of the CPU time"
     results = [
         (
@@ -270,7 +255,7 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
         energy_plots.stage_energy("Energy by stage", parts_mJ, frames, basis),
         energy_plots.cumulative_energy(energy_mJ, each, f"E2: {basis}; E1: estimated", dashed=baseline),
         energy_plots.gamma_curve(saved["a"], saved["proposals"], point, "dot: this run"),
-        energy_plots.life_histogram("Life of tracks", series["lives"]),
+        energy_plots.length_histogram("Lengths of tracks", series["lives"]),
         ("Use of the budget", svg.lines(budget, "frame", "proposals"), "counted"),
     ]
 

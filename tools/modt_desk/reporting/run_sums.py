@@ -1,19 +1,84 @@
-"""Sums over a run's records for its report, in bounded memory at any length of the run."""
+"""Sums and series over a run's records for its report, in bounded memory at any length of the run."""
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from modt import profile
 from modt.classes import CLASS_NAMES, ObjectClass
+from modt.config import ProfileConfig
+from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, STAGES
 from modt.reporting.histogram import Histogram
-from modt.types import Int
+from modt.sinks.run_directory import RUN
+from modt.types import Float64, Int
 from modt_desk.energy.savings import Counts
-from modt_desk.reporting.frame_series import FrameSeries
+
+SCHEMA, GIVE = "modt.run/1", "give the directory of a run"
+POINTS = 512
+"""Points held at most; an even number."""
+
+
+def run_facts(run: Path) -> dict[str, Any]:
+    """Content of a run's run.yaml, with defaults for keys missing in its profile.
+
+    Raises:
+        MisuseError: it is missing, or describes no run.
+    """
+    path = run / RUN
+    try:
+        facts = profile.from_yaml(path.read_text(encoding="utf-8"), path)
+        if facts["schema"] != SCHEMA:
+            raise MisuseError(path, f"describes no run of this version ({facts['schema']})", GIVE)
+        for stage, values in profile.dump(ProfileConfig()).items():
+            facts["profile"][stage] = values | (facts["profile"].get(stage) or {})
+    except (OSError, UnicodeDecodeError, AttributeError, TypeError, KeyError) as error:
+        raise MisuseError(path, f"describes no run ({error})", GIVE) from None
+    return dict(facts)
+
+
+class FrameSeries:
+    """Sums of columns over points of equally many frames; when all points are full, neighbours become one."""
+
+    def __init__(self, columns: int, points: int = POINTS) -> None:
+        self.frames_a_point, self.count = 1, 0
+        self._sums = np.zeros((points, columns))
+
+    def add(self, row: Sequence[float] | Float64) -> None:
+        """Add the (columns,) values of one frame."""
+        points = len(self._sums)
+        if self.count == points * self.frames_a_point:
+            self._sums[: points // 2] = self._sums[::2] + self._sums[1::2]
+            self._sums[points // 2 :] = 0.0
+            self.frames_a_point *= 2
+        self._sums[self.count // self.frames_a_point] += row
+        self.count += 1
+
+    @property
+    def frames(self) -> Int:
+        """(points,) frames of each point; only the last may have fewer."""
+        starts = np.arange(0, self.count, self.frames_a_point)
+        each: Int = np.diff(starts, append=self.count)
+        return each
+
+    @property
+    def means(self) -> Float64:
+        """(points, columns) means over the frames of each point."""
+        frames = self.frames
+        mean: Float64 = self._sums[: len(frames)] / frames[:, None]
+        return mean
+
+    @property
+    def total(self) -> Float64:
+        """(columns,) sums over all frames."""
+        total: Float64 = self._sums.sum(axis=0)
+        return total
+
 
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
 COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")
@@ -32,10 +97,10 @@ class FrameSums:
         self.stages: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger's columns
         self.overhead_ns = self.cpu_ns = 0
         self.marks: set[str] = set()
-        self.lives = Histogram()  # frames with a proposal, of the tracks that ended
+        self.lengths = Histogram()  # frames with a proposal, of the tracks that ended
         self.foreground = self.tracks = self.classified_tracks = 0
         self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)  # of calls, items, points and CPU s
-        self._life: dict[int, int] = {}  # of the tracks alive
+        self._length: dict[int, int] = {}  # of the tracks alive
         self._viewed: set[int] = set()
 
     def add(self, line: dict[str, Any], record: dict[str, Any]) -> None:
@@ -56,7 +121,7 @@ class FrameSums:
 
     def finish(self) -> None:
         """Count the lengths of the tracks that have not ended."""
-        self._end(self._life.keys())
+        self._end(self._length.keys())
 
     def column(self, name: str) -> float:
         """Sum of a column of the series over all frames."""
@@ -80,13 +145,13 @@ class FrameSums:
     def _add_tracks(self, tracks: list[dict[str, Any]]) -> int:
         """Points of all proposals as the network would process them, padding included."""
         alive = {track["id"] for track in tracks}
-        self._end(self._life.keys() - alive)
+        self._end(self._length.keys() - alive)
         seen = [track for track in tracks if track["proposal"] is not None]
         self.foreground += sum(track["class"] != _BACKGROUND for track in seen)
         for track in seen:
-            life = self._life.get(track["id"], 0)
-            self.tracks += not life
-            self._life[track["id"]] = life + 1
+            length = self._length.get(track["id"], 0)
+            self.tracks += not length
+            self._length[track["id"]] = length + 1
         viewed = {track["id"] for track in tracks if track["viewed"]}
         self.classified_tracks += len(viewed - self._viewed)
         self._viewed = (self._viewed | viewed) & alive
@@ -95,4 +160,4 @@ class FrameSums:
 
     def _end(self, ids: Iterable[int]) -> None:
         for id_ in tuple(ids):
-            self.lives.add(self._life.pop(id_))
+            self.lengths.add(self._length.pop(id_))

@@ -32,13 +32,6 @@ class Trace:
     dots: bool = False  # marks instead of a line
     dashed: bool = False
     colour: str = ""  # instead of that of its place
-    names: Sequence[str] = ()  # name of each mark, instead of that of the trace
-    span: Float64 | None = None  # (n, 2) interval of the y of each mark
-
-    @property
-    def all_y(self) -> Float64:
-        """Values and ends of intervals."""
-        return self.y if self.span is None else np.append(self.y, self.span)
 
 
 def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = False) -> str:
@@ -57,16 +50,11 @@ def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = Fa
 
 
 def _marks(scale: _Scale, k: int, trace: Trace) -> Iterator[str]:
-    """Circles over their intervals."""
-    x, y = scale.x(trace.x), scale.y(trace.y)
+    """Circles with their values."""
     style = f' style="fill:{trace.colour}"' if trace.colour else ""
-    spans = np.zeros((0, 2)) if trace.span is None else scale.y(trace.span)
-    for at, (low, high) in zip(x, spans, strict=False):
-        yield f'<line class="l{k}" x1="{at:.1f}" x2="{at:.1f}" y1="{low:.1f}" y2="{high:.1f}"/>'
-    names = trace.names or [trace.name] * len(x)
-    for name, a, b, u, v in zip(names, x, y, trace.x, trace.y, strict=True):
-        said = f"{escape(name)}: {format_number(float(u))}, {format_number(float(v))}"
-        yield f'<circle class="c{k}"{style} cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{said}</title></circle>'
+    for a, b, u, v in zip(scale.x(trace.x), scale.y(trace.y), trace.x, trace.y, strict=True):
+        text = f"{escape(trace.name)}: {format_number(float(u))}, {format_number(float(v))}"
+        yield f'<circle class="c{k}"{style} cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{text}</title></circle>'
 
 
 def areas(x: Float64, parts: dict[str, Float64], x_label: str, y_label: str, at_least: float = 0.0) -> str:
@@ -108,7 +96,7 @@ class _Scale:
     @classmethod
     def around(cls, traces: Sequence[Trace], log: bool) -> _Scale:
         xs = np.concatenate([t.x for t in traces]) if traces else np.zeros(1)
-        ys = np.concatenate([t.all_y for t in traces]) if traces else np.zeros(1)
+        ys = np.concatenate([t.y for t in traces]) if traces else np.zeros(1)
         if log:
             x0, x1 = _limits(xs[xs > 0], 1.0, 10.0)
             y0, y1 = _limits(ys[ys > 0], 1.0, 10.0)

@@ -1,7 +1,8 @@
-"""Values of a profile's keys, with the evidence for each, as sweeps of the sensor show them."""
+"""Values of a profile's keys, with the evidence for each, as sweeps of the sensor show them, and as text."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,7 +16,7 @@ from modt.sensor_fit.reflectance import NONE, SCALES, recorded_in, reflectance_s
 from modt.sensor_fit.tilt import mount_height_m
 from modt.types import Float32
 
-SURE_CONTRAST = 0.985
+RELIABLE_CONTRAST = 0.985
 """Least share of the points in the peaks of beams that are told apart without a doubt."""
 
 
@@ -40,7 +41,7 @@ class Finding:
     key: str  # of the stage
     value: Any  # of the key
     evidence: str  # what was measured, or why nothing could be
-    sure: bool = True  # measured well; else to be checked by the user
+    reliable: bool = True  # measured well; else to be checked by the user
 
 
 def apply(config: ProfileConfig, findings: Iterable[Finding]) -> ProfileConfig:
@@ -53,14 +54,16 @@ def apply(config: ProfileConfig, findings: Iterable[Finding]) -> ProfileConfig:
 
 def pattern_findings(pattern: BeamPattern) -> Iterator[Finding]:
     """Keys of a pattern of beams."""
-    found, sure = pattern.elevations_deg, True
+    found, reliable = pattern.elevations_deg, True
     if len(found):
         spacing, azimuth = (
             f"{len(found)} beams from {found[-1]:.2f} to {found[0]:.2f} deg",
             "most frequent step along a beam",
         )
-        sure = pattern.contrast > SURE_CONTRAST
-        spacing += "" if sure else "; blurred, perhaps by compensation for motion: take a recording at a walking pace"
+        reliable = pattern.contrast > RELIABLE_CONTRAST
+        spacing += (
+            "" if reliable else "; blurred, perhaps by compensation for motion: take a recording at a walking pace"
+        )
     else:
         spacing, azimuth = "no beams: spacing of the returns of a sweep, in any direction", "the same"
     evidence = {
@@ -69,7 +72,7 @@ def pattern_findings(pattern: BeamPattern) -> Iterator[Finding]:
         "azimuth_step_deg": azimuth,
     }
     for key, value in beam_keys(pattern).items():
-        yield Finding("sensor", key, value, evidence[key], sure or key == "azimuth_step_deg")
+        yield Finding("sensor", key, value, evidence[key], reliable or key == "azimuth_step_deg")
     side_m = cell_m(pattern.spacing_deg, pattern.azimuth_step_deg)
     if side_m != SegmentationConfig().cell_m:
         yield Finding("segmentation", "cell_m", side_m, "by the spacing of the returns")
@@ -85,7 +88,7 @@ def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding
     """Height of the sensor above the ground."""
     height_m = mount_height_m(level(recording, config).sweeps, config.sensor)
     if height_m is None:
-        yield Finding("sensor", "height_m", None, "no flat ground in sight: estimated as it comes", sure=False)
+        yield Finding("sensor", "height_m", None, "no flat ground in sight: estimated as it comes", reliable=False)
     else:
         yield Finding("sensor", "height_m", height_m, "above a plane through the ground around, median of the sweeps")
 
@@ -106,3 +109,38 @@ def find_reflectance(recording: Recording, config: ProfileConfig) -> Iterator[Fi
         else:
             evidence += ": of no scale that models have learnt"
     yield Finding("sensor", "reflectance", usable, evidence)
+
+
+CHECK = "check this"
+WIDTH = 116
+
+
+def profile_text(title: str, findings: Sequence[Finding]) -> str:
+    """YAML of the fitted values; a comment states how each was measured."""
+    lines = [f"# {title}"]
+    stage = ""
+    for found in sorted(findings, key=lambda f: [g.stage for g in findings].index(f.stage)):
+        if found.stage != stage:
+            stage = found.stage
+            lines.append(f"{stage}:")
+        evidence = found.evidence if found.reliable else f"{CHECK}: {found.evidence}"
+        value = _plain(found.value)
+        if len(value) > 20:
+            lines += [f"  # {evidence}", *textwrap.wrap(f"{found.key}: {value}", WIDTH, **_INDENT)]
+        else:
+            lines.append(f"  {found.key}: {value} # {evidence}")
+    return "\n".join(lines) + "\n"
+
+
+_INDENT: dict[str, Any] = {"initial_indent": "  ", "subsequent_indent": "    "}
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(f'{number:g}' for number in value)}]"
+    return "null" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def doubts(findings: Sequence[Finding]) -> list[str]:
+    """A line for each uncertain value."""
+    return [f"{f.stage}.{f.key}: {f.evidence}" for f in findings if not f.reliable]

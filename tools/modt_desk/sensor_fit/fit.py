@@ -39,20 +39,22 @@ def find_period(recording: Recording, config: ProfileConfig) -> Iterator[Finding
     """Time between sweeps."""
     steps = np.diff(recording.stamps_s)
     if not len(steps) or np.median(steps) <= 0:
-        yield Finding("sensor", "period_s", config.sensor.period_s, "assumed: one sweep", sure=False)
+        yield Finding("sensor", "period_s", config.sensor.period_s, "assumed: one sweep", reliable=False)
     elif np.ptp(steps) < 1e-6:
-        said = "time stamps are exactly even: perhaps made up, as those of a folder of scans"
-        yield Finding("sensor", "period_s", round(float(steps[0]), 4), said, sure=False)
+        evidence = "time stamps are exactly even: perhaps made up, as those of a folder of scans"
+        yield Finding("sensor", "period_s", round(float(steps[0]), 4), evidence, reliable=False)
     else:
-        said = f"median of {len(steps)} steps, {steps.min():.3f} to {steps.max():.3f} s"
-        yield Finding("sensor", "period_s", round(float(np.median(steps)), 4), said)
+        evidence = f"median of {len(steps)} steps, {steps.min():.3f} to {steps.max():.3f} s"
+        yield Finding("sensor", "period_s", round(float(np.median(steps)), 4), evidence)
 
 
 def find_pattern(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Beams, their spacing, and the size of a cell."""
     pattern = find_beams(recording.sweeps)
     if pattern is None:
-        yield Finding("sensor", "elevation_step_deg", config.sensor.elevation_step_deg, "too few points", sure=False)
+        yield Finding(
+            "sensor", "elevation_step_deg", config.sensor.elevation_step_deg, "too few points", reliable=False
+        )
         return
     yield from pattern_findings(pattern)
 
@@ -61,13 +63,15 @@ def find_mount(recording: Recording, config: ProfileConfig) -> Iterator[Finding]
     """Roll and pitch of the sensor, the median of sweeps."""
     floors = [floor for points in recording.sweeps[:MOST_FLOORS] if (floor := find_floor(points)) is not None]
     if not floors:
-        yield Finding("sensor", "roll_deg", None, "no floor in sight: by the first sweep that shows one", sure=False)
+        yield Finding(
+            "sensor", "roll_deg", None, "no floor in sight: by the first sweep that shows one", reliable=False
+        )
         return
     angles = np.median([floor.roll_pitch_deg for floor in floors], axis=0)
     tilt_deg = float(np.median([floor.tilt_deg for floor in floors]))
-    said = f"by the floor in {len(floors)} sweeps: the sensor is tilted by {tilt_deg:.1f} deg"
+    evidence = f"by the floor in {len(floors)} sweeps: the sensor is tilted by {tilt_deg:.1f} deg"
     for key, angle in zip(("roll_deg", "pitch_deg"), angles.tolist(), strict=True):
-        yield Finding("sensor", key, round(angle, 1) if tilt_deg > LEVEL_DEG else 0.0, said)
+        yield Finding("sensor", key, round(angle, 1) if tilt_deg > LEVEL_DEG else 0.0, evidence)
 
 
 def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
@@ -80,18 +84,18 @@ def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator
     own = np.zeros(len(points), np.bool_)
     if body is not None and len(body.sectors_deg):
         bounds = tuple(np.round(body.sectors_deg, 1).ravel().tolist())
-        said = "returns that move with the sensor; a wall along the way would look like that too"
-        yield Finding("sensor", "blind_sectors_deg", bounds, said, sure=False)
+        evidence = "returns that move with the sensor; a wall along the way would look like that too"
+        yield Finding("sensor", "blind_sectors_deg", bounds, evidence, reliable=False)
         yield Finding("sensor", "blind_range_m", round(body.range_m, 2), "farthest of these")
         own = BlindSectors(bounds, body.range_m).contain(points)
     nearest = min(MAX_MIN_RANGE_M, float(np.floor(10 * np.quantile(range_m[~own], 0.001))) / 10)
-    said = f"of 0.1 % of the returns, at most {MAX_MIN_RANGE_M:g}"
+    evidence = f"of 0.1 % of the returns, at most {MAX_MIN_RANGE_M:g}"
     if body is None:
-        said += "; whether they are on the robot is not known: the recording stands still or is too short"
-    yield Finding("sensor", "min_range_m", nearest, said, sure=body is not None)
+        evidence += "; whether they are on the robot is not known: the recording stands still or is too short"
+    yield Finding("sensor", "min_range_m", nearest, evidence, reliable=body is not None)
     farthest = float(10 * np.ceil(np.quantile(range_m, 0.999) / 10))
-    said = f"of 99.9 % of the returns, at most {MAX_RANGE_M:g}"
-    yield Finding("sensor", "max_range_m", min(MAX_RANGE_M, farthest), f"{said}{empty_sectors(points)}")
+    evidence = f"of 99.9 % of the returns, at most {MAX_RANGE_M:g}"
+    yield Finding("sensor", "max_range_m", min(MAX_RANGE_M, farthest), f"{evidence}{empty_sectors(points)}")
 
 
 def empty_sectors(points: Float32) -> str:

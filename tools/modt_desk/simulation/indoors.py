@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt_desk.simulation import furniture
+from modt_desk.simulation import scenery
 from modt_desk.simulation.builder import SceneBuilder
 from modt_desk.simulation.materials import Material
 from modt_desk.simulation.motion import Path
 from modt_desk.simulation.solids import box
 from modt_desk.simulation.world import World
-from modt_desk.simulation.yard import enclose, floor, round_trip, walkers
+from modt_desk.simulation.yard import ROBOT_M, enclose, floor, round_trip, walkers
 
-ROBOT_M = (0.6, 0.5)
-"""Length and width of a robot indoors."""
 OVER_SENSOR_M = 0.8
 """Least distance between a sensor and the ceiling."""
 SWAY_RAD = 0.003
@@ -32,7 +30,7 @@ def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     _furnish(builder, half, 24)
     for _ in range(3):
         x, y = rng.uniform(-0.8, 0.8, 2) * half
-        builder.scenery(furniture.pane(rng, ceiling), x, y, rng.choice([0, np.pi / 2]))
+        builder.scenery(scenery.pane(rng, ceiling), x, y, rng.choice([0, np.pi / 2]))
     return _under(builder, half, ceiling, ego, height_m)
 
 
@@ -50,9 +48,9 @@ def corridor(rng: np.random.Generator, seconds: float, height_m: float) -> World
         x = rng.uniform(3.0, 18.0) * rng.choice([-1, 1])
         builder.pedestrian(Path.standing(x, rng.choice([-1, 1]) * (half[1] - 0.4), rng.uniform(-np.pi, np.pi)))
     for x in np.arange(-20.0, 20.0, 4.0):
-        builder.scenery(furniture.door(), x, half[1] - 0.04, 0.0)
+        builder.scenery(scenery.door(), x, half[1] - 0.04, 0.0)
         if rng.random() < 0.3:
-            builder.scenery(furniture.pane(rng, 2.1), x + 2.0, -half[1] + 0.04, 0.0)
+            builder.scenery(scenery.pane(rng, 2.1), x + 2.0, -half[1] + 0.04, 0.0)
         elif rng.random() < 0.4:
             builder.scenery(box((0, 0, 0.4), (0.5, 0.4, 0.8), Material.WOOD), x + 2.0, -half[1] + 0.3, 0.0)
     ego = Path.steady(np.array([[-3.0, -0.1], [12.0, -0.1]]), 0.0, 0.8, seconds)
@@ -67,7 +65,7 @@ def lobby(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     ego = Path.steady(np.array([[-half[0] + 2, 0.0], [half[0] - 2, 0.0]]), 0.0, 0.7, seconds)
     walkers(builder, half, 4)
     for x in np.arange(-half[0] + 1, half[0], 2.0):
-        builder.scenery(furniture.pane(rng, ceiling), x, half[1] - 0.3, 0.0)
+        builder.scenery(scenery.pane(rng, ceiling), x, half[1] - 0.3, 0.0)
     builder.scenery(box((0, 0, 0.55), (3.0, 0.7, 1.1), Material.WOOD), 0.0, -half[1] + 1.5, 0.0)
     _furnish(builder, half, 8)
     return _under(builder, half, ceiling, ego, height_m)
@@ -101,14 +99,12 @@ def warehouse(rng: np.random.Generator, seconds: float, height_m: float) -> Worl
     walkers(builder, (20.0, 2.0), 4)
     for y in (-11.0, -5.0, 5.0, 11.0):
         for x in np.arange(-16.0, 17.0, 4.0):
-            builder.scenery(furniture.rack(rng), x, y, 0.0)
+            builder.scenery(scenery.rack(rng), x, y, 0.0)
     for _ in range(4):
         x, y = rng.uniform(-14.0, 14.0), rng.choice([-1, 1]) * rng.uniform(2.5, 3.8)
         builder.pedestrian(Path.standing(x, y, rng.choice([-1, 1]) * np.pi / 2))
     for _ in range(8):
-        builder.scenery(
-            furniture.pallets(rng), rng.uniform(-18.0, 18.0), rng.choice([-1, 1]) * 3.0, rng.normal(0, 0.2)
-        )
+        builder.scenery(scenery.pallets(rng), rng.uniform(-18.0, 18.0), rng.choice([-1, 1]) * 3.0, rng.normal(0, 0.2))
     ego = Path.steady(np.array([[-14.0, 0.0], [14.0, 0.0]]), 0.0, 1.0, seconds)
     return _under(builder, half, float(rng.uniform(5.0, 8.0)), ego, height_m)
 
@@ -120,7 +116,7 @@ def _beside(x: float, half: tuple[float, float], wide: float, side: int) -> tupl
 
 def _furnish(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
     rng = builder.rng
-    makers = (furniture.table, furniture.chair, furniture.shelf, furniture.pallets)
+    makers = (scenery.table, scenery.chair, scenery.shelf, scenery.pallets)
     for _ in range(n):
         x, y = rng.uniform(-half[0], half[0]), rng.uniform(-half[1], half[1])
         turn = rng.choice([0, np.pi / 2]) + rng.normal(0, 0.1)

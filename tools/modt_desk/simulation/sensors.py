@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modt import profile
 from modt.errors import MisuseError
 from modt.types import Bool, Float32, Float64, Int
 
@@ -86,25 +87,11 @@ def _columns(n: int) -> Float64:
     return np.linspace(0.0, 2 * np.pi, n, endpoint=False) + np.pi / n
 
 
-def _table(*elevations_deg: float) -> Float64:
-    return np.asarray(np.deg2rad(np.sort(elevations_deg)[::-1]))
-
-
-PANDAR64_DENSE_DEG = (
-    2.046, 1.878, 1.706, 1.54, 1.369, 1.202, 1.031, 0.864, 0.693, 0.526, 0.355, 0.187, 0.018, -0.151, -0.319, -0.49,
-    -0.657, -0.827, -0.995, -1.166, -1.333, -1.504, -1.67, -1.842, -2.01, -2.18, -2.347, -2.518, -2.682, -2.855,
-    -3.022, -3.192, -3.357, -3.53, -3.694, -3.866, -4.032, -4.203, -4.367, -4.54, -4.702, -4.874, -5.039, -5.211,
-    -5.373, -5.547, -5.708, -5.88, -6.043,
-)  # fmt: skip
-PANDAR64_SPARSE_DEG = (
-    14.9, 11.05, 8.077, 5.075, 3.058, -7.045, -8.041, -9.042, -10.027, -11.014, -11.988, -12.956, -13.912, -18.871,
-    -24.879,
-)  # fmt: skip
-VLP_32C_DEG = (
-    15.0, 10.333, 7.0, 4.667, 3.333, 2.333, 1.667, 1.333, 1.0, 0.667, 0.333, 0.0, -0.333, -0.667, -1.0, -1.333,
-    -1.667, -2.0, -2.333, -2.667, -3.0, -3.333, -3.667, -4.0, -4.667, -5.333, -6.148, -7.254, -8.843, -11.31, -15.639,
-    -25.0,
-)  # fmt: skip
+def _beams_of(profile_name: str) -> Float64:
+    """Elevations of unevenly spaced beams, as the sensor's profile states them."""
+    elevations_deg = profile.load(profile_name).sensor.elevations_deg
+    assert elevations_deg is not None
+    return np.asarray(np.deg2rad(elevations_deg))
 
 
 def _ouster_os1(beams: int) -> SensorModel:
@@ -151,7 +138,7 @@ _MODELS = (
     ),
     SensorModel(
         name="vlp-32c",
-        elevation_rad=_table(*VLP_32C_DEG),
+        elevation_rad=_beams_of("vlp-32c"),
         azimuth_rad=_columns(1808),
         height_m=1.5,
         min_range_m=0.9,
@@ -159,7 +146,7 @@ _MODELS = (
     ),
     SensorModel(
         name="pandar64",
-        elevation_rad=_table(*PANDAR64_DENSE_DEG, *PANDAR64_SPARSE_DEG),
+        elevation_rad=_beams_of("pandar64"),
         azimuth_rad=_columns(1800),
         height_m=2.1,
         min_range_m=0.9,

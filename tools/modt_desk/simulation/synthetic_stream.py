@@ -12,14 +12,11 @@ from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Frame, Self
-from modt_desk.simulation.crossing import crossing
-from modt_desk.simulation.crowd import crowd
 from modt_desk.simulation.indoors import corridor, hall, lift, lobby, warehouse
 from modt_desk.simulation.sensors import sensor as sensor_model
 from modt_desk.simulation.simulator import Simulator, Truth
-from modt_desk.simulation.slopes import dock, ramp
-from modt_desk.simulation.street import street
-from modt_desk.simulation.yard import yard
+from modt_desk.simulation.street import crossing, street
+from modt_desk.simulation.yard import crowd, dock, ramp, yard
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0, 0.0]])

@@ -10,12 +10,12 @@ from modt.classes import CLASS_NAMES, CLASSES
 from modt_desk.evaluation.evaluation import ALL, RANGES_M, Evaluation
 from modt_desk.evaluation.report import report
 from modt_desk.reporting import svg
-from modt_desk.reporting.page import Plot, page, plots, preformatted, tiles
+from modt_desk.reporting.document import Plot, page, plots, preformatted, tiles
 
 _COLOURS = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)}
 _MIDDLE_M = {name: (low + high) / 2 for name, (low, high) in RANGES_M.items() if name != ALL}
 _BY_RANGE = {
-    "precision": "Precision of what is called, by range",
+    "precision": "Precision of the reported class, by range",
     "recall": "Recall with the right class, by range",
 }
 
@@ -40,9 +40,9 @@ def _facts(found: Evaluation) -> Iterator[tuple[str, str, str]]:
         note = f"precision {_percent(score.precision)}, recall {_percent(score.recall)}"
         yield f"average precision, {name}", _percent(score.average_precision), note
     if ALL in found.tracks:
-        life = found.tracks[ALL].life
-        if life.life is not None and life.ideal is not None:
-            yield "life of an object's track", f"{life.life:.1f} frames", f"of {life.ideal:.1f} ideal"
+        length = found.tracks[ALL].life
+        if length.life is not None and length.ideal is not None:
+            yield "length of an object's track", f"{length.life:.1f} frames", f"of {length.ideal:.1f} ideal"
 
 
 def _plots(found: Evaluation) -> Iterator[Plot]:
@@ -59,10 +59,10 @@ def _plots(found: Evaluation) -> Iterator[Plot]:
     ]
     yield "Precision over recall", svg.lines(curves, "recall [%]", "precision [%]"), "by posterior"
     kinds = [kind for kind in (ALL, *CLASS_NAMES) if kind in found.tracks]
-    lives = np.array([found.tracks[kind].life.ratio or 0.0 for kind in kinds])
+    lengths = np.array([found.tracks[kind].life.ratio or 0.0 for kind in kinds])
     edges = np.arange(len(kinds) + 1, dtype=np.float64) - 0.5
     note = ", ".join(f"{k}: {kind}" for k, kind in enumerate(kinds)) or "labels without identities"
-    yield "Life of tracks, of the ideal", svg.bars(edges, lives, "objects", "share"), note
+    yield "Length of tracks, of the ideal", svg.bars(edges, lengths, "objects", "share"), note
 
 
 def _trace(name: str, x: list[float], y: list[float]) -> svg.Trace:

@@ -24,8 +24,8 @@ from modt.viewer import theme
 from modt.viewer.point_cells import SIDE, Cells
 from modt.viewer.theme import LIGHT, REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_desk.viewer.extent import RINGS_M, reach_m
 from modt_desk.viewer.recorded_run import RecordedRun
+from modt_desk.viewer.recorded_tracks import RINGS_M, reach_m
 from modt_desk.viewer.truth_marks import LEGEND
 
 SIZE_IN = (12.8, 9.1)
@@ -71,10 +71,10 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
     for radius in rings:
         axes.add_patch(Circle((0, 0), radius, fill=False, edgecolor=LINE, zorder=0))
     (sensor,) = axes.plot(0, 0, ">", color=INK, markersize=12)
-    said = _tracks(axes, run, at) + _truth(axes, run, at)
+    labels = _tracks(axes, run, at) + _truth(axes, run, at)
     taken = [thing.get_window_extent() for thing in (_caption(axes, run, at), _legend(axes, run, at), sensor)]
-    said += [(0.0, radius, f"{radius:g} m", SOFT) for radius in rings]
-    _write(axes, reversed(said), [box.transformed(axes.transData.inverted()) for box in taken])
+    labels += [(0.0, radius, f"{radius:g} m", SOFT) for radius in rings]
+    _write(axes, reversed(labels), [box.transformed(axes.transData.inverted()) for box in taken])
 
 
 def _points(axes: Axes, cells: Cells, step_cm: int) -> None:

@@ -11,8 +11,8 @@ from modt.viewer import theme
 from modt.viewer.html_page import content, page
 from modt.viewer.packed import packed_cells, packed_table
 from modt.viewer.point_cells import Cells
-from modt_desk.viewer.extent import reach_m
 from modt_desk.viewer.recorded_run import RecordedRun
+from modt_desk.viewer.recorded_tracks import reach_m
 from modt_desk.viewer.truth_marks import LEGEND
 
 SCRIPT = Path(__file__).parent / "recorded.js"

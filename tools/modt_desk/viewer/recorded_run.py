@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,22 +16,15 @@ from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
-from modt.profile import from_yaml
 from modt.profile.yaml_text import to_yaml
 from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
-from modt.sinks.tracks import SCHEMA
 from modt.types import Float64, Int
 from modt.viewer.track_rows import COLUMNS, planar
 from modt_desk.energy.run_energy import run_energy
-from modt_desk.evaluation.recorded_result import recorded_pose
+from modt_desk.evaluation.recorded_result import recorded_result
+from modt_desk.evaluation.run_record import RunRecord, broken
 from modt_desk.viewer.recorded_tracks import frame_rows, track_table
-
-COUNTS: dict[str, Callable[[Any], Any]] = {
-    "frame": int,
-    "stamp_s": float,
-    **dict.fromkeys(("proposals", "classifications", "deferred"), int),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,16 +32,16 @@ class RecordedRun:
     """The records of a run, read.
 
     Attributes:
-        facts: content of run.yaml.
+        record: its directory.
         config: the profile that it ran with.
-        frames: of each frame COUNTS, `cpu_ms` by stage, `energy_mJ` with its `kind` where a window covers it, and
-            `call_mJ`, the estimated energy of each of its classifications, where energy is attributed to them.
+        frames: number, stamp [s] and counts of each frame; `cpu_ms` by stage; `energy_mJ` with its `kind` where a
+            window covers it; `call_mJ`, the estimated energy of each of its classifications, where it is attributed.
         states: names, in the order of the column `state`.
         tracks: (R, COLUMNS) as `track_rows.COLUMNS`.
         poses: (F, 3) of the sensor in the world: x, y [m], yaw [rad].
     """
 
-    facts: dict[str, Any]
+    record: RunRecord
     config: ProfileConfig
     frames: list[dict[str, Any]]
     states: list[str]
@@ -63,31 +55,34 @@ class RecordedRun:
         Raises:
             MisuseError: not the directory of a run, no frame so far, or a broken record.
         """
-        described = run / RUN
-        try:
-            facts = from_yaml(described.read_text(encoding="utf-8"), described)
-            config = profile.parse(to_yaml(facts["profile"]), described)
-            _ = facts["stream"]["path"], facts["stream"]["name"], facts["mode"]
-        except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
-            raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        states, poses = list[str](), list[Float64]()
+        opened = RunRecord.open(run)
+        config = profile.parse(to_yaml(opened.facts["profile"]), run / RUN)
         with records_of(run / LEDGER):
             costs = _costs(run / LEDGER, config.energy)
-        frames, rows = list[dict[str, Any]](), list[list[list[float]]]()
-        for number, record in enumerate(read_records(run / TRACKS, SCHEMA)):
+        frames, rows, states, poses = list[dict[str, Any]](), list[Float64](), list[str](), list[Float64]()
+        for number, (place, record) in enumerate(opened.records()):
             try:
-                counts = {name: kind(record[name]) for name, kind in COUNTS.items()}
-                rows.append(frame_rows(number, record, states))
-                poses.append(planar(recorded_pose(record)))
-                frames.append({**counts, **costs.get(int(counts["frame"]), {})})
+                result, classifications = recorded_result(record), int(record["classifications"])
+                rows.append(frame_rows(number, result, states))
+                poses.append(planar(result.T_world_sensor))
+                counts = {
+                    "frame": result.frame.index,
+                    "stamp_s": result.frame.stamp_s,
+                    "proposals": len(result.proposals),
+                    "classifications": classifications,
+                    "deferred": result.n_deferred,
+                }
+                frames.append(counts | costs.get(result.frame.index, {}))
             except BROKEN as error:
-                place = f"{run / TRACKS}:{number + 1}"
-                raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
-        if not frames:
-            raise MisuseError(run / TRACKS, "no frames are recorded", "give the directory of a longer run")
+                raise broken(place, error) from None
         with records_of(run / TRACKS), np.errstate(over="raise", invalid="raise"):
             placed = np.stack(poses)
-            return cls(facts, config, frames, states, track_table(rows, placed), placed)
+            return cls(opened, config, frames, states, track_table(rows, placed), placed)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Content of run.yaml."""
+        return self.record.facts
 
     @property
     def numbers(self) -> list[int]:
@@ -116,11 +111,6 @@ class RecordedRun:
     def sensor(self) -> str:
         """Name of its profile."""
         return " + ".join(self.facts.get("profiles", ()))
-
-    @property
-    def live(self) -> bool:
-        """Whether its source was live and cannot be read again."""
-        return self.facts["stream"]["path"] is None and bool(self.facts.get("service", False))
 
     def position(self, frame: int) -> int:
         """Index of a frame, by its number.

@@ -1,50 +1,29 @@
-"""The recorded tracks of a run as one table of `modt.viewer.track_rows`, sorted by track."""
+"""The recorded tracks of a run as one table of `modt.viewer.track_rows`, sorted by track, and their extent."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 
-from modt.classes import CLASS_NAMES
 from modt.geometry import wrap
-from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.types import Float64, Int
-from modt.viewer.track_rows import COLUMNS, scaled
+from modt.types import Float64, FrameResult, Int
+from modt.viewer.theme import REACH_M
+from modt.viewer.track_rows import COLUMNS, SCALE, result_rows, scaled
 
 
-def frame_rows(at: int, record: dict[str, Any], states: list[str]) -> list[list[float]]:
-    """Rows of a line of tracks.jsonl in units of the line; names of states are added to `states`."""
-    classified, rows = set(record.get("classified", ())), []
-    for track in record["tracks"]:
-        state = str(track["state"])
-        if state not in states:
-            states.append(state)
-        box = track["box"] or dict.fromkeys(BOX_KEYS, 0.0)
-        rows.append(
-            [
-                track["id"],
-                at,
-                states.index(state),
-                CLASS_NAMES.index(track["class"]),
-                track["box"] is not None,
-                track["final"],
-                track["id"] in classified,
-                track["points"],
-                *track["posterior"],
-                *track.get("witness", [0.0] * len(CLASS_NAMES)),  # earlier runs have none
-                *(box[key] for key in BOX_KEYS),
-                *(track["world"][key] for key in WORLD_KEYS),
-            ]
-        )
+def frame_rows(at: int, result: FrameResult, states: list[str]) -> Float64:
+    """(M, COLUMNS) rows of a recorded result; names of states are added to `states`."""
+    states += [name for name in result.state_names if name not in states]
+    number = np.array([states.index(name) for name in result.state_names], np.int64)
+    rows = result_rows(result)
+    rows[:, COLUMNS.index("at")], rows[:, COLUMNS.index("state")] = at, number[result.tracks.state]
     return rows
 
 
-def track_table(frames: Iterable[Sequence[Sequence[float]]], poses: Float64) -> Int:
+def track_table(frames: Iterable[Float64], poses: Float64) -> Int:
     """(R, COLUMNS) table of the rows of F frames, and of (F, 3) planar poses of the sensor."""
-    parts = [np.array(rows, np.float64).reshape(-1, len(COLUMNS)) for rows in frames]
-    rows = np.concatenate(parts) if parts else np.zeros((0, len(COLUMNS)))
+    rows = np.concatenate([np.zeros((0, len(COLUMNS))), *frames])
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     _fill_lost(rows, poses)
     return scaled(rows)
@@ -63,3 +42,21 @@ def _fill_lost(rows: Float64, poses: Float64) -> None:
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     rows[lost, x], rows[lost, x + 1] = c * dx + s * dy, c * dy - s * dx
     rows[lost, yaw] = wrap(rows[lost, yaw] + then[:, 2] - pose[:, 2])
+
+
+_SIDE_M = 32.0
+"""Half the height of a picture whose half width is REACH_M."""
+RINGS_M = {6.0: 2, 10.0: 5, 15.0: 5, 20.0: 10, 30.0: 10, REACH_M: 20}
+"""Ranges that a picture may reach, and the distance of the rings in it."""
+_NEARLY = 0.95
+"""Share of the tracked boxes that must be visible."""
+
+
+def reach_m(tracks: Int) -> float:
+    """Half the width of a picture that shows nearly all of (R, COLUMNS) rows of tracks; REACH_M at most."""
+    seen = tracks[tracks[:, COLUMNS.index("seen")] > 0]
+    if not len(seen):
+        return REACH_M
+    x, y = (np.abs(seen[:, COLUMNS.index(name)]) / SCALE[name] for name in ("x", "y"))
+    needed = np.quantile(np.maximum(x, y * REACH_M / _SIDE_M), _NEARLY)
+    return next((reach for reach in RINGS_M if reach >= needed), REACH_M)

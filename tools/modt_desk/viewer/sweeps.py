@@ -14,7 +14,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.sources.stream import Stream
 from modt.types import Float32
 from modt.viewer.point_cells import LEVEL_M, LEVELS, SIDE, Cells, occupied
-from modt_desk.evaluation.frames_by_number import FramesByNumber
+from modt_desk.evaluation.run_record import FramesByNumber
 
 NO_CELLS = Cells(np.zeros(0, np.int64), np.zeros(0, np.int64))
 

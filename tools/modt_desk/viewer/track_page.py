@@ -14,7 +14,7 @@ from modt.sources.stream import Stream
 from modt.types import Float32
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.reporting import svg
-from modt_desk.reporting.page import Plot, page, plots, tiles
+from modt_desk.reporting.document import Plot, page, plots, tiles
 from modt_desk.viewer.crop_picture import crop_picture
 from modt_desk.viewer.recorded_run import RecordedRun
 
@@ -94,27 +94,29 @@ def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) ->
     """A block for each classification and each change of the state or of the class that is reported."""
     before: Row | None = None
     for row in rows:
-        at, said = int(row["at"]), []
+        at, sentences = int(row["at"]), []
         if row["classified"]:
             posterior = ", ".join(f"{c} {100 * row[f'p_{c}']:.1f} %" for c in CLASS_NAMES)
             motion = ", ".join(f"{c} {row[f'motion_{c}']:+.1f}" for c in CLASS_NAMES[1:])
             where = f"{np.hypot(row['x'], row['y']):.0f} m away, {row['l']:.1f} × {row['w']:.1f} × {row['h']:.1f} m"
             call_mJ = run.frames[at].get("call_mJ", 0.0)
-            said.append(f"Classified, {row['points']:g} points, {where}, {call_mJ:.1f} mJ.")
-            said.append(f"Posterior: {posterior}.")
-            said.append(f"Motion, log-likelihood over background: {motion}.")
+            sentences.append(f"Classified, {row['points']:g} points, {where}, {call_mJ:.1f} mJ.")
+            sentences.append(f"Posterior: {posterior}.")
+            sentences.append(f"Motion, log-likelihood over background: {motion}.")
         if before is None or row["state"] != before["state"]:
             state = run.states[int(row["state"])].replace("_", " ")
-            said.append(f"Begins as {state}." if before is None else f"Becomes {state}.")
+            sentences.append(f"Begins as {state}." if before is None else f"Becomes {state}.")
         if before is None or row["class"] != before["class"]:
-            said.append(f"Reported as {_reported(row)}.")
+            sentences.append(f"Reported as {_reported(row)}.")
         if row["final"] and not (before and before["final"]):
-            said.append(f"The class is settled: {_reported(row)}. It is asked for again only if the view improves.")
+            sentences.append(
+                f"The class is settled: {_reported(row)}. It is asked for again only if the view improves."
+            )
         if before and before["final"] and not row["final"]:
-            said.append("The class is open.")
-        if said:
+            sentences.append("The class is open.")
+        if sentences:
             pictures = crop_picture([row[key] for key in BOX_KEYS], sweeps[at]) if at in sweeps else ""
-            lines = "<br>".join(map(escape, said))
+            lines = "<br>".join(map(escape, sentences))
             yield f"<section><h2>Frame {run.numbers[at]}</h2><p>{lines}</p>{pictures}</section>"
         before = row
 

@@ -46,8 +46,8 @@ def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int
     labelled = ((place, record) for place, record in run.records() if record["frame"] in truth.frames)
     for frame in run.frames(truth, None if exact else points_in_boxes, stream, labelled):
         objects, proposals, _ = judge(frame, truth.rules)
-        called = proposals[proposals["to_call"] & (proposals["said"] > 0)]
-        false = called["track"][called["said"] != called["owner"]]
+        called = proposals[proposals["to_report"] & (proposals["reported"] > 0)]
+        false = called["track"][called["reported"] != called["owner"]]
         marks[frame.index] = {"truth": _objects(frame.truth, objects), "false": false.tolist()}
     if not marks:
         cause = f"none of its frames is in the truth, which has {len(truth.frames)}"
@@ -58,7 +58,7 @@ def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int
 def _objects(truth: FrameTruth, rows: Rows) -> list[dict[str, Any]]:
     """Objects of a class in the frame of the sensor; found: detected with the right class."""
     boxes = transform_boxes(inverse(truth.T_box_sensor), truth.box)[:, DRAWN]
-    found = rows["said"] == rows["class"]
+    found = rows["reported"] == rows["class"]
     outcome = np.where(found, "found", np.where(rows["to_segment"] & rows["to_classify"], "missed", "not judged"))
     columns = zip(boxes.tolist(), rows["class"].tolist(), outcome.tolist(), strict=True)
     names = [BOX_KEYS[k] for k in DRAWN]

@@ -1,0 +1,170 @@
+"""A recorded run from above: a page that plays it, a picture of a frame, a film, or the page of a track."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from modt.errors import MisuseError, ModtError, install
+from modt.sources.stream import Stream
+from modt.viewer.point_cells import Cells
+from modt_desk.evaluation.truth import by_stamp
+from modt_desk.evaluation.truth_files import labels_beside, open_truth
+from modt_desk.reporting.document import save
+from modt_desk.viewer.player import most_cells, save_player
+from modt_desk.viewer.recorded_run import RecordedRun
+from modt_desk.viewer.sweeps import Grid, sweeps
+from modt_desk.viewer.track_page import rows_of, track_page, views
+from modt_desk.viewer.truth_marks import truth_marks
+
+if TYPE_CHECKING:  # Matplotlib is an extra
+    from matplotlib.figure import Figure
+
+Capture = Sequence[tuple[str, str]]
+PLAYER, PICTURE, PIXELS, GIF, MP4 = ".html", ".svg", ".png", ".gif", ".mp4"
+PICTURE_WIDTH, FILM_WIDTH = 1280, 960
+"""Widths of pictures and films [pixel]."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The frames to show and the file to write."""
+
+    run: RecordedRun
+    at: int  # index of the frame, or of the first
+    stream: Stream | None
+    grid: Grid
+    out: Path
+
+    def cells(self, numbers: Sequence[int], most: int) -> Iterator[Cells] | None:
+        """Cells of the frames, None without points."""
+        return None if self.stream is None else sweeps(numbers, self.stream, self.grid, most)
+
+    def drawings(self, width: int, n: int | None = None) -> Iterator[Figure]:
+        """One figure, drawn anew for each frame from the first one on.
+
+        Raises:
+            MisuseError: Matplotlib or Pillow is not installed.
+        """
+        try:
+            from modt_desk.viewer.picture import draw, new_figure
+        except ModuleNotFoundError as error:
+            raise MisuseError(self.out, f"needs {error.name}", install("view")) from None
+        figure, numbers = new_figure(width), self.run.numbers[self.at :][:n]
+        cells = self.cells(numbers, sys.maxsize)
+        for at in range(self.at, self.at + len(numbers)):
+            draw(figure, self.run, at, self.grid.step_cm, None if cells is None else next(cells))
+            yield figure
+
+    @property
+    def period_s(self) -> float:
+        """Mean time between two frames."""
+        stamps: list[float] = [frame["stamp_s"] for frame in self.run.frames]
+        return max((stamps[-1] - stamps[0]) / max(len(stamps) - 1, 1), 0.02)
+
+
+def _player(view: View) -> None:
+    numbers = view.run.numbers
+    save_player(view.out, view.run, view.at, view.grid.step_cm, view.cells(numbers, most_cells(len(numbers))))
+
+
+def _picture(view: View) -> None:
+    figure = next(view.drawings(PICTURE_WIDTH, 1))  # names a missing library before the next module needs it
+    from modt_desk.viewer.film import save_picture
+
+    save_picture(view.out, figure, f"{view.run.facts['stream']['name']}, frame {view.run.numbers[view.at]}")
+
+
+def _film(view: View) -> None:
+    drawings = view.drawings(FILM_WIDTH)
+    first = next(drawings)
+    from modt_desk.viewer.film import save_film
+
+    save_film(view.out, first, drawings, view.period_s)
+
+
+FORMS = {PLAYER: _player, PICTURE: _picture, PIXELS: _picture, GIF: _film, MP4: _film}
+
+
+def save_view(directory: Path, frame: int | None, labels: Path | None, capture: Capture, out: Path) -> None:
+    """Write the page, the picture or the film of a run, by the ending of the file's name.
+
+    Raises:
+        MisuseError: no run, a frame that is not recorded, a file of another kind, or a missing extra.
+        ModtError: the file cannot be written.
+    """
+    if out.suffix not in FORMS:
+        raise MisuseError(out, "no kind of picture", f"give a name that ends with {', '.join(FORMS)}")
+    recorded = RecordedRun.read(directory)
+    first = 0 if out.suffix in (GIF, MP4) else recorded.first_object
+    at = first if frame is None else recorded.position(frame)
+    stream = mark_truth(recorded, labels, source(recorded, capture))
+    if stream is None and recorded.record.live:
+        print("modt: without points: a live source cannot be read again; --truth may have scans", file=sys.stderr)
+    FORMS[out.suffix](View(recorded, at, stream, Grid(recorded.config), out))
+
+
+def save_track_page(directory: Path, track: int, capture: Capture, out: Path) -> None:
+    """Write the page of a track.
+
+    Raises:
+        MisuseError: no run, or no such track.
+        ModtError: the file cannot be written.
+    """
+    recorded = RecordedRun.read(directory)
+    rows = rows_of(recorded, track)
+    save(out, track_page(recorded, rows, views(recorded, rows, source(recorded, capture))))
+
+
+def default_name(frame: int | None, animate: bool) -> str:
+    """Default name of the file."""
+    if animate:
+        return f"view{MP4 if shutil.which('ffmpeg') else GIF}"
+    return f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}"
+
+
+def mark_truth(recorded: RecordedRun, labels: Path | None, stream: Stream | None) -> Stream | None:
+    """Mark the frames with their truth, by the given labels or those beside the source of the run.
+
+    Returns:
+        the stream, of a live run the scans of its truth.
+
+    Raises:
+        MisuseError: labels are given that cannot be used.
+    """
+    run = recorded.record
+    try:
+        found = labels or (labels_beside(run.stream) if run.stream else None)
+        if found is None:
+            return stream
+        truth = open_truth(found, run.stream)
+        if run.live:
+            truth = by_stamp(truth, {frame["frame"]: frame["stamp_s"] for frame in recorded.frames})
+            stream = truth.scans
+        marks = truth_marks(run, truth, stream)
+    except ModtError as error:
+        if labels is not None:
+            raise
+        print(f"modt: without truth: {error}", file=sys.stderr)
+        return stream
+    for frame in recorded.frames:
+        frame.update(marks.get(frame["frame"], {}))
+    return stream
+
+
+def source(recorded: RecordedRun, capture: Capture) -> Stream | None:
+    """The stream of a run, None if it was live or cannot be found."""
+    try:
+        stream = recorded.record.source(capture)
+    except ModtError as error:
+        print(f"modt: without points: {error}", file=sys.stderr)
+        return None
+    name = recorded.facts["stream"]["name"]
+    if stream is None or stream.info.name == name:
+        return stream
+    print(f"modt: without points: {name} cannot be read again", file=sys.stderr)
+    return None
