@@ -11,7 +11,9 @@ from typing import Any
 
 from modt.cli import options
 from modt.cli.run import OUT
-from modt.errors import MisuseError
+from modt.errors import MisuseError, refuse_pipe
+
+REMEDY = "give the run directory of a modt run"
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -61,12 +63,11 @@ def read(directory: Path) -> dict[str, Any]:
     place = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
     owners = {os.getuid(), place.stat().st_uid}  # anybody may write to the folder in memory
     path = memory if memory.is_file() and memory.stat().st_uid in owners else beside
+    refuse_pipe(path, REMEDY)
     try:
-        if path.exists() and not path.is_file():
-            raise ValueError("no file")  # a pipe may never end
         status = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise MisuseError(path, f"no status ({error})", "give the run directory of a modt run") from None
+        raise MisuseError(path, f"no status ({error})", REMEDY) from None
     if not isinstance(status, dict) or status.get("schema") != SCHEMA:
         raise MisuseError(path, "another schema", f"this version reads {SCHEMA}")
     return status

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, refuse_pipe
 
 log = logging.getLogger(__name__)
 
@@ -36,8 +36,7 @@ def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iter
         MisuseError: missing, unreadable, or of another schema; the error names the line.
     """
     try:
-        if path.exists() and not path.is_file():  # a pipe may never end
-            raise MisuseError(path, "is no file", "give the directory of a run")
+        refuse_pipe(path, "give the directory of a run")
         with path.open(encoding="utf-8") as lines:
             for number, text in enumerate(lines, 1):
                 try:
