@@ -366,7 +366,7 @@ class FaultyRun:
             stack.enter_context(patch.object(run_directory, "MEMORY", folder / "memory"))
             stack.enter_context(faults.installed())
             session = Session(
-                source, stages, recording, sinks, deadlines, Containment(), monitor, stop, Summary(0), [meter], None,
+                source, stages, recording, sinks, deadlines, Containment(), monitor, stop, Summary(), [meter], None,
                 clock=lambda: faults.now_s,
             )  # fmt: skip
             self.session = session
@@ -426,15 +426,14 @@ class FaultyRun:
 
         recording.write, recording.ledger = write_counted, ledger_counted  # type: ignore[method-assign]
 
-    def _windows(self, meters: Any, core: int | None, config: Any) -> Windows:
+    def _windows(self, meters: Any, core: int | None) -> Windows:
         faults = self.faults
         clocks = Clocks(
             lambda: int(1e9 * faults.monotonic()),
             lambda: int(1e9 * faults.monotonic()),
-            lambda: int(1e9 * faults.calendar()),
             lambda: int(1e9 * faults.now_s),
         )
-        return Windows(meters, clocks, Conditions(0), config)
+        return Windows(meters, clocks, Conditions(0))
 
     def _joules(self) -> float:
         return 5.0 * self.faults.now_s
