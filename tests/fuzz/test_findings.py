@@ -222,5 +222,5 @@ def test_a_pipe_in_the_place_of_a_file_is_refused_at_once(read, tmp_path):
     os.mkfifo(path)
     if "Velodyne" in read or "Ouster" in read:
         pytest.importorskip("velodyne_decoder" if "Velodyne" in read else "ouster.sdk")
-    with pytest.raises(ModtError, match="no (such )?file"):
+    with pytest.raises(ModtError, match=r"no (such )?file"):
         PIPES[read](path)

@@ -41,6 +41,8 @@ class RunDirectory:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.before: Path | None = None
+        self._locked, self._lock = False, ExitStack()
+        self._number: int | None = None  # descriptor of the lock
         self._disk = next(folder for folder in path.absolute().parents if os.path.ismount(folder))
         if path.exists() and not path.is_dir():
             raise MisuseError(path, "is a file", "give a directory as --out")
@@ -50,26 +52,18 @@ class RunDirectory:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other runs out until the process ends; where no lock can be written, none is kept out.
+        """Keep other runs out within the context; where no lock can be written, none is kept out.
 
         Raises:
             ModtError: another run is in.
         """
-        with ExitStack() as stack:
+        with ExitStack() as self._lock:
+            self._locked = True
+            self._take_lock()
             try:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                lock = os.open(
-                    self.path.with_name(f".{self.path.name}.lock"), os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW
-                )
-                stack.callback(os.close, lock)
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                remedy = "end it, or give another --out"
-                raise ModtError(self.path, "another run of modt records into it", remedy) from None
-            except OSError:  # said when the recording begins
-                pass
-            stack.callback(self.in_memory, None)
-            yield
+                yield
+            finally:
+                self.in_memory(None)
 
     def begin(self, description: str, limit_bytes: float) -> None:
         """Keep the part before under the next name, delete the oldest ones beyond a limit, and begin a new part.
@@ -80,6 +74,8 @@ class RunDirectory:
         with writing(self.path):
             if not os.path.ismount(self._disk):
                 raise OSError(f"{self._disk} is not mounted")
+            if self._locked:
+                self._take_lock()
             self._keep()
             self._trim(limit_bytes)
             self.path.mkdir(parents=True, exist_ok=True)
@@ -119,6 +115,26 @@ class RunDirectory:
     def kept(self) -> list[Path]:
         """Earlier parts, the oldest first."""
         return [path for _, path in sorted(self._numbered()) if _is_ours(path)]
+
+    def _take_lock(self) -> None:
+        """Take the lock, and take it anew where its file was removed with the folder around the run."""
+        path = self.path.with_name(f".{self.path.name}.lock")
+        with suppress(OSError):
+            if self._number is not None and os.path.samestat(os.fstat(self._number), os.stat(path)):
+                return
+        self._lock.close()
+        self._number = None
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            number = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW)
+            self._lock.callback(os.close, number)
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._number = number
+        except BlockingIOError:
+            remedy = "end it, or give another --out"
+            raise ModtError(self.path, "another run of modt records into it", remedy) from None
+        except OSError:  # the recording reports it when it begins
+            pass
 
     def _numbered(self) -> Iterator[tuple[int, Path]]:
         for path in self.path.parent.glob("*~*"):
