@@ -44,9 +44,8 @@ class Frames:
         end = self.now + seconds
         while self.now < end - 1e-9:
             self.now += 0.1
-            change = self.ladder.frame(self.now, share(self.ladder.step) if callable(share) else share)
-            if change is not None:
-                self.changes.append((round(self.now, 1), change.after))
+            if self.ladder.frame(self.now, share(self.ladder.step) if callable(share) else share):
+                self.changes.append((round(self.now, 1), self.ladder.step))
         return self
 
 

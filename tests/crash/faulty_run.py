@@ -27,8 +27,8 @@ from modt.app.containment import Containment
 from modt.app.deadlines import Deadlines
 from modt.app.loop import Stop
 from modt.app.session import Session
-from modt.app.status import STALE_S, Monitor
-from modt.app.supervisor import Systemd
+from modt.app.status import STALE_S
+from modt.app.supervisor import Supervisor
 from modt.cli.status import read
 from modt.config import ProfileConfig, RecordingConfig
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
@@ -357,17 +357,16 @@ class FaultyRun:
                 Facts("test", "J", 1e-6, 100.0, Scope.BOARD, Kind.MEASURED),
                 lambda: faults.call("meter", self._joules),
             )
-            monitor = Monitor(recording, deadlines.timing, folder / "modt.prom")
             stages: Any = Stages(poses)
-            supervisor = Systemd(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
+            supervisor = Supervisor(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
             stack.enter_context(patch.object(metering, "windows", self._windows))
             stack.enter_context(patch.object(live_stream, "READ_S", PAUSE_S))
             (folder / "memory").mkdir()
             stack.enter_context(patch.object(run_directory, "MEMORY", folder / "memory"))
             stack.enter_context(faults.installed())
             session = Session(
-                source, stages, recording, sinks, deadlines, Containment(), monitor, stop, Summary(), [meter], None,
-                clock=lambda: faults.now_s,
+                source, stages, recording, sinks, deadlines, Containment(), stop, Summary(), [meter], None,
+                metrics=folder / "modt.prom", clock=lambda: faults.now_s,
             )  # fmt: skip
             self.session = session
 

@@ -88,11 +88,6 @@ def test_the_threads_of_a_domain_run_where_they_are_told():
     assert dds.participant(NEAR - 1) is joined
 
 
-def test_what_fails_on_the_other_thread_is_raised_here():
-    with pytest.raises(ZeroDivisionError):
-        dds.on_cores(None, lambda: 1 // 0)
-
-
 def test_a_domain_without_an_interface_is_an_error_with_a_remedy(monkeypatch):
     wrong = (
         '<CycloneDDS><Domain Id="any"><General><Interfaces><NetworkInterface name="none0"/></Interfaces></General>'
@@ -115,7 +110,7 @@ def threads() -> set[str]:
 
 
 def alive(begun: set[str]) -> list[tuple[str, frozenset[int]]]:
-    """Names and cores of those threads that have not ended, as the one that joins a domain does."""
+    """Names and cores of those threads that have not ended."""
     found = []
     for thread in begun:
         with suppress(FileNotFoundError, ProcessLookupError):

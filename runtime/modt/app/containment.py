@@ -45,7 +45,7 @@ class Containment:
         self.in_a_row += 1
         self.note(error, where)
         if self.in_a_row >= MAX_IN_A_ROW:
-            cause = f"{self.in_a_row} failures in a row, the last one {_kind(error)}: {error}"
+            cause = f"{self.in_a_row} failures in a row, the last one {type(error).__name__}: {error}"
             raise ModtError(where, cause, "report it, with the traceback above") from error
 
     def spare(self, where: str, call: Callable[P, R], /, *arguments: P.args, **options: P.kwargs) -> R | None:
@@ -60,7 +60,7 @@ class Containment:
         """Count an exception that cost no frame."""
         if not self._contains:
             raise error
-        kind = f"{where}: {_kind(error)}"
+        kind = f"{where}: {type(error).__name__}"
         self.counts[kind] += 1
         if self.counts[kind] == 1:
             log.error("%s; later ones are only counted", kind, exc_info=error)
@@ -83,7 +83,3 @@ class OncePerSecond(logging.Filter):
         self._passed[kind] = now_s, 0
         record.msg = f"{record.msg} (and {held} lines like it)" if held else record.msg
         return True
-
-
-def _kind(error: Exception) -> str:
-    return type(error).__name__

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from modt.app.ladder import GIVEN_UP, Change, Ladder, Step, budget_at
+from modt.app.ladder import GIVEN_UP, Event, Ladder, Step, budget_at
 from modt.app.timing import Timing
 from modt.pipeline import CLASSIFICATION
 from modt.types import Budget
@@ -93,10 +93,10 @@ class Deadlines:
             "shed_sweeps": self.shed,
         }
 
-    def _changed(self, change: Change | None) -> None:
-        if change is not None:
-            self.changes[change.after.name.lower()] += 1
-            log.warning("load: %s (%s)", GIVEN_UP[change.after], change.event.value)
+    def _changed(self, event: Event | None) -> None:
+        if event is not None:
+            self.changes[self.ladder.step.name.lower()] += 1
+            log.warning("load: %s (%s)", GIVEN_UP[self.ladder.step], event.value)
 
 
 class NoDeadlines:

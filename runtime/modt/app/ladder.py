@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum, IntEnum
 
 from modt.types import Budget
@@ -54,17 +54,10 @@ def step_after(step: Step, event: Event) -> Step:
     return Step(max(step - 1, Step.ALL) if event is Event.SLACK else min(step + 1, Step.DROPPED))
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """A change of the step."""
-
-    before: Step
-    after: Step
-    event: Event
-
-
 class Ladder:
     """Where the loop stands, by the times of its frames and its power; times are of one monotonic clock [s].
+
+    `frame` and `power` return the event that has changed the step, None where it stays.
 
     Args:
         power_W: limit; None without one.
@@ -77,7 +70,7 @@ class Ladder:
         self._cause = Event.OVERRUN  # of the last step up
         self._calm_s = self._ample_s = self._down_s = float("-inf")  # since when; last step down
 
-    def frame(self, now_s: float, share: float) -> Change | None:
+    def frame(self, now_s: float, share: float) -> Event | None:
         """A frame whose result came `share` of a period after its sweep."""
         if share > BUSY_SHARE:
             self._calm_s = now_s
@@ -91,14 +84,14 @@ class Ladder:
             return self._fire(Event.SLACK, now_s)
         return None
 
-    def power(self, now_s: float, watts: float) -> Change | None:
+    def power(self, now_s: float, watts: float) -> Event | None:
         """A window of the meters."""
         if self.power_W is None or watts <= NEAR_SHARE * self.power_W:
             return None
         self._calm_s = self._ample_s = now_s
         return self._fire(Event.OVER_POWER, now_s) if watts > self.power_W else None
 
-    def _fire(self, event: Event, now_s: float) -> Change | None:
+    def _fire(self, event: Event, now_s: float) -> Event | None:
         before = self.step
         self.step = step_after(before, event)
         if self.step > before:
@@ -107,7 +100,7 @@ class Ladder:
             self._cause, self._calm_s, self._ample_s = event, now_s, now_s
         elif self.step < before:
             self._down_s = self._calm_s = now_s  # slack that is ample goes on being so
-        return Change(before, self.step, event) if self.step != before else None
+        return event if self.step != before else None
 
 
 def budget_at(step: Step, budget: Budget, left_ms: float, frame: int) -> Budget:

@@ -17,9 +17,9 @@ from modt.app import inputs, metering
 from modt.app.containment import Containment
 from modt.app.deadlines import Deadlines, NoDeadlines
 from modt.app.loop import Loop, Stop
-from modt.app.playback import FixedPeriod, FullSpeed, Playback
-from modt.app.stages import NoWatch, SensorWatch, Stages
-from modt.app.status import SCHEMA, Counts, Monitor, NoMonitor, Power
+from modt.app.playback import Pace, Playback
+from modt.app.stages import SensorWatch, Stages
+from modt.app.status import SCHEMA, Counts, Power, one_line
 from modt.app.supervisor import Supervisor
 from modt.classes import CLASS_NAMES
 from modt.energy.ledger import Ledger
@@ -55,25 +55,25 @@ class Session:
         sinks: Mapping[str, Sink],
         deadlines: Deadlines | NoDeadlines,
         failures: Containment,
-        monitor: Monitor | NoMonitor,
         stop: Stop,
         totals: Summary,
         meters: Sequence[Meter],
         core: int | None,
         lacking: Sequence[str] = (),
+        metrics: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
         self.source, self.stages, self.recording, self.sinks = source, stages, recording, sinks
         self.deadlines, self.failures, self.stop = deadlines, failures, stop
-        self._monitor, self._totals, self._core, self._lacking = monitor, totals, core, list(lacking)
+        self._totals, self._core, self._lacking, self._metrics = totals, core, list(lacking), metrics
         outputs = {**sinks, "recording": recording}
         self.loop = Loop(
             source,
             stages,
             outputs,
             self._observe,
-            lambda supervisor: monitor.report(self.status, supervisor),
+            self._report,
             deadlines,
             failures,
             stop,
@@ -138,6 +138,20 @@ class Session:
             "host": {"core": self._core, "resident_mb": resident_mb, "lacking": self._lacking},
         }
 
+    def _report(self, supervisor: Supervisor) -> None:
+        """Show the status of a service to its supervisor, in status.json and to Prometheus."""
+        if isinstance(self.deadlines, Deadlines):
+            status = self.status()
+            supervisor.status(one_line(status))
+            self.recording.writer.write(lambda: self._show(status))
+
+    def _show(self, status: dict[str, Any]) -> None:
+        self.recording.state(json.dumps(status, indent=1) + "\n")
+        if self._metrics is not None:
+            from modt.app.prometheus import write_metrics
+
+            write_metrics(self._metrics, status)
+
     def _observe(self, result: FrameResult, line: dict[str, Any]) -> None:
         if self.stages.chosen is not self._followed:
             self._followed = self.stages.chosen
@@ -193,7 +207,10 @@ class Session:
             },
         }
         directory, writer = self.recording.directory, self.recording.writer
-        self.summary |= self._monitor.finish(self.status)
+        if isinstance(self.deadlines, Deadlines):
+            last = self.status()
+            self.summary |= {"status": last, "lateness": self.deadlines.timing.late_or_later()}
+            writer.write(lambda: self._show(last))
         writer.write(self.recording.finish)
         text = json.dumps(self.summary, indent=2) + "\n"
         writer.write(lambda: directory.write(SUMMARY, text) if self.recording.parts else None)
@@ -209,9 +226,9 @@ def replay(
         MisuseError: an invalid request.
     """
     stop, ledger = Stop(), Ledger()
-    pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz, sleep=stop.sleep)
+    pace = Pace(request.rate_hz, sleep=stop.sleep)
     source = Playback(inputs.stream(request), pace, ledger)
-    stages = Stages(request, source.info, ledger, NoWatch())
+    stages = Stages(request, source.info, ledger)
     name = re.sub(r"[^\w.]+", "-", source.info.name)
     recording = WholeRecording(
         RunDirectory(out or Path("runs") / f"{name}-{request.mode}"),
@@ -221,8 +238,8 @@ def replay(
         labels=request.labels,
     )
     meters = metering.discovery(stages.config.energy).best.meters
-    deadlines, failures, monitor = NoDeadlines(pace.report), Containment(contains=False), NoMonitor()
-    return Session(source, stages, recording, sinks, deadlines, failures, monitor, stop, Summary(), meters, core)
+    deadlines, failures = NoDeadlines(pace.report), Containment(contains=False)
+    return Session(source, stages, recording, sinks, deadlines, failures, stop, Summary(), meters, core)
 
 
 def service(
@@ -262,6 +279,5 @@ def service(
 
     writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
     recording = Recording(RunDirectory(out), stages.config.recording, writer, describe)
-    deadlines = Deadlines(source.info.period_s)
-    kinds = deadlines, Containment(), Monitor(recording, deadlines.timing, metrics), Stop(reload=True)
-    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, lacking)
+    kinds = Deadlines(source.info.period_s), Containment(), Stop(reload=True)
+    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, lacking, metrics)

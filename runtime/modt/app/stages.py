@@ -28,18 +28,8 @@ SWEEPS = 10
 """In a row, of another size than before, after which the sensor is looked at again."""
 RATIO = 2.0
 """Of the numbers of returns of two sweeps that are of another size."""
-
-
 RANGE_SHARE = 0.6
 """Share of sensor.max_range_m that is kept while the range is reduced."""
-
-
-class NoWatch:
-    """The sensor of a recording is that of its first sweep."""
-
-    def unlike(self, points: Float32) -> bool:
-        """False."""
-        return False
 
 
 class SensorWatch:
@@ -72,7 +62,7 @@ class Stages:
         request: what is asked for.
         info: of the source, before its first frame.
         ledger: of the run.
-        watch: notices sweeps of another sensor.
+        watch: notices sweeps of another sensor; None for a recording, whose sensor is that of its first sweep.
 
     Attributes:
         chosen: the present profile.
@@ -86,7 +76,7 @@ class Stages:
     """
 
     def __init__(
-        self, request: inputs.Request, info: StreamInfo, ledger: Ledger, watch: SensorWatch | NoWatch
+        self, request: inputs.Request, info: StreamInfo, ledger: Ledger, watch: SensorWatch | None = None
     ) -> None:
         self.request, self.ledger, self._info, self._watch = request, ledger, info, watch
         self._mode = assembly.MODES[request.mode]
@@ -137,7 +127,7 @@ class Stages:
 
     def watch(self, frame: Frame) -> None:
         """Between two frames: follow a sensor that has changed. One thread at a time compares its sweep, for long."""
-        self._unlike |= self._watch.unlike(frame.points)
+        self._unlike |= self._watch is not None and self._watch.unlike(frame.points)
         if self._found:
             self.misfits += 1
             self._use(self._found.pop())

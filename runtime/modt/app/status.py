@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modt.app.supervisor import Supervisor
-from modt.app.timing import Timing
 from modt.classes import CLASS_NAMES
 from modt.config import EnergyConfig
 from modt.energy.attribution import attribute
 from modt.reporting.summary import Summary
-from modt.sinks.recording import Recording
 from modt.types import NONE, Tracks
 
 SCHEMA = "modt.status/1"
@@ -105,46 +99,3 @@ def one_line(status: dict[str, Any]) -> str:
     silent = ", sensor silent" if status["sensor"].get("silent") else ""
     seen = f" ({classes})" if classes else ""
     return f"{counts['rate_hz']:.1f} Hz, {counts['tracks']} tracks{seen}, {watts}{step}{silent}"
-
-
-class Monitor:
-    """Shows the status of a service: to its supervisor, in status.json, and to Prometheus.
-
-    Args:
-        recording: whose thread writes the files.
-        timing: of the frames.
-        metrics: file for Prometheus; None for none.
-    """
-
-    def __init__(self, recording: Recording, timing: Timing, metrics: Path | None) -> None:
-        self._recording, self._timing, self._metrics = recording, timing, metrics
-
-    def report(self, status: Callable[[], dict[str, Any]], supervisor: Supervisor) -> None:
-        """Say what is going on; the files are written off the loop's thread."""
-        present = status()
-        supervisor.status(one_line(present))
-        self._recording.writer.write(lambda: self._write(present))
-
-    def finish(self, status: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Write the last status; returns it and the lateness for the summary."""
-        last = status()
-        self._recording.writer.write(lambda: self._write(last))
-        return {"status": last, "lateness": self._timing.late_or_later()}
-
-    def _write(self, status: dict[str, Any]) -> None:
-        self._recording.state(json.dumps(status, indent=1) + "\n")
-        if self._metrics is not None:
-            from modt.app.prometheus import write_metrics
-
-            write_metrics(self._metrics, status)
-
-
-class NoMonitor:
-    """Nobody watches a replay."""
-
-    def report(self, status: Callable[[], dict[str, Any]], supervisor: Supervisor) -> None:
-        """No effect."""
-
-    def finish(self, status: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """No effect."""
-        return {}
