@@ -29,20 +29,28 @@ NUMBER_BYTES = 32
 """Room for the numbers in `part` and `parts` [bytes]."""
 
 
-_latest: list[tuple[FrameResult, str]] = []
+class _Latest:
+    """Cache of the latest line, for several sinks of one frame."""
+
+    result: FrameResult | None = None
+    line = ""
+
+    def of(self, result: FrameResult) -> str:
+        if result is not self.result:
+            self.line, self.result = f"{_head(result)},{_tracks(_rows(result))}", result
+        return self.line
+
+
+_latest = _Latest()
 
 
 def frame_line(result: FrameResult) -> str:
     """Line of a frame: lengths and log likelihoods rounded to 1e-3, probabilities and the pose to 1e-6.
 
-    The latest line is kept, for several sinks of one frame.
-
     Raises:
         ValueError: a number is not finite.
     """
-    if not _latest or result is not _latest[0][0]:
-        _latest[:] = [(result, f"{_head(result)},{_tracks(_rows(result))}")]
-    return _latest[0][1]
+    return _latest.of(result)
 
 
 def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
