@@ -37,8 +37,7 @@ def add_directory(p: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the status; 0 while the service runs, else 1."""
-    from modt.app.status import STALE_S
-    from modt.app.status_text import status_text
+    from modt.app.status import STALE_S, status_text
     from modt.sinks.records import records_of
 
     directory, now_s = arguments.directory, time.time()

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-from modt import host
 from modt.errors import MisuseError, ModtError, install
 
 try:
@@ -73,8 +72,8 @@ _participants: WeakValueDictionary[int, Participant] = WeakValueDictionary()
 _lock = threading.Lock()
 
 
-def participant(domain_id: int, cores: frozenset[int] | None = None) -> Participant:
-    """The participant of a domain, which is joined first. Its threads run on `cores`, None: where the caller runs.
+def participant(domain_id: int) -> Participant:
+    """The participant of a domain, which is joined first. Its threads run on the cores of the caller.
 
     Raises:
         ModtError: the domain cannot be joined.
@@ -83,8 +82,7 @@ def participant(domain_id: int, cores: frozenset[int] | None = None) -> Particip
         found = _participants.get(domain_id)
         if found is None:
             _warn_of_buffer()
-            with host.threads_on(cores):
-                found = _participants[domain_id] = Participant(domain_id)
+            found = _participants[domain_id] = Participant(domain_id)
         return found
 
 

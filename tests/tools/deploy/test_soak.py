@@ -13,6 +13,7 @@ from tools.deploy.sender import Faulty
 from tools.deploy.soak import Episode, Witness, judge
 from tools.send.loops import VelodyneStamps
 
+
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_changes_the_packets_from_its_begin_to_its_end(fault):
     before = [payload for _, payload in packets("vlp-16", 3)]
