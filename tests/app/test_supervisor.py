@@ -11,7 +11,7 @@ from modt.errors import MisuseError
 
 
 class Listener:
-    """Where systemd would listen."""
+    """Stands in for systemd."""
 
     def __init__(self, address):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)

@@ -109,7 +109,7 @@ class Faults:
     Attributes:
         calls: what was called, in order.
         now_s: the monotonic clock.
-        calendar_s: by which the calendar is ahead of it.
+        calendar_s: time by which the calendar is ahead of it.
         last_s: time of the last fault; minus infinity before.
     """
 
@@ -392,7 +392,7 @@ class FaultyRun:
                 faults.active = False
 
     def check(self) -> None:
-        """What holds after every run."""
+        """Check the promises that hold after every run."""
         assert not self.unread, self.unread
         records: dict[str, list[Any]] = {SCHEMA: [], LEDGER_SCHEMA: [], ENERGY_SCHEMA: []}
         for part in self.out.parent.glob("run*"):

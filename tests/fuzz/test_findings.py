@@ -1,4 +1,4 @@
-"""What fuzzing has found: inputs that once left a reader by another error than ours."""
+"""Findings of fuzzing: inputs that once made a reader fail by another error than ours."""
 
 from __future__ import annotations
 

@@ -40,9 +40,9 @@ class Mode:
     """One way of the method over the same stages.
 
     Attributes:
-        machine: the states that a track goes through.
-        fusion: which views are classified and what becomes of them.
-        budget: what a frame may spend.
+        machine: states of a track and their transitions.
+        fusion: choice of the views to classify, and their combination.
+        budget: budget of a frame.
     """
 
     machine: StateMachine
@@ -85,7 +85,7 @@ class BlindSectorFilter:
     sectors: BlindSectors
 
     def facts(self) -> dict[str, str]:
-        """Which kernels it runs on."""
+        """Kernels of the segmenter."""
         return self.segmenter.facts()
 
     def segment(self, points: Float32) -> Proposals:
@@ -115,7 +115,7 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
 
 
 def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledger | None = None) -> Pipeline:
-    """The stages of a mode; without a ledger they have one that nobody reads.
+    """The stages of a mode; the default ledger is their own.
 
     Raises:
         MisuseError: the model cannot be used.
@@ -142,7 +142,7 @@ def stages(
     ledger: Ledger,
     kernels: GeometryKernels,
 ) -> Pipeline:
-    """A pipeline around a given segmenter and classifier: the network, or what stands for it at this cost."""
+    """A pipeline around a given segmenter, and the network or a substitute of the given cost as its classifier."""
     prior = make_prior(network.box_scores, network.class_frequency)
     decision = LikeliestClass if profile.decision.rule == "likeliest" else Decision
     return Pipeline(

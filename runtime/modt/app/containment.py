@@ -1,4 +1,4 @@
-"""Failures of single frames: counted, said once of each kind, fatal only when they repeat; and a log kept short."""
+"""Containment of failures: each kind is counted and logged once, and only a row of failures ends the run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Containment:
     """Counts of contained exceptions by kind.
 
     Args:
-        contains: whether anything is contained; else every exception ends the run as it is.
+        contains: whether exceptions are contained. If not, each one ends the run.
     """
 
     def __init__(self, *, contains: bool = True) -> None:
@@ -49,7 +49,7 @@ class Containment:
             raise ModtError(where, cause, "report it, with the traceback above") from error
 
     def spare(self, where: str, call: Callable[P, R], /, *arguments: P.args, **options: P.kwargs) -> R | None:
-        """Result of a call that a frame can do without; None where it fails, which is counted."""
+        """Result of a dispensable call. A failure is counted and gives None."""
         try:
             return call(*arguments, **options)
         except Exception as error:
@@ -67,7 +67,7 @@ class Containment:
 
 
 class OncePerSecond(logging.Filter):
-    """Passes one line a second of each kind, its text before the values; it says how many were held back."""
+    """Passes one line a second of each kind of message, with the number of lines that were held back."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Deadlines of a live source: every frame within a period of its sweep, with less where the time does not suffice."""
+"""Deadlines of a live source: a frame has one period from its sweep to its result, and does less when that is short."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from modt.pipeline import CLASSIFICATION
 from modt.types import Budget
 
 DECAY = 0.95
-"""Weight of the past a frame, in the cost of the other stages; a greater cost counts at once."""
+"""Weight of the previous cost of the other stages at each frame. A greater cost is taken over at once."""
 log = logging.getLogger(__name__)
 
 
 class Deadlines:
-    """Which sweeps are processed, and what their frames may spend; times are of one monotonic clock [s].
+    """Decides which sweeps are processed and what their frames may spend. All times are monotonic [s].
 
     The first frame warms up: its deadline is a period after its start, and sweeps that arrive before its end are left
     out.
 
     Args:
-        period_s: of the sensor.
+        period_s: period of the sensor.
 
     Attributes:
-        ladder, timing: what is known of the frames so far.
+        ladder, timing: state formed by the frames so far.
         rest_ms: cost of a frame beside its classification: a maximum over the last frames that decays.
         changes: number of times that each step of the ladder was entered.
         shed: sweeps left out by the last step, or that arrived during the first frame.
@@ -47,7 +47,7 @@ class Deadlines:
 
     @property
     def reduced(self) -> bool:
-        """Whether frames are processed without what is far."""
+        """Whether the range of the sensor is cut."""
         return self.ladder.step >= Step.REDUCED
 
     def admit(self, arrived_s: float) -> bool:
@@ -58,7 +58,7 @@ class Deadlines:
         return not shed
 
     def budget(self, whole: Budget, arrived_s: float, frame: int) -> Budget:
-        """What a frame that starts now may spend, of the whole budget of its profile."""
+        """Budget of a frame that starts now, at most the `whole` budget of its profile."""
         self._start_s = self._clock()
         deadline_s = self._period_s + (self._start_s if self._fresh_s is None else arrived_s)
         left_ms = max(1e3 * (deadline_s - self._start_s) - self.rest_ms, 0.0)
@@ -103,7 +103,7 @@ class NoDeadlines:
     """Every frame of a replay is processed, and may spend the budget of its profile.
 
     Attributes:
-        report: of its pace.
+        report: report of the pace.
     """
 
     reduced = False

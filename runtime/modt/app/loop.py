@@ -92,12 +92,12 @@ class Loop:
     """Drives the stages by the frames of a source.
 
     Args:
-        source: of the frames.
+        source: source of the frames.
         stages: process them.
-        sinks: of the results, by their names in messages.
+        sinks: sinks of the results, by their names in messages.
         observe: called with every result and its ledger line.
         report: called once a second.
-        deadlines, failures, stop: say what is processed, what is contained, and when to end.
+        deadlines, failures, stop: decide which sweeps are processed, which failures are contained, and when to end.
 
     Attributes:
         reloads, refused_reloads: counts.
@@ -126,7 +126,7 @@ class Loop:
         Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
 
         Raises:
-            ModtError: what cannot be contained.
+            ModtError: a failure that cannot be contained.
         """
         gc.collect()
         gc.freeze()
@@ -139,7 +139,7 @@ class Loop:
                 self._process(received)
 
     def _frames(self, supervisor: Supervisor) -> Iterator[Received]:
-        """Frames as they come; between them reloads, watchdog and reports are served."""
+        """Frames as they arrive. Reloads, watchdog and reports are served between them."""
         reported_s = float("-inf")
         while self._stop.signal is None:
             if self._stop.take_reload():

@@ -81,7 +81,7 @@ class Playback:
         return Received(frame, 0.0)
 
     def health(self) -> dict[str, Any]:
-        """Nothing is received."""
+        """No counts: nothing is received."""
         return {}
 
     def close(self) -> None:

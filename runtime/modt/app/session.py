@@ -44,7 +44,7 @@ class Session:
 
     Attributes:
         source, stages, recording, sinks, deadlines, failures, stop: its parts.
-        power: what the windows of the meters say.
+        power: power by the windows of the meters.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class Session:
         return {address: sink.health() for address, sink in self.sinks.items()}
 
     def _finish(self) -> None:
-        """Write what waits, and the summary."""
+        """Write the summary after everything that waits."""
         elapsed_s, frames, stages = self._clock() - self._began_s, self._totals.frames, self.stages
         faults = self.source.faults
         self.summary = self._totals.result() | {
@@ -255,14 +255,14 @@ def service(
     """A service over a live source; the threads that write begin on the cores that this one is allowed.
 
     Args:
-        request: what is asked for.
+        request: the options of the user.
         source: open, not started.
-        sinks: of the results, by their addresses.
+        sinks: sinks of the results, by their addresses.
         out: run directory.
         metrics: file for Prometheus; None for none.
-        core: of the loop; None leaves it where it is.
+        core: core of the loop; None leaves the affinity unchanged.
         command: for the record.
-        lacking: what the loop has to do without, for the status.
+        lacking: refused permissions, for the status.
 
     Raises:
         MisuseError: an invalid request.

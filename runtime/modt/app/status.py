@@ -50,10 +50,10 @@ class Counts:
 
 
 class Power:
-    """What the windows say; unknown until the first one with a reading, and while the meters fail.
+    """Power by the windows of the meters. It is unknown before the first reading and while the meters fail.
 
     Attributes:
-        watts: of the last window.
+        watts: power in the last window.
         kind: measured, integrated, estimated or unavailable.
         frame_J: energy a frame in it.
         stages_J: the same of each stage, of idling and of the rest of the process (`attribute`).
@@ -135,6 +135,6 @@ def _times(figures: dict[str, float]) -> str:
 
 
 def _counts(health: dict[str, Any]) -> str:
-    """Scalars that say something."""
+    """Scalars that are not empty or zero."""
     said = {key: value for key, value in health.items() if value and not isinstance(value, dict)}
     return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in said.items()) or "nothing to report"

@@ -20,7 +20,7 @@ class Supervisor:
     Sending never blocks. The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
 
     Args:
-        address: of the socket; None where nobody supervises.
+        address: address of the socket; None without a supervisor.
         watchdog_s: period of the watchdog; None where there is none.
         clock: monotonic [s].
     """

@@ -1,4 +1,4 @@
-"""`modt status`: what a running service is doing."""
+"""`modt status`: print the status of a service."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def add_directory(p: argparse.ArgumentParser) -> None:
-    """That of the service."""
+    """Add the run directory of the service."""
     run_directory = "its run directory (default: %(default)s)"
     p.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
 

@@ -15,7 +15,7 @@ log = logging.getLogger(__name__)
 
 MAX_QUOTED = 100
 BROKEN = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
-"""What using a record raises that lacks a value, or has one of another kind."""
+"""Exceptions raised by the use of a record that lacks a value or has one of another kind."""
 
 
 def line(record: dict[str, Any]) -> str:
@@ -59,10 +59,10 @@ def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iter
 
 @contextmanager
 def records_of(path: Path) -> Iterator[None]:
-    """Where records are used: one that lacks a value, or has one of another kind, is an error of its file or folder.
+    """Convert the failure of using a broken record to an error of its file or folder.
 
     Raises:
-        MisuseError: so it is.
+        MisuseError: a record lacks a value, or has one of another kind.
     """
     try:
         yield

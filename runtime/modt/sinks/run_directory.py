@@ -22,13 +22,13 @@ _KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) f
 
 
 def status_paths(directory: Path) -> tuple[Path, Path]:
-    """Where the status of a run is: beside its records and, while those cannot be written, in memory."""
+    """Paths of the status of a run: beside its records, and in memory while those cannot be written."""
     name = hashlib.sha256(os.fsencode(directory.resolve())).hexdigest()[:16]
     return directory / STATUS, MEMORY / f"modt-{name}.json"
 
 
 class RunDirectory:
-    """Every part is a whole run; a half-made one, which a failed start has left, is made anew.
+    """The parts of a run. Each is complete in itself; an incomplete one, left by a failed start, is replaced.
 
     Attributes:
         path: the directory.
@@ -82,7 +82,7 @@ class RunDirectory:
         self.write(RUN, description, lasting=True)
 
     def write(self, name: str, text: str, *, lasting: bool = False) -> None:
-        """Write a file of the present part atomically; a lasting one is never found empty after a power cut.
+        """Write a file of the present part atomically. A lasting file survives a power cut whole.
 
         Raises:
             ModtError: it cannot be written.
@@ -90,11 +90,11 @@ class RunDirectory:
         replace_file(self.path / name, text, lasting=lasting)
 
     def present(self) -> bool:
-        """Whether the present part is still at its path."""
+        """Whether the present part is at its path."""
         return os.path.isfile(self.path / RUN)
 
     def in_memory(self, status: str | None) -> None:
-        """Keep the status in memory, None removes it; one that cannot be kept is left out."""
+        """Keep the status in memory; None removes it. Failures are ignored."""
         path = status_paths(self.path)[1]
         with suppress(OSError, ModtError):
             if status is None:
@@ -103,10 +103,10 @@ class RunDirectory:
                 replace_file(path, status)
 
     def sync(self) -> None:
-        """Have the names of the present part and its files outlast a power cut.
+        """Make the names of the present part and its files survive a power cut.
 
         Raises:
-            ModtError: they may not.
+            ModtError: the disk reports a failure.
         """
         with writing(self.path):
             sync_folder(self.path)
@@ -159,7 +159,7 @@ class RunDirectory:
             if excess <= 0:
                 return
             _remove_known(path)
-            with suppress(OSError):  # holds files of someone else
+            with suppress(OSError):  # it holds foreign files
                 path.rmdir()
             excess -= size
 
@@ -178,4 +178,4 @@ def _size(path: Path) -> int:
 def _remove_known(path: Path) -> None:
     for name in _KNOWN - {RUN}:
         (path / name).unlink(missing_ok=True)
-    (path / RUN).unlink(missing_ok=True)  # the last one: what is left half deleted is still known as ours
+    (path / RUN).unlink(missing_ok=True)  # last, so that a half deleted part is recognised as ours
