@@ -2,8 +2,7 @@
 
 import pytest
 
-from modt.app.deadlines import Deadlines
-from modt.app.timing import Timing
+from modt.app.deadlines import Deadlines, Timing
 
 
 def test_a_frame_is_missed_when_its_result_comes_after_the_next_sweep():

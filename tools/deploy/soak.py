@@ -195,7 +195,7 @@ def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[s
     descriptors, late = _thirds(witness.descriptors)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
     share = missed / max(int(clear.sum()), 1)
-    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.deadlines.report()}")
+    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.status()['loop']}")
     print(f"memory {max(witness.resident_mb):.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
     print(f"descriptors {max(witness.descriptors)} at most, {descriptors:.0f} midway, {late:.0f} at the end")
     if share > MAX_MISSED:

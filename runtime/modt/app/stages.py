@@ -106,7 +106,7 @@ class Stages:
         return self._mode.budget(self.config)
 
     def recognise(self, first: Frame, named: str | None = None) -> None:
-        """Take the profile that the first sweep shows; `named` is the profile that the messages of the sensor name."""
+        """Take the profile that the first sweep shows, or `named`, which the messages of the sensor name."""
         self._first, self._info = first, replace(self._info, profile=named or self._info.profile)
         chosen = self._choose()
         if chosen.config == self.config:

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from modt.app.timing import Timing
+from modt.app.deadlines import Timing
 from modt.sinks.run_directory import SUMMARY
 from modt_desk.reporting.run_report import lateness_plots
 

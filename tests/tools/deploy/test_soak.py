@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from modt.app.timing import Timing
 from tests.sources.packets.simulated import packets
 from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT
 from tools.deploy.sender import Faulty
@@ -46,7 +45,7 @@ def test_the_clock_of_the_sensor_is_set_once_by_its_fault():
 
 def session(lost):
     recording = SimpleNamespace(health=lambda: {"lost_lines": lost})
-    return SimpleNamespace(deadlines=Timing(), recording=recording)
+    return SimpleNamespace(status=lambda: {"loop": {}}, recording=recording)
 
 
 def witness(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0):
