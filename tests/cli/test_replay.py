@@ -60,18 +60,6 @@ def test_run_directory_has_the_documented_files(runs, mode):
             assert (t["box"] is None) == (t["proposal"] is None) == (t["missed"] > 0)
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_the_ledger_counts_what_each_stage_made(runs, mode):
-    root, _ = runs
-    lines = [json.loads(line) for line in (root / mode / "ledger.jsonl").read_text().splitlines()]
-    booked = [line["stages"] for line in lines if "frame" in line]
-    frames = tracks(root / mode)
-    assert [b["tracking"]["items"] for b in booked] == [len(f["tracks"]) for f in frames]
-    found = [b["segmentation"]["items"] for b in booked]
-    in_conventional = [json.loads(line) for line in (root / "conventional/ledger.jsonl").read_text().splitlines()]
-    assert found == [line["stages"]["segmentation"]["items"] for line in in_conventional if "frame" in line]
-
-
 def test_conventional_classifies_everything_and_the_others_less(runs):
     root, _ = runs
     figures = {mode: json.loads((root / mode / "summary.json").read_text()) for mode in MODES}
