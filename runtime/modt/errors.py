@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 
 class ModtError(Exception):
     """A failure that the user can remedy; exit status 1.
@@ -31,6 +33,12 @@ class MisuseError(ModtError):
 
 class ScanError(ModtError):
     """A scan that cannot be used; the stream continues without it."""
+
+
+def refuse_pipe(path: Path, remedy: str) -> None:
+    """Raise a MisuseError where a path leads to a pipe or a device, which may never end, or to a folder."""
+    if path.exists() and not path.is_file():
+        raise MisuseError(path, "is no file", remedy)
 
 
 def install(extra: str) -> str:

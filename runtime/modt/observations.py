@@ -45,7 +45,7 @@ class Observations:
         return centres(self.kdop)[::2].T
 
     def moved(self, step: Float64) -> Observations:
-        """The same, each displaced by a step (P, 2) [m, world]."""
+        """A copy, displaced by steps (P, 2) [m, world]."""
         box = self.box.copy()
         box[:, :2] += step
         return Observations(
@@ -96,7 +96,7 @@ def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKern
 
 @dataclass(frozen=True, slots=True)
 class StaticTracks:
-    """What the odometry needs to know of the tracks after a frame; M rows in the order of their ids.
+    """The tracks after a frame, as the odometry needs them; M rows in the order of their ids.
 
     Attributes:
         id: (M,) ascending.

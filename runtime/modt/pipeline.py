@@ -46,7 +46,7 @@ class Segmenter(Protocol):
         """Proposals of (N, 4) points."""
 
     def facts(self) -> dict[str, str]:
-        """Which kernels it runs on, for the record of a run."""
+        """Kernels of the segmenter, for the record of a run."""
 
 
 class Odometry(Protocol):
@@ -64,7 +64,7 @@ class Tracker(Protocol):
         """Name of each value of tracks.state."""
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """What the odometry needs to know of the tracks that a frame at this time may continue."""
+        """Tracks that a frame at this time may continue, as the odometry needs them."""
 
     def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """Predict, associate and update; afterwards every proposal belongs to one track."""
@@ -80,17 +80,17 @@ class Classifier(Protocol):
         """(R, 4) P(Y|X) of the proposals named."""
 
     def facts(self) -> dict[str, str]:
-        """Which model it is, for the record of a run."""
+        """Name and hash of the model, for the record of a run."""
 
 
 class Fusion(Protocol):
-    """Which views count, and what they add up to."""
+    """Views to posteriors."""
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks whose view of this frame is worth a classification."""
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Write the posterior of the rows; (R,) whether each is certain now."""
+        """Write the posterior of the rows; (R,) whether each class is confirmed."""
 
 
 class Decision(Protocol):
@@ -98,10 +98,10 @@ class Decision(Protocol):
 
     @property
     def frequency(self) -> Float64:
-        """(4,) of the classes among the proposals of the stream."""
+        """(4,) frequency of the classes among the proposals of the stream."""
 
     def decide(self, tracks: Tracks) -> None:
-        """Write the class that is said of every track."""
+        """Write the reported class of every track."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ class Pipeline:
         return FrameResult(frame, T_world_sensor, proposals, final, names, chosen.deferred, classified)
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
-        """(R, 4) likelihoods; the ledger counts the points, and the scheduler is told the price of limited time."""
+        """(R, 4) likelihoods. The ledger counts the points; the scheduler learns the cost where time is limited."""
         cost, count = self.scheduler.cost, proposals.count[which]
         classify = self.classifier.classify
         likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)

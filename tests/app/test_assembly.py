@@ -44,7 +44,7 @@ def test_the_network_has_run_on_every_size_of_batch_before_the_first_frame(monke
     ],
 )
 def test_a_budget_below_the_price_of_a_call_is_warned_of(mode, scheduler, warned, monkeypatch, caplog):
-    """With a clock by which a call takes 0.4 ms, and a margin of half of that."""
+    """A call takes 0.4 ms by the clock of this test; the margin is half of that."""
     clock = type("Clock", (), {"thread_time_ns": itertools.count(0, 400_000).__next__})
     monkeypatch.setattr(assembly, "time", clock)
     with caplog.at_level(logging.WARNING):

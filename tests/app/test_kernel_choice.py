@@ -1,4 +1,4 @@
-"""Which kernels segmentation runs on, and where that is said."""
+"""Choice of the kernels of the segmentation, and how it is reported."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ import logging
 
 import pytest
 
-from modt import profile
-from modt.app import assembly, checks, kernel_choice
+from modt.app import checks, kernel_choice
 from modt.errors import MisuseError
-from modt.geometry import FieldOfView
 from modt.native.library import NotAvailableError
 from modt.segmentation.kernels import NUMPY
 
@@ -31,13 +29,6 @@ def test_numpy_takes_their_place_with_a_warning(none_compiled, caplog):
     assert "not compiled for riscv64" in caplog.text
 
 
-def test_a_pipeline_warns_once(none_compiled, caplog):
-    config = profile.load("vlp-16")
-    with caplog.at_level(logging.WARNING):
-        assembly.pipeline(assembly.MODES["efficient"], config, FieldOfView())
-    assert caplog.text.count("run on NumPy") == 1
-
-
 def test_numpy_where_it_is_asked_for_is_no_reason_to_warn(none_compiled, caplog):
     assert kernel_choice.choose("numpy") is NUMPY
     assert not caplog.text
@@ -54,11 +45,6 @@ def test_the_environment_wins(none_compiled, monkeypatch, caplog):
     monkeypatch.setenv(kernel_choice.VARIABLE, "fast")
     with pytest.raises(MisuseError, match="MODT_KERNELS: no kernels 'fast'; use one of: auto, native, numpy"):
         kernel_choice.choose("numpy")
-
-
-@pytest.mark.parametrize(("name", "level"), [("numpy", checks.WARN), ("native (baseline)", checks.OK)])
-def test_the_check_says_which(name, level):
-    assert checks.kernels(lambda: name).level == level
 
 
 def test_the_check_fails_where_they_cannot_be_chosen(none_compiled):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from modt import profile
-from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.inputs import Request
 from modt.app.stages import RANGE_SHARE, SensorWatch, Stages, within
 from modt.energy.ledger import Ledger
@@ -146,13 +145,6 @@ def test_a_reload_keeps_the_tilt_that_the_first_sweep_showed():
     assert stages.config.sensor.pitch_deg == pitch_deg
 
 
-def test_without_a_profile_the_first_sweep_decides(caplog):
-    stages = stages_of(profile=None)
-    stages.recognise(frames()[0])
-    assert stages.chosen.name == "as found"
-    assert stages.config.sensor != profile.load().sensor
-
-
 def test_a_profile_that_fits_keeps_its_stages():
     stages = stages_of()
     made = stages.pipeline
@@ -169,12 +161,6 @@ def test_a_reload_keeps_what_the_first_sweep_has_shown():
     assert stages.pipeline is not made
 
 
-def test_a_profile_that_the_source_names_is_the_base_of_what_is_found():
-    stages = stages_of(profile=())
-    stages.recognise(frames()[0], "vlp-16")
-    assert stages.config.sensor.elevation_step_deg == profile.load("vlp-16").sensor.elevation_step_deg
-
-
 def test_a_reduced_frame_holds_what_is_near():
     stages, frame = stages_of(), frames()[0]
     reach_m = RANGE_SHARE * stages.config.sensor.max_range_m
@@ -183,16 +169,6 @@ def test_a_reduced_frame_holds_what_is_near():
     assert distance_m.max() <= reach_m
     assert len(result.frame.points) == np.count_nonzero(np.hypot(*frame.points[:, :2].T) <= reach_m)
     assert len(within(frame.points, 1e9)) == len(frame.points)
-
-
-def test_failures_are_counted_by_kind_and_fatal_only_in_a_row(caplog):
-    failures = Containment()
-    for _ in range(3):
-        for _ in range(RENEW_AFTER):
-            failures.fail(ValueError("x"), "frame")
-        failures.succeed()
-    assert failures.counts == {"frame: ValueError": 3 * RENEW_AFTER}
-    assert len(caplog.records) == 1
 
 
 @pytest.mark.slow
@@ -228,11 +204,3 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
     stages.watch(Frame(100, 10.0, few))
     stages.looking.join()
     assert looks[1:] == [100]  # what it could not look at meanwhile
-
-
-def test_fewer_returns_of_the_same_sensor_change_nothing():
-    stages = stages_of()
-    for k, frame in enumerate(frames()):
-        some = frame.points if k < 3 else frame.points[frame.points[:, 0] > 0]
-        stages.watch(dataclasses.replace(frame, points=some))
-    assert stages.misfits == 0

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from modt.app.prometheus import metrics_text, write_metrics
-from modt.app.status import Counts, Power, one_line
+from modt.app.status import Counts, Power
 from modt.config import EnergyConfig
 from modt.reporting.summary import Summary
 from tests.results import CAR, result
@@ -33,11 +33,6 @@ def status(**loop):
         "recording": {"lines": 40, "lost_lines": 0, "keep": "all"},
         "host": {"resident_mb": 150.5, "lacking": []},
     }
-
-
-def test_the_line_has_rate_tracks_and_watts():
-    assert one_line(status()) == "10.0 Hz, 7 tracks (2 car), 6.2 W estimated"
-    assert one_line(status(step="reduced")).endswith(", load: reduced")
 
 
 def test_metrics_are_valid_lines_with_one_type_each():

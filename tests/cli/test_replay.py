@@ -19,7 +19,7 @@ from modt_desk.reporting.run_report import run_tree
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
-from .commands import begin, environment, modt
+from .commands import begin, modt
 
 pytestmark = pytest.mark.command
 
@@ -58,32 +58,6 @@ def test_run_directory_has_the_documented_files(runs, mode):
             objects = CLASS_NAMES[1 + int(np.argmax(t["posterior"][1:]))]
             assert t["class"] in {"background", objects} or max(t["posterior"][1:]) < 0.5  # by the decision
             assert (t["box"] is None) == (t["proposal"] is None) == (t["missed"] > 0)
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_the_ledger_counts_what_each_stage_made(runs, mode):
-    root, _ = runs
-    lines = [json.loads(line) for line in (root / mode / "ledger.jsonl").read_text().splitlines()]
-    booked = [line["stages"] for line in lines if "frame" in line]
-    frames = tracks(root / mode)
-    assert [b["tracking"]["items"] for b in booked] == [len(f["tracks"]) for f in frames]
-    found = [b["segmentation"]["items"] for b in booked]
-    in_conventional = [json.loads(line) for line in (root / "conventional/ledger.jsonl").read_text().splitlines()]
-    assert found == [line["stages"]["segmentation"]["items"] for line in in_conventional if "frame" in line]
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_labels_name_proposals_and_classes(runs, mode):
-    root, _ = runs
-    for frame in tracks(root / mode):
-        label = np.fromfile(root / mode / "labels" / f"{frame['frame']:06d}.label", np.uint32)
-        of = {t["proposal"] + 1: t for t in frame["tracks"] if t["proposal"] is not None}
-        numbers, counts = np.unique(label >> 16, return_counts=True)
-        shown = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
-        assert set(shown) - {0} == set(of)
-        assert all(shown[n] == t["points"] for n, t in of.items())
-        classes = dict(zip((label >> 16).tolist(), (label & 0xFFFF).tolist(), strict=True))
-        assert all(CLASS_NAMES[classes[n]] == t["class"] for n, t in of.items())
 
 
 def test_conventional_classifies_everything_and_the_others_less(runs):
@@ -263,16 +237,6 @@ def test_a_signal_ends_the_run_well(tmp_path, number, status):
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["frames"] == len(tracks(tmp_path / "run"))
     assert summary["run"]["stopped_by"] == signal.Signals(number).name
-
-
-def test_systemd_is_notified(tmp_path):
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
-        systemd.bind(str(tmp_path / "notify"))
-        environment_ = environment() | {"NOTIFY_SOCKET": str(tmp_path / "notify")}
-        done = modt("replay", "--frames", "0:3", "--out", "run", cwd=tmp_path, env=environment_)
-        assert done.returncode == 0, done.stderr
-        heard = [systemd.recv(4096) for _ in range(5)]
-    assert heard == [b"READY=1", *3 * [b"WATCHDOG=1"], b"STOPPING=1"]
 
 
 @pytest.mark.kitti

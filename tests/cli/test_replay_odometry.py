@@ -9,7 +9,7 @@ import yaml
 
 from modt.app.inputs import Request
 from modt.app.session import replay
-from modt.app.supervisor import NoSupervisor
+from modt.app.supervisor import Supervisor
 from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
@@ -37,7 +37,7 @@ def session(out, **options):
 
 def run(out, **options):
     """Summary of a run and the bytes of its tracks."""
-    summary = session(out, **options).run(NoSupervisor())
+    summary = session(out, **options).run(Supervisor())
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
@@ -64,7 +64,7 @@ def test_poses_from_a_socket_equal_recorded_poses_and_a_restart_of_the_sender_mo
             pose = T_elsewhere @ T if restarted and i >= FRAMES // 2 else T
             message = {"stamp": stamp_s, "pose": pose.ravel().tolist()}
             out.sendto(json.dumps(message).encode(), str(tmp_path / "s"))
-    odometry = played.run(NoSupervisor())["odometry"]
+    odometry = played.run(Supervisor())["odometry"]
     tracks = (tmp_path / "run" / "tracks.jsonl").read_bytes()
     assert not (tmp_path / "s").exists()
     if restarted:
@@ -114,7 +114,7 @@ def test_a_stream_without_poses_is_said_to_have_none_unless_they_come_from_elsew
     (tmp_path / "poses.txt").write_text(3 * GOOD)
     request = Request(path=layouts.bare(tmp_path), **{key: places.get(name, name) for key, name in options.items()})
     made = replay(request, {}, tmp_path / "run", None, ["modt"])
-    made.run(NoSupervisor())
+    made.run(Supervisor())
     notes = [*made.stages.info.notes, *made.stages.info.pose_notes]
     assert any("no calibration" in note for note in notes)
     assert any("no odometry" in note for note in notes) == said

@@ -7,7 +7,7 @@ import pytest
 
 from modt.app.inputs import Request
 from modt.app.session import replay
-from modt.app.supervisor import NoSupervisor
+from modt.app.supervisor import Supervisor
 from modt.ros2 import odometry
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
@@ -35,7 +35,7 @@ def session(out, **options):
 
 def run(out, **options):
     made = session(out, **options)
-    return made, made.run(NoSupervisor())
+    return made, made.run(Supervisor())
 
 
 def tracks(out):
@@ -67,7 +67,7 @@ def test_the_poses_of_a_topic_place_the_sweeps(street, tmp_path, loopback):
     for frame in street:
         sent.write(write_odometry(frame.stamp_s, "odom", "lidar", frame.T_world_sensor))
     until(lambda: made.stages.odometry.place(street[0]).T_world_sensor is not None)
-    summary = made.run(NoSupervisor())
+    summary = made.run(Supervisor())
     assert summary["odometry"]["frames_unposed"] <= FRAMES
     assert summary["odometry"]["frames_posed"] >= FRAMES
     assert summary["odometry"]["used"] == FRAMES

@@ -1,1 +1,1 @@
-"""What is left of the records when the power, the disk or the process goes."""
+"""Loss of power, disk or process: the records that remain."""

@@ -27,8 +27,8 @@ from modt.app.containment import Containment
 from modt.app.deadlines import Deadlines
 from modt.app.loop import Stop
 from modt.app.session import Session
-from modt.app.status import STALE_S, Monitor
-from modt.app.supervisor import Systemd
+from modt.app.status import STALE_S
+from modt.app.supervisor import Supervisor
 from modt.cli.status import read
 from modt.config import ProfileConfig, RecordingConfig
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
@@ -109,7 +109,7 @@ class Faults:
     Attributes:
         calls: what was called, in order.
         now_s: the monotonic clock.
-        calendar_s: by which the calendar is ahead of it.
+        calendar_s: time by which the calendar is ahead of it.
         last_s: time of the last fault; minus infinity before.
     """
 
@@ -357,17 +357,16 @@ class FaultyRun:
                 Facts("test", "J", 1e-6, 100.0, Scope.BOARD, Kind.MEASURED),
                 lambda: faults.call("meter", self._joules),
             )
-            monitor = Monitor(recording, deadlines.timing, folder / "modt.prom")
             stages: Any = Stages(poses)
-            supervisor = Systemd(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
+            supervisor = Supervisor(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
             stack.enter_context(patch.object(metering, "windows", self._windows))
             stack.enter_context(patch.object(live_stream, "READ_S", PAUSE_S))
             (folder / "memory").mkdir()
             stack.enter_context(patch.object(run_directory, "MEMORY", folder / "memory"))
             stack.enter_context(faults.installed())
             session = Session(
-                source, stages, recording, sinks, deadlines, Containment(), monitor, stop, Summary(0), [meter], None,
-                clock=lambda: faults.now_s,
+                source, stages, recording, sinks, deadlines, Containment(), stop, Summary(), [meter], None,
+                metrics=folder / "modt.prom", clock=lambda: faults.now_s,
             )  # fmt: skip
             self.session = session
 
@@ -393,7 +392,7 @@ class FaultyRun:
                 faults.active = False
 
     def check(self) -> None:
-        """What holds after every run."""
+        """Check the promises that hold after every run."""
         assert not self.unread, self.unread
         records: dict[str, list[Any]] = {SCHEMA: [], LEDGER_SCHEMA: [], ENERGY_SCHEMA: []}
         for part in self.out.parent.glob("run*"):
@@ -426,15 +425,14 @@ class FaultyRun:
 
         recording.write, recording.ledger = write_counted, ledger_counted  # type: ignore[method-assign]
 
-    def _windows(self, meters: Any, core: int | None, config: Any) -> Windows:
+    def _windows(self, meters: Any, core: int | None) -> Windows:
         faults = self.faults
         clocks = Clocks(
             lambda: int(1e9 * faults.monotonic()),
             lambda: int(1e9 * faults.monotonic()),
-            lambda: int(1e9 * faults.calendar()),
             lambda: int(1e9 * faults.now_s),
         )
-        return Windows(meters, clocks, Conditions(0), config)
+        return Windows(meters, clocks, Conditions(0))
 
     def _joules(self) -> float:
         return 5.0 * self.faults.now_s

@@ -51,7 +51,7 @@ class PowerCuts:
 
     @property
     def number(self) -> int:
-        """Of the root."""
+        """Inode of the root."""
         return self.root.stat().st_ino
 
     def note(self) -> None:

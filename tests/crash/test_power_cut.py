@@ -25,7 +25,7 @@ def recorded(folder, time=None):
 
 
 def parts(folder):
-    """Those of a service, the oldest first."""
+    """Parts of a service, the oldest first."""
     kept = sorted((p for p in folder.glob("run~*")), key=lambda p: int(p.name.partition("~")[2]))
     return [*kept, *(p for p in [folder / "run"] if p.exists())]
 

@@ -26,7 +26,7 @@ class DeadlineError(BaseException):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What left a reader that should not have.
+    """An exception that should not have left a reader.
 
     Attributes:
         error: its type and message.

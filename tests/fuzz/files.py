@@ -91,7 +91,7 @@ def oxts_of_drive(folder: Path) -> Feed:
 
 @target()
 def time_stamps(folder: Path) -> Feed:
-    """Those of the sweeps, of their begin and of their end alike."""
+    """Time stamps of the sweeps, the same for their begin and their end."""
     drive = layouts.raw_drive(folder)
     points = drive / "velodyne_points"
 

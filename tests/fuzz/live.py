@@ -1,4 +1,4 @@
-"""What comes while a robot runs: sweeps of any numbers, and requests for its page."""
+"""Inputs of a running robot: sweeps of any numbers, and requests for its page."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.segmentation.test_native_kernels import HOSTILE, same, street
 
 @target()
 def sweeps(folder: Path) -> Feed:
-    """Of x, y, z and reflectance in single precision: the compiled kernels, with their assertions, and NumPy's."""
+    """Sweeps of x, y, z and reflectance in single precision, by the checked compiled kernels and by NumPy's."""
     library = folder / "kernels.so"
     try:
         build.compile_library(library, build.BASELINE, flags=build.CHECKED)
@@ -59,7 +59,7 @@ class Connection:
 
 @target()
 def requests(_: Path) -> Feed:
-    """Of the live page."""
+    """Requests to the live page."""
     ended = Client()
     ended.end()
     names = {"localhost", "127.0.0.1"}

@@ -71,7 +71,7 @@ def _splice(raw: bytearray, seeds: Sequence[bytes], chance: random.Random) -> No
 
 
 def _word(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
-    """In place of a word of the text, if it is one."""
+    """Replace a word of the text, if it is a text."""
     at = _place(raw, chance)
     ends = [end for end in (raw.find(c, at, at + 64) for c in b' \n,:"]}<') if end >= 0]
     raw[at : chance.choice((at, min(ends, default=at)))] = chance.choice(WORDS)

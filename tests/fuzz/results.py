@@ -1,4 +1,4 @@
-"""What the package has written itself, and others may have changed: comparisons and predictions."""
+"""Comparisons and predictions, which the package has written and others may have changed."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ABOUT = {**ITSELF, "fov": "full", "asked": [0, 8], "frames": 8}
 
 
 def comparison() -> bytes:
-    """Of nine frames."""
+    """A comparison over nine frames."""
     found = CALIBRATION[0].take(np.arange(9))
     names = dict(zip(found.runs, (*assembly.MODES, "varied"), strict=True))
     tables = {
@@ -73,7 +73,7 @@ def json_lines(records: Iterable[dict[str, Any]]) -> bytes:
 
 @target()
 def viewed_run(folder: Path) -> Feed:
-    """What is seen by its ledger and its tracks, parted by a line `---`."""
+    """The view of a run from its ledger and its tracks, which a line `---` separates."""
     run = described(write_run(folder / "run", frames=2))
     ledger, tracks, costs = run / "ledger.jsonl", run / "tracks.jsonl", [ledger_line(k, 1) for k in range(2)]
     seed = [*costs, window(0, costs, 1.5)]

@@ -137,7 +137,7 @@ def tracks(folder: Path) -> Feed:
 
 @target()
 def judged_run(folder: Path) -> Feed:
-    """What is judged by its description and its tracks, parted by a line `---`."""
+    """Evaluation of a run by its description and its tracks, which a line `---` separates."""
     truth = open_truth(tracklets(layouts.raw_drive(folder), ("Car", 1, [8, 9])))
     run = folder / "run"
     (run / "labels").mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""What is fuzzed: readers, the bytes that they are fed with, and how they may refuse them."""
+"""Targets of fuzzing: readers, the bytes that they are fed with, and how they may refuse them."""
 
 from __future__ import annotations
 

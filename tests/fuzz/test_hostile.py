@@ -61,14 +61,6 @@ def test_many_hostile_recordings_are_read_or_refused(maker: str, tmp_path: Path)
     assert findings(tmp_path, maker, range(FEW, MANY)) == []
 
 
-@pytest.mark.parametrize("schema", range(len(hostile.SCHEMAS)))
-def test_every_schema_is_read_or_refused(schema: int, tmp_path: Path) -> None:
-    path = tmp_path / "a.db3"
-    hostile.database(path, random.Random(schema), schema)
-    with limits():
-        assert execute(lambda _: read(path), b"", (ModtError,)) is None
-
-
 @pytest.mark.parametrize("schema", [2, 3, 4, 9])
 def test_views_and_triggers_are_refused_by_their_name(schema: int, tmp_path: Path) -> None:
     path = tmp_path / "a.db3"

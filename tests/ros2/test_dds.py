@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from modt import host
 from modt.errors import ModtError
 from modt.ros2 import point_cloud2
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
@@ -51,7 +52,8 @@ def test_the_threads_of_a_domain_run_where_they_are_told():
         pytest.skip("one core")
     gc.collect()
     before = threads()
-    joined = dds.participant(NEAR - 1, frozenset(allowed[:1]))
+    with host.threads_on(frozenset(allowed[:1])):
+        joined = dds.participant(NEAR - 1)
     begun = threads() - before
     until(lambda: {"recv", "tev"} <= {name for name, _ in alive(begun)})
     assert {cores for _, cores in alive(begun)} == {frozenset(allowed[:1])}

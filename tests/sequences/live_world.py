@@ -103,13 +103,13 @@ class Reader:
 
 
 class LiveWorld:
-    """What stands between a robot's sockets and its loop, without threads, on clocks of the test.
+    """The parts between a robot's sockets and its loop, without threads, on clocks of the test.
 
     Attributes:
         now_s: monotonic.
-        set_s: by which the calendar is ahead of it.
-        sensor_s: the same of the sensor's own clock.
-        origin_m: of the odometry.
+        set_s: time by which the calendar is ahead of it.
+        sensor_s: time by which the clock of the sensor is ahead of it.
+        origin_m: origin of the odometry.
     """
 
     def __init__(self, source: str, odometry: str) -> None:
@@ -161,7 +161,7 @@ class LiveWorld:
         self._put(self.reader.read(0.0))
 
     def pause(self) -> None:
-        """Nothing comes for a moment."""
+        """Let a moment pass in which nothing arrives."""
         self._put(self.decoder.pause(self.reader.reception))
 
     def _put(self, sweeps: Iterable[Sweep]) -> None:
@@ -232,7 +232,7 @@ class LiveWorld:
             self.take()
 
     def check(self, cpu_s: float, messages: int) -> None:
-        """What holds after every step, which took a CPU time and brought some messages."""
+        """Check the promises after a step, by its CPU time and its number of messages."""
         assert cpu_s < SLACK_CPU_S + MESSAGE_CPU_S * messages, "it took too long"
         self._bounded()
         counts = self._present_counts()

@@ -20,7 +20,7 @@ ODD = np.array([np.nan, np.inf, -np.inf, 1e-42, -1e-42, 0.0, -0.0, 999.9, -999.9
 
 @dataclass
 class World:
-    """What stands and moves around the robot, and what it is told of it.
+    """The surroundings of the robot, and its odometry.
 
     Attributes:
         stamp_s: time of the next sweep.

@@ -125,29 +125,6 @@ def test_the_end_does_not_wait_for_a_writer_that_hangs(slow, caplog):
     assert background.health()["dropped"] == 3
 
 
-def test_what_waits_too_long_at_the_end_is_dropped(slow):
-    times, asked = iter([0.0, 0.1, 9.0]), threading.Event()
-
-    def clock():
-        asked.set()
-        return next(times)
-
-    background = Background("test", slow, 10, clock=clock)
-    background.write("in work")
-    assert slow.entered.acquire(timeout=LIMIT_S)
-    background.write("in time")
-    background.write("too late")
-    closing = threading.Thread(target=background.close, daemon=True)
-    closing.start()
-    assert asked.wait(LIMIT_S)
-    slow.released.release()
-    slow.released.release()
-    closing.join(LIMIT_S)
-    assert slow.closed.wait(LIMIT_S)
-    assert slow.items == ["in work", "in time"]
-    assert background.health()["dropped"] == 1
-
-
 def test_the_thread_of_a_loop_of_real_time_is_not(slow):
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:

@@ -1,4 +1,4 @@
-"""What a client of the Foxglove server receives."""
+"""The messages that a client of the Foxglove server receives."""
 
 import base64
 import json

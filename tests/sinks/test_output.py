@@ -1,4 +1,4 @@
-"""What every sink of files shares."""
+"""Properties of all sinks of files."""
 
 import threading
 

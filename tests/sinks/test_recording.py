@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from modt.config import RecordingConfig
-from modt.errors import ModtError
 from modt.sinks import output
 from modt.sinks.recording import KEPT, RETRY_S, AtOnce, Recording, WholeRecording
 from modt.sinks.records import read_records
@@ -114,28 +113,6 @@ def test_a_full_disk_pauses_the_recording_until_there_is_room(tmp_path, monkeypa
     assert recording.cause is None
 
 
-def test_a_disk_that_is_full_at_the_start_is_no_obstacle(tmp_path, monkeypatch):
-    time, room = Time(), []
-    real = RunDirectory.write
-
-    def write(directory, name, text, **options):
-        if not room:
-            with output.writing(directory.path):
-                raise OSError(errno.ENOSPC, "No space left on device")
-        real(directory, name, text, **options)
-
-    monkeypatch.setattr(RunDirectory, "write", write)
-    recording = made(tmp_path, time=time)
-    recording.write(frame(0))
-    assert recording.health()["failing"]
-    room.append(True)
-    time.now += RETRY_S
-    recording.write(frame(1))
-    recording.finish()
-    assert [r["frame"] for r in read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA)] == [1]
-    assert recording.health()["lost_lines"] == 1
-
-
 def test_another_profile_changes_what_is_kept_and_the_description(tmp_path):
     recording = made(tmp_path, keep="none")
     (tmp_path / "run" / "run.yaml").write_text("before")
@@ -186,12 +163,3 @@ def test_a_replay_is_recorded_whole_whatever_the_profile_keeps(tmp_path):
     names = {str(p.relative_to(tmp_path / "run")) for p in (tmp_path / "run").rglob("*") if p.is_file()}
     labels = {"labels/000000.label", "labels/000001.label"}
     assert names == {"run.yaml", "tracks.jsonl", "ledger.jsonl", "kitti/0003.txt", *labels}
-
-
-def test_a_full_disk_ends_a_replay(tmp_path, monkeypatch):
-    recording = WholeRecording(RunDirectory(tmp_path / "run"), lambda: OURS, 0, None, labels=False)
-    recording.start()
-    FullDisk(monkeypatch, 0)
-    with pytest.raises(ModtError, match="No space left on device"):
-        recording.write(frame(0))
-    recording.finish()

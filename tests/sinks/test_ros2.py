@@ -43,13 +43,6 @@ def test_a_frame_is_published_to_whom_has_subscribed(loopback):
     sink.write(FRAME)
 
 
-@pytest.mark.parametrize("option", ["", "&world_frame_id="])
-def test_without_the_name_of_a_world_tf_is_left_alone(loopback, option):
-    sink = opened(option)
-    assert "/tf" not in {topic.name for topic, _ in sink.topics}
-    sink.close()
-
-
 def test_tracks_of_an_unknown_kind_are_refused():
     with pytest.raises(MisuseError, match="tracks 'some' is unknown; write tracks=objects or tracks=all"):
         opened("&tracks=some")

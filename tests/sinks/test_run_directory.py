@@ -1,5 +1,8 @@
 """The run directory: no earlier run is lost, half-made ones are no obstacle, nothing else is touched."""
 
+import shutil
+from contextlib import ExitStack
+
 import pytest
 
 from modt.errors import MisuseError, ModtError
@@ -89,6 +92,26 @@ def test_two_services_do_not_share_a_directory(tmp_path):
             second.__enter__()
     with RunDirectory(out).locked(), RunDirectory(tmp_path / "other").locked():
         pass
+
+
+@pytest.mark.parametrize("first", ["the run that is in", "another one"])
+def test_the_lock_outlasts_the_removal_of_the_folder_around_the_run(tmp_path, first):
+    run, other = (RunDirectory(tmp_path / "state" / "run") for _ in range(2))
+    with run.locked(), ExitStack() as stack:
+        run.begin(OURS, 1e9)
+        shutil.rmtree(tmp_path / "state")
+        if first == "another one":
+            stack.enter_context(other.locked())
+            other.begin(OURS, 1e9)
+            fill(other.path)
+            for _ in range(2):
+                with pytest.raises(ModtError, match="another run of modt records into it"):
+                    run.begin(OURS, 1e9)
+            assert names(tmp_path / "state" / "run") == ["run.yaml", "tracks.jsonl"]
+            stack.close()
+        run.begin(OURS, 1e9)
+        with pytest.raises(ModtError, match="another run of modt records into it"):
+            other.locked().__enter__()
 
 
 def test_where_no_lock_can_be_written_the_service_goes_on(tmp_path):

@@ -1,4 +1,4 @@
-"""Faults of a live source and its surroundings, each with the counter that must report it."""
+"""Faults of a sensor, its network and the surroundings of a run, and the counter that must report each."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,9 @@ from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, MeterLostError, Scope
 from modt.pipeline import Pipeline
 from modt.sinks.output import LineFile, writing
-from modt.sources.live.sweep_reader import Sweep
 from modt.types import Budget, Frame, FrameResult
+from tools.send.faults import PacketFaults
+from tools.send.loops import VelodyneStamps
 
 LATE_MS = 5.0
 HOG = """
@@ -30,28 +31,27 @@ while True:
     time.sleep(0.02)
 """
 HOG_PRIORITY = 20
-"""Real-time priority above that of the loop."""
+"""Above the priority of the loop."""
 FULL_DISK = "full disk"
 """The one fault that may cost records."""
-Sweeps = Sequence[Sweep]
+BLOCKS, BLOCK_BYTES, CELL = 12, 100, np.dtype([("distance", "<u2"), ("reflectance", "u1")])
+"""A Velodyne's packet: blocks of a head of four bytes and of the returns of 32 firings."""
 
 
 class World:
-    """State of the surroundings, which the faults change.
+    """Switches that the faults turn.
 
     Attributes:
-        disk_full, meter_lost, stage_broken: whether the fault is active.
-        back_s: sum of the steps back of the sensor's clock [s].
+        disk_full, meter_lost, stage_broken: the fault is active.
     """
 
     def __init__(self, core: int | None, hogs: int, *, fifo: bool) -> None:
         self.disk_full = self.meter_lost = self.stage_broken = False
-        self.back_s = 0.0
         self._core, self._n_hogs, self._fifo = core, hogs, fifo
         self._hogs: list[subprocess.Popen[bytes]] = []
 
     def set_hogs(self, on: bool) -> None:
-        """Start or end processes that compute on the core of the loop."""
+        """Begin or end processes that compute on the core of the loop."""
         while on and len(self._hogs) < self._n_hogs:
             hog = subprocess.Popen([sys.executable, "-c", HOG])
             if self._fifo:
@@ -65,7 +65,7 @@ class World:
             hog.wait()
 
     def install(self) -> None:
-        """Have the writers and stages of this process obey the switches."""
+        """Put the switches of disk and stages into this process."""
         write, step, world = LineFile.write, Pipeline.step, self
 
         def full(file: LineFile[Any], item: Any) -> None:
@@ -84,7 +84,7 @@ class World:
         Pipeline.step = broken  # type: ignore[method-assign, assignment]
 
     def meters(self, clock: Callable[[], float]) -> Discovery:
-        """Discovery of a meter of 5 W that can be lost."""
+        """A meter of 5 W that may be lost."""
 
         def read() -> float:
             if self.meter_lost:
@@ -102,55 +102,34 @@ class Fault:
     Attributes:
         seconds: duration.
         counter: the counter that reports it.
-        sweeps: turns a sweep into faulty ones, by a random generator.
-        switch: turns the fault on and off in the world.
+        network: what becomes of packets on their way.
+        packet: changes a packet, by a random generator.
+        clock_s: step of the sensor's clock when the fault begins [s].
+        switch: turns it on and off in the world.
         silent_if_steady: no report is needed while results stay regular.
     """
 
     name: str
     seconds: float
     counter: Callable[[Any], int]
-    sweeps: Callable[[Sweep, np.random.Generator], Sweeps] = lambda sweep, _: (sweep,)
+    network: PacketFaults = field(default_factory=PacketFaults)
+    packet: Callable[[bytes, np.random.Generator], bytes] = lambda payload, _: payload
+    clock_s: float = 0.0
     switch: Callable[[World, bool], None] = lambda world, on: None
     silent_if_steady: bool = False
 
 
-def _with_points(sweep: Sweep, points: Any) -> Sweep:
-    return replace(sweep, points=np.ascontiguousarray(points, np.float32))
+def _few_lasers(payload: bytes, _rng: np.random.Generator) -> bytes:
+    """Two of the sixteen lasers, a tenth nearer."""
+    raw = np.frombuffer(payload, np.uint8).copy()
+    cells = raw[: BLOCKS * BLOCK_BYTES].reshape(BLOCKS, BLOCK_BYTES)[:, 4:].view(CELL)
+    cells["distance"] = np.where(np.arange(cells.shape[1]) % 8 == 0, 0.9 * cells["distance"], 0)
+    return raw.tobytes()
 
 
-def _nan(sweep: Sweep, rng: np.random.Generator) -> Sweeps:
-    points = sweep.points.copy()
-    points[rng.random(len(points)) < 0.2] = np.nan
-    return (_with_points(sweep, points),)
-
-
-def _garbage(sweep: Sweep, rng: np.random.Generator) -> Sweeps:
-    return (_with_points(sweep, rng.normal(0.0, 1e5, sweep.points.shape)),)
-
-
-def _loss(sweep: Sweep, rng: np.random.Generator) -> Sweeps:
-    azimuth = np.arctan2(sweep.points[:, 1], sweep.points[:, 0])
-    lost = np.abs(azimuth - rng.uniform(-3, 3)) < rng.uniform(0.1, 1.0)
-    return (replace(_with_points(sweep, sweep.points[~lost]), complete=False),)
-
-
-def _other_sensor(sweep: Sweep, _rng: np.random.Generator) -> Sweeps:
-    """Every eighth beam, at nine tenths of the range."""
-    tangent = sweep.points[:, 2] / np.maximum(np.hypot(sweep.points[:, 0], sweep.points[:, 1]), 0.1)
-    return (_with_points(sweep, sweep.points[np.floor(tangent * 140) % 8 == 0] * [0.9, 0.9, 0.9, 1.0]),)
-
-
-def _late(sweep: Sweep, _rng: np.random.Generator) -> Sweeps:
-    return (sweep, replace(sweep, stamp_s=sweep.stamp_s - 0.1))
-
-
-def _lie(sweep: Sweep, rng: np.random.Generator) -> Sweeps:
-    return (replace(sweep, stamp_s=sweep.stamp_s + 59.0 * (rng.random() < 0.3)),)
-
-
-def _set_back(world: World, on: bool) -> None:
-    world.back_s += 100.0 * on
+def _lie(payload: bytes, rng: np.random.Generator) -> bytes:
+    stamps, ahead_us = VelodyneStamps(), 59_000_000 * int(rng.random() < 0.3)
+    return stamps.stamped(payload, (stamps.stamp_us(payload) + ahead_us) % stamps.wrap_us)
 
 
 def _switch(name: str) -> Callable[[World, bool], None]:
@@ -163,22 +142,32 @@ def _hangup(_world: World, on: bool) -> None:
 
 
 def _late_frames(session: Any) -> int:
-    """Frames that began late, and steps of the ladder. A hog need not cost a deadline."""
+    """Frames that began late, and steps of the ladder; a hog need not cost a deadline."""
     lateness = session.deadlines.timing.late_or_later()
     late = max((n for ms, n in zip(lateness["ms"], lateness["frames"], strict=True) if ms > LATE_MS), default=0)
     return int(late) + session.deadlines.changes.total()
 
 
+def _refused(session: Any) -> int:
+    """Messages and sweeps that were not used."""
+    return sum(session.source.health()["refused_messages"].values()) + int(session.source.faults.skipped)
+
+
+def _incomplete(session: Any) -> int:
+    health = session.source.health()
+    return int(health["incomplete_sweeps"] + health["lost_messages"])
+
+
+NO_FAULT = Fault("none", 0.0, lambda s: 0)
 FAULTS = (
-    Fault("silence", 4.0, lambda s: s.source.silences, lambda sweep, rng: ()),
-    Fault("not finite", 2.0, lambda s: s.source.faults.count, _nan),
-    Fault("garbage", 2.0, lambda s: s.source.faults.skipped, _garbage),
-    Fault("loss", 2.0, lambda s: s.source.incomplete, _loss),
-    Fault("duplicates", 2.0, lambda s: s.source.dropped + s.source.faults.skipped, lambda sweep, rng: (sweep, sweep)),
-    Fault("reordering", 2.0, lambda s: s.source.faults.skipped, _late),
-    Fault("other sensor", 3.0, lambda s: s.stages.misfits, _other_sensor),
-    Fault("lying stamps", 2.0, lambda s: s.source.faults.skipped, _lie),
-    Fault("clock set back", 0.2, lambda s: s.source.health()["time_steps"], switch=_set_back),
+    Fault("silence", 4.0, lambda s: s.source.silences, PacketFaults(lost=1.0)),
+    Fault("garbage", 2.0, _refused, PacketFaults(lost=1.0, garbage=1.0)),
+    Fault("loss", 2.0, _incomplete, PacketFaults(lost=0.3)),
+    Fault("duplicates", 2.0, _refused, PacketFaults(duplicated=1.0), silent_if_steady=True),
+    Fault("reordering", 2.0, _refused, PacketFaults(reordered=0.5), silent_if_steady=True),
+    Fault("other sensor", 3.0, lambda s: s.stages.misfits, packet=_few_lasers),
+    Fault("lying stamps", 2.0, _refused, packet=_lie, silent_if_steady=True),
+    Fault("clock set back", 0.2, lambda s: s.source.health()["time_steps"], clock_s=-100.0, silent_if_steady=True),
     Fault(FULL_DISK, 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
     Fault("meter lost", 3.0, lambda s: s.power.unread, switch=_switch("meter_lost")),
     Fault("failing stage", 1.0, lambda s: s.failures.counts.total(), switch=_switch("stage_broken")),

@@ -1,6 +1,8 @@
-"""Runs a recording as a live source under faults by seed, and ends with figures and a verdict.
+"""Runs a service under faults by seed, and ends with figures and a verdict.
 
     python -m tools.deploy.soak DRIVE --minutes 30 --seed 1
+
+A process of its own sends the recording as the packets of a VLP-16 to a UDP port, where the service receives them.
 
 Every fault must be reported by its counter (a process that takes the core only if results stall). The next result
 must be there within a second, at full quality. No record is lost except on a full disk. At most one deadline in 1,000
@@ -14,10 +16,12 @@ from __future__ import annotations
 import logging
 import os
 import resource
+import socket
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +29,15 @@ import numpy as np
 from modt import host
 from modt.app import metering
 from modt.app.deadlines import Deadlines
-from modt.app.inputs import Request, stream
+from modt.app.inputs import Request
 from modt.app.ladder import Step
 from modt.app.session import Session, service
-from modt.app.supervisor import NoSupervisor
+from modt.app.supervisor import Supervisor
+from modt.schemes import open_sensor
 from modt.sinks.output import Health
-from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.played_reader import PlayedReader
-from modt.sources.live.sweep_reader import StreamEndedError, Sweep
+from modt.sources.live.sweep_reader import StreamEndedError, Sweep, SweepReader
 from modt.types import FrameResult
-from tools.deploy.faults import FAULTS, FULL_DISK, Fault, World
+from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT, Fault, World
 from tools.options import parser
 
 WARM_UP_S, REST_S, SETTLE_S = 15.0, 4.0, 2.5
@@ -88,12 +91,12 @@ class Witness:
 
 
 class FaultyReader:
-    """Plays a recording for a time, with one fault after the other."""
+    """Reads the sensor for a time, with one fault after the other."""
 
-    profile = None
-
-    def __init__(self, reader: PlayedReader, world: World, seconds: float, seed: int) -> None:
-        self.reception, self._reader, self._world = reader.reception, reader, world
+    def __init__(
+        self, reader: SweepReader, sender: subprocess.Popen[str], world: World, seconds: float, seed: int
+    ) -> None:
+        self.reception, self._reader, self._sender, self._world = reader.reception, reader, sender, world
         self._rng = np.random.default_rng(seed)
         self._begin_s = self._rest_s = time.monotonic()
         self._rest_s += WARM_UP_S
@@ -103,8 +106,13 @@ class FaultyReader:
         self.episodes: list[Episode] = []
         self._now: Episode | None = None
 
+    @property
+    def profile(self) -> str | None:
+        """Profile of the sensor."""
+        return self._reader.profile
+
     def read(self, timeout_s: float) -> Sequence[Sweep]:
-        """Sweeps as the present fault has them."""
+        """Sweeps as the present fault leaves them."""
         now_s = time.monotonic()
         if now_s > self._end_s:
             self._turn_off(now_s)
@@ -113,15 +121,10 @@ class FaultyReader:
             self._turn_on(now_s)
         elif self._now is not None and now_s >= self._now.begin_s + self._now.fault.seconds:
             self._turn_off(now_s)
-        sweeps = self._reader.read(min(timeout_s, 0.05))
-        back_s = self._world.back_s
-        sweeps = [replace(sweep, stamp_s=sweep.stamp_s - back_s, points=sweep.points.copy()) for sweep in sweeps]
-        if self._now is None:
-            return sweeps
-        return [out for sweep in sweeps for out in self._now.fault.sweeps(sweep, self._rng)]
+        return self._reader.read(min(timeout_s, 0.05))
 
     def close(self) -> None:
-        """End the recording."""
+        """Release the socket."""
         self._reader.close()
 
     def ask(self) -> None:
@@ -137,13 +140,27 @@ class FaultyReader:
         self.ask()
         self._now = Episode(fault, now_s, fault.counter(self.session))
         self.episodes.append(self._now)
+        self._send(fault)
         fault.switch(self._world, True)
 
     def _turn_off(self, now_s: float) -> None:
         if self._now is not None:
+            self._send(NO_FAULT)
             self._now.fault.switch(self._world, False)
             self._now.end_s = time.monotonic()  # a hog is gone
             self._now, self._rest_s = None, now_s + REST_S + float(self._rng.uniform(0, 2))
+
+    def _send(self, fault: Fault) -> None:
+        """Have packets sent with a fault."""
+        assert self._sender.stdin is not None
+        print(fault.name, file=self._sender.stdin, flush=True)
+
+
+def free_port() -> int:
+    """A UDP port that nobody has bound."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bound:
+        bound.bind(("127.0.0.1", 0))
+        return int(bound.getsockname()[1])
 
 
 def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[str]:
@@ -178,7 +195,7 @@ def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[s
     descriptors, late = _thirds(witness.descriptors)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
     share = missed / max(int(clear.sum()), 1)
-    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.deadlines.report()}")
+    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.status()['loop']}")
     print(f"memory {max(witness.resident_mb):.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
     print(f"descriptors {max(witness.descriptors)} at most, {descriptors:.0f} midway, {late:.0f} at the end")
     if share > MAX_MISSED:
@@ -217,18 +234,24 @@ def main(arguments: list[str] | None = None) -> int:
     world = World(core, given.hogs, fifo=given.fifo)
     world.install()
     metering.discovery = lambda config: world.meters(time.monotonic)  # type: ignore[attr-defined]
-    recording = stream(Request(path=given.drive))
-    reader = FaultyReader(PlayedReader(recording, loop=True), world, 60 * given.minutes, given.seed)
-    witness = Witness()
-    source = LiveStream(recording.info, reader, cores=others)
-    request = Request(profile=given.profile)
+    port = str(free_port())
+    command = [sys.executable, "-m", "tools.deploy.sender", port, *([str(given.drive)] if given.drive else [])]
     with host.threads_on(others):
+        sender = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert sender.stdout is not None
+        sender.stdout.readline()
+        source = open_sensor(f"velodyne://127.0.0.1:{port}", others)
+        reader = FaultyReader(source.reader, sender, world, 60 * given.minutes, given.seed)
+        source.reader, witness = reader, Witness()
+        request = Request(profile=[given.profile] if given.profile else ())
         session = service(request, source, {"witness": witness}, given.out, None, core, ["soak"])
     witness.session = reader.session = session
     try:
-        session.run(NoSupervisor())
+        session.run(Supervisor())
     finally:
         world.set_hogs(False)
+        sender.kill()
+        sender.wait()
     reader.ask()
     wrong = judge(witness, reader.episodes, session)
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

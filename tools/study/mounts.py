@@ -74,8 +74,8 @@ def shares(drives: Sequence[DriveRows], kind: ObjectClass, band_m: tuple[float, 
         for rows in (np.concatenate([d.objects for d in drives]), np.concatenate([d.proposals for d in drives]))
     )
     wanted = objects[(objects["class"] == kind) & (objects["role"] == Role.COUNTED) & objects["to_segment"]]
-    reported = proposals[proposals["to_call"] & (proposals["said"] == kind)]
-    of_class = (wanted["outcome"] == Outcome.FOUND, wanted["said"] == kind, reported["owner"] == kind)
+    reported = proposals[proposals["to_call"] & (proposals["reported"] == kind)]
+    of_class = (wanted["outcome"] == Outcome.FOUND, wanted["reported"] == kind, reported["owner"] == kind)
     percent = (f"{100 * np.mean(of):.0f}" if len(of) else "-" for of in of_class)
     return f"{len(wanted)}: {' / '.join(percent)}"
 

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 
@@ -39,9 +40,9 @@ class Mode:
     """One way of the method over the same stages.
 
     Attributes:
-        machine: the states that a track goes through.
-        fusion: which views are classified and what becomes of them.
-        budget: what a frame may spend.
+        machine: states of a track and their transitions.
+        fusion: choice of the views to classify, and their combination.
+        budget: budget of a frame.
     """
 
     machine: StateMachine
@@ -53,39 +54,38 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
     return Budget(profile.scheduler.calls_per_frame, mean_ms=profile.classification_ms)
 
 
-def _first_views(config: FusionConfig, prior: Prior) -> Fusion:
-    if config.rule == "product":
-        from modt.classification.product_fusion import AnyView
+def _views(usual: Callable[[FusionConfig, Prior], Fusion], product: str) -> Callable[[FusionConfig, Prior], Fusion]:
+    """A fusion, or the one of this name for the rule `product`, whose module is loaded on demand."""
 
-        return AnyView(config, prior)
-    return FirstViews(config, prior)
+    def made(config: FusionConfig, prior: Prior) -> Fusion:
+        rule = (
+            getattr(import_module("modt.classification.product_fusion"), product)
+            if config.rule == "product"
+            else usual
+        )
+        fusion: Fusion = rule(config, prior)
+        return fusion
 
-
-def _further_views(config: FusionConfig, prior: Prior) -> Fusion:
-    if config.rule == "product":
-        from modt.classification.product_fusion import KeyViews
-
-        return KeyViews(config, prior)
-    return FurtherViews(config, prior)
+    return made
 
 
 MODES = {
     "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, _first_views, _profile_budget),
-    "accurate": Mode(ACCURATE, _further_views, _profile_budget),
+    "efficient": Mode(EFFICIENT, _views(FirstViews, "AnyView"), _profile_budget),
+    "accurate": Mode(ACCURATE, _views(FurtherViews, "KeyViews"), _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 
 
 @dataclass(frozen=True, slots=True)
-class SightedSegmenter:
-    """A segmenter to which points of blind sectors are no returns: they lie at the origin."""
+class BlindSectorFilter:
+    """Moves the points of blind sectors to the origin, which means no return, before it segments."""
 
     segmenter: SegmenterStage
     sectors: BlindSectors
 
     def facts(self) -> dict[str, str]:
-        """Which kernels it runs on."""
+        """Kernels of the segmenter."""
         return self.segmenter.facts()
 
     def segment(self, points: Float32) -> Proposals:
@@ -100,7 +100,7 @@ def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> Seg
     sensor, stage = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
     if sensor.blind_sectors_deg is None:
         return stage
-    return SightedSegmenter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
+    return BlindSectorFilter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
 
 
 def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> None:
@@ -115,7 +115,7 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
 
 
 def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledger | None = None) -> Pipeline:
-    """The stages of a mode; without a ledger they have one that nobody reads.
+    """The stages of a mode; the default ledger is their own.
 
     Raises:
         MisuseError: the model cannot be used.
@@ -142,7 +142,7 @@ def stages(
     ledger: Ledger,
     kernels: GeometryKernels,
 ) -> Pipeline:
-    """A pipeline around a given segmenter and classifier: the network, or what stands for it at this cost."""
+    """A pipeline around a given segmenter, and the network or a substitute of the given cost as its classifier."""
     prior = make_prior(network.box_scores, network.class_frequency)
     decision = LikeliestClass if profile.decision.rule == "likeliest" else Decision
     return Pipeline(

@@ -1,4 +1,4 @@
-"""What will not work here, found out before the first frame: each check is one line with its remedy."""
+"""Checks of the machine before the first frame. Each finding is one line with its remedy."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from modt.sources.live.live_stream import LiveStream
 
 OK, WARN, FAIL = "ok", "warn", "fail"
 REACH_S = 2.0
-"""Time in which a sensor is heard of."""
+"""Time in which a sensor has to send a sweep [s]."""
 COMPILE = "install modt from a wheel for this machine, or where a C compiler is"
 _TIME_ERROR = 5  # adjtimex(2)
 _SANE_YEAR = 2024
@@ -41,7 +41,7 @@ class Finding:
 
 
 def core(number: int | None, sys: Path = Path("/sys")) -> Finding:
-    """Whether the core of the loop is kept free of other work."""
+    """Check that the core of the loop is kept free of other work."""
     if number is None:
         return Finding(WARN, "core", "the loop is not pinned to a core", "leave out --core none")
     isolated = host.core_list(host.content(sys / "devices/system/cpu/isolated"))
@@ -52,7 +52,7 @@ def core(number: int | None, sys: Path = Path("/sys")) -> Finding:
 
 
 def governor(number: int | None, sys: Path = Path("/sys")) -> Finding:
-    """Whether the clock of the core is fixed."""
+    """Check that the clock frequency of the core is fixed."""
     path = sys / f"devices/system/cpu/cpu{number or 0}/cpufreq/scaling_governor"
     name = host.content(path).strip()
     if name in ("performance", ""):
@@ -61,7 +61,7 @@ def governor(number: int | None, sys: Path = Path("/sys")) -> Finding:
 
 
 def permissions() -> list[Finding]:
-    """Priority and memory; takes what is permitted."""
+    """Check real-time priority and locked memory, and take what is permitted."""
     said = host.take_real_time_priority()
     with ThreadPoolExecutor(1) as receiving:
         said.append(receiving.submit(host.serve_loop, None).result())
@@ -70,7 +70,7 @@ def permissions() -> list[Finding]:
 
 
 def meters(found: Discovery) -> Finding:
-    """Whether energy is measured."""
+    """Check that energy is measured."""
     best = found.best
     facts = best.facts
     if facts is not None and facts.kind is not Kind.ESTIMATED:
@@ -82,7 +82,7 @@ def meters(found: Discovery) -> Finding:
 
 
 def kernels(choose: Callable[[], str]) -> Finding:
-    """Whether segmentation runs on compiled kernels."""
+    """Check that segmentation runs on compiled kernels."""
     try:
         name = choose()
     except ModtError as error:
@@ -93,7 +93,7 @@ def kernels(choose: Callable[[], str]) -> Finding:
 
 
 def model(config: ClassificationConfig, load: Callable[[], dict[str, str]]) -> Finding:
-    """Whether the network is that of its card."""
+    """Check that the network is the one of its card."""
     try:
         facts = load()
     except ModtError as error:
@@ -102,7 +102,7 @@ def model(config: ClassificationConfig, load: Callable[[], dict[str, str]]) -> F
 
 
 def near(sensor: SensorConfig) -> Finding:
-    """From which distance on enough of a person is in view; from 0.7 m on, people are expected to be recognised."""
+    """Check that enough of a person is in view from 0.7 m on."""
     seen_m = sensor.person_seen_from_m
     if seen_m is None:
         return Finding(OK, "near", "how much is seen of people is not known", "set height_m, elevation_span_deg")
@@ -111,7 +111,7 @@ def near(sensor: SensorConfig) -> Finding:
 
 
 def disk(out: Path, config: ProfileConfig, free_bytes: Callable[[Path], int] | None = None) -> Finding:
-    """Whether the records have room."""
+    """Check that the disk has room for the records."""
     place = next(path for path in (out, *out.absolute().parents) if path.exists())
     if not os.access(place, os.W_OK):
         return Finding(FAIL, "disk", f"{place} cannot be written", "give another --out, or its owner the right")
@@ -124,7 +124,7 @@ def disk(out: Path, config: ProfileConfig, free_bytes: Callable[[Path], int] | N
 
 
 def clock(state: int | None = None, now_s: float | None = None) -> Finding:
-    """Whether the calendar clock is set: poses and sweeps meet by it."""
+    """Check that the calendar clock is set, which poses and sweeps are matched by."""
     year = time.gmtime(time.time() if now_s is None else now_s).tm_year
     if year < _SANE_YEAR:
         return Finding(FAIL, "clock", f"the year is {year}", "set it, or fit a battery to the clock")
@@ -136,7 +136,7 @@ def clock(state: int | None = None, now_s: float | None = None) -> Finding:
 
 
 def sensor(open_source: Callable[[], LiveStream], timeout_s: float = REACH_S) -> list[Finding]:
-    """Whether a source can be opened, and sends sweeps."""
+    """Check that a source can be opened and sends sweeps."""
     try:
         stream = open_source()
     except ModtError as error:

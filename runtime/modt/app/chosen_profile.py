@@ -1,4 +1,4 @@
-"""The profile of a stream: what is asked for, else what the source names, else what the first sweep shows."""
+"""The profile of a stream: the requested one, or the one that the source names, or what the first sweep shows."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class ChosenProfile:
     Attributes:
         config: the configuration.
         sensor: name of the sensor's profile, FOUND where the first sweep has replaced it.
-        names: of all profiles put together, the sensor's first where nobody has asked for it.
-        recognition: what differs between the first sweep and the profile.
+        names: names of the combined profiles. A sensor's profile that nobody requested comes first.
+        recognition: differences between the first sweep and the profile.
     """
 
     config: ProfileConfig
@@ -37,7 +37,7 @@ class ChosenProfile:
 
     @property
     def name(self) -> str:
-        """Of all profiles put together."""
+        """Names of all profiles that were combined."""
         return " + ".join(self.names)
 
 

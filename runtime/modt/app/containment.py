@@ -1,4 +1,4 @@
-"""Failures of single frames: counted, said once of each kind, fatal only when they repeat; and a log kept short."""
+"""Containment of failures: each kind is counted and logged once, and only a row of failures ends the run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Containment:
     """Counts of contained exceptions by kind.
 
     Args:
-        contains: whether anything is contained; else every exception ends the run as it is.
+        contains: whether exceptions are contained. If not, each one ends the run.
     """
 
     def __init__(self, *, contains: bool = True) -> None:
@@ -45,11 +45,11 @@ class Containment:
         self.in_a_row += 1
         self.note(error, where)
         if self.in_a_row >= MAX_IN_A_ROW:
-            cause = f"{self.in_a_row} failures in a row, the last one {_kind(error)}: {error}"
+            cause = f"{self.in_a_row} failures in a row, the last one {type(error).__name__}: {error}"
             raise ModtError(where, cause, "report it, with the traceback above") from error
 
     def spare(self, where: str, call: Callable[P, R], /, *arguments: P.args, **options: P.kwargs) -> R | None:
-        """Result of a call that a frame can do without; None where it fails, which is counted."""
+        """Result of a dispensable call. A failure is counted and gives None."""
         try:
             return call(*arguments, **options)
         except Exception as error:
@@ -60,14 +60,14 @@ class Containment:
         """Count an exception that cost no frame."""
         if not self._contains:
             raise error
-        kind = f"{where}: {_kind(error)}"
+        kind = f"{where}: {type(error).__name__}"
         self.counts[kind] += 1
         if self.counts[kind] == 1:
             log.error("%s; later ones are only counted", kind, exc_info=error)
 
 
 class OncePerSecond(logging.Filter):
-    """Passes one line a second of each kind, its text before the values; it says how many were held back."""
+    """Passes one line a second of each kind of message, with the number of lines that were held back."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
@@ -83,7 +83,3 @@ class OncePerSecond(logging.Filter):
         self._passed[kind] = now_s, 0
         record.msg = f"{record.msg} (and {held} lines like it)" if held else record.msg
         return True
-
-
-def _kind(error: Exception) -> str:
-    return type(error).__name__

@@ -1,4 +1,4 @@
-"""What a user asks for, and the stream, the poses and the field of view that follow from it."""
+"""Request of a user, and the stream, the poses and the field of view that follow from it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What a user asks for; each field is an option of `modt replay`."""
+    """Request of a user. Each field is an option of `modt replay`."""
 
     path: Path | None = None
     capture: Sequence[tuple[str, str]] = ()
@@ -101,7 +101,7 @@ def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Pa
 
 
 def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> PoseSource:
-    """Where the poses of a stream's frames come from.
+    """Source of the poses of a stream's frames.
 
     Raises:
         MisuseError: a file of poses that cannot be used, an address that cannot be bound or is none.

@@ -1,4 +1,4 @@
-"""Which kernels the pipeline runs on."""
+"""Choice of the kernels that the pipeline runs on."""
 
 from __future__ import annotations
 

@@ -1,28 +1,28 @@
-"""What the loop gives up under load, step by step, and takes back by itself."""
+"""Load shedding: steps that the loop goes up under load, and down again when there is slack."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum, IntEnum
 
 from modt.types import Budget
 
 CALM_S = 0.5
-"""Slack after which something is taken back: within a second, at 5 Hz, the result is a better one."""
+"""Time with slack before one step is restored [s]."""
 BUSY_SHARE, AMPLE_SHARE = 0.8, 0.5
-"""Of the period between arrival and result: below it there is slack; slack for everything at once."""
+"""Share of the period from arrival to result. Below BUSY_SHARE there is slack, below AMPLE_SHARE ample slack."""
 NEAR_SHARE = 0.9
-"""Of the power limit: below it there is slack."""
+"""Share of the power limit, below which there is slack."""
 PROBE_S = 3.0
-"""A step down that is taken back within this time has failed: the next one waits twice as long ..."""
+"""A step down fails if a step up follows within this time [s]. The next step down then waits twice as long."""
 MAX_PATIENCE_S = 30.0
-"""... up to this."""
+"""Longest wait before a step down [s]."""
 DEFERRED_EVERY = 5
-"""While classification is deferred, every so many frames the call that has waited longest is made."""
+"""While classification is deferred, one call is made every so many frames: the one that has waited longest."""
 
 
 class Step(IntEnum):
-    """What is given up; each step includes those before it."""
+    """Measures against load. Each step includes those before it."""
 
     ALL = 0  # nothing
     DEFERRED = 1  # classification, but for a call now and then
@@ -39,7 +39,7 @@ GIVEN_UP = {
 
 
 class Event(Enum):
-    """What a frame or a window of the meters says of the load."""
+    """Load as seen by a frame or by a window of the meters."""
 
     OVERRUN = "the result came after its deadline"
     OVER_POWER = "more power than the limit"
@@ -54,17 +54,10 @@ def step_after(step: Step, event: Event) -> Step:
     return Step(max(step - 1, Step.ALL) if event is Event.SLACK else min(step + 1, Step.DROPPED))
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """A change of the step."""
-
-    before: Step
-    after: Step
-    event: Event
-
-
 class Ladder:
-    """Where the loop stands, by the times of its frames and its power; times are of one monotonic clock [s].
+    """Present step, by the times of the frames and the power. All times are monotonic [s].
+
+    `frame` and `power` return the event that has changed the step, None where it stays.
 
     Args:
         power_W: limit; None without one.
@@ -77,7 +70,7 @@ class Ladder:
         self._cause = Event.OVERRUN  # of the last step up
         self._calm_s = self._ample_s = self._down_s = float("-inf")  # since when; last step down
 
-    def frame(self, now_s: float, share: float) -> Change | None:
+    def frame(self, now_s: float, share: float) -> Event | None:
         """A frame whose result came `share` of a period after its sweep."""
         if share > BUSY_SHARE:
             self._calm_s = now_s
@@ -91,14 +84,14 @@ class Ladder:
             return self._fire(Event.SLACK, now_s)
         return None
 
-    def power(self, now_s: float, watts: float) -> Change | None:
+    def power(self, now_s: float, watts: float) -> Event | None:
         """A window of the meters."""
         if self.power_W is None or watts <= NEAR_SHARE * self.power_W:
             return None
         self._calm_s = self._ample_s = now_s
         return self._fire(Event.OVER_POWER, now_s) if watts > self.power_W else None
 
-    def _fire(self, event: Event, now_s: float) -> Change | None:
+    def _fire(self, event: Event, now_s: float) -> Event | None:
         before = self.step
         self.step = step_after(before, event)
         if self.step > before:
@@ -107,11 +100,11 @@ class Ladder:
             self._cause, self._calm_s, self._ample_s = event, now_s, now_s
         elif self.step < before:
             self._down_s = self._calm_s = now_s  # slack that is ample goes on being so
-        return Change(before, self.step, event) if self.step != before else None
+        return event if self.step != before else None
 
 
 def budget_at(step: Step, budget: Budget, left_ms: float, frame: int) -> Budget:
-    """What a frame may spend at a step, by the budget of the profile and the time that is left to it [ms]."""
+    """Budget of a frame at a step, from the budget of the profile and the time left to the deadline [ms]."""
     if step >= Step.DEFERRED:
         calls = 1 if frame % DEFERRED_EVERY == 0 else 0
         return replace(budget, calls=calls if budget.calls is None else min(calls, budget.calls))

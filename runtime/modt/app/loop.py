@@ -13,7 +13,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from modt.app.containment import RENEW_AFTER, Containment
-from modt.app.deadlines import Deadlines, NoDeadlines
+from modt.app.deadlines import Deadlines
 from modt.app.playback import Playback
 from modt.app.stages import Stages
 from modt.app.supervisor import Supervisor
@@ -92,12 +92,13 @@ class Loop:
     """Drives the stages by the frames of a source.
 
     Args:
-        source: of the frames.
+        source: source of the frames.
         stages: process them.
-        sinks: of the results, by their names in messages.
+        sinks: sinks of the results, by their names in messages.
         observe: called with every result and its ledger line.
         report: called once a second.
-        deadlines, failures, stop: say what is processed, what is contained, and when to end.
+        deadlines: decide which sweeps are processed; None for a recording, of which every frame is.
+        failures, stop: decide which failures are contained, and when to end.
 
     Attributes:
         reloads, refused_reloads: counts.
@@ -110,7 +111,7 @@ class Loop:
         sinks: Mapping[str, Writer[FrameResult]],
         observe: Callable[[FrameResult, Line], None],
         report: Callable[[Supervisor], None],
-        deadlines: Deadlines | NoDeadlines,
+        deadlines: Deadlines | None,
         failures: Containment,
         stop: Stop,
         clock: Callable[[], float] = time.monotonic,
@@ -126,7 +127,7 @@ class Loop:
         Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
 
         Raises:
-            ModtError: what cannot be contained.
+            ModtError: a failure that cannot be contained.
         """
         gc.collect()
         gc.freeze()
@@ -139,7 +140,7 @@ class Loop:
                 self._process(received)
 
     def _frames(self, supervisor: Supervisor) -> Iterator[Received]:
-        """Frames as they come; between them reloads, watchdog and reports are served."""
+        """Frames as they arrive. Reloads, watchdog and reports are served between them."""
         reported_s = float("-inf")
         while self._stop.signal is None:
             if self._stop.take_reload():
@@ -161,7 +162,8 @@ class Loop:
                 self._failures.spare("status", self._report, supervisor)
 
     def _process(self, received: Received) -> None:
-        if not self._deadlines.admit(received.arrived_s):
+        deadlines = self._deadlines
+        if deadlines is not None and not deadlines.admit(received.arrived_s):
             return
         try:
             line = self._step(received)
@@ -173,14 +175,17 @@ class Loop:
             self._stages.recover(anew=self._failures.in_a_row == RENEW_AFTER)
             return
         self._failures.succeed()
-        self._deadlines.finish(received.arrived_s, line)
+        if deadlines is not None:
+            deadlines.finish(received.arrived_s, line)
         self._stages.watch(received.frame)
 
     def _step(self, received: Received) -> Line:
         """Process a frame; returns its ledger line."""
-        stages, frame = self._stages, received.frame
-        budget = self._deadlines.budget(stages.budget, received.arrived_s, frame.index)
-        result = stages.step(frame, budget, reduced=self._deadlines.reduced)
+        stages, frame, deadlines = self._stages, received.frame, self._deadlines
+        budget, reduced = stages.budget, False
+        if deadlines is not None:
+            budget, reduced = deadlines.budget(budget, received.arrived_s, frame.index), deadlines.reduced
+        result = stages.step(frame, budget, reduced=reduced)
         for name, sink in self._sinks.items():
             self._failures.spare(name, stages.ledger.run, SINK, sink.write, result)
         line = stages.ledger.close_frame(frame.index)

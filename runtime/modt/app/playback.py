@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from modt.energy.ledger import Ledger
@@ -13,58 +12,50 @@ from modt.sources.live.sweep_reader import Received, StreamEndedError
 from modt.sources.stream import Stream
 
 
-class FullSpeed:
-    """Frames without waiting."""
+class Pace:
+    """Frames at absolute deadlines, which restart after an overrun so that no burst follows.
 
-    def wait(self) -> None:
-        """Return at once."""
+    Args:
+        rate_hz: frames a second; None for as many as there is time for.
+    """
 
-    def report(self) -> dict[str, Any]:
-        """No rate was requested."""
-        return {"rate_hz": None}
-
-
-@dataclass
-class FixedPeriod:
-    """Frames at absolute deadlines, which restart after an overrun so that no burst follows."""
-
-    period_s: float
-    clock: Callable[[], float] = time.monotonic
-    sleep: Callable[[float], None] = time.sleep
-    max_lateness_s: float = 0.0
-    lost_s: float = 0.0  # by which the deadlines were put off
-    _deadline_s: float | None = None
-
-    @property
-    def missed(self) -> int:
-        """Periods without a frame."""
-        return int(self.lost_s / self.period_s + 1e-6)
+    def __init__(
+        self,
+        rate_hz: float | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._rate_hz, self._clock, self._sleep = rate_hz, clock, sleep
+        self._period_s = 0.0 if rate_hz is None else 1.0 / rate_hz
+        self._max_lateness_s = self._lost_s = 0.0  # by which the deadlines were put off
+        self._deadline_s: float | None = None
 
     def wait(self) -> None:
         """Sleep until the deadline; when late by more than a period, begin a new row of deadlines."""
-        now = self.clock()
+        if self._rate_hz is None:
+            return
+        now_s = self._clock()
         if self._deadline_s is None:
-            self._deadline_s = now
-        if now < self._deadline_s:
-            self.sleep(self._deadline_s - now)
-            now = self.clock()
-        late_s = now - self._deadline_s
-        self.max_lateness_s = max(self.max_lateness_s, late_s)
-        if late_s > self.period_s:
-            self.lost_s += late_s
-            self._deadline_s = now
-        self._deadline_s += self.period_s
+            self._deadline_s = now_s
+        if now_s < self._deadline_s:
+            self._sleep(self._deadline_s - now_s)
+            now_s = self._clock()
+        late_s = now_s - self._deadline_s
+        self._max_lateness_s = max(self._max_lateness_s, late_s)
+        if late_s > self._period_s:
+            self._lost_s += late_s
+            self._deadline_s = now_s
+        self._deadline_s += self._period_s
 
     def report(self) -> dict[str, Any]:
-        """Rate, deadlines missed, and largest delay [ms]."""
+        """Rate, periods without a frame, and largest delay [ms]."""
+        if self._rate_hz is None:
+            return {"rate_hz": None}
         return {
-            "rate_hz": 1.0 / self.period_s,
-            "missed_deadlines": self.missed,
-            "max_lateness_ms": 1e3 * self.max_lateness_s,
+            "rate_hz": self._rate_hz,
+            "missed_deadlines": int(self._lost_s / self._period_s + 1e-6),
+            "max_lateness_ms": 1e3 * self._max_lateness_s,
         }
-
-
-Pace = FullSpeed | FixedPeriod
 
 
 class Playback:
@@ -90,7 +81,7 @@ class Playback:
         return Received(frame, 0.0)
 
     def health(self) -> dict[str, Any]:
-        """Nothing is received."""
+        """No counts: nothing is received."""
         return {}
 
     def close(self) -> None:

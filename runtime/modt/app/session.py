@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 from modt import host, profile
 from modt.app import inputs, metering
 from modt.app.containment import Containment
-from modt.app.deadlines import Deadlines, NoDeadlines
+from modt.app.deadlines import Deadlines
 from modt.app.loop import Loop, Stop
-from modt.app.playback import FixedPeriod, FullSpeed, Playback
-from modt.app.stages import NoWatch, SensorWatch, Stages
-from modt.app.status import SCHEMA, Counts, Monitor, NoMonitor, Power
+from modt.app.playback import Pace, Playback
+from modt.app.stages import SensorWatch, Stages
+from modt.app.status import SCHEMA, Counts, Power, one_line
 from modt.app.supervisor import Supervisor
 from modt.classes import CLASS_NAMES
 from modt.energy.ledger import Ledger
@@ -44,7 +44,7 @@ class Session:
 
     Attributes:
         source, stages, recording, sinks, deadlines, failures, stop: its parts.
-        power: what the windows of the meters say.
+        power: power by the windows of the meters.
     """
 
     def __init__(
@@ -53,27 +53,27 @@ class Session:
         stages: Stages,
         recording: Recording,
         sinks: Mapping[str, Sink],
-        deadlines: Deadlines | NoDeadlines,
+        deadlines: Deadlines | None,
         failures: Containment,
-        monitor: Monitor | NoMonitor,
         stop: Stop,
         totals: Summary,
         meters: Sequence[Meter],
         core: int | None,
         lacking: Sequence[str] = (),
+        metrics: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
         self.source, self.stages, self.recording, self.sinks = source, stages, recording, sinks
         self.deadlines, self.failures, self.stop = deadlines, failures, stop
-        self._monitor, self._totals, self._core, self._lacking = monitor, totals, core, list(lacking)
+        self._totals, self._core, self._lacking, self._metrics = totals, core, list(lacking), metrics
         outputs = {**sinks, "recording": recording}
         self.loop = Loop(
             source,
             stages,
             outputs,
             self._observe,
-            lambda supervisor: monitor.report(self.status, supervisor),
+            self._report,
             deadlines,
             failures,
             stop,
@@ -127,7 +127,7 @@ class Session:
             "profile": self.stages.chosen.name,
             "period_s": info.period_s,
             "counts": self._counts.report(now_s, self._tracks),
-            "loop": self.deadlines.report() | loop,
+            "loop": self._pace() | loop,
             "power": self.power.report() | {"limit_W": self.stages.config.loop.power_W},
             "sensor": self.source.health()
             | {"faults": self.source.faults.count, "misfits": self.stages.misfits}
@@ -137,6 +137,20 @@ class Session:
             "recording": self.recording.health(),
             "host": {"core": self._core, "resident_mb": resident_mb, "lacking": self._lacking},
         }
+
+    def _report(self, supervisor: Supervisor) -> None:
+        """Show the status of a service to its supervisor, in status.json and to Prometheus."""
+        if self.deadlines is not None:
+            status = self.status()
+            supervisor.status(one_line(status))
+            self.recording.writer.write(lambda: self._show(status))
+
+    def _show(self, status: dict[str, Any]) -> None:
+        self.recording.state(json.dumps(status, indent=1) + "\n")
+        if self._metrics is not None:
+            from modt.app.prometheus import write_metrics
+
+            write_metrics(self._metrics, status)
 
     def _observe(self, result: FrameResult, line: dict[str, Any]) -> None:
         if self.stages.chosen is not self._followed:
@@ -151,7 +165,7 @@ class Session:
         if window is not None:
             self._ledger(window)
             watts = self.power.add(window, config.energy)
-            if watts is not None:
+            if watts is not None and self.deadlines is not None:
                 self.deadlines.power(watts, config.loop.power_W)
         misses = config.sensor.reflectance != "none" and result.proposals.reflectance is None
         self._without_reflectance += misses and len(result.proposals) > 0
@@ -161,11 +175,17 @@ class Session:
         for sink in self._ledgers:
             sink.ledger(line)
 
+    def _pace(self) -> dict[str, Any]:
+        """Deadlines of a live source, or the pace of a recording."""
+        if self.deadlines is not None:
+            return self.deadlines.report()
+        return self.source.pace.report() if isinstance(self.source, Playback) else {}
+
     def _sinks_health(self) -> dict[str, Any]:
         return {address: sink.health() for address, sink in self.sinks.items()}
 
     def _finish(self) -> None:
-        """Write what waits, and the summary."""
+        """Write the summary after everything that waits."""
         elapsed_s, frames, stages = self._clock() - self._began_s, self._totals.frames, self.stages
         faults = self.source.faults
         self.summary = self._totals.result() | {
@@ -179,7 +199,7 @@ class Session:
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * stages.info.period_s / elapsed_s,
                 "stopped_by": self.stop.signal,
-                **self.deadlines.report(),
+                **self._pace(),
             },
             "odometry": stages.odometry.report(),
             "class_frequency": dict(zip(CLASS_NAMES, stages.pipeline.decision.frequency.tolist(), strict=True)),
@@ -193,7 +213,10 @@ class Session:
             },
         }
         directory, writer = self.recording.directory, self.recording.writer
-        self.summary |= self._monitor.finish(self.status)
+        if self.deadlines is not None:
+            last = self.status()
+            self.summary |= {"status": last, "lateness": self.deadlines.timing.late_or_later()}
+            writer.write(lambda: self._show(last))
         writer.write(self.recording.finish)
         text = json.dumps(self.summary, indent=2) + "\n"
         writer.write(lambda: directory.write(SUMMARY, text) if self.recording.parts else None)
@@ -209,9 +232,8 @@ def replay(
         MisuseError: an invalid request.
     """
     stop, ledger = Stop(), Ledger()
-    pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz, sleep=stop.sleep)
-    source = Playback(inputs.stream(request), pace, ledger)
-    stages = Stages(request, source.info, ledger, NoWatch())
+    source = Playback(inputs.stream(request), Pace(request.rate_hz, sleep=stop.sleep), ledger)
+    stages = Stages(request, source.info, ledger)
     name = re.sub(r"[^\w.]+", "-", source.info.name)
     recording = WholeRecording(
         RunDirectory(out or Path("runs") / f"{name}-{request.mode}"),
@@ -221,8 +243,8 @@ def replay(
         labels=request.labels,
     )
     meters = metering.discovery(stages.config.energy).best.meters
-    deadlines, failures, monitor = NoDeadlines(pace.report), Containment(contains=False), NoMonitor()
-    return Session(source, stages, recording, sinks, deadlines, failures, monitor, stop, Summary(), meters, core)
+    failures = Containment(contains=False)
+    return Session(source, stages, recording, sinks, None, failures, stop, Summary(), meters, core)
 
 
 def service(
@@ -238,14 +260,14 @@ def service(
     """A service over a live source; the threads that write begin on the cores that this one is allowed.
 
     Args:
-        request: what is asked for.
+        request: the options of the user.
         source: open, not started.
-        sinks: of the results, by their addresses.
+        sinks: sinks of the results, by their addresses.
         out: run directory.
         metrics: file for Prometheus; None for none.
-        core: of the loop; None leaves it where it is.
+        core: core of the loop; None leaves the affinity unchanged.
         command: for the record.
-        lacking: what the loop has to do without, for the status.
+        lacking: refused permissions, for the status.
 
     Raises:
         MisuseError: an invalid request.
@@ -262,6 +284,5 @@ def service(
 
     writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
     recording = Recording(RunDirectory(out), stages.config.recording, writer, describe)
-    deadlines = Deadlines(source.info.period_s)
-    kinds = deadlines, Containment(), Monitor(recording, deadlines.timing, metrics), Stop(reload=True)
-    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, lacking)
+    kinds = Deadlines(source.info.period_s), Containment(), Stop(reload=True)
+    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, lacking, metrics)

@@ -1,4 +1,4 @@
-"""The stages of a run: those of its profile, exchanged between two frames by a reload or for another sensor."""
+"""The stages of a run. They are exchanged between two frames at a reload, or when the sensor has changed."""
 
 from __future__ import annotations
 
@@ -25,32 +25,22 @@ from modt.tracking.tracker import Tracker
 from modt.types import Budget, Float32, Frame, FrameResult
 
 SWEEPS = 10
-"""In a row, of another size than before, after which the sensor is looked at again."""
+"""Number of sweeps of another size in a row, after which the sensor is recognised anew."""
 RATIO = 2.0
-"""Of the numbers of returns of two sweeps that are of another size."""
-
-
+"""Ratio of the numbers of returns, from which a sweep is of another size."""
 RANGE_SHARE = 0.6
 """Share of sensor.max_range_m that is kept while the range is reduced."""
 
 
-class NoWatch:
-    """The sensor of a recording is that of its first sweep."""
-
-    def unlike(self, points: Float32) -> bool:
-        """False."""
-        return False
-
-
 class SensorWatch:
-    """Compares each sweep with those before."""
+    """Compares the number of returns of each sweep with the usual one."""
 
     def __init__(self) -> None:
         self._usual: float | None = None
         self._in_a_row = 0
 
     def unlike(self, points: Float32) -> bool:
-        """Whether this is the last of SWEEPS sweeps in a row of another size; from now on that is the usual one."""
+        """Whether this is the last of SWEEPS sweeps in a row of another size, which then becomes the usual one."""
         returns = max(int(np.count_nonzero(points[:, 0])), 1)
         if self._usual is None:
             self._usual = returns
@@ -66,13 +56,13 @@ class SensorWatch:
 
 
 class Stages:
-    """Stages of the profile that was asked for, else of that which the source names, corrected by the first sweep.
+    """Stages of the requested profile, or of the one that the source names, corrected by the first sweep.
 
     Args:
-        request: what is asked for.
-        info: of the source, before its first frame.
-        ledger: of the run.
-        watch: notices sweeps of another sensor.
+        request: the options of the user.
+        info: properties of the source before its first frame.
+        ledger: ledger of the run.
+        watch: notices sweeps of another sensor; None for a recording, whose sensor is that of its first sweep.
 
     Attributes:
         chosen: the present profile.
@@ -86,7 +76,7 @@ class Stages:
     """
 
     def __init__(
-        self, request: inputs.Request, info: StreamInfo, ledger: Ledger, watch: SensorWatch | NoWatch
+        self, request: inputs.Request, info: StreamInfo, ledger: Ledger, watch: SensorWatch | None = None
     ) -> None:
         self.request, self.ledger, self._info, self._watch = request, ledger, info, watch
         self._mode = assembly.MODES[request.mode]
@@ -112,11 +102,11 @@ class Stages:
 
     @property
     def budget(self) -> Budget:
-        """What a frame may spend, by mode and profile."""
+        """Budget of a frame by mode and profile."""
         return self._mode.budget(self.config)
 
     def recognise(self, first: Frame, named: str | None = None) -> None:
-        """Take the profile that a sweep shows, or `named`, that of the sensor by its messages."""
+        """Take the profile that the first sweep shows, or `named`, which the messages of the sensor name."""
         self._first, self._info = first, replace(self._info, profile=named or self._info.profile)
         chosen = self._choose()
         if chosen.config == self.config:
@@ -125,7 +115,7 @@ class Stages:
             self._use(chosen)
 
     def step(self, frame: Frame, budget: Budget, *, reduced: bool) -> FrameResult:
-        """One frame; reduced: without what is far."""
+        """Process a frame; `reduced` leaves out distant points."""
         frame = self.odometry.place(frame)
         if reduced:
             config = self.config
@@ -136,8 +126,8 @@ class Stages:
         return result
 
     def watch(self, frame: Frame) -> None:
-        """Between two frames: follow a sensor that has changed. One thread at a time compares its sweep, for long."""
-        self._unlike |= self._watch.unlike(frame.points)
+        """Follow a sensor that has changed, between two frames. A thread compares its sweep, which is slow."""
+        self._unlike |= self._watch is not None and self._watch.unlike(frame.points)
         if self._found:
             self.misfits += 1
             self._use(self._found.pop())
@@ -147,7 +137,7 @@ class Stages:
             self.looking.start()
 
     def recover(self, *, anew: bool) -> None:
-        """Hold the tracks of the last good frame; anew: in stages without a past, and no tracks."""
+        """Restore the tracks of the last good frame; with `anew` make new stages without tracks."""
         tracks, next_id = self._good
         if anew:
             tracks, self.pipeline = TrackTable.blank(), self._made(self.config)
@@ -194,7 +184,7 @@ class Stages:
         }
 
     def _look_again(self, frame: Frame) -> None:
-        """Sweeps have changed: whether they still are of the sensor of the profile in use."""
+        """Choose a profile anew if a changed sweep does not fit the present one."""
         if recognise(frame.points, self.config).differences:
             self._first = frame
             self._found.append(self._choose())
@@ -208,7 +198,7 @@ class Stages:
         return assembly.pipeline(self._mode, config, fov, self.ledger)
 
     def _use(self, chosen: ChosenProfile) -> None:
-        """Go on with the stages of another profile."""
+        """Exchange the stages for those of another profile; the tracks are kept."""
         old, new = self.pipeline, self._made(chosen.config)
         if isinstance(old.tracker, Tracker) and isinstance(new.tracker, Tracker):
             new.tracker.adopt(old.tracker)

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modt.app.supervisor import Supervisor
-from modt.app.timing import Timing
 from modt.classes import CLASS_NAMES
 from modt.config import EnergyConfig
 from modt.energy.attribution import attribute
 from modt.reporting.summary import Summary
-from modt.sinks.recording import Recording
 from modt.types import NONE, Tracks
 
 SCHEMA = "modt.status/1"
@@ -56,10 +50,10 @@ class Counts:
 
 
 class Power:
-    """What the windows say; unknown until the first one with a reading, and while the meters fail.
+    """Power by the windows of the meters. It is unknown before the first reading and while the meters fail.
 
     Attributes:
-        watts: of the last window.
+        watts: power in the last window.
         kind: measured, integrated, estimated or unavailable.
         frame_J: energy a frame in it.
         stages_J: the same of each stage, of idling and of the rest of the process (`attribute`).
@@ -107,44 +101,40 @@ def one_line(status: dict[str, Any]) -> str:
     return f"{counts['rate_hz']:.1f} Hz, {counts['tracks']} tracks{seen}, {watts}{step}{silent}"
 
 
-class Monitor:
-    """Shows the status of a service: to its supervisor, in status.json, and to Prometheus.
-
-    Args:
-        recording: whose thread writes the files.
-        timing: of the frames.
-        metrics: file for Prometheus; None for none.
-    """
-
-    def __init__(self, recording: Recording, timing: Timing, metrics: Path | None) -> None:
-        self._recording, self._timing, self._metrics = recording, timing, metrics
-
-    def report(self, status: Callable[[], dict[str, Any]], supervisor: Supervisor) -> None:
-        """Say what is going on; the files are written off the loop's thread."""
-        present = status()
-        supervisor.status(one_line(present))
-        self._recording.writer.write(lambda: self._write(present))
-
-    def finish(self, status: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Write the last status; returns it and the lateness for the summary."""
-        last = status()
-        self._recording.writer.write(lambda: self._write(last))
-        return {"status": last, "lateness": self._timing.late_or_later()}
-
-    def _write(self, status: dict[str, Any]) -> None:
-        self._recording.state(json.dumps(status, indent=1) + "\n")
-        if self._metrics is not None:
-            from modt.app.prometheus import write_metrics
-
-            write_metrics(self._metrics, status)
+def status_text(status: dict[str, Any], now_s: float) -> str:
+    """Some lines for a terminal, without characters that would steer it."""
+    loop, sensor, recording = status["loop"], status["sensor"], status["recording"]
+    age_s = now_s - status["time_s"]
+    state = (
+        f"running for {status['up_s']:.0f} s" if age_s < STALE_S else f"NOT running: last heard of {age_s:.0f} s ago"
+    )
+    entered = ", ".join(f"{step} {n} times" for step, n in loop["steps_entered"].items())
+    power = status["power"]
+    energy = "" if power["frame_J"] is None else f"{1e3 * power['frame_J']:.0f} mJ a frame, {power['kind']}"
+    stages = ", ".join(f"{stage} {1e3 * joules:.1f}" for stage, joules in power.get("stages_J", {}).items() if joules)
+    lines = [
+        f"{status['source']}: {state}, mode {status['mode']}, profile {status['profile']}",
+        f"  {one_line(status)}",
+        f"  deadlines   {loop['missed_deadlines']} of {loop['frames']} missed, {loop['shed_sweeps']} sweeps left out",
+        *(f"  {name:<11} {_times(loop[f'{name}_ms'])}" for name in ("lateness", "execution", "latency")),
+        f"  budget      {loop['budget_ms']:.1f} ms for classification, {loop['other_stages_ms']:.1f} ms for the rest",
+        f"  load        {loop['step']}" + (f" ({entered})" if entered else ""),
+        f"  energy      {energy or 'unavailable'}",
+        *([f"  by stage    {stages} mJ a frame, estimated"] if stages else []),
+        f"  sensor      {_counts(sensor)}",
+        f"  recording   {recording['failing'] or 'on'}, {recording['lines']} lines, {recording['lost_lines']} lost",
+        *(f"  sink        {name}: {_counts(health)}" for name, health in status["sinks"].items()),
+        *(f"  failures    {kind}: {n}" for kind, n in loop["failures"].items()),
+        *(f"  lacking     {what}" for what in status["host"]["lacking"]),
+    ]
+    return "\n".join("".join(c if c.isprintable() else "?" for c in line) for line in lines)
 
 
-class NoMonitor:
-    """Nobody watches a replay."""
+def _times(figures: dict[str, float]) -> str:
+    return ", ".join(f"{name} {ms:.1f}" for name, ms in figures.items()) + " ms"
 
-    def report(self, status: Callable[[], dict[str, Any]], supervisor: Supervisor) -> None:
-        """No effect."""
 
-    def finish(self, status: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """No effect."""
-        return {}
+def _counts(health: dict[str, Any]) -> str:
+    """Scalars that are not empty or zero."""
+    said = {key: value for key, value in health.items() if value and not isinstance(value, dict)}
+    return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in said.items()) or "nothing to report"

@@ -14,45 +14,30 @@ log = logging.getLogger(__name__)
 _VARIABLE, _WATCHDOG = "NOTIFY_SOCKET", "WATCHDOG_USEC"
 
 
-class NoSupervisor:
-    """No receiver of the state of the loop."""
+class Supervisor:
+    """Tells systemd READY=1, WATCHDOG=1 at half its period, STATUS, RELOADING=1 and, at the end, STOPPING=1.
 
-    def ready(self) -> None:
-        """No effect."""
-
-    def alive(self) -> None:
-        """No effect."""
-
-    def status(self, text: str) -> None:
-        """No effect."""
-
-    def reloading(self) -> None:
-        """No effect."""
-
-    def close(self) -> None:
-        """No effect."""
-
-
-class Systemd:
-    """READY=1, WATCHDOG=1 at half its period, STATUS, RELOADING=1 and, at the end, STOPPING=1; sending never blocks.
-
-    The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
+    Sending never blocks. The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
 
     Args:
-        address: of the socket.
+        address: address of the socket; None without a supervisor.
         watchdog_s: period of the watchdog; None where there is none.
         clock: monotonic [s].
     """
 
     def __init__(
-        self, address: str, watchdog_s: float | None = None, clock: Callable[[], float] = time.monotonic
+        self,
+        address: str | None = None,
+        watchdog_s: float | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._address, self._clock = address, clock
         self._interval_s = 0.0 if watchdog_s is None else watchdog_s / 2
         self._ready = self._failed = False
         self._alive_s = float("-inf")
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
+        if address is not None:
+            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self._socket.setblocking(False)
 
     def ready(self) -> None:
         """Report that the service is up."""
@@ -76,9 +61,12 @@ class Systemd:
     def close(self) -> None:
         """Report that the service ends."""
         self._send("STOPPING=1")
-        self._socket.close()
+        if self._address is not None:
+            self._socket.close()
 
     def _send(self, message: str) -> bool:
+        if self._address is None:
+            return True
         try:
             self._socket.sendto(message.encode(), self._address)
         except OSError as error:
@@ -89,16 +77,13 @@ class Systemd:
         return True
 
 
-Supervisor = NoSupervisor | Systemd
-
-
 def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
     """Systemd where the environment names its socket: /PATH, or @NAME if abstract."""
     name = environment.get(_VARIABLE)
     if not name:
-        return NoSupervisor()
+        return Supervisor()
     if name[0] not in "/@" or len(name) == 1:
         raise MisuseError(_VARIABLE, f"{name!r} is neither /PATH nor @NAME", "unset it, or let systemd set it")
     watchdog = environment.get(_WATCHDOG, "")
     watchdog_s = 1e-6 * int(watchdog) if watchdog.isdecimal() else None
-    return Systemd("\0" + name[1:] if name[0] == "@" else name, watchdog_s)
+    return Supervisor("\0" + name[1:] if name[0] == "@" else name, watchdog_s)

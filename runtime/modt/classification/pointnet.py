@@ -26,7 +26,7 @@ from modt.classification.crops import canonical, gather, ground_z_m
 from modt.classification.pool import log_pool, softmax
 from modt.classification.prior import BoxScores
 from modt.config import ClassificationConfig, SensorConfig
-from modt.errors import MisuseError
+from modt.errors import MisuseError, refuse_pipe
 from modt.types import Float32, Float64, Int, Proposals
 
 MAX_BYTES = 64 << 20
@@ -63,6 +63,7 @@ def read_model(path: Path) -> tuple[bytes, str]:
         MisuseError: unreadable, too large, not the model of its card, or not a plain ONNX model.
     """
     card = path.with_suffix(".md")
+    refuse_pipe(path, REMEDY)
     try:
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)

@@ -5,21 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from modt.errors import install
-
-if TYPE_CHECKING:  # NumPy is imported once the process is pinned
-    from modt.types import FrameResult
-
-Tick = Callable[["FrameResult"], None]
-
-
-@contextmanager
-def progress(total: int | None, *, shown: bool) -> Iterator[Tick]:
-    """Function to call after every frame; without effect unless shown."""
-    with bar(total, "frame", shown=shown) as step:
-        yield lambda result: step(f"{len(result.proposals)} proposals, {len(result.classified)} classified")
 
 
 @contextmanager

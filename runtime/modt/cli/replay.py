@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app.inputs import Request
     from modt.app.session import replay
     from modt.app.supervisor import supervisor_of
-    from modt.cli.progress import progress
+    from modt.cli.progress import bar
     from modt.reporting.summary import summary_text
     from modt.schemes import open_sink
 
@@ -62,8 +62,10 @@ def run(arguments: argparse.Namespace) -> int:
     if show:
         for note in (*info.notes, *info.pose_notes):
             print(f"modt: {note}", file=sys.stderr)
-    with progress(info.n_frames, shown=show and sys.stderr.isatty()) as tick:
-        summary = session.run(supervisor, tick)
+    with bar(info.n_frames, "frame", shown=show and sys.stderr.isatty()) as step:
+        summary = session.run(
+            supervisor, lambda r: step(f"{len(r.proposals)} proposals, {len(r.classified)} classified")
+        )
     if show:
         print(summary_text(summary))
         kept = f"; those before are kept in {directory.before}" if directory.before else ""

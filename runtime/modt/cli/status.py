@@ -1,4 +1,4 @@
-"""`modt status`: what a running service is doing."""
+"""`modt status`: print the status of a service."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from typing import Any
 
 from modt.cli import options
 from modt.cli.run import OUT
-from modt.errors import MisuseError
+from modt.errors import MisuseError, refuse_pipe
+
+REMEDY = "give the run directory of a modt run"
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -28,15 +30,14 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def add_directory(p: argparse.ArgumentParser) -> None:
-    """That of the service."""
+    """Add the run directory of the service."""
     run_directory = "its run directory (default: %(default)s)"
     p.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the status; 0 while the service runs, else 1."""
-    from modt.app.status import STALE_S
-    from modt.app.status_text import status_text
+    from modt.app.status import STALE_S, status_text
     from modt.sinks.records import records_of
 
     directory, now_s = arguments.directory, time.time()
@@ -61,12 +62,11 @@ def read(directory: Path) -> dict[str, Any]:
     place = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
     owners = {os.getuid(), place.stat().st_uid}  # anybody may write to the folder in memory
     path = memory if memory.is_file() and memory.stat().st_uid in owners else beside
+    refuse_pipe(path, REMEDY)
     try:
-        if path.exists() and not path.is_file():
-            raise ValueError("no file")  # a pipe may never end
         status = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise MisuseError(path, f"no status ({error})", "give the run directory of a modt run") from None
+        raise MisuseError(path, f"no status ({error})", REMEDY) from None
     if not isinstance(status, dict) or status.get("schema") != SCHEMA:
         raise MisuseError(path, "another schema", f"this version reads {SCHEMA}")
     return status

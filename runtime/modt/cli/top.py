@@ -6,7 +6,7 @@ import argparse
 import shutil
 import sys
 import time
-from pathlib import Path
+from contextlib import suppress
 
 from modt.cli import options
 from modt.cli.status import add_directory, read
@@ -35,26 +35,19 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         MisuseError: there is no status at the start.
     """
-    from modt.app.status_text import status_text
+    from modt.app.status import status_text
 
     text = status_text(read(arguments.directory), time.time())
     if not sys.stdout.isatty():
         print(text)
         return 0
-    try:
+    with suppress(KeyboardInterrupt):
         while True:
             rows = text.splitlines()[: shutil.get_terminal_size().lines - 1]
             print(CLEAR + "\n".join(rows), flush=True)
             time.sleep(PERIOD_S)
-            text = _text(arguments.directory)
-    except KeyboardInterrupt:
-        return 0
-
-
-def _text(directory: Path) -> str:
-    from modt.app.status_text import status_text
-
-    try:
-        return status_text(read(directory), time.time())
-    except MisuseError as error:  # another part of the records begins, or the service ends
-        return str(error)
+            try:
+                text = status_text(read(arguments.directory), time.time())
+            except MisuseError as error:  # another part of the records begins, or the service ends
+                text = str(error)
+    return 0

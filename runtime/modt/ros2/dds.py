@@ -5,11 +5,10 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 from weakref import WeakValueDictionary
 
 from modt.errors import MisuseError, ModtError, install
@@ -30,7 +29,6 @@ except ImportError:
     raise MisuseError("ROS 2", "needs Cyclone DDS", f"{install('ros2')}, or build cyclonedds") from None
 
 log = logging.getLogger(__name__)
-T = TypeVar("T")
 
 BUFFER_BYTES = 16 << 20
 """Requested socket buffer [bytes]: a sweep arrives as a burst of up to 2 MB."""
@@ -74,8 +72,8 @@ _participants: WeakValueDictionary[int, Participant] = WeakValueDictionary()
 _lock = threading.Lock()
 
 
-def participant(domain_id: int, cores: frozenset[int] | None = None) -> Participant:
-    """The participant of a domain, which is joined first. Its threads run on `cores`, None: where the caller runs.
+def participant(domain_id: int) -> Participant:
+    """The participant of a domain, which is joined first. Its threads run on the cores of the caller.
 
     Raises:
         ModtError: the domain cannot be joined.
@@ -84,29 +82,8 @@ def participant(domain_id: int, cores: frozenset[int] | None = None) -> Particip
         found = _participants.get(domain_id)
         if found is None:
             _warn_of_buffer()
-            found = _participants[domain_id] = on_cores(cores, lambda: Participant(domain_id))
+            found = _participants[domain_id] = Participant(domain_id)
         return found
-
-
-def on_cores(cores: frozenset[int] | None, make: Callable[[], T]) -> T:
-    """Result of `make` in a thread on these cores, which the threads that it starts inherit."""
-    made: list[T] = []
-    errors: list[Exception] = []
-
-    def work() -> None:
-        try:
-            if cores:
-                os.sched_setaffinity(0, cores)
-            made.append(make())
-        except Exception as error:
-            errors.append(error)
-
-    thread = threading.Thread(target=work, name="joiner")
-    thread.start()
-    thread.join()
-    if errors:
-        raise errors[0]
-    return made[0]
 
 
 class Subscription:

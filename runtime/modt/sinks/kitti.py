@@ -9,7 +9,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
 from modt.placement import Mount
-from modt.sinks.output import Health, LineFile, writing
+from modt.sinks.output import LineFile, writing
 from modt.types import NONE, Cut, Float64, FrameResult
 
 KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
@@ -23,7 +23,7 @@ NO_CAMERA = Camera(
 """Camera axes at the origin of the sensor, without an image."""
 
 
-class KittiResults:
+class KittiResults(LineFile[FrameResult]):
     """Writes kitti/NNNN.txt: frame, id, type, image box, size, position, heading, score.
 
     Without a camera, coordinates are camera axes at the sensor's origin, and image boxes are -1.
@@ -32,20 +32,16 @@ class KittiResults:
     def __init__(self, path: Path, camera: Camera | None) -> None:
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-        self._lines = LineFile[str](path)
+        super().__init__(path, self._rows)
         self._camera = camera or NO_CAMERA
 
-    def write(self, result: FrameResult) -> None:
-        """Append the frame's objects: tracks of a foreground class that have a proposal.
-
-        Raises:
-            ModtError: the file cannot be written.
-        """
+    def _rows(self, result: FrameResult) -> str:
+        """Rows of the frame's objects: tracks of a foreground class that have a proposal."""
         tracks = result.tracks
         class_ = tracks.object_class
         rows = np.flatnonzero((tracks.proposal != NONE) & (class_ != ObjectClass.BACKGROUND))
         if not len(rows):
-            return
+            return ""
         boxes = result.proposals.box[tracks.proposal[rows]]
         truncated = (result.proposals.cut[tracks.proposal[rows]] & Cut.SIDE > 0).astype(np.int64)
         camera = Mount(result.frame.R_level_sensor).camera(self._camera)
@@ -57,21 +53,12 @@ class KittiResults:
         score = tracks.posterior[rows, class_[rows]]
         image_box = _image_boxes(boxes, camera)
         columns = (tracks.id[rows], class_[rows], truncated, alpha, image_box, boxes[:, 3:6], bottom, ry, score)
-        text = "".join(
+        return "".join(
             f"{result.frame.index} {id_} {KITTI_TYPES[c]} {cut} -1 {a:.4f} "
             f"{i[0]:.2f} {i[1]:.2f} {i[2]:.2f} {i[3]:.2f} {lwh[2]:.3f} {lwh[1]:.3f} {lwh[0]:.3f} "
             f"{at[0]:.3f} {at[1]:.3f} {at[2]:.3f} {r:.4f} {s:.6f}\n"
             for id_, c, cut, a, i, lwh, at, r, s in zip(*(c.tolist() for c in columns), strict=True)
         )
-        self._lines.write(text)
-
-    def health(self) -> Health:
-        """Frames with objects that were written."""
-        return self._lines.health()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._lines.close()
 
 
 def _image_boxes(boxes: Float64, camera: Camera) -> Float64:

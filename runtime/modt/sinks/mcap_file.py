@@ -15,7 +15,7 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sinks.foxglove_channels import FoxgloveChannels
+from modt.sinks.foxglove_server import FoxgloveChannels
 from modt.sinks.output import writing
 from modt.types import FrameResult
 

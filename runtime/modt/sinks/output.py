@@ -130,13 +130,13 @@ class LineFile(Generic[T]):
             os.fsync(self._file.fileno())
 
     def present(self) -> bool:
-        """Whether its path still leads to it."""
+        """Whether its path leads to this file."""
         with suppress(OSError):
             return os.path.samestat(os.fstat(self._file.fileno()), os.stat(self.path))
         return False
 
     def removed(self) -> bool:
-        """Whether it has no name left, so that what was written is lost when it is closed."""
+        """Whether the file has no name any more, so that closing it loses its content."""
         with suppress(OSError):
             return os.fstat(self._file.fileno()).st_nlink == 0
         return False

@@ -1,4 +1,4 @@
-"""Records of a run: of a service written by a thread of their own, in parts of limited size."""
+"""Records of a run. Those of a service are written by a thread of their own, in parts of limited size."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 KEPT = {"all": (TRACKS, LEDGER), "tracks": (TRACKS,), "ledger": (LEDGER,), "none": ()}
 PARTS = 8
-"""The disk holds this many parts."""
+"""Number of parts that share the limit `disk_mb`."""
 RESERVED_BYTES = 20_000
 """Bytes of each part that are kept for run.yaml, status.json and summary.json."""
 RETRY_S = 1.0
@@ -34,7 +34,7 @@ WHOLE_BYTES = 5e8
 """Records of frames that are written whole before `gb_per_day` thins them: a run on a desk loses no frame."""
 DAY_S = 86_400.0
 JOBS = 128
-"""Jobs that wait for the disk at most."""
+"""Length of the queue of jobs."""
 CLOSE_S = 1.0
 """Time limit for the last jobs of a service [s]; half of it is reserved for draining the queue."""
 Job = Callable[[], None]
@@ -48,7 +48,7 @@ class AtOnce:
         job()
 
     def health(self) -> Health:
-        """None is dropped."""
+        """No job is ever dropped."""
         return {"dropped": 0}
 
     def close(self) -> None:
@@ -58,12 +58,11 @@ class AtOnce:
 class Recording:
     """tracks.jsonl and ledger.jsonl; while they cannot be written, lines are lost, counted, and the loop goes on.
 
-    Once a second it looks whether its files are still where they were begun. If somebody has removed or moved them,
-    it begins another part.
+    Once a second it checks that its files are in place, and begins another part if they were removed or moved.
 
     Args:
-        directory: where they go.
-        config: what is kept.
+        directory: directory of the records.
+        config: choice of the records and their limits.
         writer: runs what writes, in a thread; `write`, `ledger`, `start` and `follow` are for the loop, the rest for
             that thread.
         describe: text of run.yaml for a new part.
@@ -111,7 +110,7 @@ class Recording:
             self.writer.write(lambda: self._append(LEDGER, text))
 
     def follow(self, config: RecordingConfig) -> None:
-        """Keep what another profile says, and describe it."""
+        """Follow the recording of another profile, and describe that profile in run.yaml."""
         self.config = config
         self.writer.write(self._redescribe)
 
@@ -130,7 +129,7 @@ class Recording:
         """No effect: `finish` ends the files on their own thread."""
 
     def state(self, status: str) -> None:
-        """Write the status, beside the records or in memory, and have the lines so far outlast a power cut."""
+        """Write the status beside the records or in memory, and make the lines so far survive a power cut."""
         self._look()
         self.sync()
         if self._ready() or self._begun:
@@ -141,7 +140,7 @@ class Recording:
         self.directory.in_memory(status)
 
     def sync(self) -> None:
-        """Have the lines so far outlast a power cut; those that may not are lost."""
+        """Make the lines so far survive a power cut. If that fails, they count as lost."""
         if self.cause is None and self._unsynced:
             if not self._attempt(self._sync):
                 self.lost += self._unsynced
@@ -155,7 +154,7 @@ class Recording:
         self._leave()
 
     def _allows(self) -> bool:
-        """Whether the bytes of a day suffice for another frame."""
+        """Whether another frame keeps to `gb_per_day`."""
         now_s, self._allowed_s = self._allowed_s, self._clock()
         self._allowed_bytes += 1e9 * self.config.gb_per_day / DAY_S * max(self._allowed_s - now_s, 0.0)
         self._allowed_bytes = min(self._allowed_bytes, WHOLE_BYTES)
@@ -185,7 +184,7 @@ class Recording:
         self._bytes, self.parts = RESERVED_BYTES, self.parts + self._begun
 
     def _look(self) -> None:
-        """Leave a part whose files are not where they were begun; the lines of a file without a name are lost."""
+        """Leave a part whose files were moved or removed. The lines of removed files count as lost."""
         if self._begun and not (self.directory.present() and all(file.present() for file in self._files.values())):
             removed = sum(int(file.health()["written"]) for file in self._files.values() if file.removed())
             self.lost, self._unsynced = self.lost + removed, 0
@@ -215,7 +214,7 @@ class Recording:
             self._named = len(self._files)
 
     def _attempt(self, action: Callable[[], None]) -> bool:
-        """Whether an action went well; failures pause the recording, and its return is logged."""
+        """Whether an action succeeded. A failure pauses the recording, and its end is logged."""
         try:
             action()
         except Exception as error:
@@ -234,11 +233,11 @@ class Recording:
 
 
 class WholeRecording(Recording):
-    """The records of a replay: all of them, in one part, written where they are handed over; a failure ends the run.
+    """The records of a replay: all of them, in one part, written at once. A failure ends the run.
 
     Args:
         directory, describe: as of Recording.
-        sequence, camera: of the KITTI results.
+        sequence, camera: sequence and camera of the KITTI results.
         labels: whether point labels are written.
     """
 

@@ -9,13 +9,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, refuse_pipe
 
 log = logging.getLogger(__name__)
 
 MAX_QUOTED = 100
 BROKEN = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
-"""What using a record raises that lacks a value, or has one of another kind."""
+"""Exceptions raised by the use of a record that lacks a value or has one of another kind."""
 
 
 def line(record: dict[str, Any]) -> str:
@@ -36,8 +36,7 @@ def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iter
         MisuseError: missing, unreadable, or of another schema; the error names the line.
     """
     try:
-        if path.exists() and not path.is_file():  # a pipe may never end
-            raise MisuseError(path, "is no file", "give the directory of a run")
+        refuse_pipe(path, "give the directory of a run")
         with path.open(encoding="utf-8") as lines:
             for number, text in enumerate(lines, 1):
                 try:
@@ -60,10 +59,10 @@ def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iter
 
 @contextmanager
 def records_of(path: Path) -> Iterator[None]:
-    """Where records are used: one that lacks a value, or has one of another kind, is an error of its file or folder.
+    """Convert the failure of using a broken record to an error of its file or folder.
 
     Raises:
-        MisuseError: so it is.
+        MisuseError: a record lacks a value, or has one of another kind.
     """
     try:
         yield

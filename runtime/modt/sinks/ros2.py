@@ -32,12 +32,8 @@ class Ros2Sink:
         self.topics = []
 
 
-def open_ros2(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink:
+def open_ros2(address: Address) -> Ros2Sink:
     """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME&tracks=objects|all.
-
-    Args:
-        address: of the sink.
-        cores: cores of Cyclone's threads; None: where the caller runs.
 
     Raises:
         MisuseError: Cyclone DDS is not installed, or an option is invalid.
@@ -49,5 +45,5 @@ def open_ros2(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink
         world_frame_id=address.option("world_frame_id") or "",
         background=address.choice("tracks", "objects", "all") == "all",
     )
-    joined = participant(domain_of(address), cores)
+    joined = participant(domain_of(address))
     return Ros2Sink([(topic, Publication(joined, topic.name, topic.type)) for topic in made])

@@ -22,13 +22,13 @@ _KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) f
 
 
 def status_paths(directory: Path) -> tuple[Path, Path]:
-    """Where the status of a run is: beside its records and, while those cannot be written, in memory."""
+    """Paths of the status of a run: beside its records, and in memory while those cannot be written."""
     name = hashlib.sha256(os.fsencode(directory.resolve())).hexdigest()[:16]
     return directory / STATUS, MEMORY / f"modt-{name}.json"
 
 
 class RunDirectory:
-    """Every part is a whole run; a half-made one, which a failed start has left, is made anew.
+    """The parts of a run. Each is complete in itself; an incomplete one, left by a failed start, is replaced.
 
     Attributes:
         path: the directory.
@@ -41,6 +41,8 @@ class RunDirectory:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.before: Path | None = None
+        self._locked, self._lock = False, ExitStack()
+        self._number: int | None = None  # descriptor of the lock
         self._disk = next(folder for folder in path.absolute().parents if os.path.ismount(folder))
         if path.exists() and not path.is_dir():
             raise MisuseError(path, "is a file", "give a directory as --out")
@@ -50,26 +52,18 @@ class RunDirectory:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other runs out until the process ends; where no lock can be written, none is kept out.
+        """Keep other runs out within the context; where no lock can be written, none is kept out.
 
         Raises:
             ModtError: another run is in.
         """
-        with ExitStack() as stack:
+        with ExitStack() as self._lock:
+            self._locked = True
+            self._take_lock()
             try:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                lock = os.open(
-                    self.path.with_name(f".{self.path.name}.lock"), os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW
-                )
-                stack.callback(os.close, lock)
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                remedy = "end it, or give another --out"
-                raise ModtError(self.path, "another run of modt records into it", remedy) from None
-            except OSError:  # said when the recording begins
-                pass
-            stack.callback(self.in_memory, None)
-            yield
+                yield
+            finally:
+                self.in_memory(None)
 
     def begin(self, description: str, limit_bytes: float) -> None:
         """Keep the part before under the next name, delete the oldest ones beyond a limit, and begin a new part.
@@ -80,13 +74,15 @@ class RunDirectory:
         with writing(self.path):
             if not os.path.ismount(self._disk):
                 raise OSError(f"{self._disk} is not mounted")
+            if self._locked:
+                self._take_lock()
             self._keep()
             self._trim(limit_bytes)
             self.path.mkdir(parents=True, exist_ok=True)
         self.write(RUN, description, lasting=True)
 
     def write(self, name: str, text: str, *, lasting: bool = False) -> None:
-        """Write a file of the present part atomically; a lasting one is never found empty after a power cut.
+        """Write a file of the present part atomically. A lasting file survives a power cut whole.
 
         Raises:
             ModtError: it cannot be written.
@@ -94,11 +90,11 @@ class RunDirectory:
         replace_file(self.path / name, text, lasting=lasting)
 
     def present(self) -> bool:
-        """Whether the present part is still at its path."""
+        """Whether the present part is at its path."""
         return os.path.isfile(self.path / RUN)
 
     def in_memory(self, status: str | None) -> None:
-        """Keep the status in memory, None removes it; one that cannot be kept is left out."""
+        """Keep the status in memory; None removes it. Failures are ignored."""
         path = status_paths(self.path)[1]
         with suppress(OSError, ModtError):
             if status is None:
@@ -107,10 +103,10 @@ class RunDirectory:
                 replace_file(path, status)
 
     def sync(self) -> None:
-        """Have the names of the present part and its files outlast a power cut.
+        """Make the names of the present part and its files survive a power cut.
 
         Raises:
-            ModtError: they may not.
+            ModtError: the disk reports a failure.
         """
         with writing(self.path):
             sync_folder(self.path)
@@ -119,6 +115,26 @@ class RunDirectory:
     def kept(self) -> list[Path]:
         """Earlier parts, the oldest first."""
         return [path for _, path in sorted(self._numbered()) if _is_ours(path)]
+
+    def _take_lock(self) -> None:
+        """Take the lock, and take it anew where its file was removed with the folder around the run."""
+        path = self.path.with_name(f".{self.path.name}.lock")
+        with suppress(OSError):
+            if self._number is not None and os.path.samestat(os.fstat(self._number), os.stat(path)):
+                return
+        self._lock.close()
+        self._number = None
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            number = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW)
+            self._lock.callback(os.close, number)
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._number = number
+        except BlockingIOError:
+            remedy = "end it, or give another --out"
+            raise ModtError(self.path, "another run of modt records into it", remedy) from None
+        except OSError:  # the recording reports it when it begins
+            pass
 
     def _numbered(self) -> Iterator[tuple[int, Path]]:
         for path in self.path.parent.glob("*~*"):
@@ -143,7 +159,7 @@ class RunDirectory:
             if excess <= 0:
                 return
             _remove_known(path)
-            with suppress(OSError):  # holds files of someone else
+            with suppress(OSError):  # it holds foreign files
                 path.rmdir()
             excess -= size
 
@@ -162,4 +178,4 @@ def _size(path: Path) -> int:
 def _remove_known(path: Path) -> None:
     for name in _KNOWN - {RUN}:
         (path / name).unlink(missing_ok=True)
-    (path / RUN).unlink(missing_ok=True)  # the last one: what is left half deleted is still known as ours
+    (path / RUN).unlink(missing_ok=True)  # last, so that a half deleted part is recognised as ours

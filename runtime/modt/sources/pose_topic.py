@@ -45,10 +45,8 @@ class PoseTopic(ReceivedPoses):
         return odometry.stamp_s, T
 
 
-def open_topic(address: Address, config: OdometryConfig, cores: frozenset[int] | None = None) -> PoseTopic:
+def open_topic(address: Address, config: OdometryConfig) -> PoseTopic:
     """The poses of ros2:///TOPIC?domain=N&base_to_sensor=x,y,z,roll,pitch,yaw [m, rad].
-
-    `cores`: where Cyclone's threads run, None: where the caller does.
 
     Raises:
         MisuseError: Cyclone DDS is not installed, or the address names no topic, domain or mount.
@@ -56,7 +54,7 @@ def open_topic(address: Address, config: OdometryConfig, cores: frozenset[int] |
     """
     topic = topic_of(address)
     T_base_sensor = _mount(address.option("base_to_sensor", "0,0,0,0,0,0"), address.text)
-    joined = participant(domain_of(address), cores)
+    joined = participant(domain_of(address))
     return PoseTopic(Subscription(joined, topic, TYPE, depth=CAPACITY), config, address.text, T_base_sensor)
 
 

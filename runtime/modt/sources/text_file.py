@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, refuse_pipe
 from modt.types import Float64
 
 
@@ -21,8 +21,7 @@ def read_text(path: Path, remedy: str) -> str:
     Raises:
         MisuseError: it cannot be read, or is a pipe or device, which may never end.
     """
-    if path.exists() and not path.is_file():
-        raise MisuseError(path, "is no file", remedy)
+    refuse_pipe(path, remedy)
     try:
         return path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:

@@ -1,30 +1,51 @@
 """Faults of the soak, and its verdict."""
 
+from dataclasses import replace
+from itertools import islice
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-from modt.app.timing import Timing
-from modt.sources.live.sweep_reader import Sweep
-from tools.deploy.faults import FAULTS, FULL_DISK
+from tests.sources.packets.simulated import packets
+from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT
+from tools.deploy.sender import Faulty
 from tools.deploy.soak import Episode, Witness, judge
-
-SWEEP = Sweep(10.0, np.random.default_rng(0).uniform(-30, 30, (500, 4)).astype(np.float32))
+from tools.send.loops import VelodyneStamps
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
-def test_a_fault_makes_sweeps_that_a_sensor_could_send_and_leaves_its_own_alone(fault):
-    before = SWEEP.points.copy()
-    for sweep in fault.sweeps(SWEEP, np.random.default_rng(1)):
-        assert sweep.points.dtype == np.float32
-        assert sweep.points.shape[1] == 4
-    np.testing.assert_array_equal(SWEEP.points, before)
+def test_a_fault_changes_the_packets_from_its_begin_to_its_end(fault):
+    before = [payload for _, payload in packets("vlp-16", 3)]
+    sent, faulty = iter(enumerate(before)), Faulty()
+
+    def take(n):
+        return [payload for _, payload in islice(faulty.applied(sent), n)]
+
+    assert take(50) == before[:50]
+    faulty.fault = replace(fault, clock_s=0.0)
+    changed = take(50) if fault.network.lost < 1 else []
+    changes = fault.network != NO_FAULT.network or fault.packet is not NO_FAULT.packet
+    assert (changed != before[50:100]) is changes
+    assert {len(payload) for payload in changed} <= {len(before[0])}
+    faulty.fault = NO_FAULT
+    after = take(20)
+    first = before.index(after[0])
+    assert after == before[first : first + 20]
+
+
+def test_the_clock_of_the_sensor_is_set_once_by_its_fault():
+    stamps, faulty = VelodyneStamps(), Faulty()
+    faulty.fault = next(fault for fault in FAULTS if fault.clock_s)
+    sent = [(0.0, payload) for _, payload in packets("vlp-16", 1)][:4]
+    changed = [payload for _, payload in islice(faulty.applied(iter(sent)), 4)]
+    for (_, before), after in zip(sent, changed, strict=True):
+        step_us = (stamps.stamp_us(after) - stamps.stamp_us(before) + stamps.wrap_us // 2) % stamps.wrap_us
+        assert step_us - stamps.wrap_us // 2 == 1e6 * faulty.fault.clock_s
 
 
 def session(lost):
     recording = SimpleNamespace(health=lambda: {"lost_lines": lost})
-    return SimpleNamespace(deadlines=Timing(), recording=recording)
+    return SimpleNamespace(status=lambda: {"loop": {}}, recording=recording)
 
 
 def witness(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0):

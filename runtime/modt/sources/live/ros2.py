@@ -6,6 +6,7 @@ import logging
 from collections import deque
 from statistics import fmean
 
+from modt import host
 from modt.address import Address
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
@@ -116,7 +117,8 @@ def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
     """
     topic = topic_of(address)
     reliable = address.choice("reliability", "best_effort", "reliable") == "reliable"
-    joined = participant(domain_of(address), cores)
+    with host.threads_on(cores):
+        joined = participant(domain_of(address))
     subscription = Subscription(joined, topic, TYPE, depth=DEPTH, reliable=reliable)
     info = StreamInfo(f"/{topic}", "ros2", 0, None, PERIOD_S, None, has_poses=False)
     return LiveStream(info, PointCloudReader(subscription, info.name), cores=cores)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, refuse_pipe
 from modt.sources.packets.packet_decoder import extra, one_line
 from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, TurnDecoder
 from modt.sources.packets.velodyne_models import (
@@ -48,10 +48,11 @@ class VelodyneDecoder(TurnDecoder):
         super().__init__(name, model.profile if model else None)
 
     def _read(self, calibration: Path) -> Any:
+        remedy = "give a calibration in the format of ROS's velodyne_pointcloud"
+        refuse_pipe(calibration, remedy)
         try:
             return self._library.Calibration.read(str(calibration))
         except Exception as error:  # of the library's YAML parser, of no common type
-            remedy = "give a calibration in the format of ROS's velodyne_pointcloud"
             raise MisuseError(calibration, f"no calibration ({one_line(error)})", remedy) from None
 
     def _recognise(self, payloads: Sequence[bytes]) -> Signature | None:

@@ -1,0 +1,84 @@
+"""Sends the packets of an ideal VLP-16 to a port of this machine, with the fault whose name was read last.
+
+    python -m tools.deploy.sender PORT [DRIVE]
+
+It writes a line when it begins to send, and ends with its standard input.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import count, takewhile
+from pathlib import Path
+from threading import Thread
+
+import numpy as np
+
+from modt.app.inputs import Request, stream
+from tools.deploy.faults import FAULTS, NO_FAULT, Fault
+from tools.send.faults import Timed
+from tools.send.ideal_packets import packets_of
+from tools.send.loops import VelodyneStamps, turn_loop
+from tools.send.packets import send
+
+MODEL, FRAMES = "vlp-16", 50
+
+
+class Faulty:
+    """Packets with one fault after the other.
+
+    Attributes:
+        fault: the present one.
+    """
+
+    def __init__(self) -> None:
+        self.fault, self._set_s, self._rng = NO_FAULT, 0.0, np.random.default_rng(0)
+
+    def applied(self, packets: Iterable[Timed]) -> Iterator[Timed]:
+        """The packets as the sensor and the network leave them."""
+        for seed in count():
+            fault, self._set_s = self.fault, self._set_s + self.fault.clock_s
+            of_fault = takewhile(lambda _, now=fault: self.fault is now, packets)  # type: ignore[misc]
+            changed = ((at_s, self._changed(fault, payload)) for at_s, payload in of_fault)
+            yield from replace(fault.network, seed=seed).applied(changed)
+
+    def _changed(self, fault: Fault, payload: bytes) -> bytes:
+        stamps = VelodyneStamps()
+        stamp_us = stamps.stamp_us(payload) + round(1e6 * self._set_s)
+        return fault.packet(stamps.stamped(payload, stamp_us % stamps.wrap_us), self._rng)
+
+    def follow(self, names: Iterable[str]) -> None:
+        """Take each fault that is named; end the process with the names."""
+        faults = {fault.name: fault for fault in FAULTS}
+        for name in names:
+            self.fault = faults.get(name.strip(), NO_FAULT)
+        os._exit(0)
+
+
+def paced(packets: Iterable[Timed]) -> Iterator[Timed]:
+    """Packets at their times, so that those that a fault takes away pass as slowly as the others."""
+    began_s = time.monotonic()
+    for at_s, payload in packets:
+        time.sleep(max(began_s + at_s - time.monotonic(), 0.0))
+        yield at_s, payload
+
+
+def main(port: str, drive: str | None = None) -> None:
+    """Send for ever."""
+    recording = stream(Request(path=Path(drive) if drive else None, frames=(0, FRAMES)))
+    payloads = [payload for _, payload in packets_of(list(recording), MODEL, recording.info.period_s)]
+    faulty = Faulty()
+    Thread(target=faulty.follow, args=(sys.stdin,), daemon=True).start()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to:
+        to.connect(("127.0.0.1", int(port)))
+        print("sending", flush=True)
+        send(faulty.applied(paced(turn_loop(payloads))), to)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
