@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from modt.errors import MisuseError
-from modt.sources.scan_file import READERS
+from modt.sources.scan_file import SUFFIXES
 from modt.sources.scan_stream import PERIOD_S, ScanStream
 from modt.sources.stream import Stream
 
@@ -116,7 +116,7 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
         (_is_odometry(path), kitti.odometry_sequence, path),
         (scans, kitti.odometry_sequence, path.parent),
     ]
-    for suffix in READERS:
+    for suffix in SUFFIXES:
         folder = partial(kitti.scan_folder, period_s=period_s, suffix=suffix)
         layouts.append((_has_scans(path, suffix), folder, path))
     return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
