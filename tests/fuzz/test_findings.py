@@ -14,7 +14,7 @@ from modt.cli.status import read as read_status
 from modt.errors import ModtError
 from modt.ros2.cdr import CdrWriter
 from modt.sinks.records import read_records
-from modt.sources.pose_file import read_poses
+from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from tests.desk.reporting.test_run_report import ledger_line

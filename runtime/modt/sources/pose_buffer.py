@@ -1,4 +1,4 @@
-"""Poses received: interpolation at the time of a frame, and which of them are believed."""
+"""Received poses: interpolation at the time of a frame, and rejection of wrong ones."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from modt.geometry import se3, turn_between
 from modt.types import Float64
 
 CAPACITY = 256
-"""Poses kept, and messages read for a frame at most [count]: the newest."""
+"""Greatest number of poses kept, and of messages read for a frame; the newest remain."""
 MAX_AGE_S = 0.3
-"""Greatest distance in time of a frame from its poses [s]; beyond it the frame has none."""
+"""Greatest time between a frame and its poses [s]; a frame beyond it has no pose."""
 MAX_ACCELERATION_MPS2 = 10.0
-"""Acceleration of the sensor beyond which a pose is doubted [m/s2]."""
+"""Greatest acceleration of the sensor [m/s2]; a pose that needs more is doubted."""
 POSITION_NOISE_M = 0.5
-"""Distance between two poses that is noise, not speed [m]."""
+"""Distance between two poses that is attributed to noise, not to speed [m]."""
 CONFIRM_S = 0.2
-"""Time for which doubted poses must continue one another to be believed [s]."""
+"""Time for which doubted poses must be mutually consistent to be believed [s]."""
 _LEVER_M = 5.0
-"""Distance that a turn of one radian counts as [m]."""
+"""Distance that stands for a turn of one radian [m]."""
 _UNKNOWN_INTERVAL_S = 0.5
+"""Assumed interval between poses until two are known [s]."""
 
 
 class PoseBuffer:
@@ -53,9 +54,9 @@ class PoseBuffer:
         self._poses.append(T)
 
     def doubt(self, stamp_s: float, T: Float64, now_s: float) -> str | None:
-        """Why a (4, 4) pose does not continue these: repeated, out_of_order, early or leap; None if it does.
+        """Reason why a (4, 4) pose does not continue these: repeated, out_of_order, early or leap; None if it does.
 
-        A gap before it is one of the sender's, not a wrong stamp, if it is not ahead of now_s, the time of the frame.
+        A long gap is a pause of the sender, not a wrong stamp, if the pose is not ahead of the frame at `now_s`.
         """
         if not self._stamps:
             return None
@@ -72,7 +73,7 @@ class PoseBuffer:
         return "leap" if self._off_m(stamp_s, T) > slack_m else None
 
     def leaps(self, stamp_s: float, T: Float64) -> bool:
-        """Whether a (4, 4) pose is farther from the latest than its sensor can have moved: it is of another world."""
+        """Whether a (4, 4) pose is farther from the latest than the sensor can have moved, so of another world."""
         if not self._poses:
             return False
         dt_s = stamp_s - self.newest_s if stamp_s > self.newest_s else MAX_AGE_S
@@ -99,7 +100,10 @@ class PoseBuffer:
         return None if stamp_s > t1 and self.leaps(stamp_s, T) else T
 
     def _ends(self, stamp_s: float) -> tuple[int, int] | None:
-        """The poses around a time or, after the latest, it and the one as long before; twice the one at the time."""
+        """Indices of the two poses to interpolate; twice the same one if it has this time.
+
+        After the latest pose they are the latest and one as long before it as the time is behind it.
+        """
         stamps = np.array(self._stamps)
         after = int(np.searchsorted(stamps, stamp_s))
         if after < len(self):
@@ -111,7 +115,7 @@ class PoseBuffer:
         return (before, len(self) - 1) if before >= 0 else None
 
     def _off_m(self, stamp_s: float, T: Float64) -> float:
-        """Distance of a (4, 4) pose, later than the latest, from where they lead; zero where they lead nowhere."""
+        """Distance of a (4, 4) pose, later than the latest, from its extrapolation; zero without one [m]."""
         ends = self._ends(stamp_s)
         if ends is None:
             return 0.0
@@ -132,18 +136,19 @@ def interpolate(a: Float64, b: Float64, share: float) -> Float64:
 
 
 _MIN_VOTES = 5
+"""Number of votes after which a doubted sequence replaces the old one."""
 
 
 class PoseSequence:
-    """Poses that continue one another; single ones that do not are doubted.
+    """Poses that are mutually consistent; single inconsistent ones are doubted.
 
-    Doubted poses that continue one another instead are a sequence of their own. Poses vote: one that continues the
-    doubted sequence for it, any other against. From a number of votes and a span of time on it is the one believed:
-    the sender has another clock or, after a leap, has restarted with another world.
+    Mutually consistent doubted poses form a sequence of their own. A pose that continues it votes for it, any other
+    pose votes against it. After _MIN_VOTES votes over CONFIRM_S the new sequence replaces the old one: the sender has
+    set its clock or, after a leap, restarted with another world.
 
     Attributes:
-        believed: poses of the sequence that is believed.
-        restarts: sequences that took over with a leap.
+        believed: poses of the current sequence.
+        restarts: number of sequences that took over with a leap.
     """
 
     def __init__(self, config: OdometryConfig) -> None:
@@ -152,11 +157,11 @@ class PoseSequence:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all poses; the next one is believed."""
+        """Remove all poses; the next one is believed."""
         self.believed, self._doubted, self._votes = PoseBuffer(self.config), PoseBuffer(self.config), 0
 
     def add(self, stamp_s: float, T: Float64, now_s: float) -> str | None:
-        """Take in a (4, 4) pose, received before a frame of time now_s; why it is doubted, None if it is believed."""
+        """Add a (4, 4) pose received before the frame at `now_s`; the reason of a doubt, None if it is believed."""
         doubt = self.believed.doubt(stamp_s, T, now_s)
         if doubt is None:
             self.believed.add(stamp_s, T)

@@ -139,7 +139,7 @@ def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) 
     """(n, 4, 4) T_world_camera of every frame of the sequence."""
     from modt.geometry import inverse
     from modt.sources import kitti_calibration, oxts
-    from modt.sources.pose_file import read_poses
+    from modt.sources.pose_source import read_poses
 
     given: Path | None = arguments.poses or arguments.oxts
     if given is None:

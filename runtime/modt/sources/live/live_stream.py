@@ -15,7 +15,7 @@ from modt.sources.live.sweep_reader import Received, StreamEndedError, Sweep, Sw
 from modt.sources.packets.packet_decoder import DeviceClock
 from modt.sources.scan_file import sanitised
 from modt.sources.stamp_check import StampCheck
-from modt.sources.stream import Fault, Faults, StreamInfo, no_seconds, unit_of
+from modt.sources.stream import Faults, StreamInfo, no_seconds, unit_of
 from modt.types import Frame
 
 log = logging.getLogger(__name__)
@@ -175,7 +175,7 @@ class LiveStream:
         flaws = (doubt,) if doubt else arrival.flaws
         used = arrival.usable and not doubt
         if flaws:
-            self._fault(index, "; ".join(flaws), skipped=not used)
+            self.faults.report(index, self.info.name, "; ".join(flaws), skipped=not used)
         turn_s, steady_s, frame_id = sweep.turn_s, self._steady_s, sweep.frame_id
         frame = Frame(index, sweep.stamp_s, sweep.points, turn_s=turn_s, steady_s=steady_s, frame_id=frame_id)
         return Received(frame, arrived_s) if used else None
@@ -198,10 +198,6 @@ class LiveStream:
         stepped = doubting or abs(self._delay.offset_s - before_s) > JITTER_S
         self._steady_s += check.waited_s if stepped else check.passed_s
         return ""
-
-    def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
-        if self.faults.add(Fault(index, self.info.name, cause, skipped)):
-            log.warning("%s: %s%s", self.info.name, cause, "; sweep skipped" if skipped else "")
 
     def _watch_silence(self) -> None:
         if not self._silent and self._clock() - self._last_s > SILENT_S:

@@ -136,8 +136,7 @@ def decoder_for(maker: str, name: str, options: Mapping[str, str], host: str = "
             remedy = "write ouster://HOST, the sensor's address, to have it asked, or add ?metadata=FILE"
             raise MisuseError(name, "its packets cannot be read without the sensor's metadata", remedy)
         return OusterDecoder(name, Path(metadata) if metadata else host)
-    from modt.sources.packets.velodyne import VelodyneDecoder
-    from modt.sources.packets.velodyne_models import model_named
+    from modt.sources.packets.velodyne import VelodyneDecoder, model_named
 
     return VelodyneDecoder(name, model_named(options["model"]) if options.get("model") else None, calibration)
 
