@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import OdometryConfig
-from modt.sources.pose_buffer import MAX_AGE_S, POSITION_NOISE_M
 from modt.sources.pose_socket import PoseSocket
+from modt.sources.received_poses import MAX_AGE_S, POSITION_NOISE_M
 from modt.types import Frame
 
 CONFIG = OdometryConfig()

@@ -16,8 +16,8 @@ from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.ros2.cdr import MessageError
 from modt.schemes import POSES, open_poses
-from modt.sources.pose_buffer import MAX_AGE_S, PoseBuffer, interpolate
 from modt.sources.pose_socket import PoseSocket, open_socket, read_datagram
+from modt.sources.received_poses import MAX_AGE_S, PoseBuffer, interpolate
 from modt.types import Frame
 
 CONFIG = OdometryConfig()

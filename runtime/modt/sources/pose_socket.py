@@ -25,9 +25,8 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.ros2.cdr import MessageError
-from modt.sources.pose_buffer import CAPACITY
 from modt.sources.pose_source import pose_defect
-from modt.sources.received_poses import ReceivedPoses
+from modt.sources.received_poses import CAPACITY, ReceivedPoses
 from modt.types import Float64
 
 MAX_BYTES = 4096

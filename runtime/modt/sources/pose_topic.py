@@ -12,9 +12,8 @@ from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
-from modt.sources.pose_buffer import CAPACITY
 from modt.sources.pose_source import pose_defect
-from modt.sources.received_poses import ReceivedPoses
+from modt.sources.received_poses import CAPACITY, ReceivedPoses
 from modt.types import Float64
 
 MOUNT = ("x", "y", "z", "roll", "pitch", "yaw")
