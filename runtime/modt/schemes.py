@@ -50,7 +50,11 @@ def open_poses(text: str, config: OdometryConfig) -> PoseSource:
 
 def _opener(module: str, name: str) -> Callable[..., Any]:
     """Function of a module of modt, which is imported when an address is opened."""
-    return lambda *arguments: getattr(import_module(f"modt.{module}"), name)(*arguments)
+
+    def opened(*arguments: object) -> Any:
+        return getattr(import_module(f"modt.{module}"), name)(*arguments)
+
+    return opened
 
 
 def _background(module: str, name: str, depth: int) -> Callable[[Address], Sink]:
