@@ -1,4 +1,4 @@
-"""Addresses of sensors, sinks and senders of poses: SCHEME://HOST:PORT/PATH?KEY=VALUE."""
+"""Addresses of sensors, sinks and senders of poses, in the form SCHEME://HOST:PORT/PATH?KEY=VALUE."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Address:
     Attributes:
         text: the address as given.
         scheme, host, path: its parts; empty where not given.
-        port: None where not given.
-        options: of the query.
+        port: port, None where not given.
+        options: options of the query.
     """
 
     text: str
@@ -33,7 +33,7 @@ class Address:
         return self.options.get(name, default)
 
     def choice(self, name: str, *values: str) -> str:
-        """Value of an option, by default the first of `values`; MisuseError for none of them."""
+        """Value of an option, by default the first of `values`; MisuseError for any other value."""
         if (value := self.option(name, values[0])) not in values:
             forms = " or ".join(f"{name}={known}" for known in values)
             raise MisuseError(self.text, f"{name} {value!r} is unknown", f"write {forms}")
@@ -42,11 +42,11 @@ class Address:
 
 @dataclass(frozen=True, slots=True)
 class Scheme:
-    """How the addresses of a scheme are opened.
+    """Form and opener of the addresses of a scheme.
 
     Attributes:
-        form: pattern of its addresses, for messages and help.
-        opener: function that opens an Address; it imports the modules that it needs, which may need an extra.
+        form: form of its addresses, for messages and help.
+        opener: function of an Address; it imports the modules that it needs, which may need an extra.
         options: names of the options that its addresses may have.
         extra: extra of modt that it needs.
     """
@@ -58,10 +58,10 @@ class Scheme:
 
 
 def parse_address(text: str, schemes: Mapping[str, Scheme]) -> Address:
-    """An address of one of these schemes.
+    """Parse an address of one of these schemes.
 
     Raises:
-        MisuseError: another scheme or option, or no valid port.
+        MisuseError: the scheme or an option is unknown, or the port is invalid.
     """
     remedy = f"write one of {', '.join(scheme.form for scheme in schemes.values())}"
     try:
@@ -81,10 +81,10 @@ def parse_address(text: str, schemes: Mapping[str, Scheme]) -> Address:
 
 
 def open_address(text: str, schemes: Mapping[str, Scheme], *arguments: object) -> Any:
-    """Open an address by the opener of its scheme; returns what that opener returns.
+    """Open an address with the opener of its scheme and further arguments.
 
     Raises:
-        MisuseError: another scheme or option, a missing extra, or what cannot be opened.
+        MisuseError: the scheme or an option is unknown, an extra is missing, or the address cannot be opened.
     """
     address = parse_address(text, schemes)
     scheme = schemes[address.scheme]

@@ -22,7 +22,7 @@ from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.sources.pose_file import pose_defect
+from modt.sources.pose_source import pose_defect
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
 from modt.sources.stream import Stream, no_seconds, unit_of
@@ -32,16 +32,16 @@ log = logging.getLogger(__name__)
 
 
 def open(path: str | PathLike[str], **capture: str) -> Stream:
-    """The frames of a recording: a KITTI drive, a folder of scans, a PCAP file or a recording of ROS 2.
+    """Open a recording: a KITTI drive, a folder of scans, a PCAP file or a recording of ROS 2.
 
     A frame has an index, a stamp_s [s], points (N, 4), and the recording's pose T_world_sensor, else None. The stream
-    can be iterated repeatedly. `between(first, last)` is a part of it, `info` describes it, and `faults` lists what
-    could not be used. `capture` adds what a recording lacks, as `--capture` of `modt replay` does: model, calibration
-    or metadata of a sensor, the topic of a recording.
+    can be iterated repeatedly. `between(first, last)` selects a part of it, `info` describes it, and `faults` lists
+    unusable scans. `capture` adds facts that a recording does not hold, as `--capture` of `modt replay`: model,
+    calibration or metadata of a sensor, the topic of a recording.
 
     Raises:
         MisuseError: there is no stream at the path, or an option does not apply.
-        ModtError: a recording that cannot be read.
+        ModtError: the recording cannot be read.
     """
     return open_stream(Path(path), capture=capture)
 
@@ -51,20 +51,20 @@ class TrackedObjects:
     """The tracks alive after a frame, n rows.
 
     Attributes:
-        id: (n,) never used twice.
+        id: (n,) number of the track, never used twice.
         object_class: (n,) index in modt.CLASS_NAMES.
         posterior: (n, 4) probability of each class.
         final: (n,) whether the class is confirmed.
-        visible: (n,) whether it has a proposal in this frame.
-        unknown_near: (n,) background as far as is known, but too near for the sensor to show whether it is a person.
+        visible: (n,) whether the track matches a proposal of this frame.
+        unknown_near: (n,) whether the track is reported as background, but too near to rule out a person.
         box_sensor: (n, 7) x, y, z of the centre, length, width, height [m], yaw [rad] in the sensor frame, for a
             tilted sensor the level frame at its place; NaN if not visible.
         box_world: (n, 7) last box in the world.
         position: (n, 2) filtered x, y [m, world].
-        heading_rad, speed_mps: (n,) of the motion in the world.
-        points: (n,) of the last proposal.
+        heading_rad, speed_mps: (n,) heading and speed of the motion in the world.
+        points: (n,) number of points of the last proposal.
         age, missed: (n,) frames since birth, and since the last proposal.
-        T_world_sensor: (4, 4) pose of that frame at the stamp: as given, or as registered.
+        T_world_sensor: (4, 4) pose of the sensor frame at the stamp, as given or as registered.
     """
 
     id: Int
@@ -87,7 +87,7 @@ class TrackedObjects:
         return len(self.id)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
-        """One row, as of as_dicts; also what iteration yields."""
+        """One row, as in as_dicts; iteration yields the rows too."""
         return self.take(np.array([range(len(self))[index(row)]])).as_dicts()[0]
 
     def __repr__(self) -> str:
@@ -96,21 +96,21 @@ class TrackedObjects:
         return f"<{len(self)} tracked objects: {named or 'none'}; {np.count_nonzero(self.visible)} visible>"
 
     def take(self, rows: Int | Bool) -> Self:
-        """The rows given, by index or mask."""
+        """Rows selected by index or mask."""
         return replace(self, **{name: column[rows] for name, column in self._columns().items()})
 
     def objects(self) -> Self:
-        """The rows whose class is not background and that are visible."""
+        """Visible rows whose class is not background."""
         return self.take((self.object_class != ObjectClass.BACKGROUND) & self.visible)
 
     def as_dicts(self) -> list[dict[str, Any]]:
-        """A dictionary a row, of plain numbers and lists; object_class is a name."""
+        """One dictionary a row, of plain numbers and lists; object_class is a name."""
         columns = {name: column.tolist() for name, column in self._columns().items()}
         columns["object_class"] = [CLASS_NAMES[c] for c in self.object_class.tolist()]
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def to_pandas(self) -> Any:
-        """A pandas.DataFrame of the columns of as_dicts; MisuseError where pandas is not installed."""
+        """pandas.DataFrame with the columns of as_dicts; MisuseError if pandas is not installed."""
         try:
             pandas = import_module("pandas")
         except ModuleNotFoundError as error:
@@ -118,7 +118,7 @@ class TrackedObjects:
         return pandas.DataFrame(self.as_dicts(), columns=[*self._columns()])
 
     def _columns(self) -> dict[str, Any]:
-        """The fields with a row a track."""
+        """Fields that have a row a track."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "T_world_sensor"}
 
 
@@ -134,7 +134,7 @@ class Pipeline:
     The mode is "conventional", "efficient" or "accurate".
 
     Raises:
-        MisuseError: an unknown mode, or a model that cannot be used.
+        MisuseError: the mode is unknown, or a model cannot be used.
     """
 
     def __init__(self, config: ProfileConfig, mode: str = "accurate") -> None:
@@ -153,12 +153,12 @@ class Pipeline:
 
     @classmethod
     def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:
-        """Pipeline of profiles by name or file, of which later ones win key by key.
+        """Make a pipeline from profiles by name or file; later ones win key by key.
 
-        Without a sensor's profile the sensor is the default one, or the one that the first sweep shows.
+        If no profile names the sensor, it is that of the default, or the one that the first sweep shows.
 
         Raises:
-            MisuseError: no such profile or mode, or a profile with an error; it names the line.
+            MisuseError: the profile or mode does not exist, or a profile has an error, whose line is named.
         """
         pipeline = cls(profile.load(names), mode)
         pipeline._asked = names
@@ -172,18 +172,18 @@ class Pipeline:
         *,
         turn_s: float = 0.0,
     ) -> TrackedObjects:
-        """The tracks after one sweep.
+        """Process one sweep and return the tracks after it.
 
         Args:
             points: a frame of `open`, which needs no other argument; or (N, 3) or (N, 4) x, y, z [m, sensor frame:
                 x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
-            T_world_sensor: (4, 4) pose at the stamp; None: the sweep is registered against stationary tracks.
+            T_world_sensor: (4, 4) pose at the stamp; None estimates the motion of the sensor from the proposals.
             turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
 
         Raises:
-            MisuseError: arguments of another shape, a stamp that goes back, a matrix that is no pose.
-            ScanError: columns that are not x, y, z, reflectance.
+            MisuseError: an argument has another shape, a stamp goes back, or a matrix is no pose.
+            ScanError: the columns are not x, y, z, reflectance.
         """
         if isinstance(points, Frame):
             given = points

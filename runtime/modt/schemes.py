@@ -1,4 +1,4 @@
-"""Schemes of addresses: sensors, sinks and senders of poses; only what is opened is imported."""
+"""Schemes of the addresses of sensors, sinks and senders of poses; the modules are imported when one is opened."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ if TYPE_CHECKING:
 
 
 def open_sensor(text: str, cores: frozenset[int] | None = None) -> LiveStream:
-    """The sensor at an address, not yet started; `cores` as in LiveStream.
+    """Open the sensor at an address without starting it; `cores` as in LiveStream.
 
     Raises:
-        MisuseError: an unknown scheme or option, a missing extra, or what cannot be bound or read.
+        MisuseError: the scheme or an option is unknown, an extra is missing, or the address cannot be bound or read.
     """
     stream: LiveStream = open_address(text, SENSORS, cores)
     return stream
 
 
 def open_sink(text: str) -> Sink:
-    """The sink at an address, which never waits; "-" is standard output.
+    """Open the sink at an address, which never waits; "-" is standard output.
 
     Raises:
-        MisuseError: an unknown scheme or option, or a missing extra.
-        ModtError: what cannot be written.
+        MisuseError: the scheme or an option is unknown, or an extra is missing.
+        ModtError: the address cannot be written.
     """
     sink: Sink = open_address("stdout://" if text == "-" else text, SINKS)
     return sink
 
 
 def open_poses(text: str, config: OdometryConfig) -> PoseSource:
-    """The poses that are sent to an address.
+    """Receive the poses that are sent to an address.
 
     Raises:
-        MisuseError: an unknown scheme or option, a missing extra, or what cannot be bound.
-        ModtError: a domain of ROS 2 that cannot be joined.
+        MisuseError: the scheme or an option is unknown, an extra is missing, or the address cannot be bound.
+        ModtError: the domain of ROS 2 cannot be joined.
     """
     poses: PoseSource = open_address(text, POSES, config)
     return poses
 
 
 def _opener(module: str, name: str) -> Callable[..., Any]:
-    """A function of a module of modt, which is imported when an address is opened."""
+    """Function of a module of modt, which is imported when an address is opened."""
 
     def opened(*arguments: object) -> Any:
         return getattr(import_module(f"modt.{module}"), name)(*arguments)
@@ -58,7 +58,7 @@ def _opener(module: str, name: str) -> Callable[..., Any]:
 
 
 def _background(module: str, name: str, depth: int) -> Callable[[Address], Sink]:
-    """The same for a writer that may wait; `depth` frames, with their points, wait for it at most."""
+    """Opener of a writer that may wait; at most `depth` frames, with their points, wait for it."""
     return lambda address: _in_background(address, _opener(module, name)(address), depth)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from modt.config import OdometryConfig
 from modt.sources.pose_socket import PoseSocket
-from modt.sources.pose_source import NoPoses, PoseFile, RecordedPoses
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource
 from modt.sources.recognise import open_stream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import bags, layouts
@@ -53,7 +53,7 @@ SOURCES = {
     "odometry": lambda root: open_stream(layouts.odometry(root)),
     "bare": lambda root: open_stream(layouts.bare(root)),
     "street": lambda root: SyntheticStream("street", "hdl-64e", 0.4, seed=3),
-    "recorded": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), RecordedPoses()),
+    "recorded": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), PoseSource()),
     "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoPoses()),
     "listed": listed,
     "sent": sent,

@@ -49,8 +49,7 @@ from modt.sinks.tracks import SCHEMA, frame_line
 from modt.sources.live import live_stream
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PAUSE_S, PacketReader
-from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.packets.velodyne_models import STAMP_AT
+from modt.sources.packets.velodyne import STAMP_AT, VelodyneDecoder
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Frame

@@ -18,7 +18,7 @@ from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.packet_decoder import PacketDecoder
-from modt.sources.pose_datagram import DatagramError, read_datagram
+from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
 from tests.fuzz.target import Feed, of_file, target
 from tests.ros2 import messages
@@ -156,7 +156,7 @@ def transforms(folder: Path) -> Feed:
     return [messages.encode(messages.transforms(*edges))], call
 
 
-@target(DatagramError)
+@target(MessageError)
 def pose_datagram(folder: Path) -> Feed:
     matrix = [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0]
     return [

@@ -19,7 +19,7 @@ from modt.sinks.records import read_records
 from modt.sources.packets.hesai import read_angles
 from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.pose_file import read_poses
+from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from modt.sources.text_file import read_numbers

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from modt.sources.packets.velodyne_models import AZIMUTHS, IDENTITY_AT, RETURN_AT
+from modt.sources.packets.velodyne import AZIMUTHS, IDENTITY_AT, RETURN_AT
 from tests.sequences.live_world import LiveWorld, cpu_s, turn
 
 SEED = st.integers(0, 9)

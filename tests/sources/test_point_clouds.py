@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from modt.errors import ScanError
 from modt.ros2.point_cloud2 import read_cloud
-from modt.sources.pcd_file import decompress
+from modt.sources.point_cloud_file import decompress
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from modt.types import UNRECORDED

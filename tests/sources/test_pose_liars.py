@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import OdometryConfig
-from modt.sources.pose_buffer import MAX_AGE_S, POSITION_NOISE_M
 from modt.sources.pose_socket import PoseSocket
+from modt.sources.received_poses import MAX_AGE_S, POSITION_NOISE_M
 from modt.types import Frame
 
 CONFIG = OdometryConfig()
@@ -51,7 +51,7 @@ class Robot:
         told = (self.time_s + self.sender_s, SPEED_MPS * self.time_s + self.world_m, 0.0)
         stamp_s, x, yaw = lie(*told[:2]) if lie else told
         self.there.send(json.dumps({"stamp": stamp_s, "x": x, "y": 0.0, "yaw": yaw}).encode())
-        self.odometry._queue._read()  # the kernel's queue of a pair of sockets is short
+        self.odometry._empty()  # the kernel's queue of a pair of sockets is short
 
     def frame_error_m(self):
         """Of the pose at a frame now; None without one."""

@@ -14,10 +14,10 @@ from modt.address import parse_address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
+from modt.ros2.cdr import MessageError
 from modt.schemes import POSES, open_poses
-from modt.sources.pose_buffer import MAX_AGE_S, PoseBuffer, interpolate
-from modt.sources.pose_datagram import DatagramError, read_datagram
-from modt.sources.pose_socket import DatagramQueue, PoseSocket, open_socket
+from modt.sources.pose_socket import PoseSocket, open_socket, read_datagram
+from modt.sources.received_poses import MAX_AGE_S, PoseBuffer, interpolate
 from modt.types import Frame
 
 CONFIG = OdometryConfig()
@@ -69,7 +69,7 @@ def test_any_bytes_are_a_pose_or_refused(raw):
     reason = None
     try:
         stamp_s, T = read_datagram(raw)
-    except DatagramError as error:
+    except MessageError as error:
         reason = error.reason
     if reason is None:
         assert np.isfinite(stamp_s)
@@ -129,7 +129,7 @@ def test_both_forms_give_the_same_pose():
     ],
 )
 def test_the_reason_of_a_refusal_is_given(raw, reason, cause):
-    with pytest.raises(DatagramError, match=cause) as caught:
+    with pytest.raises(MessageError, match=cause) as caught:
         read_datagram(raw)
     assert caught.value.reason == reason
 
@@ -231,11 +231,11 @@ def test_no_motion_below_the_speed_limit_is_a_restart(steps):
     odometry.close()
 
 
-def test_of_a_flood_the_newest_are_kept():
+def test_of_a_flood_the_newest_are_kept(monkeypatch):
+    monkeypatch.setattr("modt.sources.pose_socket.CAPACITY", 4)
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     there.setblocking(False)
     odometry = PoseSocket(here, CONFIG, "test")
-    odometry._queue = DatagramQueue(here, 4, 4096)
     for k in range(6):
         there.send(planar(0.1 * k, 1.0 * k))
     assert pose_of(odometry, frame(0.5))[0, 3] == 5.0

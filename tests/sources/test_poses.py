@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
-from modt.sources.pose_file import read_poses
-from modt.sources.pose_source import NoPoses, PoseFile, RecordedPoses
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, read_poses
 from modt.sources.recognise import open_stream
 
 from . import layouts
@@ -92,7 +91,7 @@ def test_too_few_lines_are_refused_before_the_start(tmp_path):
 
 def test_the_streams_own_may_be_kept_or_switched_off(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path))
-    own, none = PosedStream(stream, RecordedPoses()), PosedStream(stream, NoPoses())
+    own, none = PosedStream(stream, PoseSource()), PosedStream(stream, NoPoses())
     assert (own.info.has_poses, none.info.has_poses) == (True, False)
     assert all(f.T_world_sensor is None for f in none)
     for a, b in zip(own, stream, strict=True):

@@ -14,7 +14,7 @@ from modt.errors import MisuseError
 from modt.sources.packets import hesai, livox
 from modt.sources.packets.packet_decoder import extra
 from modt.sources.packets.turn_decoder import TURN
-from modt.sources.packets.velodyne_models import STAMP_AT, azimuths
+from modt.sources.packets.velodyne import STAMP_AT, azimuths
 from tools.send.faults import Timed
 
 

@@ -17,7 +17,7 @@ from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.placement import LEVEL, Mount
 from modt.schemes import POSES, open_poses, open_sensor
-from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource
 from modt.sources.stream import Stream, StreamInfo
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> Pose
     if request.poses is not None:
         return PoseFile(request.poses, info.camera, info.end)
     if request.odometry == RECORDED:
-        return RecordedPoses()
+        return PoseSource()
     if request.odometry == NONE:
         return NoPoses()
     if "://" not in request.odometry:

@@ -5,48 +5,45 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations, islice, pairwise
 from pathlib import Path
 
 import numpy as np
 
 from modt.config import OdometryConfig
-from modt.errors import MisuseError, ModtError, ScanError
+from modt.errors import MisuseError, ModtError
 from modt.ros2 import odometry, point_cloud2, static_transforms
 from modt.ros2.cdr import CdrReader, MessageError
 from modt.ros2.odometry import read_odometry
 from modt.ros2.point_cloud2 import PointCloud, read_cloud
 from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.bag_files import BagFile, BagMessage, BagTopic, bag_files, messages_of
-from modt.sources.pose_buffer import PoseBuffer
-from modt.sources.scan_file import sanitised
-from modt.sources.stamp_check import CLOCK_SET, STEP_S, StampCheck
-from modt.sources.stream import Fault, Faults, StreamInfo
+from modt.sources.live.sweep_reader import Sweep
+from modt.sources.received_poses import PoseBuffer
+from modt.sources.stamp_check import STEP_S, StampCheck
+from modt.sources.stream import Faults, StreamInfo
 from modt.types import Float64, Frame, Self
 
-
-@dataclass(frozen=True, slots=True)
-class Poses:
-    """The topic of the poses, and where the sensor sits on the frame that they are of."""
-
-    topic: str
-    T_base_sensor: Float64
+Poses = tuple[str, Float64]
+"""Topic of the poses, and pose of the sensor in the frame that they describe."""
 
 
 def find_poses(
     files: list[BagFile], topics: dict[str, BagTopic], sensor: str
 ) -> tuple[Poses | None, tuple[str, ...]]:
-    """The topic of the poses, None without one and where its frame does not lead to the sensor's; and notes."""
-    found = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE and topic.count)
-    if not found:
+    """Poses for the frame of a sensor, and notes; None without poses, or where their frame is not connected to it."""
+    names = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE and topic.count)
+    if not names:
         return None, ("no nav_msgs/Odometry: no poses",)
-    if len(found) > 1:
-        return None, (f"several topics of odometry ({', '.join(found)}): none is used, no poses",)
-    (topic,) = found
-    base = next((_base(message) for message in islice(messages_of(files, {topic}), 1)), "")
+    if len(names) > 1:
+        return None, (f"several topics of odometry ({', '.join(names)}): none is used, no poses",)
+    (topic,) = names
+    base = ""
+    with suppress(MessageError, StopIteration):
+        base = read_odometry(next(messages_of(files, {topic})).data).child_frame_id
     if base.lstrip("/") == sensor.lstrip("/") or not base or not sensor:
-        return Poses(topic, np.eye(4)), ()
+        return (topic, np.eye(4)), ()
     transforms = StaticTransforms()
     if topics.get(static_transforms.TOPIC, BagTopic("", 0)).type == static_transforms.TYPE:
         for message in messages_of(files, {static_transforms.TOPIC}):
@@ -56,45 +53,38 @@ def find_poses(
     if T_base_sensor is None:
         where = f"{static_transforms.TOPIC} does not lead from {base}, of which they are, to {sensor}"
         return None, (f"poses of {topic} are not used: {where}",)
-    return Poses(topic, T_base_sensor), ()
-
-
-def _base(message: BagMessage) -> str:
-    try:
-        return read_odometry(message.data).child_frame_id
-    except MessageError:
-        return ""
+    return (topic, T_base_sensor), ()
 
 
 PEEKED = 50
-"""Messages of a topic read before the first frame, until some can be used."""
+"""Greatest number of messages that are read before the first frame, to find usable sweeps."""
 COMPARED = 4
-"""First sweeps whose stamps are compared."""
+"""Number of first sweeps whose stamps are compared, to find one that is right."""
 
 
 class BagStream:
-    """The frames of a recording; stamps count from its first usable sweep.
+    """Frames of a recording; stamps count from its first usable sweep.
 
-    A frame is held back until there is a pose at least as late, or the next sweep, so that its pose is interpolated.
-    Messages that cannot be used are counted and skipped, the first ones are logged.
+    A frame is held back until a pose at least as late or the next sweep is read, so that its pose is interpolated.
+    Unusable messages are counted and skipped, the first ones are logged.
     """
 
     def __init__(
         self, info: StreamInfo, files: list[BagFile], topic: str, began: tuple[float, float], poses: Poses | None
     ) -> None:
-        """`began`: stamp and recorded time of the first sweep whose stamp is believed [s]."""
+        """`began`: stamp and recorded time of the first sweep whose stamp is accepted [s]."""
         self.info, self.faults = info, Faults()
         self._files, self._topic, self._began, self._poses = files, topic, began, poses
         self._first, self._last = 0, info.n_frames or 0
 
     def __iter__(self) -> Iterator[Frame]:
-        """The frames, with poses where there are any."""
+        """Yield the frames, with poses where there are any."""
         buffer, held, index = PoseBuffer(OdometryConfig()), None, -1
         stamps, pose_stamps = StampCheck(self._began), None
-        topics = {self._topic} if self._poses is None else {self._topic, self._poses.topic}
+        topics = {self._topic} if self._poses is None else {self._topic, self._poses[0]}
         for message in self._readable(topics):
             if message.topic != self._topic:
-                if pose_stamps is None:  # poses begin by the clock of the sweeps, at any time
+                if pose_stamps is None:  # the clock of the poses is that of the sweeps
                     began_s = message.recorded_s - STEP_S / 2
                     pose_stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
                 self._keep(message, buffer, pose_stamps)
@@ -114,7 +104,7 @@ class BagStream:
             yield replace(held, T_world_sensor=buffer.at(held.stamp_s))
 
     def between(self, first: int, last: int | None) -> Self:
-        """The frames with first <= index < last; others are not decoded."""
+        """Frames with first <= index < last; others are not decoded."""
         part = copy.copy(self)
         part.faults = Faults()
         part._first = max(first, self._first)
@@ -123,28 +113,22 @@ class BagStream:
         return part
 
     def _readable(self, topics: set[str]) -> Iterator[BagMessage]:
-        """The messages up to where the recording is broken."""
+        """Messages up to where the recording is broken."""
         try:
             yield from messages_of(self._files, topics)
         except ModtError as error:
-            self._fault(self._last, error.cause, skipped=True)
+            place = f"{self._topic} {self._last}"
+            self.faults.report(self._last, self._topic, error.cause, skipped=True, place=place)
 
     def _frame(self, index: int, message: BagMessage, stamps: StampCheck) -> Frame | None:
+        place = (index, self._topic, f"{self._topic} {index}")
         try:
             cloud = read_cloud(message.data)
-            points, flaws = sanitised(cloud.points, self._topic)
-        except (MessageError, ScanError) as error:
-            self._fault(index, error.cause if isinstance(error, ScanError) else str(error), skipped=True)
+        except MessageError as error:
+            self.faults.report(index, self._topic, str(error), skipped=True, place=place[2])
             return None
-        stamp_s, steps = _stamp_s(cloud, message), stamps.steps
-        if doubt := stamps.doubt(stamp_s, message.recorded_s):
-            self._fault(index, doubt, skipped=True)
-            return None
-        if stamps.steps > steps:
-            flaws = [*flaws, CLOCK_SET]
-        if flaws:
-            self._fault(index, "; ".join(flaws), skipped=False)
-        return Frame(index, stamp_s + stamps.shift_s - self._began[0], points, turn_s=cloud.turn_s)
+        sweep = Sweep(_stamp_s(cloud, message), cloud.points, cloud.turn_s)
+        return stamps.frame(sweep, message.recorded_s, self.faults, place, began_s=self._began[0])
 
     def _keep(self, message: BagMessage, buffer: PoseBuffer, stamps: StampCheck) -> None:
         with suppress(MessageError):
@@ -153,17 +137,14 @@ class BagStream:
                 return
             stamp_s = pose.stamp_s + stamps.shift_s - self._began[0]
             if stamp_s > buffer.newest_s:
-                buffer.add(stamp_s, pose.T_odom_child @ self._poses.T_base_sensor)
-
-    def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
-        self.faults.report(Fault(index, self._topic, cause, skipped), f"{self._topic} {index}")
+                buffer.add(stamp_s, pose.T_odom_child @ self._poses[1])
 
 
 def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream:
-    """The stream of a rosbag2 folder, a .db3 or an .mcap file; period_s where it has one sweep alone.
+    """Stream of a rosbag2 folder, a .db3 or an .mcap file; `period_s` holds for a recording of a single sweep.
 
     Raises:
-        MisuseError: no topic of point clouds, or several and none is chosen; or no library to read the file.
+        MisuseError: no topic of point clouds, several and none is chosen, or no library to read the file.
         ModtError: the file cannot be read.
     """
     path = path.resolve()
@@ -181,10 +162,8 @@ def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream
     info = StreamInfo(
         name=path.stem if path.is_file() else path.name,
         layout="rosbag2",
-        sequence=0,
         n_frames=topics[chosen].count,
         period_s=next(steps_s, period_s),
-        camera=None,
         has_poses=poses is not None,
         pose_notes=notes,
         end=topics[chosen].count,
@@ -211,10 +190,10 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
 
 
 def _first_clouds(path: Path, files: list[BagFile], topic: str) -> list[tuple[PointCloud, BagMessage]]:
-    """The first usable sweeps, at least one.
+    """First usable sweeps, at least one.
 
     Raises:
-        ModtError: there are none.
+        ModtError: no message can be used.
     """
     clouds: list[tuple[PointCloud, BagMessage]] = []
     refused = "no message"

@@ -29,11 +29,11 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 MAX_RECORD_BYTES = 2**28
 """Largest record of an MCAP file and largest unpacked message; a chunk has a few megabytes."""
 ALLOWANCE_BYTES, MOST_TIMES = 16 * 2**20, 64
-"""A file unpacks to as many bytes, and as many times its size, at most."""
+"""A file may unpack to ALLOWANCE_BYTES and MOST_TIMES its size together."""
 FOOTER_BYTES = 37
-"""Last record of a closed MCAP file, and what follows it."""
+"""Size of the last record of a closed MCAP file and of what follows it."""
 STEPS = 10_000
-"""Instructions of a database between two looks at their number, which may be that of the bytes unpacked."""
+"""Instructions of a database between two checks of their number, which is limited like the bytes unpacked."""
 
 
 class BagMessage(NamedTuple):
@@ -46,7 +46,7 @@ class BagMessage(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class BagTopic:
-    """A topic of a recording: the type of its messages as PACKAGE/NAME, and their number."""
+    """A topic of a recording, with the type of its messages as PACKAGE/NAME, and their number."""
 
     type: str
     count: int
@@ -71,7 +71,7 @@ class BagFile(ABC):
                 self._unpack(handle)
 
     def topics(self) -> dict[str, BagTopic]:
-        """Topics by name, of messages in CDR.
+        """Topics with messages in CDR by name.
 
         Raises:
             ModtError: the file cannot be read.
@@ -83,7 +83,7 @@ class BagFile(ABC):
         """Messages of these topics in the order of their recording.
 
         Raises:
-            ModtError: the file cannot be read, or not beyond the messages before.
+            ModtError: the file cannot be read, or not beyond the messages yielded before.
         """
         left = self._most
         with self._refusals():
@@ -101,10 +101,10 @@ class BagFile(ABC):
         """Topic, time of the recording [ns] and bytes of each message."""
 
     def _less(self, left: int, size: int) -> int:
-        """Bytes that may still be unpacked after some more.
+        """Number of bytes that may be unpacked after `size` more.
 
         Raises:
-            ModtError: there are none.
+            ModtError: the limit is exceeded.
         """
         if size > left:
             most = f"{MOST_TIMES} times its size and {ALLOWANCE_BYTES >> 20} MiB"
@@ -112,7 +112,7 @@ class BagFile(ABC):
         return left - size
 
     def _unpack(self, handle: int) -> None:
-        """Write what the compressed file holds."""
+        """Write the content of the compressed file."""
         from zstandard import ZstdDecompressor
 
         left = self._most
@@ -124,7 +124,7 @@ class BagFile(ABC):
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:
-        """Any failure of a library as an error that names the file: its bytes may be anything."""
+        """Turn any failure of a library into an error that names the file; its bytes may be anything."""
         try:
             yield
         except ModtError:
@@ -136,7 +136,7 @@ class BagFile(ABC):
 
 
 class DatabaseFile(BagFile):
-    """A .db3 file, which may hold plain tables only: views and triggers are programs."""
+    """A .db3 file; it may hold plain tables only, because views and triggers are programs."""
 
     def _topics(self) -> Iterator[tuple[str, str, int]]:
         yield from self._rows(
@@ -172,7 +172,7 @@ NO_TABLES = (
 
 
 class McapFile(BagFile):
-    """An .mcap file; one that was cut off is read up to there."""
+    """An .mcap file; a truncated one is read up to its end."""
 
     def _topics(self) -> list[tuple[str, str, int]]:
         with self._plain.open("rb") as file:
@@ -186,7 +186,7 @@ class McapFile(BagFile):
                     for schema, channel, _ in self._records(file, None):
                         seen[channel.id] = schema, channel
                         counts[channel.id] += 1
-                except Exception as error:  # at its end
+                except Exception as error:  # at the broken end of the file
                     cause = f" ({error.cause})" if isinstance(error, ModtError) else ""
                 found = list(seen.values())
         if not found:
@@ -203,7 +203,7 @@ class McapFile(BagFile):
                 yield channel.topic, message.log_time, message.data
 
     def _records(self, file: BinaryIO, summary: Any, topics: Collection[str] | None = None) -> Iterator[Any]:
-        """Schema, channel and message: by the time of the recording where there is an index, else as they come."""
+        """Schema, channel and message, ordered by recorded time with an index, else by their place in the file."""
         from mcap.records import Channel, Chunk, Message, Schema
         from mcap.stream_reader import breakup_chunk
 
@@ -237,8 +237,10 @@ KINDS: dict[str, type[BagFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
 
 
 def bag_files(path: Path) -> list[BagFile]:
-    """The files of a recording, a file or a folder, in their order; none where there are none."""
-    return [KINDS[_kind(file)](file) for file in sorted(_within(path), key=lambda p: (len(p.name), p.name))]
+    """Files of a recording, which is a file or a folder, in their order."""
+    within = path.iterdir() if path.is_dir() else [path]
+    files = [p for p in within if _kind(p) in KINDS and p.is_file()]
+    return [KINDS[_kind(file)](file) for file in sorted(files, key=lambda p: (len(p.name), p.name))]
 
 
 def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:
@@ -246,18 +248,13 @@ def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:
     return (message for file in files for message in file.messages(topics))
 
 
-def _within(path: Path) -> list[Path]:
-    """The files at a path or in a folder that have the suffix of a recording."""
-    return [p for p in (path.iterdir() if path.is_dir() else [path]) if _kind(p) in KINDS and p.is_file()]
-
-
 def _kind(path: Path) -> str:
-    """Suffix of a file, of the one within where it is compressed."""
+    """Suffix of a file without that of its compression."""
     return Path(path.name.removesuffix(ZSTD)).suffix
 
 
 def _from(file: BinaryIO, at: int) -> Iterator[Any]:
-    """Records of an MCAP file from a place on; chunks as they are."""
+    """Records of an MCAP file from an offset on; chunks are not unpacked."""
     from mcap.stream_reader import StreamReader
 
     file.seek(at)
@@ -286,7 +283,7 @@ def _summary(file: BinaryIO) -> Any:
 
 
 def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iterator[tuple[int, Any]]:
-    """Chunks with messages of these topics by the time of their begin [ns]; without an index all records, and 0."""
+    """Begin [ns] and chunk, for chunks with messages of these topics; without an index, 0 and each record."""
     chunks = () if summary is None else summary.chunk_indexes
     for index in sorted(chunks, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
         held = {summary.channels[number].topic for number in index.message_index_offsets}
@@ -297,7 +294,7 @@ def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iter
 
 
 def _unpacked(compression: str, data: bytes, most: int) -> bytes:
-    """Uncompressed data, or their first `most` bytes."""
+    """Uncompressed data, limited to `most` bytes."""
     if compression == "lz4":
         from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 
@@ -310,7 +307,7 @@ def _unpacked(compression: str, data: bytes, most: int) -> bytes:
 
 
 def _message(data: bytes, most: int) -> bytes:
-    """A message, uncompressed; one that cannot be unpacked is left as it is."""
+    """Uncompressed message; one that cannot be unpacked is returned unchanged."""
     if data.startswith(ZSTD_MAGIC):
         with suppress(Exception):
             unpacked = _unpacked("zstd", data, most + 1)

@@ -1,4 +1,4 @@
-"""Order and times of files by their names."""
+"""Order and times of files from their names."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _CALENDAR = re.compile(
 _SECONDS = re.compile(r"([0-9]{1,9})(\.)([0-9]+)")
 
 MAX_NS = 1e19
-"""A greater number is no time in any unit."""
+"""A greater number is no time in any unit [ns]."""
 UNITS_NS = (1e11, 10**9), (1e14, 10**6), (1e17, 10**3)
-"""Numbers below which a time is in seconds, milliseconds, microseconds, and what is 1 of each [ns]."""
+"""Numbers below which a time is in seconds, milliseconds, microseconds, and the length of the unit [ns]."""
 
 
 def files_in(folder: Path, suffix: str) -> list[Path]:
-    """Regular files with a suffix in a folder, in the order of the times in their names, else of the numbers."""
+    """Regular files with a suffix in a folder, ordered by the times in their names, else by the numbers."""
     files = [f for f in folder.glob(f"*{suffix}") if f.is_file() and not f.name.startswith(".")]
     files.sort(key=lambda f: [int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", f.stem))])
     times = times_ns([f.stem for f in files])
@@ -30,14 +30,14 @@ def files_in(folder: Path, suffix: str) -> list[Path]:
 
 
 def times_ns(names: Sequence[str]) -> list[int] | None:
-    """Times in names [ns]; None where one has none, or two have the same.
+    """Times in names [ns]; None if a name has no time, or two names have the same.
 
-    A time is a date and time of day, or seconds with or without a fraction, since 1970 or, alone, since any moment.
+    A time is a date and time of day, or seconds since 1970. A name that is a number with a fraction may count its
+    seconds from any moment.
     """
-    found = [_time(name) for name in names]
-    if not found or None in found:
+    known = [time for name in names if (time := _time(name)) is not None]
+    if not names or len(known) < len(names):
         return None
-    known = [time for time in found if time is not None]
     longest = max(len(fraction) for _, _, fraction in known)
     uneven = any(len(fraction) < longest for _, _, fraction in known)
     counted = uneven and (longest > 7 or known[0][1] != ".")  # without leading zeros; else without trailing ones
@@ -47,13 +47,13 @@ def times_ns(names: Sequence[str]) -> list[int] | None:
 
 
 def time_ns(text: str) -> int | None:
-    """Time in a text [ns], None where there is none."""
-    found = _time(text.strip())
-    return None if found is None else found[0] * 10**9 + int(found[2].ljust(9, "0"))
+    """Time in a text [ns], None without one."""
+    time = _time(text.strip())
+    return None if time is None else time[0] * 10**9 + int(time[2].ljust(9, "0"))
 
 
 def seconds_ns(text: str) -> int | None:
-    """A number of seconds [ns], or a number as great as only milli-, micro- or nanoseconds since 1970 are."""
+    """Time of a number in seconds [ns]; greater numbers are milli-, micro- or nanoseconds since 1970."""
     try:
         time = float(text)
     except ValueError:

@@ -1,6 +1,6 @@
 """KITTI's folder layouts: raw drives, tracking and odometry sequences, folders of scans.
 
-Every reader raises a MisuseError where there are no scans, or a file is invalid.
+Every reader raises a MisuseError for a folder without scans and for an invalid file.
 """
 
 from __future__ import annotations
@@ -17,18 +17,17 @@ from typing import TypeVar
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.geometry import Camera
 from modt.sources import kitti_calibration, oxts
 from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
-from modt.sources.pose_file import read_poses, sensor_poses
+from modt.sources.pose_source import read_poses, sensor_poses
 from modt.sources.scan_stream import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt.types import Float64
 
 MAX_NUMBER_DIGITS = 10
-"""Of names that are numbers of frames, not times."""
+"""Greatest number of digits of a name that is the number of a frame."""
 MAX_SWEEP_PERIODS = 2
-"""Longer sweeps are taken for wrong time stamps."""
+"""Greatest duration of a sweep [periods]; a longer one is attributed to wrong time stamps."""
 NO_SWEEP_TIMES = "sweeps are not deskewed"
 NO_CAMERA = "no camera, no --fov camera"
 NO_POSES = "no odometry, ego-motion is estimated from the proposals"
@@ -40,7 +39,7 @@ Poses = dict[int, Float64]
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """Missing files and their consequences; those of the poses do not matter with another pose source."""
+    """Missing files and their consequences; `of_poses` does not matter with another pose source."""
 
     of_stream: list[str] = field(default_factory=list)
     of_poses: list[str] = field(default_factory=list)
@@ -56,13 +55,14 @@ def raw_drive(drive: Path) -> ScanStream:
     frames, _ = _scans(data)
     stamps = _stamps(drive / "velodyne_points" / "timestamps.txt", frames, notes, time_ns)
     turns = _raw_turns(drive / "velodyne_points", frames, notes)
-    return _stream(drive.name, "KITTI raw drive", data, camera, poses, stamps, notes, turns=turns)
+    info = StreamInfo(drive.name, "KITTI raw drive", camera=camera)
+    return _stream(info, data, notes, poses, stamps, turns)
 
 
 def tracking_sequence(scans: Path) -> ScanStream:
     """A sequence of the tracking layout, .../training/velodyne/0005, with calib/ and oxts/ next to velodyne/.
 
-    Its sweeps are those of raw drives without their time stamps: each is taken to last the period.
+    Its sweeps are those of raw drives without time stamps; each lasts one period.
     """
     root, number = scans.parent.parent, scans.name
     notes = Notes()
@@ -76,8 +76,8 @@ def tracking_sequence(scans: Path) -> ScanStream:
         T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, notes.of_poses, NO_POSES)
         if T_imu_sensor is not None:
             poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
-    name, turns = f"tracking {number}", dict.fromkeys(_scans(scans)[0], PERIOD_S)
-    return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turns=turns)
+    info = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera)
+    return _stream(info, scans, notes, poses, turns=dict.fromkeys(_scans(scans)[0], PERIOD_S))
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
@@ -90,25 +90,28 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     cost = f"{NO_CAMERA}; get Tr from data_odometry_calib.zip"
     camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, cost)
     places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
-    found = next((p for p in places if not _absent(p)), None)
+    path = next((p for p in places if not _absent(p)), None)
     poses: Poses = {}
-    if found is None or camera is None:
-        cause = f"{places[0]} {_absent(places[0])}" if found is None else f"{found} needs the Tr of {calib}"
+    if path is None or camera is None:
+        cause = f"{places[0]} {_absent(places[0])}" if path is None else f"{path} needs the Tr of {calib}"
         notes.of_poses.append(f"{cause}: {NO_POSES}")
     else:
-        poses = dict(enumerate(sensor_poses(read_poses(found), camera.T_camera_sensor)))
-    stamps = _stamps(sequence / "times.txt", _scans(sequence / "velodyne")[0], notes, seconds_ns)
-    return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
+        poses = dict(enumerate(sensor_poses(read_poses(path), camera.T_camera_sensor)))
+    data = sequence / "velodyne"
+    stamps = _stamps(sequence / "times.txt", _scans(data)[0], notes, seconds_ns)
+    info = StreamInfo(f"odometry {sequence.name}", "KITTI odometry", camera=camera)
+    return _stream(info, data, notes, poses, stamps)
 
 
 def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") -> ScanStream:
-    """A folder of scans in the order of their names, at the times that these are, or period_s apart."""
+    """A folder of scans in the order of their names, stamped by their names or `period_s` apart."""
     indices, files = _scans(folder, suffix)
     times = times_ns([f.stem for f in files])
     apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
     stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(indices)}
     notes = Notes([f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"])
-    return _stream(folder.name, "folder of scans", folder, None, {}, stamps, notes, period_s=period_s, suffix=suffix)
+    info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
+    return _stream(info, folder, notes, {}, stamps, suffix=suffix)
 
 
 def _scans(data: Path, suffix: str = ".bin") -> tuple[list[int], list[Path]]:
@@ -122,30 +125,26 @@ def _scans(data: Path, suffix: str = ".bin") -> tuple[list[int], list[Path]]:
 
 
 def _stream(
-    name: str,
-    layout: str,
+    info: StreamInfo,
     data: Path,
-    camera: Camera | None,
-    poses: Poses,
-    stamps: dict[int, float],
     notes: Notes,
-    *,
-    sequence: int = 0,
+    poses: Poses,
+    stamps: Mapping[int, float] = MappingProxyType({}),
     turns: Mapping[int, float] = MappingProxyType({}),
-    period_s: float = PERIOD_S,
     suffix: str = ".bin",
 ) -> ScanStream:
+    """Stream of the scans in `data` with their poses, stamps and durations [s] by frame."""
     indices, files = _scans(data, suffix)
     missing = indices[-1] - indices[0] + 1 - len(indices)
     if missing:
         first = next(a + 1 for a, b in pairwise(indices) if b > a + 1)
         notes.of_stream.append(f"{missing} frames are missing (the first is {first})")
     if poses:
-        lost = [i for i in indices if i not in poses]
+        lost, known = [i for i in indices if i not in poses], sorted(poses)
         if lost:
             cost = "have the pose of the frame before"
             notes.of_poses.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
-        poses = _filled(poses, indices)
+        poses = {i: poses[known[max(bisect_right(known, i) - 1, 0)]] for i in indices}  # the first, before it
     scans = [
         ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0))
         for i, f in zip(indices, files, strict=True)
@@ -153,24 +152,8 @@ def _stream(
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
         notes.of_stream.append(f"time stamps decrease: frames {PERIOD_S} s apart instead")
         scans = [replace(s, stamp_s=s.index * PERIOD_S) for s in scans]
-    info = StreamInfo(
-        name=name,
-        layout=layout,
-        sequence=sequence,
-        n_frames=len(scans),
-        period_s=period_s,
-        camera=camera,
-        has_poses=bool(poses),
-        notes=tuple(notes.of_stream),
-        pose_notes=tuple(notes.of_poses),
-    )
-    return ScanStream(info, scans)
-
-
-def _filled(poses: Poses, indices: list[int]) -> Poses:
-    """A pose for every frame: its own, else the last one before, else the first."""
-    known = sorted(poses)
-    return {i: poses[known[max(bisect_right(known, i) - 1, 0)]] for i in indices}
+    of_stream, of_poses = tuple(notes.of_stream), tuple(notes.of_poses)
+    return ScanStream(replace(info, has_poses=bool(poses), notes=of_stream, pose_notes=of_poses), scans)
 
 
 def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
@@ -187,7 +170,7 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
 
 
 def _stamps(path: Path, frames: Sequence[int], notes: Notes, read: Callable[[str], int | None]) -> dict[int, float]:
-    """Seconds since scan 0, by frame; interpolated where missing."""
+    """Stamps of the frames since scan 0 [s]; missing ones are interpolated."""
     times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "theirs are interpolated", read)
     if not times:
         return {}
@@ -203,7 +186,7 @@ def _stamps(path: Path, frames: Sequence[int], notes: Notes, read: Callable[[str
 
 
 def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
-    """Duration of the sweep [s], by frame; empty where the time stamps are missing or wrong."""
+    """Durations of the sweeps by frame [s]; empty where the time stamps are missing or wrong."""
     starts = _times_ns(folder / "timestamps_start.txt", frames, NO_SWEEP_TIMES, notes)
     ends = _times_ns(folder / "timestamps_end.txt", frames, NO_SWEEP_TIMES, notes) if starts else {}
     turns = {i: (ends[i] - starts[i]) / 1e9 for i in frames if i in starts and i in ends}
@@ -225,9 +208,9 @@ def _times_ns(
     cost_of_few: str = "",
     read: Callable[[str], int | None] = time_ns,
 ) -> dict[int, int]:
-    """Times of a KITTI list, by frame [ns]: line i is that of scan i, blank where it is missing.
+    """Times of a KITTI list by frame [ns]; line i belongs to scan i and is blank where the scan is missing.
 
-    Defects are noted with their cost, that of single frames without a time by default the same.
+    A defect is noted with its cost; `cost_of_few` is the cost of single frames without a time.
     """
     if absent := _absent(path):
         notes.of_stream.append(f"{path} {absent}: {cost}")
@@ -243,20 +226,20 @@ def _times_ns(
         notes.of_stream.append(f"{unlike}: line i is used for scan i, from 0; restore the missing lines")
     without = [i for i in frames if i not in times]
     if without:
-        lacking = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
-        notes.of_stream.append(f"{lacking}: {cost_of_few or cost}")
+        few = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
+        notes.of_stream.append(f"{few}: {cost_of_few or cost}")
     return times
 
 
 def _absent(path: Path) -> str:
-    """Why a part of a recording is not there, empty if it is; an empty file is what a broken download leaves."""
+    """Reason why a part of a recording is absent, empty if it is there; broken downloads leave empty files."""
     if not path.is_file():
         return "is missing"
     return "" if path.stat().st_size else "is empty"
 
 
 def _optional(read: Callable[[Path], T], path: Path, notes: list[str], cost: str) -> T | None:
-    """A calibration; None where its file or a row of it is missing, which is noted with its cost."""
+    """Read a calibration; None if its file or a row of it is missing, which is noted with its cost."""
     try:
         return read(path)
     except kitti_calibration.MissingError as error:

@@ -1,6 +1,6 @@
 """KITTI calibration files: left colour camera and inertial unit, relative to the sensor.
 
-All readers raise a MissingError where a file or a row is missing, a MisuseError where one is invalid.
+All readers raise a MissingError for a missing file or row, and a MisuseError for an invalid one.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from modt.sources.text_file import read_lines
 from modt.types import Float64
 
 IMAGE_PX = (1242.0, 375.0)
-"""Size of the rectified image where the calibration has none."""
+"""Size of the rectified image, for a calibration without one."""
 REMEDY = "restore the calibration file"
 MAX_ELEMENT = 1e6
 """Greatest number in a calibration [pixel or m]."""
 
 
 class MissingError(MisuseError):
-    """A calibration file or a row of it that is not there: a recording goes on without."""
+    """A calibration file or a row of it is missing; the recording is used without it."""
 
 
 def read_table(path: Path) -> dict[str, Float64]:
     """Numeric rows by key.
 
     Raises:
-        MissingError: there is no such file.
+        MissingError: the file does not exist.
     """
     if not path.is_file():
         raise MissingError(path, "is missing", REMEDY)
@@ -44,7 +44,7 @@ def read_table(path: Path) -> dict[str, Float64]:
 
 
 def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys: str) -> Float64:
-    """Matrix of the first key found, of numbers up to MAX_ELEMENT."""
+    """Matrix of the first known key, with numbers up to MAX_ELEMENT."""
     for key in keys:
         if key in table:
             if table[key].size != shape[0] * shape[1]:
@@ -57,7 +57,7 @@ def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys:
 
 
 def rigid(table: dict[str, Float64], path: Path) -> Float64:
-    """(4, 4) transform of R and T of a raw calibration."""
+    """(4, 4) transform from R and T of a raw calibration."""
     return se3(matrix(table, path, (3, 3), "R"), matrix(table, path, (3, 1), "T")[:, 0])
 
 
@@ -75,7 +75,7 @@ def camera(P: Float64, R_rect: Float64, T_camera_sensor: Float64, size_px: tuple
 
 
 def camera_of_raw(path: Path) -> Camera:
-    """Left colour camera by calib_cam_to_cam.txt and the calib_velo_to_cam.txt in the same folder."""
+    """Left colour camera from calib_cam_to_cam.txt and the calib_velo_to_cam.txt in the same folder."""
     table = read_table(path)
     size = matrix({"S_rect_02": np.array(IMAGE_PX)} | table, path, (1, 2), "S_rect_02")[0]
     to_camera = path.with_name("calib_velo_to_cam.txt")
@@ -88,7 +88,7 @@ def camera_of_raw(path: Path) -> Camera:
 
 
 def camera_of_sequence(path: Path) -> Camera:
-    """Left colour camera by a calibration file of the tracking, object or odometry layout."""
+    """Left colour camera from a calibration file of the tracking, object or odometry layout."""
     table = read_table(path)
     R_rect = np.eye(3)  # Tr of the odometry layout includes the rectification
     if "R0_rect" in table or "R_rect" in table:
@@ -98,12 +98,12 @@ def camera_of_sequence(path: Path) -> Camera:
 
 
 def T_imu_sensor_of_raw(folder: Path) -> Float64:
-    """(4, 4) T_imu_sensor by calib_imu_to_velo.txt."""
+    """(4, 4) T_imu_sensor from calib_imu_to_velo.txt."""
     path = folder / "calib_imu_to_velo.txt"
     return inverse(rigid(read_table(path), path))
 
 
 def T_imu_sensor_of_sequence(path: Path) -> Float64:
-    """(4, 4) T_imu_sensor by a calibration file of the tracking or object layout."""
+    """(4, 4) T_imu_sensor from a calibration file of the tracking or object layout."""
     table = read_table(path)
     return inverse(homogeneous(matrix(table, path, (3, 4), "Tr_imu_to_velo", "Tr_imu_velo")))

@@ -1,8 +1,14 @@
-"""Poses received in datagrams, one each."""
+"""Poses received in datagrams of a socket.
+
+A datagram is JSON: {"stamp": s, "x": m, "y": m, "yaw": rad}, or {"stamp": s, "pose": [...]} with the 16 elements of
+T_world_sensor in row-major order, or the first 12 of them. Other keys are ignored.
+"""
 
 from __future__ import annotations
 
 import errno
+import json
+import math
 import socket
 import stat
 import struct
@@ -12,40 +18,95 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.sources.pose_buffer import CAPACITY
-from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
-from modt.sources.received_poses import ReceivedPoses
+from modt.geometry import rotation_zyx, se3
+from modt.ros2.cdr import MessageError
+from modt.sources.pose_source import pose_defect
+from modt.sources.received_poses import CAPACITY, ReceivedPoses
+from modt.types import Float64
 
+MAX_BYTES = 4096
+PLANAR = ("x", "y", "yaw")
 _BUFFER_BYTES = 1 << 20
-_READ_AT_ONCE = 4096  # in a flood; the kernel holds about as many
+_READ_AT_ONCE = 4096  # bounds the time of a frame in a flood; the kernel holds about as many
 _EMPTIED_S = 0.01
-_OVERFLOW = getattr(socket, "SO_RXQ_OVFL", 40)  # has Linux count what it dropped; Python does not name it
+_OVERFLOW = getattr(socket, "SO_RXQ_OVFL", 40)  # Linux counts dropped datagrams; Python does not name the option
 _COUNT = struct.Struct("=I")
 
 
-class DatagramQueue:
-    """The newest datagrams since they were last taken, oldest first.
+def read_datagram(raw: bytes) -> tuple[float, Float64]:
+    """Stamp [s] and (4, 4) T_world_sensor.
 
-    Of a Unix socket the kernel holds ten datagrams, whatever its buffer: where others can send to one, a thread
-    empties it meanwhile.
+    Raises:
+        MessageError: the bytes are no pose.
+    """
+    if len(raw) > MAX_BYTES:
+        raise MessageError("malformed", f"more than {MAX_BYTES} bytes")
+    try:
+        message = json.loads(raw)
+    except (ValueError, RecursionError):
+        raise MessageError("malformed", "no JSON") from None
+    if not isinstance(message, dict):
+        raise MessageError("malformed", "no JSON object")
+    if ("pose" in message) == any(key in message for key in PLANAR):
+        raise MessageError("malformed", "neither x, y, yaw nor pose, or both")
+    stamp = _number(message, "stamp")
+    if "pose" in message:
+        T = _matrix(message["pose"])
+    else:
+        x, y, yaw = (_number(message, key) for key in PLANAR)
+        T = se3(rotation_zyx(0.0, 0.0, math.remainder(yaw, 2 * math.pi)), np.array([x, y, 0.0]))
+    if defect := pose_defect(T):
+        raise MessageError("malformed", f"pose is {defect}")
+    return stamp, T
 
-    Args:
-        bound: socket, which it owns.
-        capacity: datagrams kept.
-        max_bytes: of a datagram, beyond which it is cut.
 
-    Attributes:
-        overflowed: datagrams that the kernel dropped, where it says so.
+def _number(message: dict[str, Any], key: str) -> float:
+    if key not in message:
+        raise MessageError("malformed", f"no {key}")
+    return _finite(message[key], key)
+
+
+def _finite(value: object, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise MessageError("malformed", f"{key} is no number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise MessageError("non_finite", f"{key} is not finite")
+    return number
+
+
+def _matrix(values: object) -> Float64:
+    if not isinstance(values, list) or len(values) not in (12, 16):
+        raise MessageError("malformed", "pose is no list of 12 or 16 numbers")
+    numbers = np.array([_finite(value, "pose") for value in values])
+    if len(numbers) == 16 and np.abs(numbers[12:] - [0, 0, 0, 1]).max() > 1e-6:
+        raise MessageError("malformed", "the last row of pose is not 0 0 0 1")
+    T = np.eye(4)
+    T[:3] = numbers[:12].reshape(3, 4)
+    return T
+
+
+class PoseSocket(ReceivedPoses):
+    """Reads the newest datagrams of a socket, which it owns, once a frame without blocking.
+
+    The kernel holds ten datagrams of a Unix socket, whatever its buffer, so a thread empties such a socket between
+    two frames.
     """
 
-    def __init__(self, bound: socket.socket, capacity: int, max_bytes: int) -> None:
+    def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
+        super().__init__(config, name)
         bound.setblocking(False)
-        self._socket, self._max_bytes = bound, max_bytes
-        self._kept: deque[bytes] = deque(maxlen=capacity)
-        self._crowded_out = self.overflowed = 0
+        self._socket = bound
+        self._kept: deque[bytes] = deque(maxlen=CAPACITY)
+        self._crowded_out = 0
         with suppress(OSError):
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
         with suppress(OSError):
@@ -56,15 +117,6 @@ class DatagramQueue:
         if bound.family == socket.AF_UNIX and self._address:
             self._thread.start()
 
-    def take(self) -> tuple[list[bytes], int]:
-        """The newest of what has arrived, and the number of older ones that they crowded out; without waiting."""
-        with self._lock:
-            self._read()
-            taken, crowded_out = list(self._kept), self._crowded_out
-            self._kept.clear()
-            self._crowded_out = 0
-        return taken, crowded_out
-
     def close(self) -> None:
         """Close the socket and remove its file."""
         self._ended.set()
@@ -74,15 +126,30 @@ class DatagramQueue:
         if isinstance(self._address, str) and self._address:
             Path(self._address).unlink(missing_ok=True)
 
+    def _take(self) -> list[bytes]:
+        """Take the newest CAPACITY datagrams; a flood must not delay the frame."""
+        with self._lock:
+            self._empty()
+            taken, crowded_out = list(self._kept), self._crowded_out
+            self._kept.clear()
+            self._crowded_out = 0
+        self.received += len(taken) + crowded_out
+        if crowded_out:
+            self._refuse(MessageError("crowded_out", f"more than {CAPACITY} a frame"), crowded_out)
+        return taken
+
+    _read = staticmethod(read_datagram)
+
     def _keep_empty(self) -> None:
         while not self._ended.wait(_EMPTIED_S):
             with self._lock:
-                self._read()
+                self._empty()
 
-    def _read(self) -> None:
+    def _empty(self) -> None:
+        """Move datagrams from the kernel's queue to the newest ones kept."""
         for _ in range(_READ_AT_ONCE):
             try:
-                raw, facts, _, _ = self._socket.recvmsg(self._max_bytes, socket.CMSG_SPACE(_COUNT.size))
+                raw, facts, _, _ = self._socket.recvmsg(MAX_BYTES + 1, socket.CMSG_SPACE(_COUNT.size))
             except OSError:  # nothing to read, or an error caused by the last sender
                 return
             self._crowded_out += len(self._kept) == self._kept.maxlen
@@ -92,30 +159,8 @@ class DatagramQueue:
                     (self.overflowed,) = _COUNT.unpack(value[: _COUNT.size])
 
 
-class PoseSocket(ReceivedPoses):
-    """Reads the socket once a frame without blocking."""
-
-    def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
-        super().__init__(config, name)
-        self._queue = DatagramQueue(bound, CAPACITY, MAX_BYTES + 1)
-
-    def close(self) -> None:
-        """Close the socket and remove its file."""
-        self._queue.close()
-
-    def _take(self) -> list[bytes]:
-        """The newest CAPACITY datagrams: a flood must not delay the frame."""
-        taken, crowded_out = self._queue.take()
-        self.received, self.overflowed = self.received + len(taken) + crowded_out, self._queue.overflowed
-        if crowded_out:
-            self._refuse(DatagramError("crowded_out", f"more than {CAPACITY} a frame"), crowded_out)
-        return taken
-
-    _read = staticmethod(read_datagram)
-
-
 def open_socket(address: Address) -> socket.socket:
-    """A socket bound to udp://HOST:PORT or unix:///PATH.
+    """Bind a socket to udp://HOST:PORT or unix:///PATH.
 
     Raises:
         MisuseError: the address names no socket, or it cannot be bound.

@@ -12,17 +12,15 @@ from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
-from modt.sources.pose_buffer import CAPACITY
-from modt.sources.pose_datagram import DatagramError
-from modt.sources.pose_file import pose_defect
-from modt.sources.received_poses import ReceivedPoses
+from modt.sources.pose_source import pose_defect
+from modt.sources.received_poses import CAPACITY, ReceivedPoses
 from modt.types import Float64
 
 MOUNT = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 class PoseTopic(ReceivedPoses):
-    """Reads the topic once a frame without blocking; T_base_sensor is where the sensor sits on the robot."""
+    """Reads the topic once a frame without blocking; T_base_sensor is the pose of the sensor on the robot."""
 
     def __init__(self, subscription: Subscription, config: OdometryConfig, name: str, T_base_sensor: Float64) -> None:
         super().__init__(config, name)
@@ -34,19 +32,15 @@ class PoseTopic(ReceivedPoses):
         return taken
 
     def _read(self, message: Message, /) -> tuple[float, Float64]:
-        try:
-            odometry = read_odometry(message.data)
-        except MessageError as error:
-            raise DatagramError(error.reason, str(error)) from None
+        odometry = read_odometry(message.data)
         T = odometry.T_odom_child @ self._T_base_sensor
-        defect = pose_defect(T)
-        if defect:
-            raise DatagramError("malformed", f"pose is {defect}")
+        if defect := pose_defect(T):
+            raise MessageError("malformed", f"pose is {defect}")
         return odometry.stamp_s, T
 
 
 def open_topic(address: Address, config: OdometryConfig) -> PoseTopic:
-    """The poses of ros2:///TOPIC?domain=N&base_to_sensor=x,y,z,roll,pitch,yaw [m, rad].
+    """Subscribe to ros2:///TOPIC?domain=N&base_to_sensor=x,y,z,roll,pitch,yaw [m, rad].
 
     Raises:
         MisuseError: Cyclone DDS is not installed, or the address names no topic, domain or mount.

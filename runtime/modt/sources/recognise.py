@@ -1,19 +1,18 @@
-"""Recognition of the layout at a path."""
+"""Recognition of the recording at a path."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from functools import partial
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
 from modt.errors import MisuseError
-from modt.sources.scan_file import READERS
+from modt.sources.scan_file import SUFFIXES
 from modt.sources.scan_stream import PERIOD_S, ScanStream
 from modt.sources.stream import Stream
 
 CAPTURES = frozenset({".pcap", ".cap", ".pcapng"})
-"""Suffixes of captures; of the last kind `Capture` says how it is converted."""
+"""Suffixes of captures; for the last one `Capture` raises an error with its conversion."""
 BAGS = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 """Suffixes of the files of ROS 2 recordings."""
 _LAS = ("is a LAS file", "convert it: pdal translate FILE scans/000000.ply, one file a sweep, and give scans")
@@ -31,22 +30,20 @@ FOREIGN = {
     ".lvx": _LIVOX,
     ".lvx2": _LIVOX,
 }
-"""Cause and remedy by the suffix of well-known files that are not read."""
+"""Cause and remedy for well-known files that are not read, by suffix."""
 MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
-
-
 REMEDY = "give a KITTI drive, a sequence, a folder of .bin, .pcd or .ply scans, a PCAP file or a recording of ROS 2"
 
 
 def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, str] = MappingProxyType({})) -> Stream:
-    """The stream at a path: packets, a recording of ROS 2, or what `open_scans` opens.
+    """Stream at a path: packets, a recording of ROS 2, or scan files.
 
-    `capture` is what the recording does not tell: options of `open_capture`, or the topic for `open_bag`.
+    `capture` adds facts that the recording does not hold: options of `open_capture`, or the topic for `open_bag`.
 
     Raises:
-        MisuseError: the path does not exist or holds no stream, or an option that does not apply.
-        ModtError: a recording that cannot be read.
+        MisuseError: the path does not exist or holds no stream, or an option does not apply.
+        ModtError: the recording cannot be read.
     """
     if path.is_file() and path.suffix in CAPTURES:
         from modt.sources.packets.open_capture import open_capture
@@ -63,7 +60,7 @@ def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, st
 
 
 def _refuse_foreign(path: Path) -> None:
-    """Raise MisuseError for a file that is not read, or a folder that holds such files alone."""
+    """Raise MisuseError for a well-known file that is not read, or a folder of such files."""
     files = [p for p in (path.iterdir() if path.is_dir() else [path]) if not p.name.startswith(".")]
     suffixes = {p.suffix.lower() for p in files}
     if len(suffixes) == 1 and (known := FOREIGN.get(suffixes.pop())):
@@ -79,7 +76,7 @@ def _only(path: Path, capture: Mapping[str, str], known: Collection[str]) -> Non
 
 
 def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
-    """The stream of scan files at a path; period_s is the time between the scans of a folder, which has no stamps.
+    """Stream of scan files at a path; `period_s` is the time between the scans of a folder without stamps.
 
     Raises:
         MisuseError: the path does not exist or holds no stream; the error names streams below it.
@@ -103,27 +100,27 @@ def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
 
 
 def _stream(path: Path, period_s: float) -> ScanStream | None:
-    """The stream in a folder or around it, by the most specific layout; None where there is none."""
+    """Stream in a folder or around it, by the most specific layout; None where there is none."""
     from modt.sources import kitti
 
-    data = path.parts[-2:] == ("velodyne_points", "data")
-    scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
-    layouts: list[tuple[bool, Callable[[Path], ScanStream], Path]] = [
-        (_is_raw(path), kitti.raw_drive, path),
-        (path.name == "velodyne_points", kitti.raw_drive, path.parent),
-        (data, kitti.raw_drive, path.parent.parent),
-        (_is_tracking(path), kitti.tracking_sequence, path),
-        (_is_odometry(path), kitti.odometry_sequence, path),
-        (scans, kitti.odometry_sequence, path.parent),
-    ]
-    for suffix in READERS:
-        folder = partial(kitti.scan_folder, period_s=period_s, suffix=suffix)
-        layouts.append((_has_scans(path, suffix), folder, path))
-    return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
+    if not path.is_dir():
+        return None
+    for drive in (path, path.parent, path.parent.parent):
+        scans = drive / "velodyne_points"
+        if path in (drive, scans, scans / "data") and _is_raw(drive):
+            return kitti.raw_drive(drive)
+    if _is_tracking(path):
+        return kitti.tracking_sequence(path)
+    if path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path):
+        path = path.parent
+    if _is_odometry(path):
+        return kitti.odometry_sequence(path)
+    suffix = next((s for s in SUFFIXES if _has_scans(path, s)), None)
+    return None if suffix is None else kitti.scan_folder(path, period_s, suffix)
 
 
 def _is_bag(path: Path) -> bool:
-    """Whether a path is a recording: a file, or a folder that `metadata.yaml` joins, or of one file alone."""
+    """Whether a path is a recording: a file, a folder with `metadata.yaml`, or a folder of a single file."""
     files = [p for p in (path.iterdir() if path.is_dir() else [path]) if p.is_file()]
     joined = len(files) == 1 or (path / "metadata.yaml").is_file()
     return joined and any(file.name.endswith(BAGS) for file in files)

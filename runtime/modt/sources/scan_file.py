@@ -1,4 +1,4 @@
-"""One scan: KITTI's float32 rows of x, y, z, reflectance, or a PCD or PLY file."""
+"""Scan files: KITTI's float32 rows of x, y, z, reflectance, PCD and PLY."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 from modt.errors import ScanError
 from modt.types import UNRECORDED, Float32
 
+SUFFIXES = (".bin", ".pcd", ".ply")
+"""Suffixes of scan files; a folder that holds several kinds is read by the first one."""
 COLUMNS, NUSCENES_COLUMNS = 4, 5
-"""Float32 numbers of a point: KITTI's, and those of nuScenes (`.pcd.bin`), whose fifth is the beam."""
+"""Float32 numbers per point in files of KITTI and of nuScenes (`.pcd.bin`), whose fifth number is the beam."""
 MAX_BYTES = 256 << 20
 MAX_COORDINATE_M = 1000.0
 MAX_IMPLAUSIBLE_SHARE = 0.02
@@ -19,27 +21,30 @@ MAX_IMPLAUSIBLE_SHARE = 0.02
 
 
 def read_scan(path: Path) -> tuple[Float32, list[str]]:
-    """Points of a file by its suffix, a key of READERS, and its flaws.
+    """Points of a scan file, and its flaws.
 
     Points that are not finite, or far beyond any range, are set to the origin, which counts as no return, so that
     rows keep their indices. A reflectance that is not finite or negative counts as not recorded. Reflectances from 0
     to 255 are scaled to 0 to 1.
 
     Raises:
-        ScanError: missing, unreadable, empty, truncated, or of other columns.
+        ScanError: the file is missing, unreadable, empty or truncated, or has other columns.
     """
     try:
         with path.open("rb") as file:
-            raw = file.read(min(os.fstat(file.fileno()).st_size, MAX_BYTES) + 1)  # a buffer of what there is
+            raw = file.read(min(os.fstat(file.fileno()).st_size, MAX_BYTES) + 1)  # no larger buffer than the file
     except OSError as error:
         raise ScanError(path, f"cannot be read ({error.strerror})", "the frame is skipped") from None
     if not raw:
         raise ScanError(path, "empty scan", "the frame is skipped; record it again")
     if len(raw) > MAX_BYTES:
-        raise ScanError(
-            path, f"larger than {MAX_BYTES >> 20} MiB", "the frame is skipped; it is no sweep of a sensor"
-        )
-    return sanitised(READERS.get(path.suffix, _read_rows)(path, raw), path)
+        cause = f"larger than {MAX_BYTES >> 20} MiB"
+        raise ScanError(path, cause, "the frame is skipped; it is no sweep of a sensor")
+    if path.suffix not in (".pcd", ".ply"):
+        return sanitised(_read_rows(path, raw), path)
+    from modt.sources.point_cloud_file import read_pcd, read_ply
+
+    return sanitised((read_pcd if path.suffix == ".pcd" else read_ply)(path, raw), path)
 
 
 def _read_rows(path: Path, raw: bytes) -> Float32:
@@ -50,23 +55,8 @@ def _read_rows(path: Path, raw: bytes) -> Float32:
     return np.frombuffer(raw, np.float32).reshape(-1, columns)[:, :COLUMNS].copy()
 
 
-def _read_pcd(path: Path, raw: bytes) -> Float32:
-    from modt.sources.pcd_file import read_pcd
-
-    return read_pcd(path, raw)
-
-
-def _read_ply(path: Path, raw: bytes) -> Float32:
-    from modt.sources.ply_file import read_ply
-
-    return read_ply(path, raw)
-
-
-READERS = {".bin": _read_rows, ".pcd": _read_pcd, ".ply": _read_ply}
-
-
 def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
-    """Points with finite values, corrected in place, and the flaws found.
+    """Points with finite values, corrected in place, and their flaws.
 
     Raises:
         ScanError: the columns are not x, y, z, reflectance.
@@ -76,17 +66,17 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
     if _flawless(points):
         return points, flaws
     # One sum detects any NaN or infinity at a tenth of the cost of testing each value.
-    with np.errstate(invalid="ignore"):  # of infinities of either sign
+    with np.errstate(invalid="ignore"):  # infinities of both signs
         finite = np.isfinite(points.sum(dtype=np.float64))
     if not finite:
         broken = np.flatnonzero(~np.isfinite(points[:, :3]).all(axis=1))
         points[broken] = 0.0
-        lacking = np.flatnonzero(~np.isfinite(reflectance))
-        reflectance[lacking] = UNRECORDED
+        unlit = np.flatnonzero(~np.isfinite(reflectance))
+        reflectance[unlit] = UNRECORDED
         if len(broken):
             flaws.append(f"{len(broken)} points are not finite and count as no return")
-        if len(lacking):
-            unread = f"{len(lacking)} reflectances are not finite and count as not recorded"
+        if len(unlit):
+            unread = f"{len(unlit)} reflectances are not finite and count as not recorded"
             flaws.append(f"{unread}: have the sensor's driver write them")
     negative = np.flatnonzero(reflectance < 0)
     implausible = np.count_nonzero(reflectance[negative] != UNRECORDED) + np.count_nonzero(reflectance > 255)
@@ -104,8 +94,8 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
 
 
 def _flawless(points: Float32) -> bool:
-    """Whether nothing is to be corrected, by four reductions; those that meet a NaN are NaN."""
-    reflectance = points[:, 3].copy()  # contiguous, which is reduced faster
+    """Whether nothing must be corrected; a NaN makes its reduction NaN, so that the comparison fails."""
+    reflectance = points[:, 3].copy()  # contiguous, for faster reductions
     with np.errstate(invalid="ignore"):
         coordinates = points.min(initial=0.0) >= -MAX_COORDINATE_M and points.max(initial=0.0) <= MAX_COORDINATE_M
         return bool(coordinates and reflectance.min(initial=0.0) >= 0.0 and reflectance.max(initial=0.0) <= 1.0)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from modt.errors import ModtError, ScanError
 from modt.sources.scan_file import read_scan
-from modt.sources.stream import Fault, Faults, StreamInfo
+from modt.sources.stream import Faults, StreamInfo
 from modt.types import Float64, Frame, Self
 
 PERIOD_S = 0.1
@@ -40,10 +40,10 @@ class ScanStream:
             try:
                 points, flaws = read_scan(scan.path)
             except ScanError as error:
-                self._fault(scan, error.cause, skipped=True)
+                self.faults.report(scan.index, scan.path, error.cause, skipped=True)
                 continue
             if flaws:
-                self._fault(scan, "; ".join(flaws), skipped=False)
+                self.faults.report(scan.index, scan.path, "; ".join(flaws), skipped=False)
             used += 1
             yield Frame(scan.index, scan.stamp_s, points, scan.T_world_sensor, turn_s=scan.turn_s)
         if self.scans and not used:
@@ -51,8 +51,5 @@ class ScanStream:
             raise ModtError(self.info.name, cause, "give a stream of float32 x, y, z, reflectance scans")
 
     def between(self, first: int, last: int | None) -> Self:
-        """The scans with first <= index < last; others are not read."""
+        """Scans with first <= index < last; others are not read."""
         return type(self)(self.info, [s for s in self.scans if s.index >= first and (last is None or s.index < last)])
-
-    def _fault(self, scan: ScanReference, cause: str, *, skipped: bool) -> None:
-        self.faults.report(Fault(scan.index, str(scan.path), cause, skipped), str(scan.path))

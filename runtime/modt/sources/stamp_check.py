@@ -1,32 +1,38 @@
-"""The rule by which stamps of a source are believed: its time passes as that of the arrivals does."""
+"""Check of the stamps of a source against the arrivals of its messages."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from modt.errors import ScanError
+from modt.sources.live.sweep_reader import Sweep
+from modt.sources.scan_file import sanitised
+from modt.sources.stream import Faults
+from modt.types import Frame
+
 STEP_S = 1.0
-"""Time by which a stamp may differ from the arrivals [s]; beyond it, or before the last stamp, it is doubted."""
+"""Time by which a stamp may differ from the arrivals [s]; a stamp beyond it, or before the last one, is doubted."""
 DOUBT_S = 0.5
 """Time for which doubtful stamps are refused [s]. If they keep coming, a clock was set, and they are followed."""
 FIRST_STEP_S = 0.1
-"""Time between two messages until two are believed [s]."""
-CLOCK_SET = "a clock was set: stamps go on evenly"
-"""Fault of a frame from which on other stamps are followed."""
+"""Assumed time between two messages until two are accepted [s]."""
 
 
 class StampCheck:
-    """Refuses single stamps that lie and follows a clock that was set: the rule of recordings and live sources.
+    """Refuses single wrong stamps and follows a clock that was set, in recordings and live sources.
 
     Attributes:
         steps: number of times that a clock was set.
         shift_s: time to add to a stamp, so that stamps go on evenly where a clock was set [s].
-        passed_s, waited_s: time from the last believed message to the latest one, by stamps and by arrivals [s].
+        passed_s, waited_s: time from the last accepted message to the latest one, by stamps and by arrivals [s].
     """
 
     def __init__(self, last: tuple[float, float] | None = None, *, live: bool = False) -> None:
         """Begin a source.
 
         Args:
-            last: stamp and arrival of a message that is believed.
-            live: a stamp that repeats or is late is of no use either; a recording may hold messages that waited.
+            last: stamp and arrival of a message that is accepted.
+            live: refuse a stamp that repeats or is late too; a recording may hold messages that waited.
         """
         self.steps, self.shift_s, self.passed_s, self.waited_s = 0, 0.0, 0.0, 0.0
         self._last, self._before_s, self._live = last, last[1] if last else 0.0, live
@@ -39,7 +45,7 @@ class StampCheck:
         return self._doubted_s is not None
 
     def doubt(self, stamp_s: float, arrived_s: float) -> str:
-        """Why a stamp is refused; empty if it is believed. The clock of the arrivals may be set as well."""
+        """Reason why a stamp is refused; empty if it is accepted. The clock of the arrivals may be set as well."""
         since_s, self._before_s = arrived_s - self._before_s, arrived_s
         if self._last is None:
             self._last, self.passed_s, self.waited_s = (stamp_s, arrived_s), stamp_s, stamp_s
@@ -60,3 +66,33 @@ class StampCheck:
             self.shift_s += max(waited_s, self._step_s) - passed_s
         self._last, self._doubted_s = (stamp_s, arrived_s), None
         return ""
+
+    def frame(
+        self,
+        sweep: Sweep,
+        arrived_s: float,
+        faults: Faults,
+        place: tuple[int, str, str],
+        flaws: Sequence[str] = (),
+        began_s: float = 0.0,
+    ) -> Frame | None:
+        """Frame of a recorded sweep, stamped from `began_s` on; None if it cannot be used.
+
+        Flaws and refusals are reported to `faults`; `place` is the index of the frame, the subject of its faults, and
+        its name in the log.
+        """
+        index, subject, name = place
+        steps, cause = self.steps, self.doubt(sweep.stamp_s, arrived_s)
+        if not cause:
+            try:
+                points, found = sanitised(sweep.points, subject)
+            except ScanError as error:
+                cause = error.cause
+        if cause:
+            faults.report(index, subject, cause, skipped=True, place=name)
+            return None
+        flaws = [*found, *flaws, *["a clock was set: stamps go on evenly"] * (self.steps > steps)]
+        if flaws:
+            faults.report(index, subject, "; ".join(flaws), skipped=False, place=name)
+        stamp_s = sweep.stamp_s + self.shift_s - began_s
+        return Frame(index, stamp_s, points, turn_s=sweep.turn_s)

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from modt.errors import MisuseError
 from modt.sources.packets.hesai import GET_CALIBRATION, HesaiDecoder, asked_angles, model_of, read_angles
-from modt.sources.pcd_file import read_pcd
+from modt.sources.point_cloud_file import read_pcd
 from tests.sources.packets.simulated import BEGAN_S, decoded, packets
 
 TURN_S = 0.1

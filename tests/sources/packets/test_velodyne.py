@@ -11,9 +11,8 @@ from scipy.spatial import cKDTree
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
-from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.packets.velodyne_models import model_named
-from modt.sources.pcd_file import read_pcd
+from modt.sources.packets.velodyne import VelodyneDecoder, model_named
+from modt.sources.point_cloud_file import read_pcd
 from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 

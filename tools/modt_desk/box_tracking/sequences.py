@@ -11,7 +11,7 @@ from modt.classes import CLASSES
 from modt.errors import MisuseError
 from modt.geometry import inverse, transform_boxes
 from modt.sources import kitti_calibration, oxts
-from modt.sources.pose_file import read_poses
+from modt.sources.pose_source import read_poses
 from modt.types import Float64
 from modt_desk.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
 from modt_desk.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, Detections, box_lines, boxes_to_kitti

@@ -1,4 +1,4 @@
-"""The newest sweep of a sensor, received by a thread of its own."""
+"""Live source that hands over the newest sweep, received by a separate thread."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from modt import host
@@ -15,39 +14,29 @@ from modt.sources.live.sweep_reader import Received, StreamEndedError, Sweep, Sw
 from modt.sources.packets.packet_decoder import DeviceClock
 from modt.sources.scan_file import sanitised
 from modt.sources.stamp_check import StampCheck
-from modt.sources.stream import Fault, Faults, StreamInfo, no_seconds, unit_of
+from modt.sources.stream import Faults, StreamInfo, no_seconds, unit_of
 from modt.types import Frame
 
 log = logging.getLogger(__name__)
 
 SILENT_S = 2.0
-"""Time without a sweep after which a sensor counts as silent."""
+"""Time without a sweep after which a sensor is reported as silent [s]."""
 READ_S = 0.2
-"""Time that the receiving thread waits for a message before it looks whether it is to end."""
+"""Time that the receiving thread waits for a message before it checks for its end [s]."""
 JITTER_S = 0.1
-"""Change of the least delay from stamp to arrival, beyond which the stamps have stepped."""
+"""Change of the least delay from stamp to arrival [s]; beyond it the stamps have stepped."""
 LATE_S = 1.0
-"""Time after its arrival from which a sweep, or a packet of it, is no longer of use."""
-
-
-@dataclass(frozen=True, slots=True)
-class Arrival:
-    """A sweep as the receiving thread hands it over, and what that has found wrong with it."""
-
-    sweep: Sweep
-    flaws: tuple[str, ...]
-    usable: bool
-    arrived_s: float
+"""Greatest age of a sweep or packet that is used [s]."""
 
 
 class LiveStream:
-    """Hands over the newest sweep; an older one that nobody took is dropped and counted.
+    """Hands over the newest sweep; an older one that was not taken is dropped and counted.
 
     Attributes:
         info: properties of the stream, with n_frames None.
         faults: unusable sweeps and points.
-        sweeps, incomplete, dropped: counts of sweeps received, of those with missing messages, of those replaced by a
-            newer one before they were taken.
+        sweeps, incomplete, dropped: numbers of sweeps received, of sweeps with missing messages, and of sweeps
+            replaced by a newer one before they were taken.
         silences: number of times that the sensor fell silent.
     """
 
@@ -60,12 +49,12 @@ class LiveStream:
         clock: Callable[[], float] = time.monotonic,
         pause: Callable[[float], None] = time.sleep,
     ) -> None:
-        """`cores`: where the receiving thread may run; None leaves it where it is started."""
+        """`cores`: cores of the receiving thread; None leaves it where it is started."""
         self.info, self.reader, self.faults = info, reader, Faults()
         self.sweeps = self.incomplete = self.dropped = self.silences = 0
         self._cores, self._clock, self._pause = cores, clock, pause
         self._arrived = threading.Condition()
-        self._newest: Arrival | None = None
+        self._newest: tuple[Sweep, list[str], bool, float] | None = None  # sweep, flaws, usable, arrival [s]
         self._error: Exception | None = None
         self._ended = self._silent = False
         self._last_s = self._looked_s = clock()
@@ -75,22 +64,22 @@ class LiveStream:
 
     @property
     def profile(self) -> str | None:
-        """Shipped profile of the sensor; None where there is none, or before its messages have told."""
+        """Shipped profile of the sensor; None where there is none, or before its messages have identified it."""
         return self.info.profile or self.reader.profile
 
     def start(self) -> None:
-        """Begin to receive."""
+        """Start receiving."""
         self._last_s = self._looked_s = self._clock()
         self._thread.start()
 
     def take(self, timeout_s: float) -> Received | None:
-        """The newest sweep not yet taken, waited for at most `timeout_s`; None without one.
+        """Wait at most `timeout_s` for the newest sweep that was not taken; None without one.
 
-        A sensor that is silent for SILENT_S is logged once, and once more when it returns. Sweeps that cannot be used
-        and those with a doubtful stamp are counted and skipped.
+        A sensor that is silent for SILENT_S is logged once, and once more when it returns. Unusable sweeps and sweeps
+        with a doubtful stamp are counted and skipped.
 
         Raises:
-            Exception: what ended the receiving thread, once the sweeps before it are taken.
+            Exception: the error that ended the receiving thread, once the sweeps before it are taken.
         """
         with self._arrived:
             if self._newest is None and self._error is None:
@@ -99,13 +88,16 @@ class LiveStream:
                 raise self._error
             taken, self._newest = self._newest, None
         now_s = self._clock()
-        if now_s - self._looked_s > timeout_s + LATE_S:  # nobody has looked, so nobody was silent
+        if now_s - self._looked_s > timeout_s + LATE_S:  # this process was stopped, so the sensor is not blamed
             self._last_s = now_s
         self._looked_s = now_s
         if taken is None:
-            self._watch_silence()
+            if not self._silent and now_s - self._last_s > SILENT_S:
+                self._silent, self.silences = True, self.silences + 1
+                remedy = "check its power, cable, address and port; tracks are kept until it returns"
+                log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)
             return None
-        return self._frame(taken)
+        return self._frame(*taken)
 
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
@@ -131,14 +123,13 @@ class LiveStream:
             self._thread.join(2 * READ_S)
 
     def _receive(self) -> None:
-        lacking = host.serve_loop(self._cores)
-        if lacking:
-            log.warning("%s: %s", self.info.name, lacking)
+        if refused := host.serve_loop(self._cores):
+            log.warning("%s: %s", self.info.name, refused)
         while not self._ended and self._error is None:
             self._read()
 
     def _read(self) -> None:
-        """Receive once; a failure is counted, whether it is of a message or of the system, and reading goes on."""
+        """Receive once; a failure of a message or of the system is counted, and reading goes on."""
         try:
             for sweep in self.reader.read(READ_S):
                 self._put(sweep)
@@ -150,7 +141,7 @@ class LiveStream:
             if not self._ended and self.reader.reception.refuse(f"failed ({type(error).__name__})"):
                 remedy = "check its network interface" if isinstance(error, OSError) else "report this"
                 log.exception("%s: a message is left out: %s; later ones are counted", self.info.name, remedy)
-            self._pause(0.001)  # where each read fails, others need the CPU
+            self._pause(0.001)  # leaves the CPU to others if each read fails
 
     def _put(self, sweep: Sweep) -> None:
         try:  # here, off the loop's thread
@@ -161,27 +152,28 @@ class LiveStream:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
-            self._newest = Arrival(sweep, tuple(flaws), usable, self._clock())
+            self._newest = sweep, flaws, usable, self._clock()
             self._arrived.notify()
 
-    def _frame(self, arrival: Arrival) -> Received | None:
-        sweep, arrived_s = arrival.sweep, arrival.arrived_s
+    def _frame(self, sweep: Sweep, flaws: list[str], usable: bool, arrived_s: float) -> Received | None:
         if self._silent:
             log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
         self._silent, self._last_s = False, max(self._last_s, arrived_s)
         index = self._index if sweep.index is None else sweep.index
         self._index = index + 1
-        doubt = self._doubt(sweep.stamp_s, arrived_s)
-        flaws = (doubt,) if doubt else arrival.flaws
-        used = arrival.usable and not doubt
+        if doubt := self._doubt(sweep.stamp_s, arrived_s):
+            flaws, usable = [doubt], False
         if flaws:
-            self._fault(index, "; ".join(flaws), skipped=not used)
+            self.faults.report(index, self.info.name, "; ".join(flaws), skipped=not usable)
         turn_s, steady_s, frame_id = sweep.turn_s, self._steady_s, sweep.frame_id
         frame = Frame(index, sweep.stamp_s, sweep.points, turn_s=turn_s, steady_s=steady_s, frame_id=frame_id)
-        return Received(frame, arrived_s) if used else None
+        return Received(frame, arrived_s) if usable else None
 
     def _doubt(self, stamp_s: float, arrived_s: float) -> str:
-        """Why a sweep is refused, empty if not: steady time passes as stamps do, or as arrivals where those step."""
+        """Reason why a sweep is refused, empty if it is not.
+
+        Steady time advances by the stamps, or by the arrivals where the stamps step.
+        """
         if (age_s := self._looked_s - arrived_s) > LATE_S:
             return f"taken {age_s:.1f} s after it came: this process was stopped, or has too little CPU time"
         if cause := no_seconds(stamp_s):
@@ -198,13 +190,3 @@ class LiveStream:
         stepped = doubting or abs(self._delay.offset_s - before_s) > JITTER_S
         self._steady_s += check.waited_s if stepped else check.passed_s
         return ""
-
-    def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
-        if self.faults.add(Fault(index, self.info.name, cause, skipped)):
-            log.warning("%s: %s%s", self.info.name, cause, "; sweep skipped" if skipped else "")
-
-    def _watch_silence(self) -> None:
-        if not self._silent and self._clock() - self._last_s > SILENT_S:
-            self._silent, self.silences = True, self.silences + 1
-            remedy = "check its power, cable, address and port; tracks are kept until it returns"
-            log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)

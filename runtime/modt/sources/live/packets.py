@@ -1,4 +1,4 @@
-"""Live sensors that send packets, received from a UDP socket: Velodyne, Ouster, Hesai, Livox."""
+"""Live Velodyne, Ouster, Hesai and Livox sensors, whose packets are received from a UDP socket."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ log = logging.getLogger(__name__)
 
 MAX_BYTES = 65_535
 BUFFER_BYTES = 4 * 2**20
-"""Asked of the kernel for packets received: a second of the fastest sensor."""
+"""Requested receive buffer, which holds a second of the fastest sensor."""
 TIMESTAMP, TIMESPEC = 35, struct.Struct("@ll")
-"""SO_TIMESTAMPNS, which Python does not name: Linux states when it received a packet [s, ns]."""
+"""SO_TIMESTAMPNS, which Python does not name; Linux reports the time of reception [s, ns]."""
 PAUSE_S = 0.01
-"""Time without a packet after which a sensor that does not look all round may have ended its sweep."""
+"""Time without a packet after which a sensor with a blind sector may have ended its sweep [s]."""
 
 
 class PacketReader:
-    """Receives the packets of one sensor and has them decoded.
+    """Receives and decodes the packets of one sensor.
 
     Attributes:
         reception: counts of packets.
-        decoder: of the packets.
+        decoder: decoder of the packets.
     """
 
     def __init__(
@@ -43,17 +43,17 @@ class PacketReader:
         source: str | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        """`source`: address of the sensor, packets of others are refused; None: any. `clock`: s since 1970."""
+        """`source`: address of the sensor, whose packets alone are used; None for any. `clock`: s since 1970."""
         self.reception, self.decoder = Reception(), decoder
         self._socket, self._source, self._clock = bound, source, clock
 
     @property
     def profile(self) -> str | None:
-        """Shipped profile of the sensor; None where there is none, or before its packets have told."""
+        """Shipped profile of the sensor; None where there is none, or before its packets have identified it."""
         return self.decoder.profile
 
     def read(self, timeout_s: float) -> Sequence[Sweep]:
-        """Sweeps finished by the packets received until the timeout; returns as soon as there is one."""
+        """Receive until the timeout or the first finished sweep."""
         until_s = time.monotonic() + timeout_s
         self._socket.settimeout(min(timeout_s, PAUSE_S))
         while True:
@@ -79,19 +79,19 @@ class PacketReader:
 
     def close(self) -> None:
         """Release the socket."""
-        with suppress(OSError):  # not connected; it wakes a thread that waits in `read` all the same
+        with suppress(OSError):  # raises if it is not connected, but wakes a thread that waits in `read`
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
 
 
 def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
-    """A socket that receives what is sent to a UDP port of this machine, broadcasts and a multicast group included.
+    """Bind a socket to a UDP port of this machine, for broadcasts and a multicast group too.
 
     Raises:
         MisuseError: the port is taken or not allowed, or the group cannot be joined.
     """
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    with suppress(OSError):  # without it, packets are as of when they are read
+    with suppress(OSError):  # without it, packets have the time at which they are read
         made.setsockopt(socket.SOL_SOCKET, TIMESTAMP, 1)
     try:
         made.bind(("", port))
@@ -107,7 +107,7 @@ def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
         remedy = "give an address from 224.0.0.0 on, and a route to it (ip route add 224.0.0.0/4 dev INTERFACE)"
         raise MisuseError(name, f"group {group} cannot be joined ({error})", remedy) from None
     made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
-    granted = made.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux says twice what it granted
+    granted = made.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux reports twice the size
     if granted < BUFFER_BYTES:
         remedy = f"sysctl -w net.core.rmem_max={BUFFER_BYTES}"
         log.warning("%s: receive buffer of %d bytes granted, %d asked; %s", name, granted, BUFFER_BYTES, remedy)
@@ -118,7 +118,7 @@ def address_of(name: str, host: str) -> str | None:
     """IPv4 address of a host, None for an empty name.
 
     Raises:
-        MisuseError: it is unknown.
+        MisuseError: the host is unknown.
     """
     try:
         return socket.gethostbyname(host) if host else None
@@ -127,19 +127,19 @@ def address_of(name: str, host: str) -> str | None:
 
 
 PORTS = {"velodyne": 2368, "hesai": 2368, "ouster": 7502, "livox": 56301}
-"""To which the sensors send as delivered."""
+"""Default ports of the sensors."""
 
 
 def open_packets(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """A sensor at MAKER://[HOST][:PORT][?OPTION=VALUE&group=ADDRESS]; the other options are those of `decoder_for`.
+    """Open the sensor at MAKER://[HOST][:PORT][?OPTION=VALUE&group=ADDRESS], with the options of `decoder_for`.
 
-    HOST is the sensor, whose packets alone are used; PORT of this machine, or of a multicast group, is where it sends
-    them.
+    HOST is the sensor, whose packets alone are used. PORT is the port of this machine, or of a multicast group, to
+    which it sends them.
     """
     name, port = address.text, address.port or PORTS[address.scheme]
     decoder = decoder_for(address.scheme, name, address.options, address.host)
     source = address_of(name, address.host)
     reader = PacketReader(bound_socket(name, port, address.option("group")), decoder, source)
-    info = StreamInfo(name, f"{address.scheme} packets", 0, None, decoder.period_s, None, has_poses=False)
+    info = StreamInfo(name, f"{address.scheme} packets", period_s=decoder.period_s)
     info = replace(info, profile=decoder.profile, elevations_deg=decoder.elevations_deg)
     return LiveStream(info, reader, cores=cores)

@@ -1,4 +1,4 @@
-"""A recording, played as if its sensor were measuring."""
+"""Playback of a recording as if its sensor were measuring."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from modt.types import Frame
 
 
 class PlayedReader:
-    """Sweeps of a stream at the pace of their stamps, without their poses; with `loop` again and again.
+    """Sweeps of a stream at the pace of their stamps, without their poses.
 
     Args:
         stream: the recording.
-        loop: begin again at its end, with stamps that go on.
-        clock: monotonic [s].
-        wait: waits for some seconds, or less if the reader is closed; True if it is.
+        loop: start over at its end, with stamps that go on.
+        clock: monotonic clock [s].
+        wait: waits for a time [s]; returns True, possibly earlier, if the reader is closed.
     """
 
-    profile = None  # that of the stream
+    profile = None  # the stream has it
 
     def __init__(
         self,
@@ -35,11 +35,11 @@ class PlayedReader:
         self._stream, self._loop, self._closed = stream, loop, threading.Event()
         self._clock, self._wait = clock, wait or self._closed.wait
         self._frames = _again(stream) if loop else ((frame.stamp_s, frame) for frame in stream)
-        self._next: tuple[float, Frame] | None = None  # read ahead of its time
-        self._start_s: float | None = None  # by the clock, of stamp 0
+        self._next: tuple[float, Frame] | None = None  # read before it is due
+        self._start_s: float | None = None  # time of stamp 0 by the clock
 
     def read(self, timeout_s: float) -> Sequence[Sweep]:
-        """The next sweep, if it is due within the timeout."""
+        """Next sweep, if it is due within the timeout."""
         if self._closed.is_set():
             raise StreamEndedError
         if self._next is None:
@@ -67,7 +67,7 @@ class PlayedReader:
 
 
 def _again(stream: Stream) -> Iterator[tuple[float, Frame]]:
-    """The frames of a stream for ever, with stamps that rise by a period from its end to its beginning."""
+    """Endless frames of a stream; stamps advance by one period from its end to its beginning."""
     played_s: float | None = None
     while True:
         offset_s: float | None = None

@@ -18,9 +18,9 @@ from modt.sources.stream import StreamInfo
 
 REMEMBERED = 32
 NEEDED = 8
-"""Steps between stamps that are remembered, and that the period needs to be known."""
+"""Number of steps between stamps that are kept, and number from which the period is known."""
 LONGEST_S = 2.0
-"""Step beyond which the sensor was silent, or its clock was set."""
+"""Greatest step between stamps [s]; beyond it the sensor was silent, or its clock was set."""
 
 
 class MissingSweeps:
@@ -31,7 +31,7 @@ class MissingSweeps:
         self._last_s: float | None = None
 
     def before(self, stamp_s: float) -> int:
-        """Sweeps missing between the sweep before and one of this stamp."""
+        """Number of sweeps missing between the last sweep and one of this stamp."""
         step_s = 0.0 if self._last_s is None else stamp_s - self._last_s
         self._last_s = stamp_s
         if not 0 < step_s < LONGEST_S:
@@ -40,29 +40,23 @@ class MissingSweeps:
         if len(self._steps_s) < NEEDED:
             return 0
         new = self._steps_s if len(self._steps_s) == NEEDED else (step_s,)
-        period_s = self._period_s()
+        lower_s = sorted(self._steps_s)[len(self._steps_s) // 4]  # single, even if half are missing
+        period_s = fmean(known_s for known_s in self._steps_s if known_s < 1.5 * lower_s)
         return sum(max(round(step_s / period_s) - 1, 0) for step_s in new)
-
-    def _period_s(self) -> float:
-        """The mean of the steps that are no multiples, known though half of the sweeps are missing."""
-        lower_s = sorted(self._steps_s)[len(self._steps_s) // 4]
-        return fmean(step_s for step_s in self._steps_s if step_s < 1.5 * lower_s)
 
 
 log = logging.getLogger(__name__)
 
-PERIOD_S = 0.1
-"""Nominal, until the profile of the sensor says better."""
 DEPTH = 5
-"""Sweeps kept until they are read, as of ROS 2's QoS for sensors."""
+"""Number of sweeps that wait to be read, as in ROS 2's QoS for sensors."""
 FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint"})
-"""Conventional names of frames that are no sensor's (REP 105)."""
+"""Conventional names of frames that do not belong to a sensor (REP 105)."""
 
 
 class PointCloudReader:
-    """Messages of a topic to sweeps."""
+    """Turns messages of a topic into sweeps."""
 
-    profile = None  # a message does not tell
+    profile = None  # a message does not identify its sensor
 
     def __init__(self, subscription: Subscription, name: str) -> None:
         self.reception = Reception()
@@ -109,7 +103,7 @@ class PointCloudReader:
 
 
 def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """The sweeps of ros2:///TOPIC; Cyclone's threads and the receiving one run on `cores`.
+    """Open the sweeps of ros2:///TOPIC; Cyclone's threads and the receiving thread run on `cores`.
 
     Raises:
         MisuseError: Cyclone DDS is not installed, or the address names no topic, domain or reliability.
@@ -120,5 +114,5 @@ def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
     with host.threads_on(cores):
         joined = participant(domain_of(address))
     subscription = Subscription(joined, topic, TYPE, depth=DEPTH, reliable=reliable)
-    info = StreamInfo(f"/{topic}", "ros2", 0, None, PERIOD_S, None, has_poses=False)
+    info = StreamInfo(f"/{topic}", "ros2")  # of nominal period, until the profile of the sensor is known
     return LiveStream(info, PointCloudReader(subscription, info.name), cores=cores)

@@ -1,4 +1,4 @@
-"""UDP datagrams of a PCAP file: either byte order, µs or ns; IPv4 or IPv6 over Ethernet, Linux cooked or raw IP."""
+"""UDP datagrams of PCAP files of either byte order, µs or ns; IPv4 or IPv6 over Ethernet, Linux cooked or raw IP."""
 
 from __future__ import annotations
 
@@ -12,31 +12,26 @@ from typing import BinaryIO
 from modt.errors import MisuseError
 
 MAX_PENDING = 64
-"""Packets of which fragments are awaited; then the oldest is given up."""
+"""Greatest number of incomplete packets; beyond it the oldest one is dropped."""
 MORE, OFFSET = 0x2000, 0x1FFF
 MAX_PACKET_BYTES = 65_535
 IPV6_BYTES, FRAGMENT = 40, 44
 EXTENSIONS = (0, 43, FRAGMENT, 60)
-"""Headers of IPv6 before the payload: hop by hop, routing, fragment, destination."""
+"""Extension headers of IPv6: hop by hop, routing, fragment, destination."""
 
 
-@dataclass(frozen=True, slots=True)
-class Packet:
-    """A whole IP packet without its headers."""
-
-    source: str
-    protocol: int
-    payload: bytes
+Packet = tuple[str, int, bytes]
+"""Source, protocol and payload of a whole IP packet."""
 
 
 class Fragments:
-    """Puts fragments together; bounded in what it keeps."""
+    """Joins the fragments of IP packets, with bounded memory."""
 
     def __init__(self) -> None:
         self._pending: dict[bytes, dict[int, tuple[bytes, bool]]] = {}
 
     def whole(self, raw: bytes) -> Packet | None:
-        """The packet that these bytes of an IP packet complete, None while it lacks a part or is none."""
+        """Packet that these bytes of an IP packet complete, None while a part is missing or if they are none."""
         version = raw[0] >> 4 if raw else 0
         if version == 6 and len(raw) >= IPV6_BYTES:
             return self._whole_of_ipv6(raw)
@@ -46,7 +41,7 @@ class Fragments:
         flags = struct.unpack_from(">H", raw, 6)[0]
         key = raw[12:20] + raw[4:6] + raw[9:10]
         payload = self._joined(key, 8 * (flags & OFFSET), raw[start : length or None], bool(flags & MORE))
-        return None if payload is None else Packet(".".join(map(str, raw[12:16])), raw[9], payload)
+        return None if payload is None else (".".join(map(str, raw[12:16])), raw[9], payload)
 
     def _whole_of_ipv6(self, raw: bytes) -> Packet | None:
         length, kind, payload = int.from_bytes(raw[4:6], "big"), raw[6], raw[IPV6_BYTES:]
@@ -56,10 +51,10 @@ class Fragments:
             where, key, whole = int.from_bytes(whole[2:4], "big"), raw[8:IPV6_BYTES] + whole[4:8], whole[size:]
             if extension == FRAGMENT:
                 whole = self._joined(key, where & ~7, whole, bool(where & 1))
-        return None if whole is None else Packet(socket.inet_ntop(socket.AF_INET6, raw[8:24]), kind, whole)
+        return None if whole is None else (socket.inet_ntop(socket.AF_INET6, raw[8:24]), kind, whole)
 
     def _joined(self, key: bytes, offset: int, payload: bytes, more: bool) -> bytes | None:
-        """The payload that a fragment completes; one that is no fragment is whole."""
+        """Payload that a fragment completes, None while a part is missing."""
         if not offset and not more:
             return payload
         parts = self._pending.setdefault(key, {})
@@ -88,10 +83,10 @@ MAGICS = {
 PCAPNG = b"\x0a\x0d\x0d\x0a"
 ETHERNET, RAW_IP, COOKED, COOKED_2 = 1, 101, 113, 276
 LINK_HEADERS = {ETHERNET: (12, 14), COOKED: (14, 16), COOKED_2: (0, 20)}
-"""Offsets of the protocol and of the payload."""
+"""Offsets of the protocol and of the payload by link type."""
 IPS, VLAN_TAGS, UDP = (0x0800, 0x86DD), (0x8100, 0x88A8, 0x9100), 17
 MAX_RECORD_BYTES = 262_144
-"""The greatest snapshot length of tcpdump; a record that promises more is none."""
+"""Greatest snapshot length of tcpdump; a record that promises more is broken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +94,9 @@ class Datagram:
     """A UDP datagram.
 
     Attributes:
-        stamp_s: when it was captured [s since 1970].
+        stamp_s: time of its capture [s since 1970].
         source: IP address of the sender.
-        port: of the receiver.
+        port: port of the receiver.
         payload: its bytes, fewer than were sent where the capture was cut short.
     """
 
@@ -112,18 +107,18 @@ class Datagram:
 
 
 class Capture:
-    """The datagrams of a file, in its order; what is no UDP is passed over.
+    """Datagrams of a file, in its order; packets of other protocols are skipped.
 
     Attributes:
-        flow: source and port of the datagrams wanted; None: all.
-        flaw: why the last pass ended before the end of the file; None if it did not.
+        flow: source and port of the datagrams wanted; None selects all.
+        flaw: reason why the last pass ended before the end of the file; None if it did not.
     """
 
     def __init__(self, path: Path) -> None:
-        """Look at the head of the file.
+        """Read the head of the file.
 
         Raises:
-            MisuseError: it cannot be read or is no PCAP file.
+            MisuseError: the file cannot be read or is no PCAP file.
         """
         self.path = path
         self.flow: tuple[str, int] | None = None
@@ -148,15 +143,15 @@ class Capture:
             file.seek(24)
             for stamp_s, frame in self._records(file):
                 start = self._start_of_ip(frame)
-                packet = None if start is None else fragments.whole(frame[start:])
-                if packet is None or packet.protocol != UDP or len(packet.payload) < 8:
+                source, protocol, payload = (start is not None and fragments.whole(frame[start:])) or ("", 0, b"")
+                if protocol != UDP or len(payload) < 8:
                     continue
-                port, length = struct.unpack_from(">HH", packet.payload, 2)
-                if self.flow in (None, (packet.source, port)):
-                    yield Datagram(stamp_s, packet.source, port, packet.payload[8 : length or None])
+                port, length = struct.unpack_from(">HH", payload, 2)
+                if self.flow in (None, (source, port)):
+                    yield Datagram(stamp_s, source, port, payload[8 : length or None])
 
     def _records(self, file: BinaryIO) -> Iterator[tuple[float, bytes]]:
-        """Stamp [s] and bytes of each record; ends at the first broken one."""
+        """Stamp [s] and bytes of each record up to the first broken one."""
         header = struct.Struct(self._order + "IIII")
         while head := file.read(header.size):
             if len(head) < header.size:

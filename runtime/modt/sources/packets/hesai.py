@@ -1,4 +1,4 @@
-"""Hesai's packets to sweeps: Pandar40P, 64, QT64, QT128, XT16, XT32 and XT32M."""
+"""Sweeps from the packets of Hesai's Pandar40P, 64, QT64, QT128, XT16, XT32 and XT32M."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from modt.types import Float32, Float64
 log = logging.getLogger(__name__)
 
 UNIT_MM = 4
-"""Of distances, where a packet does not say it."""
+"""Unit of distances in packets that do not state it [mm]."""
 RETURNS = {0x39: 2, 0x3A: 2, 0x3B: 2, 0x3C: 2, 0x3D: 3}
-"""Returns of a firing by the return mode; the other modes have one."""
+"""Number of returns a firing by return mode; the other modes have one."""
 MAX_APPENDED_BYTES = 64
-"""Greatest size of what follows the tail: sequence number, signature."""
+"""Greatest size of the sequence number and signature that follow the tail."""
 REMEDY = "give calibration=FILE, the CSV of channel, elevation and azimuth that the sensor's web page offers"
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Places in a packet, in bytes.
+    """Offsets and sizes in a packet [bytes].
 
     Attributes:
         begin: offset of the first block.
-        unit: offset of the unit of distances [mm]; None: it is UNIT_MM.
-        azimuth: of the head, offset in a block; the channels follow.
-        cell: size of a channel: distance (2), reflectance (1), others.
-        mode, date, micros: offsets in the tail of the return mode, of year to second (a byte each), of the
+        unit: offset of the unit of distances [mm]; None where it is UNIT_MM.
+        azimuth: offset of the head's azimuth in a block; the channels follow it.
+        cell: size of a channel, which holds distance (2), reflectance (1), and others.
+        mode, date, micros: offsets in the tail of the return mode, of year to second (a byte each), and of the
             microseconds.
     """
 
@@ -58,12 +58,12 @@ class Model:
     """A model of sensor.
 
     Attributes:
-        name: for messages.
-        head: offset and value of bytes which the packets of no other model have.
-        blocks, channels: of a packet, and of a block.
-        layout: of a packet.
-        firing_us: time from one firing to the next.
-        elevations_deg: of the beams of all units, for lack of the unit's own; empty where units differ by more.
+        name: name in messages.
+        head: offset and value of bytes that only the packets of this model have.
+        blocks, channels: number of blocks in a packet, and of channels in a block.
+        layout: layout of a packet.
+        firing_us: time from one firing to the next [us].
+        elevations_deg: elevations for a unit without calibration; empty where units differ too much.
         profile: shipped profile, None where there is none.
     """
 
@@ -78,7 +78,7 @@ class Model:
 
     @cached_property
     def body(self) -> np.dtype[Any]:
-        """Packet up to its tail."""
+        """Type of a packet up to its tail."""
         at = self.layout
         cell = np.dtype({"names": ["distance", "reflectance"], "formats": ["<u2", "u1"], "itemsize": at.cell})
         formats = ["<u2", (cell, (self.channels,))]
@@ -88,7 +88,7 @@ class Model:
 
     @cached_property
     def azimuths(self) -> Struct:
-        """Azimuths of the blocks."""
+        """Struct of the azimuths of the blocks."""
         between = (self.body.itemsize - self.layout.begin) // self.blocks - 2
         return Struct(f"<{self.layout.begin + self.layout.azimuth}x" + f"H{between}x" * self.blocks)
 
@@ -107,7 +107,7 @@ class Model:
 
 
 def _head(major: int, channels: int, blocks: int) -> tuple[tuple[int, int], ...]:
-    """Bytes of the header of the newer packets, which says what they hold."""
+    """Bytes of the header of the newer packets, which states their content."""
     return (0, 0xEE), (1, 0xFF), (2, major), (6, channels), (7, blocks)
 
 
@@ -126,27 +126,27 @@ MODELS = (
 
 
 def model_of(payload: bytes) -> Model | None:
-    """The model that sent a packet; None if a payload is no packet of points of a Hesai."""
+    """Model that sent a packet; None if a payload is no packet of points of a Hesai."""
     return next((model for model in MODELS if model.sends(payload)), None)
 
 
 def read_angles(path: Path) -> Float64:
-    """(n, 2) elevation and azimuth of the channels [deg] by a calibration file.
+    """(n, 2) elevation and azimuth of the channels [deg] from a calibration file.
 
     Raises:
-        MisuseError: it cannot be read, or is no calibration.
+        MisuseError: the file cannot be read, or is no calibration.
     """
     return _angles(path, read_lines(path, REMEDY))
 
 
 PTC_PORT, GET_CALIBRATION, ANSWER_BYTES = 9347, b"\x47\x74\x05\x00" + bytes(4), 8
-"""A Hesai is asked over TCP by magic, command, 0 and length; its answer begins alike, with its error for the 0."""
+"""A request over TCP is magic, command, 0 and length; the answer begins alike, with an error code for the 0."""
 TIMEOUT_S = 3.0
 MAX_ANSWER_BYTES = 65_536
 
 
 def asked_angles(host: str, port: int = PTC_PORT) -> Float64 | None:
-    """Angles as of `read_angles` that the sensor itself gives; None where it does not answer, which is warned of."""
+    """Angles as of `read_angles`, asked from the sensor; None with a warning if it does not answer."""
     try:
         with socket.create_connection((host, port), TIMEOUT_S) as sensor, sensor.makefile("rb") as answer:
             sensor.sendall(GET_CALIBRATION)
@@ -163,7 +163,7 @@ def _angles(origin: object, lines: Sequence[str]) -> Float64:
     for line in lines:
         try:
             _, *angles = map(float, line.split(",")[:3])
-        except ValueError:  # names of the columns
+        except ValueError:  # the names of the columns
             continue
         rows.append(angles)
     table = np.array([row for row in rows if len(row) == 2]).reshape(-1, 2)
@@ -173,21 +173,21 @@ def _angles(origin: object, lines: Sequence[str]) -> Float64:
 
 
 class HesaiDecoder(TurnDecoder):
-    """Turns of a Hesai; of the returns of a firing the one of the greatest reflectance is taken."""
+    """Turns of a Hesai; the return with the greatest reflectance represents a firing."""
 
     maker, wrap_s = "Hesai", 86_400.0
     unknown = "of a model of Hesai whose calibration is not given"
     signature = staticmethod(model_of)
 
     def __init__(self, name: str, angles_deg: Float64 | None = None) -> None:
-        """`angles_deg`: as of `read_angles`; None: those that all units of the model share, if they do."""
+        """`angles_deg`: as of `read_angles`; None takes the angles that all units of the model share, if any."""
         super().__init__(name)
         self._given_deg = angles_deg
         self._model = MODELS[0]
         self.elevations_deg = None if angles_deg is None else tuple(angles_deg[:, 0].tolist())
 
     def _recognise(self, payloads: Sequence[bytes]) -> Model | None:
-        model, _ = Counter(found for payload in payloads if (found := model_of(payload))).most_common(1)[0]
+        model, _ = Counter(sender for payload in payloads if (sender := model_of(payload))).most_common(1)[0]
         angles_deg = self._given_deg
         if angles_deg is None and model.elevations_deg:
             log.warning("%s: beams as of any %s; %s", self.name, model.name, REMEDY)
@@ -218,7 +218,7 @@ class HesaiDecoder(TurnDecoder):
         return Entry(time_s, phase, phase + (last - first) % TURN, payload[: model.tail + at.mode + 1])
 
     def _returns(self, payload: bytes) -> int:
-        """Returns of each firing in a packet, as many blocks that follow one another."""
+        """Number of returns a firing, each in one of as many consecutive blocks."""
         model = self._model
         returns = RETURNS.get(payload[model.tail + model.layout.mode], 1)
         return 1 if model.blocks % returns else returns

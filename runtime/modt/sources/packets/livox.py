@@ -1,4 +1,4 @@
-"""Packets of a Livox Mid-360 (protocol of Livox SDK2) to sweeps."""
+"""Sweeps from the packets of a Livox Mid-360 (protocol of Livox SDK2)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refu
 from modt.types import Float32
 
 HEADER = Struct("<BH2xH3xB13x4xQ")
-"""Version, bytes, points, data type, time of the first point [ns]."""
+"""Version, number of bytes, number of points, data type, time of the first point [ns]."""
 _TAIL = [("reflectance", "u1"), ("tag", "u1")]
 _AXES = ("x", "y", "z")
 POINTS: dict[int, tuple[np.dtype[Any], float]] = {
@@ -21,21 +21,21 @@ POINTS: dict[int, tuple[np.dtype[Any], float]] = {
     2: (np.dtype([*((axis, "<i2") for axis in _AXES), *_TAIL]), 0.01),
     3: (np.dtype([("depth", "<u4"), ("zenith", "<u2"), ("azimuth", "<u2"), *_TAIL]), 0.001),
 }
-"""A point and its unit of length [m] by data type; 3 has angles [0.01 deg]."""
+"""Row of a point and its unit of length [m] by data type; type 3 has angles [0.01 deg]."""
 LOW_CONFIDENCE = np.array([any(tag >> bit & 3 == 2 for bit in (0, 2, 4)) for tag in range(256)])
-"""Tags of points that lie between two objects, or are rain, fog or dust, rather than anything solid."""
+"""Whether a tag marks a point between two objects, or of rain, fog or dust, by tag."""
 SWEEP_NS = 100_000_000
-"""The sensor never repeats its pattern: a sweep is what it saw in this time, that of the profile."""
+"""Duration of a sweep, that of the profile; the sensor never repeats its pattern."""
 MAX_PACKETS = 1000
-"""In a sweep; a Mid-360 sends 208."""
+"""Greatest number of packets in a sweep; a Mid-360 sends 208."""
 MAX_GAP = 10
-"""Sweeps between two packets beyond which the sensor was off, or its clock was set."""
+"""Greatest number of sweeps between two packets; beyond it the sensor was off, or its clock was set."""
 
 
 class LivoxDecoder(PacketDecoder):
-    """Cuts the packets by the sensor's clock; a sweep that had begun before its first packet was received is none.
+    """Cuts sweeps by the sensor's clock; a sweep that began before the first received packet is discarded.
 
-    Points that the sensor itself calls unlikely are left out.
+    Points that the sensor marks as unlikely are left out.
     """
 
     profile = "mid-360"
@@ -75,7 +75,7 @@ class LivoxDecoder(PacketDecoder):
         return sweeps
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
-        """The last sweep, if all that it waited for is the packet after it."""
+        """Last sweep, if only the packet after it is missing."""
         stamps_ns = sorted(self._packets)
         step_ns = stamps_ns[-1] - stamps_ns[-2] if len(stamps_ns) > 1 else 0
         ends = len(stamps_ns) > 1 and (stamps_ns[-1] + step_ns) // SWEEP_NS > self._window
@@ -89,7 +89,7 @@ class LivoxDecoder(PacketDecoder):
         self._before_ns, self._packets = None, {}
 
     def _sweep(self, reception: Reception) -> list[Sweep]:
-        """The sweep of the packets kept, if its begin was received."""
+        """Sweep of the packets kept, if its begin was received."""
         stamps_ns = sorted(self._packets)
         before_ns, self._before_ns = self._before_ns, stamps_ns[-1]
         if before_ns is None:

@@ -1,4 +1,4 @@
-"""Ouster's packets to sweeps, by Ouster's SDK."""
+"""Sweeps from Ouster's packets, by Ouster's SDK."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from modt.sources.text_file import read_text
 from modt.types import Bool, Float32
 
 METADATA = "http://{host}/api/v1/sensor/metadata"
-"""Where a sensor says what it is."""
+"""Address of a sensor's metadata."""
 TIMEOUT_S = 5.0
 MAX_METADATA_BYTES = 2**20
 MAX_LOST_FRAMES = 20
-"""More frames missing in a row are a sensor that was switched on again."""
+"""Greatest number of consecutive frames that count as lost; beyond it the sensor was restarted."""
 
 
 class OusterDecoder(PacketDecoder):
-    """Packets to frames of the SDK, which are sweeps: they begin behind the sensor and turn clockwise.
+    """Turns packets into frames of the SDK, which are sweeps that begin behind the sensor and turn clockwise.
 
-    A sweep is complete by the last packet of its window. One that had begun before its first packet was received is
-    none. Of two returns of a firing the first field is taken.
+    A sweep is complete with the last packet of its window. A sweep that began before the first received packet is
+    discarded. The first of two returns of a firing is taken.
     """
 
     def __init__(self, name: str, metadata: Path | str) -> None:
-        """A decoder for the source of a name; `metadata`: a file, or the host that is the sensor.
+        """Make a decoder for the source of a name; `metadata`: a file, or the host name of the sensor.
 
         Raises:
             MisuseError: ouster-sdk is missing, or the metadata cannot be read.
@@ -59,11 +59,13 @@ class OusterDecoder(PacketDecoder):
         if flaw is not None:
             refuse(reception, self.name, flaw)
             return []
-        packet = self._sdk.LidarPacket(self._format)  # the batcher keeps it
+        packet = self._sdk.LidarPacket(self._format)  # a new one each time, as the batcher keeps it
         packet.buf[:] = np.frombuffer(payload, np.uint8)
         packet.host_timestamp = round(received_s * 1e9)
         valid = packet.validate(self._info, self._format) == self._sdk.PacketValidationFailure.NONE
-        if not valid and self._format.prod_sn(packet.buf) != self._info.sn:  # its other number changes at each start
+        if (
+            not valid and self._format.prod_sn(packet.buf) != self._info.sn
+        ):  # the initialisation id changes at each start
             refuse(reception, self.name, "of another sensor than the metadata")
             return []
         return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
@@ -75,13 +77,13 @@ class OusterDecoder(PacketDecoder):
         self._last_id: int | None = None
 
     def _read(self, metadata: Path | str) -> tuple[Any, Any, Any]:
-        """What the SDK makes of the metadata: the sensor, the format of its packets, its directions."""
-        sdk, remedy = self._sdk, "save what the sensor says at /api/v1/sensor/metadata"
+        """SDK's objects for the metadata: sensor, format of its packets, and projection."""
+        sdk, remedy = self._sdk, "save the sensor's answer at /api/v1/sensor/metadata"
         text = _asked(metadata) if isinstance(metadata, str) else read_text(metadata, remedy)
         try:
             info = sdk.SensorInfo(text)
             made = info, sdk.PacketFormat(info), sdk.XYZLutFloat(info, False)
-        except Exception as error:  # of the SDK's parser, of no common type
+        except Exception as error:  # errors of the SDK's parser have no common type
             raise MisuseError(metadata, f"no metadata of an Ouster ({one_line(error)})", remedy) from None
         width, columns = info.format.columns_per_frame, info.format.columns_per_packet
         if columns < 1 or width % columns:
@@ -89,7 +91,7 @@ class OusterDecoder(PacketDecoder):
         return made
 
     def _flaw(self, payload: bytes) -> str | None:
-        """Why a payload is no packet of points that fits the metadata; None if it is one."""
+        """Reason why a payload is no packet of points that fits the metadata; None if it is one."""
         if len(payload) != self._format.lidar_packet_size:
             return f"not the {self._format.lidar_packet_size} bytes of the metadata's format"
         header = self._sdk.ColHeader.MEASUREMENT_ID
@@ -140,30 +142,28 @@ class OusterDecoder(PacketDecoder):
 
 
 def _asked(host: str) -> str:
-    """The metadata that a sensor gives."""
-    from urllib.request import ProxyHandler, build_opener  # loaded where it is needed: it brings much
+    """Metadata from the sensor itself."""
+    from urllib.request import ProxyHandler, build_opener  # imported here, as it loads many modules
 
     address = METADATA.format(host=host)
     try:
         with build_opener(ProxyHandler({})).open(address, timeout=TIMEOUT_S) as answer:
             text: str = answer.read(MAX_METADATA_BYTES).decode("utf-8", "replace")
     except (OSError, ValueError, HTTPException) as error:
-        remedy = (
-            "check the sensor's address and this machine's network, or save what it says there and add ?metadata=FILE"
-        )
+        remedy = "check the sensor's address and this machine's network, or save its answer and add ?metadata=FILE"
         raise MisuseError(address, f"the sensor does not give its metadata ({one_line(error)})", remedy) from None
     return text
 
 
 def _awaited(window: tuple[int, int], width: int, columns: int) -> Bool:
-    """(packets of a frame,) those that hold a column of the window, which may reach over the seam."""
+    """(packets of a frame,) whether a packet holds a column of the window, which may reach over the seam."""
     first, last = window
     within = np.asarray((np.arange(width) - first) % width <= (last - first) % width)
     return np.asarray(within.reshape(-1, columns).any(axis=1))
 
 
 def _profile(product_line: str) -> str | None:
-    """Shipped profile of a product line, such as OS-1-64-U13."""
+    """Shipped profile for a product line, such as OS-1-64-U13; None without one."""
     line = re.match(r"OS-?(\w+)-(\d+)", product_line)
     name = f"os{line[1]}-{line[2]}".lower() if line else ""
     return name if (assets.folder("profiles") / f"{name}.yaml").is_file() else None

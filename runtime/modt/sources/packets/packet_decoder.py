@@ -1,4 +1,4 @@
-"""What the decoders of packets share: their interface, the sensor's clock, and how an extra is imported."""
+"""Shared parts of the decoders of packets: interface, clock of the sensor, import of an extra."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.types import Self
 
 MAX_DRIFT = 1e-4
-"""Of a sensor's clock against the host's [s/s]."""
+"""Greatest drift of a sensor's clock against the host's [s/s]."""
 MAX_ERROR_S = 1.0
-"""A greater difference is a clock that was set, or a sensor that was switched on again."""
+"""Greatest difference of offsets [s]; beyond it a clock was set, or the sensor was restarted."""
 WINDOW_S, STEP_S = 10.0, 0.02
-"""Where even the least delay of so long is longer than the one known by so much, the host's clock was set forward."""
+"""If the least delay within WINDOW_S exceeds the known one by STEP_S, the host's clock was set forward [s]."""
 
 
 class DeviceClock:
     """Follows the least delay between stamp and reception, so that a late reception moves no stamp.
 
     Attributes:
-        offset_s: of the host's clock to the unwrapped time of the device [s].
+        offset_s: offset from the unwrapped time of the device to the host's clock [s].
     """
 
     def __init__(self, wrap_s: float = math.inf) -> None:
-        """`wrap_s`: time after which the stamps of the device begin again."""
+        """`wrap_s`: time after which the stamps of the device start over [s]."""
         self.offset_s = 0.0
         self._wrap_s = wrap_s
         self._last_s: float | None = None
         self._since_s, self._least_s = 0.0, math.inf  # begin of a window, and the least offset in it
 
     def unwrapped(self, device_s: float, received_s: float) -> float:
-        """Time of the device [s], continuous beyond wrap_s, of a stamp received at a time of the host."""
+        """Time of the device [s], continuous beyond `wrap_s`, for a stamp received at a time of the host."""
         if self._last_s is None:
             self._last_s, self._since_s, self.offset_s = device_s, device_s, received_s - device_s
             return device_s
@@ -67,13 +67,13 @@ log = logging.getLogger(__name__)
 
 
 class PacketDecoder(ABC):
-    """Packets of one sensor to sweeps.
+    """Turns packets of one sensor into sweeps.
 
     Attributes:
-        name: of the source, for messages.
-        profile: shipped profile of the sensor; None where there is none, or before its packets have told.
-        elevations_deg: of its beams, where they are known.
-        period_s: time of a sweep as delivered; a sweep tells its own.
+        name: name of the source, for messages.
+        profile: shipped profile of the sensor; None where there is none, or before its packets have identified it.
+        elevations_deg: elevations of its beams, where they are known.
+        period_s: nominal time of a sweep with factory settings; each sweep has its measured time.
     """
 
     name: str
@@ -82,14 +82,14 @@ class PacketDecoder(ABC):
     period_s = 0.1
 
     def again(self) -> Self:
-        """A decoder of the same sensor that has seen no packet yet."""
+        """Decoder of the same sensor that has seen no packet yet."""
         other = copy.copy(self)
         other._forget()
         return other
 
     @abstractmethod
     def _forget(self) -> None:
-        """Be as before the first packet."""
+        """Return to the state before the first packet."""
 
     @abstractmethod
     def accepts(self, payload: bytes) -> bool:
@@ -97,25 +97,25 @@ class PacketDecoder(ABC):
 
     @abstractmethod
     def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
-        """Sweeps completed by a packet; what cannot be used or is missing is counted, never raised."""
+        """Sweeps completed by a packet; unusable and missing packets are counted, never raised."""
 
     def pause(self, reception: Reception) -> Sequence[Sweep]:
-        """The sweep, if the sensor is known not to look any further in this turn; called where it sends nothing."""
+        """Sweep that is complete because the sensor is blind in the rest of its turn; called in a pause."""
         return []
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
-        """The last sweep, if all that it waits for is the packet after it."""
+        """Last sweep, if only the packet after it is missing."""
         return []
 
 
 def decoder_for(maker: str, name: str, options: Mapping[str, str], host: str = "") -> PacketDecoder:
-    """A decoder for the sensors of a maker, the scheme of their addresses.
+    """Decoder for the sensors of a maker, which is the scheme of their addresses.
 
-    `options` may have the model and calibration of a Velodyne, the calibration of a Hesai, the metadata of an Ouster;
-    `host` is the sensor that is asked for what is not given, empty where it is not known.
+    `options` may name the model and calibration of a Velodyne, the calibration of a Hesai, the metadata of an Ouster.
+    The sensor at `host` is asked for missing options; it is empty where the sensor is not known.
 
     Raises:
-        MisuseError: an option that is invalid, no metadata, a missing extra.
+        MisuseError: an option is invalid, there are no metadata, or an extra is missing.
     """
     calibration = Path(options["calibration"]) if options.get("calibration") else None
     if maker == "livox":
@@ -136,19 +136,18 @@ def decoder_for(maker: str, name: str, options: Mapping[str, str], host: str = "
             remedy = "write ouster://HOST, the sensor's address, to have it asked, or add ?metadata=FILE"
             raise MisuseError(name, "its packets cannot be read without the sensor's metadata", remedy)
         return OusterDecoder(name, Path(metadata) if metadata else host)
-    from modt.sources.packets.velodyne import VelodyneDecoder
-    from modt.sources.packets.velodyne_models import model_named
+    from modt.sources.packets.velodyne import VelodyneDecoder, model_named
 
     return VelodyneDecoder(name, model_named(options["model"]) if options.get("model") else None, calibration)
 
 
 def extra(module: str, name: str) -> Any:
-    """A module of an extra that is made with nanobind.
+    """Import a module of an extra that is built with nanobind.
 
-    Such a library complains of leaks at exit unless what the loop has frozen is collected.
+    Such a library reports leaks at exit unless the objects that the loop has frozen are collected.
 
     Raises:
-        MisuseError: it is not installed.
+        MisuseError: the extra is not installed.
     """
     atexit.register(gc.unfreeze)
     try:
@@ -158,11 +157,11 @@ def extra(module: str, name: str) -> Any:
 
 
 def one_line(error: Exception) -> str:
-    """What a library says, as part of a line."""
+    """Message of a library's error, shortened to a part of a line."""
     return " ".join(str(error).split())[:MAX_QUOTED]
 
 
 def refuse(reception: Reception, name: str, reason: str) -> None:
-    """Count a refused packet; the first for its reason is logged."""
+    """Count a refused packet; the first one for each reason is logged."""
     if reception.refuse(reason):
         log.warning("%s: packet refused: %s; later ones are only counted", name, reason)

@@ -1,4 +1,4 @@
-"""Turns of a rotating head, cut from its packets: what the decoders of Velodyne and Hesai share."""
+"""Cutting of a rotating head's packets into turns, shared by the decoders of Velodyne and Hesai."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ log = logging.getLogger(__name__)
 TURN = 36_000
 """A turn of the head [0.01 deg]."""
 AHEAD = TURN // 2
-"""Phase of a head that looks straight ahead; it is 0 behind the sensor."""
+"""Phase of a head that looks straight ahead; phase 0 is behind the sensor [0.01 deg]."""
 MIN_HOLE = 10
-"""Missing packets in a row that may be what the sensor is set not to see."""
+"""Least number of consecutive missing packets that may be a configured blind sector."""
 SAME_S = 0.5e-6
-"""Packets whose times differ by less are one packet."""
+"""Packets whose times differ by less are the same packet [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +34,10 @@ class Entry:
     """A packet of a turn.
 
     Attributes:
-        time_s: of its first block, on the clock of the sensor.
-        phase, end: of the head at its first and last block, clockwise from behind the sensor [0.01 deg]; below 0 or
-            above TURN in the packets that a turn shares with its neighbours.
-        packet: for the decoder.
+        time_s: time of its first block, on the clock of the sensor.
+        phase, end: phases of the head at its first and last block, clockwise from behind the sensor [0.01 deg]; below
+            0 or above TURN in the packets that a turn shares with its neighbours.
+        packet: packet in the form that the decoder needs.
     """
 
     time_s: float
@@ -46,7 +46,7 @@ class Entry:
     packet: Any
 
     def turned(self, by: int) -> Entry:
-        """The same packet as part of a neighbouring turn."""
+        """Same packet as part of a neighbouring turn."""
         return replace(self, phase=self.phase + by, end=self.end + by)
 
 
@@ -56,8 +56,8 @@ class Turn:
 
     Attributes:
         began_s: time of the first of its own packets.
-        before: last packet of the turn before; None: the head was first heard of within this turn.
-        entries: its own packets, and those of its neighbours whose beams may have looked into it.
+        before: last packet of the turn before; None if the first received packet lies within this turn.
+        entries: its own packets, and packets of its neighbours whose beams may reach into it.
     """
 
     began_s: float
@@ -66,12 +66,12 @@ class Turn:
 
     @property
     def reaches_seam(self) -> bool:
-        """Whether the packet after its last one would be of the next turn."""
+        """Whether the packet after its last one belongs to the next turn."""
         last = self.entries[-1] if self.entries else None
         return last is not None and last.end + (last.end - last.phase) // 4 > TURN
 
     def ends_at(self, holes: Float64) -> bool:
-        """Whether a hole of the turn before, of which it was the beginning, is reached."""
+        """Whether the turn has reached the begin of one of the `holes` of the turn before."""
         last = self.entries[-1] if self.entries else None
         if last is None or self.before is None:
             return False
@@ -79,7 +79,7 @@ class Turn:
         return bool((np.abs(last.phase - TURN - holes) <= step / 2).any())
 
     def insert(self, entry: Entry) -> bool:
-        """Add a packet that comes late; whether it is of this turn and new."""
+        """Add a late packet; False if it is not of this turn, or already there."""
         at = bisect(self.entries, entry.time_s - SAME_S, key=attrgetter("time_s"))
         after_s = self.entries[at].time_s if at < len(self.entries) else math.inf
         if entry.time_s < self.began_s or after_s < entry.time_s + SAME_S:
@@ -88,21 +88,21 @@ class Turn:
         return True
 
     def shared(self, reach: int) -> list[Entry]:
-        """The packets at its end that the next turn needs as well."""
+        """Packets at its end that the next turn needs too."""
         return [e.turned(-TURN) for e in self.entries if e.end > TURN - reach]
 
     def times(self) -> tuple[float, float]:
-        """Times [s] at which the head looks straight ahead, and in which it turns once."""
+        """Time at which the head looks straight ahead, and duration of the turn [s]."""
         first, last = self.entries[0], self.entries[-1]
         turn_s = (last.time_s - first.time_s) * TURN / max(last.phase - first.phase, 1)
         near = min(self.entries, key=lambda e: abs(e.phase - AHEAD))
         return near.time_s + (AHEAD - near.phase) / TURN * turn_s, turn_s
 
     def missing(self, holes: Float64 | None) -> tuple[int, Float64, float]:
-        """Packets missing, phases at which long holes begin, and the interval between packets [s].
+        """Number of missing packets, phases at which long holes begin, and interval between packets [s].
 
-        A long hole that begins where one of the `holes` of the turn before did is not missing, nor is any if that is
-        None: the sensor is set not to see there.
+        A long hole that begins where one of the `holes` of the turn before did is a blind sector, and its packets are
+        not missing. The same holds for every long hole if `holes` is None.
         """
         own = [e for e in self.entries if 0 <= e.phase < TURN]
         if self.before is not None:
@@ -123,28 +123,28 @@ class Turn:
 
 
 RECOGNISED_BY = 20
-"""Packets by which the model is recognised."""
+"""Number of packets by which the model is recognised."""
 LONGEST_TURN_S = 0.3
-"""At the slowest that the heads are set to turn, and half as long again."""
+"""Duration of the slowest turn, and half of it in addition [s]."""
 LEAST_TURN = 1000
-"""A head that falls back by more has begun another turn [0.01 deg]; by less, it stands still."""
+"""A phase that falls by more begins another turn; if it falls by less, the head stands still [0.01 deg]."""
 SILENCE_S = 1.0
-"""Packets missing for longer are those of a sensor that was off."""
+"""Longest gap in which packets count as missing [s]; beyond it the sensor was off."""
 NO_TURN = Turn(0.0, None)
 
 
 class TurnDecoder(PacketDecoder):
     """Cuts the packets behind the sensor and decodes a turn at a time.
 
-    Each beam's part of a turn is cut where the beam looks backwards, not the head. What is received before the first
-    cut is no sweep. The packets of one model are followed; a subclass knows the models and their packets.
+    Each beam's part of a turn is cut where the beam looks backwards, not the head. Packets before the first cut are
+    discarded. The packets of one model are followed; a subclass knows the models and their packets.
     """
 
     maker: str
     unknown: str
-    """Why packets of a model that cannot be decoded are refused."""
+    """Reason of the refusal of packets of a model that cannot be decoded."""
     wrap_s: float
-    """Time after which the stamps of the device begin again [s]."""
+    """Time after which the stamps of the device start over [s]."""
     _last: Entry | None
     _turn: Turn
     _ending: Turn
@@ -159,22 +159,22 @@ class TurnDecoder(PacketDecoder):
     @staticmethod
     @abstractmethod
     def signature(payload: bytes) -> object:
-        """What the packets of one model share; None if a payload is no packet of points of this maker."""
+        """Value that all packets of one model share; None if a payload is no packet of points of this maker."""
 
     @abstractmethod
     def _recognise(self, payloads: Sequence[bytes]) -> object:
-        """The signature of most of the packets, with all that decodes them ready; None for an unknown model."""
+        """Prepare for the model of most of the packets, and return its signature; None for an unknown model."""
 
     @abstractmethod
     def _entry(self, received_s: float, payload: bytes) -> Entry:
-        """A packet of the model that is followed."""
+        """Entry of a packet of the followed model."""
 
     @abstractmethod
     def _table(self, entries: Sequence[Entry]) -> Float32:
-        """(N, 4 or more) x, y, z [m, sensor frame], reflectance, and other columns, of the points of packets."""
+        """(N, 4 or more) x, y, z [m, sensor frame], reflectance, and other columns of the points in packets."""
 
     def again(self) -> Self:
-        """A decoder of the same sensor that has seen no packet yet."""
+        """Decoder of the same sensor that has seen no packet yet."""
         other = super().again()
         other._first = None if self._first is None else []
         return other
@@ -195,7 +195,7 @@ class TurnDecoder(PacketDecoder):
         return self._begin(reception) if len(self._first) == RECOGNISED_BY else []
 
     def pause(self, reception: Reception) -> Sequence[Sweep]:
-        """The sweep, if the turn has reached where it ended in the turn before: what the sensor is set not to see."""
+        """Sweep, if the turn has reached the blind sector in which the turn before ended."""
         turn = self._turn
         if self._holes is None or not turn.ends_at(self._holes):
             return []
@@ -203,7 +203,7 @@ class TurnDecoder(PacketDecoder):
         return self._sweeps(turn, reception)
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
-        """The last sweep, if all that it waited for is the packet after it."""
+        """Last sweep, if only the packet after it is missing."""
         sweeps = [*self._begin(reception)] if self._first else []
         for turn in (self._ending, self._turn):
             if turn.reaches_seam:
@@ -217,7 +217,7 @@ class TurnDecoder(PacketDecoder):
         self._turn = self._ending = NO_TURN
         self._holes: Float64 | None = None
         self._interval_s, self._longest_s, self._heard_s = 0.0, LONGEST_TURN_S, -math.inf
-        self._others: list[tuple[float, bytes]] = []  # packets of another model since this one was heard
+        self._others: list[tuple[float, bytes]] = []  # packets of another model since the last one of this model
 
     def _begin(self, reception: Reception) -> Sequence[Sweep]:
         """Recognise the model by the packets kept, and decode them."""
@@ -239,7 +239,7 @@ class TurnDecoder(PacketDecoder):
         return self._follow(self._entry(received_s, payload), reception)
 
     def _foreign(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
-        """Refuse a packet of another model; after RECOGNISED_BY while the known one is silent, recognise it anew."""
+        """Refuse a packet of another model; adopt that model after RECOGNISED_BY packets without the known one."""
         refuse(reception, self.name, "of another model than the packets before")
         if abs(received_s - self._heard_s) < SILENCE_S:
             return []
@@ -252,7 +252,7 @@ class TurnDecoder(PacketDecoder):
         return self._begin(reception)
 
     def _follow(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
-        """Add a packet to its turn; the sweep that ends with it."""
+        """Add a packet to its turn; return the sweep that ends with it."""
         last = self._last
         gap_s = 0.0 if last is None else entry.time_s - last.time_s
         if last is None or max(abs(gap_s), entry.time_s - self._turn.began_s) > self._longest_s:
@@ -279,7 +279,7 @@ class TurnDecoder(PacketDecoder):
         return self._sweeps(ended, reception)
 
     def _start(self, entry: Entry) -> Sequence[Sweep]:
-        """Wait for the next cut: the head may have turned any number of times."""
+        """Wait for the next cut, as the head may have turned any number of times."""
         self._last, self._turn, self._ending = entry, Turn(entry.time_s, None, [entry]), NO_TURN
         self._longest_s = LONGEST_TURN_S
         return []
@@ -294,7 +294,7 @@ class TurnDecoder(PacketDecoder):
         return [Sweep(ahead_s + self._clock.offset_s, self._points(turn.entries), turn_s, complete=lost == 0)]
 
     def _points(self, entries: Sequence[Entry]) -> Float32:
-        """Table of a turn: of the packets whose beams look beyond the seam, the points on its own side of it."""
+        """Table of a turn, without the points that its first and last packets have beyond the seam."""
         heads = [e for e in entries if e.phase < self._reach]
         tails = [e for e in entries if e.end > TURN - self._reach]
         table = self._table([e for e in entries if e.phase >= self._reach and e.end <= TURN - self._reach])

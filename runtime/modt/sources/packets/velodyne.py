@@ -1,32 +1,147 @@
-"""Velodyne's packets to sweeps, by velodyne-decoder."""
+"""Sweeps from Velodyne's packets, by velodyne-decoder."""
 
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from statistics import median
+from struct import Struct
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from modt.errors import MisuseError, refuse_pipe
 from modt.sources.packets.packet_decoder import extra, one_line
 from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, TurnDecoder
-from modt.sources.packets.velodyne_models import (
-    IDENTITY_AT,
-    STAMP_AT,
-    Model,
-    Signature,
-    azimuths,
-    recognised,
-    signature_of,
-)
 from modt.types import Float32
 
 log = logging.getLogger(__name__)
 
+PACKET_BYTES = 1206
+BANKS, AZIMUTHS = slice(1, 1200, 100), Struct("<" + 12 * "2xH96x")
+STAMP_AT, RETURN_AT, IDENTITY_AT = 1200, 1204, 1205
+DUAL = 0x39
+"""Return mode of two returns a firing."""
+PACE_TOLERANCE = 0.05
+"""Relative difference of the interval between packets, beyond which they are of another model."""
+UPPER, UPPER_LOWER = frozenset({0xEE}), frozenset({0xEE, 0xDD})
+FOUR_BANKS = UPPER_LOWER | {0xCC, 0xBB}
 RETURN = 7
-"""Column of the library's table: which return of a firing."""
+"""Column of the library's table that numbers the return of a firing."""
+
+
+class Signature(NamedTuple):
+    """Bytes that all packets of one model share.
+
+    Attributes:
+        banks: second bytes of the headers of its blocks.
+        identity: byte that names the model; None where it has another meaning.
+    """
+
+    banks: frozenset[int]
+    identity: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A model of sensor.
+
+    Attributes:
+        name: name in addresses and options.
+        member: name in velodyne_decoder.Model.
+        signature: signature of its packets.
+        interval_us: time between packets of one return a firing [us].
+        profile: shipped profile, None where there is none.
+        reach: greatest angle between a beam and the head at the first beam of its block [0.01 deg].
+        calibration: file bundled with velodyne-decoder, used without the unit's own; None where all units are alike.
+    """
+
+    name: str
+    member: str
+    signature: Signature
+    interval_us: float
+    profile: str | None = None
+    reach: int = 100
+    calibration: str | None = None
+
+    def paces(self, interval_us: float, *, dual: bool) -> bool:
+        """Whether an interval between packets fits this model."""
+        expected_us = self.interval_us / 2 if dual else self.interval_us
+        return abs(interval_us / expected_us - 1.0) < PACE_TOLERANCE
+
+
+_HDL_64E = Signature(UPPER_LOWER, None)
+_MODELS = (
+    Model("vlp-16", "VLP16", Signature(UPPER, 0x22), 1327.1, "vlp-16"),
+    Model("puck-hi-res", "PuckHiRes", Signature(UPPER, 0x24), 1327.1),
+    Model("vlp-32c", "VLP32C", Signature(UPPER, 0x28), 663.6, "vlp-32c", 450),
+    Model("hdl-32e", "HDL32E", Signature(UPPER, 0x21), 552.96, "hdl-32e"),
+    Model("hdl-64e", "HDL64E_S3", _HDL_64E, 288.0, "hdl-64e", 900, "HDL-64E_S3-VeloView.yml"),
+    Model("hdl-64e-s2", "HDL64E_S2", _HDL_64E, 288.0, "hdl-64e", 900, "HDL-64E_S2.1-sztaki.yml"),
+    Model("vls-128", "VLS128", Signature(FOUR_BANKS, 0xA1), 165.9, None, 700),
+)
+MODELS = {model.name: model for model in _MODELS}
+
+
+def model_named(name: str) -> Model:
+    """Model of a name.
+
+    Raises:
+        MisuseError: the name is unknown.
+    """
+    if name not in MODELS:
+        raise MisuseError(f"model={name}", "no model of Velodyne that is known", f"use one of {', '.join(MODELS)}")
+    return MODELS[name]
+
+
+def signature_of(payload: bytes) -> Signature | None:
+    """Signature of a packet; None if a payload is no packet of points of a Velodyne."""
+    if len(payload) != PACKET_BYTES or payload[0:1200:100] != b"\xff" * 12:
+        return None
+    banks = frozenset(payload[BANKS])
+    if banks not in (UPPER, UPPER_LOWER, FOUR_BANKS) or max(AZIMUTHS.unpack_from(payload)) > TURN:
+        return None
+    return Signature(banks, None if banks == UPPER_LOWER else payload[IDENTITY_AT])
+
+
+def azimuths(payload: bytes) -> tuple[int, int]:
+    """Azimuths of the first and the last block [0.01 deg]."""
+    first, *_, last = AZIMUTHS.unpack_from(payload)
+    return first, last
+
+
+def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> tuple[Model | None, Signature | None]:
+    """Model that sent most of some packets, or the declared one, and the signature of those packets.
+
+    The model is None where it is unknown. Where identity and pace of the packets disagree, the pace of the lasers is
+    right. A contradiction is logged as a warning.
+    """
+    signatures = [signature_of(payload) for payload in payloads]
+    signature, _ = Counter(signatures).most_common(1)[0]
+    stated = next((model for model in _MODELS if model.signature == signature), None)
+    paced = _by_pace([p for p, s in zip(payloads, signatures, strict=True) if s == signature], stated)
+    used = declared or paced
+    if used is not None and not (used.signature == signature and (paced is stated or stated is None)):
+        facts = f"its packets say {stated.name if stated else 'nothing known'}"
+        pace = f" at the pace of {paced.name}" if paced is not stated and paced is not None else ""
+        remedy = "leave model= out to have it recognised" if declared else "give model= to overrule"
+        log.warning("%s: %s%s; decoded as %s; %s", name, facts, pace, used.name, remedy)
+    return used, signature
+
+
+def _by_pace(payloads: Sequence[bytes], stated: Model | None) -> Model | None:
+    """Model that fits the interval between the packets; the stated one if it fits."""
+    stamps_us = [int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little") for payload in payloads]
+    gaps_us = [b - a for a, b in pairwise(stamps_us) if b > a]
+    if not gaps_us or stated is None or stated.signature == _HDL_64E:
+        return stated
+    interval_us, dual = median(gaps_us), payloads[0][RETURN_AT] == DUAL
+    fitting = [m for m in _MODELS if m.signature.banks == stated.signature.banks and m.paces(interval_us, dual=dual)]
+    return stated if stated in fitting or not fitting else fitting[0]
 
 
 class VelodyneDecoder(TurnDecoder):
@@ -37,7 +152,7 @@ class VelodyneDecoder(TurnDecoder):
     signature = staticmethod(signature_of)
 
     def __init__(self, name: str, model: Model | None = None, calibration: Path | None = None) -> None:
-        """A decoder for the source of a name; without `model` it is recognised by the first packets.
+        """Make a decoder for the source of a name; without `model` it is recognised by the first packets.
 
         Raises:
             MisuseError: velodyne-decoder is missing, or the calibration cannot be read.
@@ -52,7 +167,7 @@ class VelodyneDecoder(TurnDecoder):
         refuse_pipe(calibration, remedy)
         try:
             return self._library.Calibration.read(str(calibration))
-        except Exception as error:  # of the library's YAML parser, of no common type
+        except Exception as error:  # errors of the library's YAML parser have no common type
             raise MisuseError(calibration, f"no calibration ({one_line(error)})", remedy) from None
 
     def _recognise(self, payloads: Sequence[bytes]) -> Signature | None:
@@ -75,7 +190,7 @@ class VelodyneDecoder(TurnDecoder):
         time_s = self._clock.unwrapped(stamp_s, received_s - self._packet_s)  # it is sent when it is full
         first, last = azimuths(payload)
         phase = (first + AHEAD) % TURN
-        if self._identity is not None:  # the library checks it, and there are packets that lie
+        if self._identity is not None:  # the library refuses packets with a wrong identity
             payload = payload[:IDENTITY_AT] + self._identity
         return Entry(time_s, phase, phase + (last - first) % TURN, self._library.VelodynePacket(time_s, payload))
 
