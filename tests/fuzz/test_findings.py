@@ -22,7 +22,6 @@ from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
-from modt.sources.text_file import read_numbers
 from tests.desk.reporting.test_run_report import ledger_line
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import DESCRIPTION, SENSOR_BOMB, network
@@ -212,7 +211,6 @@ PIPES = {
     "metadata of an Ouster": lambda path: OusterDecoder("sensor", path),
     "model": read_model,
     "profile": lambda path: profile.load([str(path)]),
-    "numbers of KITTI": lambda path: read_numbers(path, ""),
 }
 
 
