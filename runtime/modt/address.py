@@ -45,10 +45,10 @@ class Scheme:
     """How the addresses of a scheme are opened.
 
     Attributes:
-        form: pattern of its addresses, for messages and help.
-        opener: function that opens an Address; it imports the modules that it needs, which may need an extra.
-        options: names of the options that its addresses may have.
-        extra: extra of modt that it needs.
+        form: of its addresses, for messages and help.
+        opener: of an Address; it imports the modules that it needs, which may need an extra.
+        options: that its addresses may have.
+        extra: of modt, that it needs.
     """
 
     form: str
@@ -81,7 +81,7 @@ def parse_address(text: str, schemes: Mapping[str, Scheme]) -> Address:
 
 
 def open_address(text: str, schemes: Mapping[str, Scheme], *arguments: object) -> Any:
-    """Open an address by the opener of its scheme; returns what that opener returns.
+    """What the scheme's opener makes of an address and further arguments.
 
     Raises:
         MisuseError: another scheme or option, a missing extra, or what cannot be opened.

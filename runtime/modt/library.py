@@ -35,9 +35,9 @@ def open(path: str | PathLike[str], **capture: str) -> Stream:
     """The frames of a recording: a KITTI drive, a folder of scans, a PCAP file or a recording of ROS 2.
 
     A frame has an index, a stamp_s [s], points (N, 4), and the recording's pose T_world_sensor, else None. The stream
-    can be iterated repeatedly. `between(first, last)` is a part of it, `info` describes it, and `faults` lists what
-    could not be used. `capture` adds what a recording lacks, as `--capture` of `modt replay` does: model, calibration
-    or metadata of a sensor, the topic of a recording.
+    can be iterated repeatedly. `between(first, last)` is a part of it, `info` says what it is, `faults` what could
+    not be used. `capture` is what a recording does not tell, as `--capture` of `modt replay`: model, calibration or
+    metadata of a sensor, the topic of a recording.
 
     Raises:
         MisuseError: there is no stream at the path, or an option does not apply.
@@ -54,8 +54,8 @@ class TrackedObjects:
         id: (n,) never used twice.
         object_class: (n,) index in modt.CLASS_NAMES.
         posterior: (n, 4) probability of each class.
-        final: (n,) whether the class is confirmed.
-        visible: (n,) whether it has a proposal in this frame.
+        final: (n,) the class is final.
+        visible: (n,) matched with a proposal of this frame.
         unknown_near: (n,) background as far as is known, but too near for the sensor to show whether it is a person.
         box_sensor: (n, 7) x, y, z of the centre, length, width, height [m], yaw [rad] in the sensor frame, for a
             tilted sensor the level frame at its place; NaN if not visible.
@@ -155,7 +155,7 @@ class Pipeline:
     def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:
         """Pipeline of profiles by name or file, of which later ones win key by key.
 
-        Without a sensor's profile the sensor is the default one, or the one that the first sweep shows.
+        Where none says which sensor it is, that is the default's, or what the first sweep shows.
 
         Raises:
             MisuseError: no such profile or mode, or a profile with an error; it names the line.
@@ -178,7 +178,7 @@ class Pipeline:
             points: a frame of `open`, which needs no other argument; or (N, 3) or (N, 4) x, y, z [m, sensor frame:
                 x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
-            T_world_sensor: (4, 4) pose at the stamp; None: the sweep is registered against stationary tracks.
+            T_world_sensor: (4, 4) pose at the stamp; None: the proposals themselves tell the motion of the sensor.
             turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
 
         Raises:
