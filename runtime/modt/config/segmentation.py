@@ -1,7 +1,7 @@
 """Segmentation: the keys of the stage. Limits of a mechanism are constants beside it.
 
 Defaults without another source were chosen on KITTI object frames and labelled odometry scans, and checked on drive
-0005 and on simulated streets (docs/segmentation.md).
+0005 and on simulated streets (docs/evaluation.md).
 """
 
 from __future__ import annotations
