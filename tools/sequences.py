@@ -1,11 +1,11 @@
-"""Feed the pipeline with random sequences of frames, and hold it to what it promises.
+"""Feed the pipeline with random sequences of frames, and check its promises after each.
 
     python -m tools.sequences --n 10000 --seed 1
     python -m tools.sequences --n 1000 --live
 
-Frames are empty, huge, repeated, late, or not finite, poses leap, clocks are set, sensors change in mid-run. With
---live it is packets, clouds and poses, thousands in a sequence, that are lost, forged or late on their way to the
-loop of a robot, whose process is stopped at times. The first broken promise is printed with the shortest sequence
+Frames are empty, huge, repeated, late or not finite; poses leap, clocks are set, sensors change in mid-run. With
+--live the input is packets, clouds and poses, thousands in a sequence. They are lost, forged or late on their way to
+the loop of a robot, whose process is stopped at times. The first broken promise is printed with the shortest sequence
 that breaks it; then the exit status is 1.
 """
 
@@ -25,9 +25,9 @@ BLOCK = 250
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--n", type=int, default=1000, help="sequences (default: %(default)s)")
-    options.add_argument("--steps", type=int, default=25, help="of each at most (default: %(default)s)")
+    options.add_argument("--steps", type=int, default=25, help="longest sequence (default: %(default)s)")
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--live", action="store_true", help="what a live robot receives, in place of frames")
+    options.add_argument("--live", action="store_true", help="packets, clouds and poses instead of frames")
     given = options.parse_args()
     from hypothesis import HealthCheck, Phase, seed, settings
     from hypothesis.stateful import run_state_machine_as_test

@@ -41,7 +41,7 @@ from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT, Fault, World
 from tools.options import parser
 
 WARM_UP_S, REST_S, SETTLE_S = 15.0, 4.0, 2.5
-"""Before the first fault; between two; after one, until misses count as not of its making."""
+"""Time before the first fault, between two faults, and after one, until missed deadlines are not its effect [s]."""
 MAX_RECOVERY_S, MAX_MISSED, MAX_GROWTH = 1.0, 0.001, 0.05
 STALL = 1.5
 """A longer time between two results, in periods, is a stall."""
@@ -164,7 +164,7 @@ def free_port() -> int:
 
 
 def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[str]:
-    """Print the figures; returns what is wrong."""
+    """Print the figures; returns the broken promises."""
     wrong: list[str] = []
     times_s = np.array(witness.times_s)
     whole, gaps_s = times_s[np.array(witness.full)], np.diff(times_s)

@@ -62,11 +62,11 @@ def governor(number: int | None, sys: Path = Path("/sys")) -> Finding:
 
 def permissions() -> list[Finding]:
     """Check real-time priority and locked memory, and take what is permitted."""
-    said = host.take_real_time_priority()
+    refusals = host.take_real_time_priority()
     with ThreadPoolExecutor(1) as receiving:
-        said.append(receiving.submit(host.serve_loop, None).result())
-    lacking = [Finding(WARN, "permissions", *what.split("; ", 1)) for what in said if what]
-    return lacking or [Finding(OK, "permissions", "SCHED_FIFO, memory locked")]
+        refusals.append(receiving.submit(host.serve_loop, None).result())
+    findings = [Finding(WARN, "permissions", *refusal.split("; ", 1)) for refusal in refusals if refusal]
+    return findings or [Finding(OK, "permissions", "SCHED_FIFO, memory locked")]
 
 
 def meters(found: Discovery) -> Finding:

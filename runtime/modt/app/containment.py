@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 MAX_IN_A_ROW = 10
 """Failures in a row that end the run."""
 RENEW_AFTER = 5
-"""Failures in a row after which the stages are made anew."""
+"""Failures in a row after which new stages are made."""
 
 
 class Containment:

@@ -59,14 +59,14 @@ class Session:
         totals: Summary,
         meters: Sequence[Meter],
         core: int | None,
-        lacking: Sequence[str] = (),
+        refusals: Sequence[str] = (),
         metrics: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
         self.source, self.stages, self.recording, self.sinks = source, stages, recording, sinks
         self.deadlines, self.failures, self.stop = deadlines, failures, stop
-        self._totals, self._core, self._lacking, self._metrics = totals, core, list(lacking), metrics
+        self._totals, self._core, self._refusals, self._metrics = totals, core, list(refusals), metrics
         outputs = {**sinks, "recording": recording}
         self.loop = Loop(
             source,
@@ -135,7 +135,7 @@ class Session:
             "odometry": self.stages.odometry.report(),
             "sinks": self._sinks_health(),
             "recording": self.recording.health(),
-            "host": {"core": self._core, "resident_mb": resident_mb, "lacking": self._lacking},
+            "host": {"core": self._core, "resident_mb": resident_mb, "lacking": self._refusals},
         }
 
     def _report(self, supervisor: Supervisor) -> None:
@@ -255,7 +255,7 @@ def service(
     metrics: Path | None,
     core: int | None,
     command: Sequence[str],
-    lacking: Sequence[str] = (),
+    refusals: Sequence[str] = (),
 ) -> Session:
     """A service over a live source; the threads that write begin on the cores that this one is allowed.
 
@@ -267,7 +267,7 @@ def service(
         metrics: file for Prometheus; None for none.
         core: core of the loop; None leaves the affinity unchanged.
         command: for the record.
-        lacking: refused permissions, for the status.
+        refusals: refused permissions, for the status.
 
     Raises:
         MisuseError: an invalid request.
@@ -285,4 +285,4 @@ def service(
     writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
     recording = Recording(RunDirectory(out), stages.config.recording, writer, describe)
     kinds = Deadlines(source.info.period_s), Containment(), Stop(reload=True)
-    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, lacking, metrics)
+    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, refusals, metrics)

@@ -136,5 +136,5 @@ def _times(figures: dict[str, float]) -> str:
 
 def _counts(health: dict[str, Any]) -> str:
     """Scalars that are not empty or zero."""
-    said = {key: value for key, value in health.items() if value and not isinstance(value, dict)}
-    return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in said.items()) or "nothing to report"
+    shown = {key: value for key, value in health.items() if value and not isinstance(value, dict)}
+    return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in shown.items()) or "nothing to report"

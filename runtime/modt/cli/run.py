@@ -60,9 +60,9 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.schemes import open_sink
 
     supervisor = supervisor_of(os.environ)
-    lacking = host.take_real_time_priority()
-    for what in lacking:
-        log.warning("%s", what)
+    refusals = host.take_real_time_priority()
+    for refusal in refusals:
+        log.warning("%s", refusal)
     with host.threads_on(cores):
         source, path = live_source(arguments.source, cores)
         addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         command = ["modt", *sys.argv[1:]]
         request = replace(Request.of(arguments), path=path)
         out, metrics = arguments.out, arguments.metrics
-        session = service(request, source, sinks, out, metrics, pinned, command, lacking)
+        session = service(request, source, sinks, out, metrics, pinned, command, refusals)
     for handler in logging.getLogger().handlers:
         handler.addFilter(OncePerSecond())
     status = session.run(supervisor)["status"]

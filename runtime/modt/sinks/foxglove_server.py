@@ -35,7 +35,7 @@ FIGURES = {
 class FoxgloveChannels:
     """The topics of `modt.sinks.messages`, and FIGURES below PREFIX, as ROS 2 messages.
 
-    Messages bear the stamps of the frames, and are encoded only while a client or file takes them.
+    Messages have the stamps of the frames. They are encoded only while a client or file takes them.
     """
 
     def __init__(self, context: foxglove.Context, *, points: bool) -> None:

@@ -56,7 +56,7 @@ class AtOnce:
 
 
 class Recording:
-    """tracks.jsonl and ledger.jsonl; while they cannot be written, lines are lost, counted, and the loop goes on.
+    """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted; the loop continues.
 
     Once a second it checks that its files are in place, and begins another part if they were removed or moved.
 

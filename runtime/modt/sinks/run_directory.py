@@ -117,7 +117,7 @@ class RunDirectory:
         return [path for _, path in sorted(self._numbered()) if _is_ours(path)]
 
     def _take_lock(self) -> None:
-        """Take the lock, and take it anew where its file was removed with the folder around the run."""
+        """Take the lock, or take it once more if its file was removed together with the folder around the run."""
         path = self.path.with_name(f".{self.path.name}.lock")
         with suppress(OSError):
             if self._number is not None and os.path.samestat(os.fstat(self._number), os.stat(path)):
