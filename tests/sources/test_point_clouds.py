@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from modt.errors import ScanError
 from modt.ros2.point_cloud2 import read_cloud
 from modt.sources.point_cloud_file import decompress
-from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from modt.types import UNRECORDED
 from tests.ros2 import messages
@@ -147,14 +146,6 @@ def test_without_reflectance_none_is_recorded(form):
     assert (form(table(x="f4", y="f4", z="f4"))[0][:, 3] == UNRECORDED).all()
 
 
-def test_points_that_are_not_finite_are_no_returns(form):
-    rows = table(x="f4", y="f4", z="f4", i="u1")
-    rows["x"][2] = np.nan
-    points, flaws = form(rows)
-    assert not points[2, :3].any()
-    assert flaws == ["1 points are not finite and count as no return"]
-
-
 def test_repeated_names_and_several_numbers_a_field(tmp_path):
     rows = table(x="f4", y="f4", z="f4", a="u1", b="u1")
     points, _ = read(tmp_path / "scan.pcd", pcd(rows, FIELDS="x y z _ _"))
@@ -230,27 +221,6 @@ def test_lzf_repeats():
 def test_broken_lzf_is_refused_without_growing(data, length):
     out = decompress(data, length)
     assert out is None or len(out) == length
-
-
-@pytest.mark.parametrize("write", [pcd, ply])
-def test_a_folder_of_them_is_a_stream(tmp_path, write):
-    rows = table(x="f4", y="f4", z="f4", i="u1")
-    for name in ("a", "b", "c"):
-        (tmp_path / f"{name}.{write.__name__}").write_bytes(write(rows))
-    (tmp_path / f"b.{write.__name__}").write_bytes(write(rows)[:-3])
-    stream = open_stream(tmp_path, period_s=0.05)
-    assert [(f.index, f.stamp_s) for f in stream] == [(0, 0.0), (2, 0.1)]
-    assert (stream.info.n_frames, stream.faults.count, stream.faults.skipped) == (3, 1, 1)
-    assert "truncated" in stream.faults.first[0].cause
-
-
-def test_names_in_nanoseconds_are_stamps(tmp_path):
-    for k in (0, 1, 3):
-        (tmp_path / f"{1_673_400_472_138_016_708 + k * 100_000_000}.pcd").write_bytes(pcd(ROWS))
-    stream = open_stream(tmp_path)
-    assert [f.index for f in stream] == [0, 1, 2]
-    assert [f.stamp_s for f in stream] == pytest.approx([0.0, 0.1, 0.3])
-    assert any("stamped by their names" in note for note in stream.info.notes)
 
 
 @pytest.mark.kitti

@@ -3,7 +3,6 @@
 import json
 import logging
 import socket
-import threading
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from hypothesis import strategies as st
 from modt.address import parse_address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.geometry import inverse, rotation_zyx, se3, yaw_of
+from modt.geometry import inverse, rotation_zyx, se3
 from modt.ros2.cdr import MessageError
 from modt.schemes import POSES, open_poses
 from modt.sources.pose_socket import PoseSocket, open_socket, read_datagram
@@ -132,16 +131,6 @@ def test_the_reason_of_a_refusal_is_given(raw, reason, cause):
     with pytest.raises(MessageError, match=cause) as caught:
         read_datagram(raw)
     assert caught.value.reason == reason
-
-
-def test_poses_are_interpolated(pair):
-    there, odometry = pair
-    there.send(planar(1.0, 0.0, 0.0, 3.1))
-    there.send(planar(1.2, 1.0, -2.0, -3.1))
-    T = pose_of(odometry, frame(1.05))
-    np.testing.assert_allclose(T[:2, 3], [0.25, -0.5])
-    assert abs(yaw_of(T) - (3.1 + 0.25 * (2 * np.pi - 6.2))) < 1e-9  # the short way round
-    np.testing.assert_array_equal(pose_of(odometry, frame(1.2)), matrix([1.0, -2.0, -3.1]))
 
 
 def test_poses_are_extrapolated(pair):
@@ -350,16 +339,6 @@ def test_an_existing_file_is_not_replaced(tmp_path):
     with pytest.raises(MisuseError, match="cannot be bound"):
         open_poses(f"unix://{tmp_path / 'mine'}", CONFIG)
     assert (tmp_path / "mine").read_text() == "mine"
-
-
-def test_reading_does_not_block(pair):
-    """Without a sender; in a thread, which would hang otherwise."""
-    _, odometry = pair
-    answers = []
-    asking = threading.Thread(target=lambda: answers.append(pose_of(odometry, frame(0.0))), daemon=True)
-    asking.start()
-    asking.join(timeout=60)
-    assert answers == [None]
 
 
 @pytest.fixture(name="free_port")

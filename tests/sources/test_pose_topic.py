@@ -60,13 +60,6 @@ def test_what_cannot_be_used_is_counted_by_its_reason():
     assert counts == {"repeated": 1, "stale": 1, "non_finite": 1, "malformed": 2}
 
 
-def test_poses_that_go_on_after_a_leap_are_a_restart():
-    held = Scripted()
-    topic = PoseTopic(held, OdometryConfig(), "odom", np.eye(4))
-    held.held = [pose(10.0, 0.0), *(pose(10.1 + 0.05 * k, 500.0) for k in range(6))]
-    assert topic.place(frame(10.35)).restarts == 1
-
-
 def test_poses_over_loopback(loopback):
     address = f"ros2:///odom?domain={NEAR}&base_to_sensor=0,0,1.5,0,0,0"
     topic = open_poses(address, OdometryConfig())

@@ -1,7 +1,6 @@
 """Hesai's packets, by bytes written as the manuals lay them out, and against another decoder."""
 
 import socket
-import sqlite3
 import struct
 import threading
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from scipy.spatial import cKDTree
 from modt.errors import MisuseError
 from modt.sources.packets.hesai import GET_CALIBRATION, HesaiDecoder, asked_angles, model_of, read_angles
 from modt.sources.point_cloud_file import read_pcd
-from tests.sources.packets.simulated import BEGAN_S, decoded, packets
+from tests.sources.packets.simulated import BEGAN_S, decoded, packets, packets_of_bag
 
 TURN_S = 0.1
 RANGE = 2500
@@ -114,22 +113,6 @@ def test_of_several_returns_the_one_of_the_greatest_reflectance_is_taken(mode, s
     assert reception.lost == 0
 
 
-def test_garbage_and_packets_of_another_model_are_counted_and_change_nothing():
-    model, other = WRITTEN["PandarXT-32"], WRITTEN["PandarXT-16"]
-    timed, rng = model.turns(2.7), np.random.default_rng(0)
-    whole, _ = decoded(HesaiDecoder("sensor", angles_of(32)), timed)
-    dirty = [*timed]
-    for i in range(400, 40, -40):
-        at_s, payload = timed[i]
-        beyond = payload[:12] + b"\xff\xff" + payload[14:]  # an azimuth
-        junk = (rng.bytes(1080), b"", payload[:-40], payload + bytes(200), beyond, other.packet(36_000.0))
-        dirty[i:i] = [(at_s, bytes_) for bytes_ in junk]
-    sweeps, reception = decoded(HesaiDecoder("sensor", angles_of(32)), dirty)
-    assert [s.points.tobytes() for s in sweeps] == [s.points.tobytes() for s in whole]
-    assert reception.refused == {"no packet of a Hesai": 45, "of another model than the packets before": 9}
-    assert reception.lost == 0
-
-
 def test_an_ideal_xt_32_sees_the_scene_it_is_in(caplog):
     from modt_desk.simulation.synthetic_stream import SyntheticStream
 
@@ -187,22 +170,6 @@ def test_the_sensor_is_asked_for_its_calibration(answer, n, caplog):
     assert ("does not give its calibration" in caplog.text) is (n is None)
 
 
-def packets_of_bag(folder):
-    """Hesai's packets in the messages of a rosbag2 file."""
-    (path,) = folder.glob("*.db3")
-    bag = sqlite3.connect(f"file:{path}?mode=ro&immutable=1", uri=True)
-    messages = [data for (data,) in bag.execute("select data from messages order by timestamp")]
-    bag.close()
-    for data in messages:
-        at = 16 + struct.unpack_from("<I", data, 12)[0]
-        at += -at % 4
-        for k in range(struct.unpack_from("<I", data, at)[0]):
-            start = at + 4 + 1512 * k
-            second, fraction = struct.unpack_from("<II", data, start)
-            (size,) = struct.unpack_from("<I", data, start + 1508)
-            yield second + 1e-9 * fraction, data[start + 8 : start + 8 + size]
-
-
 @pytest.mark.kitti
 @pytest.mark.parametrize(
     ("name", "table", "n_sweeps"),
@@ -219,7 +186,7 @@ def packets_of_bag(folder):
 def test_points_are_those_of_another_decoder(kitti_root, name, table, n_sweeps):
     folder = kitti_root / "packets"
     decoder = HesaiDecoder("sensor", read_angles(folder / "calibration" / f"{table}.csv"))
-    sweeps, reception = decoded(decoder, packets_of_bag(folder / name))
+    sweeps, reception = decoded(decoder, packets_of_bag(folder / name, 1500, 1508))
     assert (len(sweeps), reception.refused) == (n_sweeps, {})
     assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * n_sweeps, abs=2e-4)
     (cloud,) = (folder / name).glob("*.pcd")

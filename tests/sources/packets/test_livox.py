@@ -74,25 +74,6 @@ def test_packets_of_a_simulated_sweep_are_the_sweep():
         assert sweep.points[:, :3] == pytest.approx(seen[:, :3], abs=1e-3)
 
 
-def test_lost_packets_are_counted_and_others_change_nothing():
-    whole, _ = decoded(LivoxDecoder("sensor"), timed(1100))
-    rng, dirty = np.random.default_rng(0), timed(1100)
-    dirty[400], dirty[401] = dirty[401], dirty[400]
-    for i in range(1000, 20, -20):
-        at_s, payload = dirty[i]
-        dirty[i:i] = [(at_s, p) for p in (rng.bytes(1380), payload[:-1], payload[:10] + b"\0" + payload[11:], b"")]
-    dirty.insert(700, dirty[699])
-    sweeps, reception = decoded(LivoxDecoder("sensor"), dirty)
-    assert [s.points.tobytes() for s in sweeps] == [s.points.tobytes() for s in whole]
-    assert reception.refused.pop("late or twice") in (0, 1)
-    assert reception.refused == {"no packet of points of a Livox": 4 * 49}
-    gone = timed(1100)
-    del gone[500:520]
-    sweeps, reception = decoded(LivoxDecoder("sensor"), gone)
-    assert reception.lost == 20
-    assert [s.complete for s in sweeps].count(False) == 1
-
-
 def test_a_clock_that_is_set_or_a_silence_costs_the_sweep_under_way():
     for step_s in (-5.0, 5.0, 1e5):
         later = [(at_s + 5.0, p) for at_s, p in timed(1100, 8.0 + step_s)]

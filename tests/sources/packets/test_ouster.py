@@ -64,47 +64,6 @@ def test_it_looks_straight_ahead_at_the_stamp(timed, metadata):
     assert np.all(np.diff(np.unwrap(np.deg2rad(bearing_deg(beam)))) < 0.01)
 
 
-def test_lost_packets_are_counted_and_their_sweep_is_incomplete(timed, metadata):
-    whole, _ = decoded(OusterDecoder("sensor", metadata), timed)
-    kept = [p for i, p in enumerate(timed) if i not in (70, 90, 91)]
-    sweeps, reception = decoded(OusterDecoder("sensor", metadata), kept)
-    assert reception.lost == 3
-    assert [s.complete for s in sweeps] == [True, False, True]
-    assert equal(sweeps[::2], whole[::2])
-
-
-def test_a_sweep_that_had_begun_is_none(timed, metadata):
-    sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[10:])
-    assert [s.complete for s in sweeps] == [True, True]
-    assert reception.lost == 0
-
-
-def test_a_whole_lost_sweep_is_counted(timed, metadata):
-    sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[:64] + timed[128:])
-    assert len(sweeps) == 2
-    assert reception.lost == 64
-
-
-def test_overtaken_doubled_and_foreign_packets_change_nothing(timed, metadata):
-    whole, _ = decoded(OusterDecoder("sensor", metadata), timed)
-    rng, size = np.random.default_rng(0), len(timed[0][1])
-    dirty = [*timed]
-    dirty[20], dirty[21] = dirty[21], dirty[20]
-    dirty.insert(30, dirty[29])
-    for i in range(40, 180, 20):
-        foreign = bytearray(timed[i][1])
-        foreign[4:12] = b"\x01" * 8  # serial numbers
-        dirty[i:i] = [(dirty[i][0], junk) for junk in (rng.bytes(size), b"", rng.bytes(48), bytes(foreign))]
-    sweeps, reception = decoded(OusterDecoder("sensor", metadata), dirty)
-    assert equal(sweeps, whole)
-    assert reception.lost == 0
-    assert reception.refused == {
-        "not the 8448 bytes of the metadata's format": 14,
-        "no packet of an Ouster": 7,
-        "of another sensor than the metadata": 7,
-    }
-
-
 @pytest.mark.parametrize(
     ("name", "beams", "turn_s", "profile"),
     [

@@ -1,0 +1,139 @@
+"""Promises that the decoders of all makers share: faults of the network are counted and change no other sweep."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modt.sources.packets.capture import Capture
+from modt.sources.packets.hesai import HesaiDecoder
+from modt.sources.packets.livox import LivoxDecoder
+from modt.sources.packets.ouster import OusterDecoder
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.velodyne import VelodyneDecoder
+from tests.sources.packets.simulated import decoded, equal, packets
+from tools.send.faults import Timed
+
+OTHER = "of another model than the packets before"
+
+
+def edited(at: int, value: bytes) -> Callable[[bytes], bytes]:
+    """Function that overwrites bytes of a payload."""
+    return lambda payload: payload[:at] + value + payload[at + len(value) :]
+
+
+@dataclass(frozen=True)
+class Maker:
+    """A decoder, packets of three whole sweeps or more, and unusable packets with the reason of their refusal."""
+
+    decoder: Callable[[], PacketDecoder]
+    timed: Callable[[], list[Timed]]
+    lost: tuple[int, ...]  # packets within the second sweep
+    refused: str
+    broken: Callable[[bytes], bytes]  # a packet with an impossible field
+    foreign: Callable[[bytes], bytes] | None = None
+    of_foreign: str = OTHER
+    lengths: str = field(default="")  # reason for another length, by default `refused`
+
+
+def ouster_folder() -> Path:
+    return Path(os.environ.get("KITTI_ROOT", "")) / "ouster"
+
+
+def of_ouster() -> list[Timed]:
+    capture = Capture(ouster_folder() / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap")
+    return [(d.stamp_s, d.payload) for d in capture if d.port == 7502]
+
+
+MAKERS = {
+    "velodyne": Maker(
+        lambda: VelodyneDecoder("sensor"),
+        lambda: list(packets()),
+        (160, 161, 190),
+        "no packet of a Velodyne",
+        edited(502, b"\xff\xff"),
+        lambda _: packets("hdl-64e", 4)[40][1],
+    ),
+    "hesai": Maker(
+        lambda: HesaiDecoder("sensor"),
+        lambda: list(packets("xt-32", 4)),
+        (400, 401, 430),
+        "no packet of a Hesai",
+        edited(12, b"\xff\xff"),
+        lambda p: edited(6, b"\x10")(p[:12] + b"".join(p[k : k + 66] for k in range(12, 1052, 130)) + p[1052:]),
+    ),
+    "livox": Maker(
+        lambda: LivoxDecoder("sensor"),
+        lambda: list(packets("mid-360", 4)),
+        (130, 131, 150),
+        "no packet of points of a Livox",
+        edited(10, b"\0"),
+    ),
+    "ouster": Maker(
+        lambda: OusterDecoder("sensor", ouster_folder() / "OS-1-128_v2.3.0_1024x10.json"),
+        of_ouster,
+        (70, 71, 90),
+        "no packet of an Ouster",
+        lambda p: np.random.default_rng(0).bytes(len(p)),
+        edited(4, b"\x01" * 8),
+        "of another sensor than the metadata",
+        "not the 8448 bytes of the metadata's format",
+    ),
+}
+
+
+@pytest.fixture(params=[pytest.param(name, marks=[pytest.mark.kitti] * (name == "ouster")) for name in MAKERS])
+def maker(request: pytest.FixtureRequest) -> Maker:
+    if request.param == "velodyne":
+        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    if request.param == "ouster":
+        request.getfixturevalue("kitti_root")
+        pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
+    return MAKERS[request.param]
+
+
+def test_lost_packets_are_counted_and_their_sweep_is_incomplete(maker: Maker) -> None:
+    timed = maker.timed()
+    whole, _ = decoded(maker.decoder(), timed)
+    sweeps, reception = decoded(maker.decoder(), [p for i, p in enumerate(timed) if i not in maker.lost])
+    assert (reception.lost, reception.refused) == (3, {})
+    assert [s.complete for s in whole] == [True] * len(sweeps)
+    assert [s.complete for s in sweeps].count(False) == 1
+    kept = [i for i, s in enumerate(sweeps) if s.complete]
+    assert equal([sweeps[i] for i in kept], [whole[i] for i in kept])
+
+
+def test_overtaken_and_doubled_packets_change_nothing(maker: Maker) -> None:
+    timed = maker.timed()
+    whole, _ = decoded(maker.decoder(), timed)
+    at = maker.lost[0]
+    timed[at], timed[at + 1] = timed[at + 1], timed[at]
+    timed.insert(at + 10, timed[at + 9])
+    sweeps, reception = decoded(maker.decoder(), timed)
+    assert equal(sweeps, whole)
+    assert reception.lost == 0
+    assert set(reception.refused) <= {"late or twice"}
+
+
+def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker: Maker, caplog) -> None:
+    timed, rng, dirty, n = maker.timed(), np.random.default_rng(0), list[Timed](), 0
+    whole, _ = decoded(maker.decoder(), timed)
+    caplog.clear()
+    for i, (at_s, payload) in enumerate(timed):
+        dirty.append((at_s, payload))
+        if i > 30 and not i % 50:
+            n += 1
+            junk = [rng.bytes(len(payload) + 1), b"", payload[: len(payload) // 2], maker.broken(payload)]
+            dirty += [(at_s, p) for p in junk + ([maker.foreign(payload)] if maker.foreign else [])]
+    sweeps, reception = decoded(maker.decoder(), dirty)
+    assert equal(sweeps, whole)
+    assert reception.lost == 0
+    expected = {maker.lengths: 3 * n, maker.refused: n} if maker.lengths else {maker.refused: 4 * n}
+    expected |= {maker.of_foreign: n} if maker.foreign else {}
+    assert reception.refused == expected
+    assert sum("only counted" in r.message for r in caplog.records) == len(expected)  # one line a reason
