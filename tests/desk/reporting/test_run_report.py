@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt import profile
-from modt.app.timing import Timing
+from modt.app.deadlines import Timing
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
