@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.app.containment import Containment
+from modt.app.deadlines import NoDeadlines
 from modt.app.loop import NAP_S, Loop, Stop
 from modt.app.playback import Pace, Playback
 from modt.app.supervisor import Supervisor
@@ -95,8 +96,8 @@ def replay(stages, sinks, stop=None, observe=lambda r, line: None, pace=None, fr
     """Play frames through stages, to the end or a signal."""
     source = Playback(Frames(frames), pace or Pace(), stages.ledger)
     sinks = {f"sink {k}": sink for k, sink in enumerate(sinks)}
-    contained = Containment(contains=False)
-    loop = Loop(source, stages, sinks, observe, lambda supervisor: None, None, contained, stop or Stop())
+    deadlines, contained = NoDeadlines(Pace().report), Containment(contains=False)
+    loop = Loop(source, stages, sinks, observe, lambda supervisor: None, deadlines, contained, stop or Stop())
     loop.run(Supervisor())
 
 

@@ -139,5 +139,32 @@ class Deadlines:
             log.warning("load: %s (%s)", GIVEN_UP[self.ladder.step], event.value)
 
 
+class NoDeadlines:
+    """Every frame of a replay is processed, and may spend the budget of its profile.
+
+    Attributes:
+        report: report of the pace.
+    """
+
+    reduced = False
+
+    def __init__(self, report: Callable[[], dict[str, Any]]) -> None:
+        self.report = report
+
+    def admit(self, arrived_s: float) -> bool:
+        """True."""
+        return True
+
+    def budget(self, whole: Budget, arrived_s: float, frame: int) -> Budget:
+        """The whole budget."""
+        return whole
+
+    def finish(self, arrived_s: float, line: dict[str, Any]) -> None:
+        """No effect."""
+
+    def power(self, watts: float, limit_W: float | None) -> None:
+        """No effect."""
+
+
 def _figures_ms(times_ns: Histogram) -> dict[str, float]:
     return {name: round(ms, 3) for name, ms in times_ns.figures(1e6, p50=0.5, p99=0.99).items()}

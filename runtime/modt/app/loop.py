@@ -13,7 +13,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from modt.app.containment import RENEW_AFTER, Containment
-from modt.app.deadlines import Deadlines
+from modt.app.deadlines import Deadlines, NoDeadlines
 from modt.app.playback import Playback
 from modt.app.stages import Stages
 from modt.app.supervisor import Supervisor
@@ -97,8 +97,7 @@ class Loop:
         sinks: sinks of the results, by their names in messages.
         observe: called with every result and its ledger line.
         report: called once a second.
-        deadlines: decide which sweeps are processed; None for a recording, of which every frame is.
-        failures, stop: decide which failures are contained, and when to end.
+        deadlines, failures, stop: decide which sweeps are processed, which failures are contained, and when to end.
 
     Attributes:
         reloads, refused_reloads: counts.
@@ -111,7 +110,7 @@ class Loop:
         sinks: Mapping[str, Writer[FrameResult]],
         observe: Callable[[FrameResult, Line], None],
         report: Callable[[Supervisor], None],
-        deadlines: Deadlines | None,
+        deadlines: Deadlines | NoDeadlines,
         failures: Containment,
         stop: Stop,
         clock: Callable[[], float] = time.monotonic,
@@ -162,8 +161,7 @@ class Loop:
                 self._failures.spare("status", self._report, supervisor)
 
     def _process(self, received: Received) -> None:
-        deadlines = self._deadlines
-        if deadlines is not None and not deadlines.admit(received.arrived_s):
+        if not self._deadlines.admit(received.arrived_s):
             return
         try:
             line = self._step(received)
@@ -175,17 +173,14 @@ class Loop:
             self._stages.recover(anew=self._failures.in_a_row == RENEW_AFTER)
             return
         self._failures.succeed()
-        if deadlines is not None:
-            deadlines.finish(received.arrived_s, line)
+        self._deadlines.finish(received.arrived_s, line)
         self._stages.watch(received.frame)
 
     def _step(self, received: Received) -> Line:
         """Process a frame; returns its ledger line."""
-        stages, frame, deadlines = self._stages, received.frame, self._deadlines
-        budget, reduced = stages.budget, False
-        if deadlines is not None:
-            budget, reduced = deadlines.budget(budget, received.arrived_s, frame.index), deadlines.reduced
-        result = stages.step(frame, budget, reduced=reduced)
+        stages, frame = self._stages, received.frame
+        budget = self._deadlines.budget(stages.budget, received.arrived_s, frame.index)
+        result = stages.step(frame, budget, reduced=self._deadlines.reduced)
         for name, sink in self._sinks.items():
             self._failures.spare(name, stages.ledger.run, SINK, sink.write, result)
         line = stages.ledger.close_frame(frame.index)

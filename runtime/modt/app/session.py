@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from modt import host, profile
 from modt.app import inputs, metering
 from modt.app.containment import Containment
-from modt.app.deadlines import Deadlines
+from modt.app.deadlines import Deadlines, NoDeadlines
 from modt.app.loop import Loop, Stop
 from modt.app.playback import Pace, Playback
 from modt.app.stages import SensorWatch, Stages
@@ -53,7 +53,7 @@ class Session:
         stages: Stages,
         recording: Recording,
         sinks: Mapping[str, Sink],
-        deadlines: Deadlines | None,
+        deadlines: Deadlines | NoDeadlines,
         failures: Containment,
         stop: Stop,
         totals: Summary,
@@ -127,7 +127,7 @@ class Session:
             "profile": self.stages.chosen.name,
             "period_s": info.period_s,
             "counts": self._counts.report(now_s, self._tracks),
-            "loop": self._pace() | loop,
+            "loop": self.deadlines.report() | loop,
             "power": self.power.report() | {"limit_W": self.stages.config.loop.power_W},
             "sensor": self.source.health()
             | {"faults": self.source.faults.count, "misfits": self.stages.misfits}
@@ -140,7 +140,7 @@ class Session:
 
     def _report(self, supervisor: Supervisor) -> None:
         """Show the status of a service to its supervisor, in status.json and to Prometheus."""
-        if self.deadlines is not None:
+        if isinstance(self.deadlines, Deadlines):
             status = self.status()
             supervisor.status(one_line(status))
             self.recording.writer.write(lambda: self._show(status))
@@ -165,7 +165,7 @@ class Session:
         if window is not None:
             self._ledger(window)
             watts = self.power.add(window, config.energy)
-            if watts is not None and self.deadlines is not None:
+            if watts is not None:
                 self.deadlines.power(watts, config.loop.power_W)
         misses = config.sensor.reflectance != "none" and result.proposals.reflectance is None
         self._without_reflectance += misses and len(result.proposals) > 0
@@ -174,12 +174,6 @@ class Session:
     def _ledger(self, line: dict[str, Any]) -> None:
         for sink in self._ledgers:
             sink.ledger(line)
-
-    def _pace(self) -> dict[str, Any]:
-        """Deadlines of a live source, or the pace of a recording."""
-        if self.deadlines is not None:
-            return self.deadlines.report()
-        return self.source.pace.report() if isinstance(self.source, Playback) else {}
 
     def _sinks_health(self) -> dict[str, Any]:
         return {address: sink.health() for address, sink in self.sinks.items()}
@@ -199,7 +193,7 @@ class Session:
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * stages.info.period_s / elapsed_s,
                 "stopped_by": self.stop.signal,
-                **self._pace(),
+                **self.deadlines.report(),
             },
             "odometry": stages.odometry.report(),
             "class_frequency": dict(zip(CLASS_NAMES, stages.pipeline.decision.frequency.tolist(), strict=True)),
@@ -213,7 +207,7 @@ class Session:
             },
         }
         directory, writer = self.recording.directory, self.recording.writer
-        if self.deadlines is not None:
+        if isinstance(self.deadlines, Deadlines):
             last = self.status()
             self.summary |= {"status": last, "lateness": self.deadlines.timing.late_or_later()}
             writer.write(lambda: self._show(last))
@@ -232,7 +226,8 @@ def replay(
         MisuseError: an invalid request.
     """
     stop, ledger = Stop(), Ledger()
-    source = Playback(inputs.stream(request), Pace(request.rate_hz, sleep=stop.sleep), ledger)
+    pace = Pace(request.rate_hz, sleep=stop.sleep)
+    source = Playback(inputs.stream(request), pace, ledger)
     stages = Stages(request, source.info, ledger)
     name = re.sub(r"[^\w.]+", "-", source.info.name)
     recording = WholeRecording(
@@ -243,8 +238,8 @@ def replay(
         labels=request.labels,
     )
     meters = metering.discovery(stages.config.energy).best.meters
-    failures = Containment(contains=False)
-    return Session(source, stages, recording, sinks, None, failures, stop, Summary(), meters, core)
+    deadlines, failures = NoDeadlines(pace.report), Containment(contains=False)
+    return Session(source, stages, recording, sinks, deadlines, failures, stop, Summary(), meters, core)
 
 
 def service(
