@@ -25,13 +25,7 @@ class ClassificationConfig(StageConfig):
         "reflectance, on the proposal's own points. network: as in the paper by the network alone, on exactly "
         "max_points points, one proposal a call.",
     )
-    max_points: int = number(
-        128,
-        8,
-        4096,
-        "",
-        "Greatest number of points of a proposal that the network sees; larger ones are subsampled evenly.",
-    )
+    max_points: int = number(128, 8, 4096, "", "Greatest number of points of a proposal that the network sees.")
 
     @property
     def batch(self) -> int:
@@ -50,14 +44,10 @@ class SchedulerConfig(StageConfig):
 
     calls_per_frame: int | None = number(16, 0, 10000, "", "Greatest number of proposals classified in a frame.")
     cpu_ms_per_frame: float | None = number(
-        None, 0.0, 10000.0, "ms", "CPU time that classification may take in a frame, on average over a second."
+        None, 0.0, 10000.0, "ms", "CPU time of classification in a frame, on average over a second."
     )
     energy_mJ_per_frame: float | None = number(
-        None,
-        0.0,
-        100000.0,
-        "mJ",
-        "Energy above idling that classification may take in a frame, on average over a second.",
+        None, 0.0, 100000.0, "mJ", "Energy of classification in a frame above idling, on average over a second."
     )
 
 
@@ -93,7 +83,7 @@ class FusionConfig(StageConfig):
     )
     object_threshold: float = number(0.9, 0.25, 1.0, "", "Posterior from which the class of an object is confirmed.")
     min_object_probability: float = number(
-        0.1, 0.0, 1.0, "", "Tracks that are less likely an object by their box and motion are not classified."
+        0.1, 0.0, 1.0, "", "Tracks less likely an object by box and motion are not classified."
     )
     start_frame: int = number(
         4, 1, 1000, "frames", "Age of a track from which its views are combined, with rule product."

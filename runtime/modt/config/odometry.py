@@ -12,9 +12,5 @@ class OdometryConfig(StageConfig):
     """Poses from another program, in effect with `--odometry udp://`, `unix://` and `ros2://`."""
 
     max_speed_mps: float = number(
-        60.0,
-        0.1,
-        1000.0,
-        "m/s",
-        "Greatest speed of the sensor. A faster jump between two poses means that their sender has restarted.",
+        60.0, 0.1, 1000.0, "m/s", "Greatest speed of the sensor. A faster jump means a restarted sender."
     )

@@ -30,53 +30,30 @@ class SensorConfig(StageConfig):
         1.73, 0.05, 5.0, "m", "Height of the sensor above the ground. Null: estimated from the first sweeps."
     )
     roll_deg: float | None = number(
-        None,
-        -180.0,
-        180.0,
-        "deg",
-        "Roll of the mount, positive with the left side up. Null: measured in the first sweep, used from 2 deg on.",
+        None, -180.0, 180.0, "deg", "Roll of the mount, left side up. Null: measured in the first sweep."
     )
     pitch_deg: float | None = number(
-        None, -90.0, 90.0, "deg", "Pitch of the mount, positive with the nose down. Null: measured as roll_deg is."
+        None, -90.0, 90.0, "deg", "Pitch of the mount, nose down. Null: measured in the first sweep."
     )
-    min_range_m: float = number(
-        2.0, 0.0, 20.0, "m", "Points nearer than this are left out, since they lie on the robot itself."
-    )
-    max_range_m: float = number(80.0, 1.0, 400.0, "m", "Points farther than this are left out.")
-    elevation_step_deg: float = number(
-        0.42, 0.01, 10.0, "deg", "Angle between neighbouring beams where they are evenly spaced."
-    )
+    min_range_m: float = number(2.0, 0.0, 20.0, "m", "Nearer points are left out, as they are on the robot.")
+    max_range_m: float = number(80.0, 1.0, 400.0, "m", "Farther points are left out.")
+    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "Angle between neighbouring beams, evenly spaced.")
     elevations_deg: tuple[float, ...] | None = numbers(
         -90.0, 90.0, 512, "deg", "Elevation of every beam, in any order. Null: the beams are evenly spaced."
     )
     elevation_span_deg: tuple[float, ...] | None = numbers(
-        -90.0,
-        90.0,
-        2,
-        "deg",
-        "Elevations of the lowest and the highest beam. Null: unknown, unless elevations_deg is set.",
+        -90.0, 90.0, 2, "deg", "Elevations of the lowest and the highest beam. Null: not known."
     )
     azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "Angle between neighbouring returns of a beam.")
     blind_sectors_deg: tuple[float, ...] | None = numbers(
-        -360.0,
-        360.0,
-        64,
-        "deg",
-        "Sectors in which the robot hides the view, as pairs of bearings from and to, counter-clockwise. Null: none.",
-        pairs=True,
+        -360.0, 360.0, 64, "deg", "Sectors hidden by the robot, each from and to, counter-clockwise.", pairs=True
     )
     blind_range_m: float = number(3.0, 0.1, 20.0, "m", "Points in blind_sectors_deg up to this range are left out.")
     period_s: float = number(
-        0.1,
-        0.001,
-        10.0,
-        "s",
-        "Time between two sweeps. It dates scans without time stamps, and is the unit of tracking.max_missed.",
+        0.1, 0.001, 10.0, "s", "Time between two sweeps, for scans without time stamps and tracking.max_missed."
     )
     reflectance: str = choice(
-        "none",
-        ("none", *REFLECTANCE_SCALES),
-        "Sensor on whose scale the reflectance is given. none: reflectance is not used.",
+        "none", ("none", *REFLECTANCE_SCALES), "Sensor whose scale the reflectance has. none: it is not used."
     )
 
     @property
@@ -114,12 +91,10 @@ class EnergyConfig(StageConfig):
     board: str = field(default="unknown", metadata={"meaning": "Name of the board in reports."})
     idle_W: float = number(3.0, 0.0, 1000.0, "W", "Power of the board while modt waits.")
     busy_W: float = number(7.0, 0.0, 1000.0, "W", "Power of the board while modt computes on one core.")
-    meter: str = field(
-        default="none", metadata={"meaning": "Meter that the calibration was made with, for the record."}
-    )
+    meter: str = field(default="none", metadata={"meaning": "Meter of the calibration."})
     seg_J: float | None = number(None, -1000.0, 1000.0, "J", "Energy of one segmentation. Null: not calibrated.")
     class_J: float | None = number(
-        None, -1000.0, 1000.0, "J", "Energy of one classification, beside that of its points. Null: not calibrated."
+        None, -1000.0, 1000.0, "J", "Energy of one classification, without its points. Null: not calibrated."
     )
     point_J: float | None = number(
         None, -1000.0, 1000.0, "J", "Energy of one point that is classified. Null: not calibrated."
@@ -143,11 +118,7 @@ class LoopConfig(StageConfig):
     """Limit of the live loop, in effect with `modt run`."""
 
     power_W: float | None = number(
-        None,
-        0.01,
-        1000.0,
-        "W",
-        "Power of the board above which the loop sheds load, by its meter or else its model. Null: no limit.",
+        None, 0.01, 1000.0, "W", "Power of the board above which the loop sheds load. Null: no limit."
     )
 
 
@@ -156,23 +127,11 @@ class RecordingConfig(StageConfig):
     """Records of the live loop, in effect with `modt run`."""
 
     keep: str = choice(
-        "all",
-        ("all", "tracks", "ledger", "none"),
-        "Records that are written: tracks and ledger, one of the two, or none.",
+        "all", ("all", "tracks", "ledger", "none"), "Records that are written: tracks, ledger, both or none."
     )
-    disk_mb: float = number(
-        2000.0,
-        1.0,
-        1e7,
-        "MB",
-        "Size of all records in the run directory together, earlier runs included. The oldest are deleted.",
-    )
+    disk_mb: float = number(2000.0, 1.0, 1e7, "MB", "Size of all records together. The oldest are deleted.")
     gb_per_day: float = number(
-        10.0,
-        0.01,
-        1e5,
-        "GB",
-        "Size of the tracks written in a day, after the first 0.5 GB of a run. Frames beyond it are left out evenly.",
+        10.0, 0.01, 1e5, "GB", "Size of the tracks of a day, after the first 0.5 GB. Frames beyond it are left out."
     )
 
 

@@ -17,17 +17,11 @@ KERNELS = AUTO, NATIVE, NUMPY = "auto", "native", "numpy"
 class SegmentationConfig(StageConfig):
     """Ground, clusters, and the sizes that an object can have (section III-A)."""
 
-    max_slope_deg: float = number(
-        16.0,
-        0.5,
-        45.0,
-        "deg",
-        "Steepest slope of the ground, up or down. Whatever rises more steeply stands on the ground.",
-    )
+    max_slope_deg: float = number(16.0, 0.5, 45.0, "deg", "Steepest slope of the ground, up or down.")
     clearance_m: float = number(0.25, 0.02, 1.0, "m", "Height above the ground from which points belong to objects.")
     max_height_m: float = number(2.6, 0.3, 20.0, "m", "Height above the ground up to which points belong to objects.")
     cell_m: float = number(
-        0.105, 0.01, 2.0, "m", "Side of a cell of the clustering at 10 m. It grows with the square root of the range."
+        0.105, 0.01, 2.0, "m", "Side of a cell at 10 m. It grows with the square root of the range."
     )
     min_points: int = number(5, 1, 1000, "", "Least number of points of a proposal.")
     max_extent_m: float = number(9.0, 0.5, 50.0, "m", "Greatest length of a proposal.")
@@ -35,6 +29,6 @@ class SegmentationConfig(StageConfig):
     kernels: str = choice(
         "auto",
         KERNELS,
-        "Code that processes points. native: compiled. numpy: NumPy. auto: compiled where this machine has it. "
+        "Code for points: compiled (native), NumPy (numpy), or compiled where it can be (auto). "
         "The environment variable MODT_KERNELS overrules this key.",
     )

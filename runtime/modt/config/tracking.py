@@ -21,11 +21,7 @@ class PaperAssociationConfig(StageConfig):
 class TrackingConfig(StageConfig):
     """Association of proposals with tracks, and the end of a track."""
 
-    association: str = choice(
-        "kdop",
-        ("kdop", "paper"),
-        "Cost by which proposals are matched with tracks. kdop: by their outlines. paper: as in the paper.",
-    )
+    association: str = choice("kdop", ("kdop", "paper"), "Cost of a match: by outlines (kdop), or as in the paper.")
     extensions: str = choice(
         "all",
         ("all", "none"),
@@ -33,10 +29,6 @@ class TrackingConfig(StageConfig):
         "background. none: switched off.",
     )
     max_missed: int = number(
-        8,
-        0,
-        100,
-        "frames",
-        "Time without a proposal, in periods of the sensor, after which a track is deleted (N of rows a9 and a14).",
+        8, 0, 100, "frames", "Time without a proposal, in periods, after which a track is deleted (N of a9 and a14)."
     )
     paper: PaperAssociationConfig = mechanism(PaperAssociationConfig)
