@@ -3,8 +3,8 @@
     python -m tools.docs.figures KITTI_ROOT [--further FILE] [--pandaset FOLDER] [--only readme|paper]
 
 KITTI_ROOT holds drive 0005 (2011_09_26) with its tracklets, FILE is the table of objects that these leave out
-(docs/evaluation.md), FOLDER a labelled PandaSet sequence. The figures of README.md take a minute and a half of CPU
-time. Without FOLDER its table has no row of PandaSet.
+(docs/evaluation.md), FOLDER a labelled PandaSet sequence. README.md takes a minute and a half of CPU time, and
+docs/paper.md three minutes. Without FOLDER the table has no row of PandaSet.
 """
 
 from __future__ import annotations
