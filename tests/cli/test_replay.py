@@ -60,6 +60,17 @@ def test_run_directory_has_the_documented_files(runs, mode):
             assert (t["box"] is None) == (t["proposal"] is None) == (t["missed"] > 0)
 
 
+@pytest.mark.parametrize("mode", MODES)
+def test_the_ledger_counts_what_each_stage_made(runs, mode):
+    root, _ = runs
+    lines = map(json.loads, (root / mode / "ledger.jsonl").read_text().splitlines())
+    booked = [line["stages"] for line in lines if "frame" in line]
+    frames = tracks(root / mode)
+    assert [b["tracking"]["items"] for b in booked] == [len(f["tracks"]) for f in frames]
+    for b, frame in zip(booked, frames, strict=True):  # tracking merges and splits proposals
+        assert b["odometry"]["items"] == b["segmentation"]["items"] >= 0.9 * frame["proposals"] > 0
+
+
 def test_conventional_classifies_everything_and_the_others_less(runs):
     root, _ = runs
     figures = {mode: json.loads((root / mode / "summary.json").read_text()) for mode in MODES}

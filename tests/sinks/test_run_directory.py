@@ -95,7 +95,8 @@ def test_two_services_do_not_share_a_directory(tmp_path):
 
 
 @pytest.mark.parametrize("first", ["the run that is in", "another one"])
-def test_the_lock_outlasts_the_removal_of_the_folder_around_the_run(tmp_path, first):
+def test_the_lock_outlasts_the_removal_of_the_folder_around_the_run(tmp_path, first, monkeypatch):
+    monkeypatch.setattr("modt.sinks.run_directory.MEMORY", tmp_path)
     run, other = (RunDirectory(tmp_path / "state" / "run") for _ in range(2))
     with run.locked(), ExitStack() as stack:
         run.begin(OURS, 1e9)
@@ -108,6 +109,8 @@ def test_the_lock_outlasts_the_removal_of_the_folder_around_the_run(tmp_path, fi
                 with pytest.raises(ModtError, match="another run of modt records into it"):
                     run.begin(OURS, 1e9)
             assert names(tmp_path / "state" / "run") == ["run.yaml", "tracks.jsonl"]
+            run.in_memory("status")
+            assert names(tmp_path) == ["state"]
             stack.close()
         run.begin(OURS, 1e9)
         with pytest.raises(ModtError, match="another run of modt records into it"):

@@ -128,7 +128,7 @@ def clock(state: int | None = None, now_s: float | None = None) -> Finding:
     year = time.gmtime(time.time() if now_s is None else now_s).tm_year
     if year < _SANE_YEAR:
         return Finding(FAIL, "clock", f"the year is {year}", "set it, or fit a battery to the clock")
-    state = _adjtimex() if state is None else state
+    state = int(ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(512))) if state is None else state
     if state == _TIME_ERROR:
         remedy = "start chrony or systemd-timesyncd, or have sensor and odometry stamp by one clock"
         return Finding(WARN, "clock", "not synchronised", remedy)
@@ -166,7 +166,3 @@ def _heard(name: str, health: dict[str, Any], points: int | None) -> Finding:
         return Finding(FAIL, "sensor", f"{name}: {messages} messages, but no sweep", "is its rate below 0.5 Hz?")
     remedy = "check its power, cable, address and port, and the firewall"
     return Finding(FAIL, "sensor", f"{name}: nothing received in {REACH_S:g} s", remedy)
-
-
-def _adjtimex() -> int:
-    return int(ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(512)))

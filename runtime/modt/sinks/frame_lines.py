@@ -9,11 +9,11 @@ from pathlib import Path
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sinks.background import Background
-from modt.sinks.output import LineFile, Writer, writing
+from modt.sinks.output import LineFile, writing
 from modt.sinks.tracks import frame_line
 
 DEPTH = 100
-"""Lines that may wait for a stalled disk, 10 s at 10 Hz."""
+"""Number of lines that may wait for a stalled disk, 10 s at 10 Hz. No points wait: frames are encoded at once."""
 LONGEST_LINE = 1 << 22
 """Longest line that is looked for at the end of a continued file [bytes]."""
 
@@ -40,7 +40,7 @@ class Descriptor:
 
 def open_stdout(address: Address) -> Background[str]:
     """Standard output."""
-    return in_background(address, Descriptor(sys.stdout.fileno()))
+    return Background(address.text, Descriptor(sys.stdout.fileno()), DEPTH, encode=frame_line)
 
 
 def open_file(address: Address) -> Background[str]:
@@ -55,12 +55,7 @@ def open_file(address: Address) -> Background[str]:
         raise MisuseError(address.text, "names no file", "write file:///PATH")
     if path.exists():
         _end_with_a_line(path)
-    return in_background(address, LineFile[str](path, mode="ab"))
-
-
-def in_background(address: Address, lines: Writer[str]) -> Background[str]:
-    """A sink that encodes a frame at once, so that no points wait in the queue."""
-    return Background(address.text, lines, DEPTH, encode=frame_line)
+    return Background(address.text, LineFile[str](path, mode="ab"), DEPTH, encode=frame_line)
 
 
 def _end_with_a_line(path: Path) -> None:

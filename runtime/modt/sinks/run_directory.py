@@ -42,6 +42,7 @@ class RunDirectory:
         self.path = path
         self.before: Path | None = None
         self._locked, self._lock = False, ExitStack()
+        self._shut_out = False  # another run has the lock
         self._number: int | None = None  # descriptor of the lock
         self._disk = next(folder for folder in path.absolute().parents if os.path.ismount(folder))
         if path.exists() and not path.is_dir():
@@ -94,7 +95,9 @@ class RunDirectory:
         return os.path.isfile(self.path / RUN)
 
     def in_memory(self, status: str | None) -> None:
-        """Keep the status in memory; None removes it. Failures are ignored."""
+        """Keep the status in memory; None removes it. Failures are ignored. Another run's status is left alone."""
+        if self._shut_out:
+            return
         path = status_paths(self.path)[1]
         with suppress(OSError, ModtError):
             if status is None:
@@ -123,7 +126,7 @@ class RunDirectory:
             if self._number is not None and os.path.samestat(os.fstat(self._number), os.stat(path)):
                 return
         self._lock.close()
-        self._number = None
+        self._number, self._shut_out = None, False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             number = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW)
@@ -131,6 +134,7 @@ class RunDirectory:
             fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._number = number
         except BlockingIOError:
+            self._shut_out = True
             remedy = "end it, or give another --out"
             raise ModtError(self.path, "another run of modt records into it", remedy) from None
         except OSError:  # the recording reports it when it begins

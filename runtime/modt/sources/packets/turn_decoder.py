@@ -234,9 +234,15 @@ class TurnDecoder(PacketDecoder):
     def _packet(self, received_s: float, payload: bytes, signature: object, reception: Reception) -> Sequence[Sweep]:
         if signature != self._signature:
             return self._foreign(received_s, payload, reception)
+        entry, quiet_s = self._entry(received_s, payload), received_s - self._heard_s
+        leap_s = 0.0 if self._last is None else entry.time_s - self._last.time_s
+        if abs(leap_s) > self._longest_s and not 0 < leap_s < SILENCE_S and quiet_s < SILENCE_S:
+            refuse(
+                reception, self.name, "its stamp leaps: the clock of the sensor was set, or lies; the turn is lost"
+            )
         self._heard_s = received_s
         self._others.clear()
-        return self._follow(self._entry(received_s, payload), reception)
+        return self._follow(entry, reception)
 
     def _foreign(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
         """Refuse a packet of another model; adopt that model after RECOGNISED_BY packets without the known one."""
