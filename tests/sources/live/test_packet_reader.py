@@ -11,14 +11,12 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
-from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.hesai import HesaiDecoder
 from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.stream import StreamInfo
 from tests.sources.packets.simulated import packets
 from tools.send.loops import endless
 from tools.send.packets import send
@@ -108,32 +106,6 @@ def test_packets_that_waited_for_a_stopped_process_are_discarded(port, to, caplo
     reader.close()
     assert sum(reader.reception.refused.values()) == 1
     assert "packet refused: late: this process was stopped" in caplog.text
-
-
-class PoisonedDecoder(EchoDecoder):
-    """Fails at some packets."""
-
-    def decode(self, received_s, payload, reception):
-        if payload == b"poison":
-            raise IndexError(payload)
-        return super().decode(received_s, payload, reception)
-
-
-def test_a_packet_that_the_decoder_fails_at_costs_itself(port, to, caplog):
-    info = StreamInfo("sensor", "packets", 0, None, 0.1, None, has_poses=False)
-    live = LiveStream(info, PacketReader(bound_socket("sensor", port), PoisonedDecoder()))
-    got = []
-    live._put = got.append
-    live.start()
-    for payload in (b"first", b"poison", b"poison", b"last"):
-        to.send(payload)
-    until_s = time.monotonic() + 60
-    while len(got) < 2 and time.monotonic() < until_s:
-        time.sleep(0.01)
-    live.close()
-    assert [payload for _, payload in got] == [b"first", b"last"]
-    assert live.health()["refused_messages"] == {"failed (IndexError)": 2}
-    assert caplog.text.count("a message is left out") == 1
 
 
 def test_packets_of_another_address_are_refused(port, to):
