@@ -72,15 +72,6 @@ def test_a_group_is_joined_and_what_is_none_is_refused(port):
             bound_socket("sensor", port, group)
 
 
-def test_what_is_received_from_the_sensor_is_decoded_at_once(port, to):
-    reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "127.0.0.1")
-    to.send(b"packet")
-    assert reader.read(60.0) == [(now(), b"packet")]
-    assert reader.read(0.0) == []
-    reader.close()
-    assert (reader.reception.messages, reader.reception.refused) == (1, {})
-
-
 def test_packets_are_as_of_when_the_kernel_received_them(port, to):
     reader = PacketReader(bound_socket("sensor", port), EchoDecoder())
     for _ in range(100):  # the kernel begins to take times a little after it was asked to
