@@ -1,7 +1,6 @@
 """Poses from files: their coordinate frames, and the errors of invalid files."""
 
 import dataclasses
-import shutil
 
 import numpy as np
 import pytest
@@ -97,21 +96,3 @@ def test_the_streams_own_may_be_kept_or_switched_off(tmp_path):
     for a, b in zip(own, stream, strict=True):
         np.testing.assert_array_equal(a.T_world_sensor, b.T_world_sensor)
         assert a.points.tobytes() == b.points.tobytes()
-
-
-def test_a_posed_stream_shares_the_faults(tmp_path):
-    drive = layouts.raw_drive(tmp_path)
-    (drive / "velodyne_points" / "data" / f"{1:010d}.bin").write_bytes(b"short")
-    posed = PosedStream(open_stream(drive), NoPoses()).between(0, 3)
-    list(posed)
-    assert [f.frame for f in posed.faults.first] == [1]
-
-
-def test_the_poses_of_a_sequence_given_as_a_file_are_the_same(tmp_path):
-    sequence = layouts.odometry(tmp_path)
-    before = [f.T_world_sensor for f in open_stream(sequence)]
-    path = shutil.copy(sequence / "poses.txt", tmp_path / "again.txt")
-    (sequence / "poses.txt").unlink()
-    stream = open_stream(sequence)
-    posed = PosedStream(stream, PoseFile(path, stream.info.camera, stream.info.end))
-    np.testing.assert_allclose([f.T_world_sensor for f in posed], before, atol=1e-12)

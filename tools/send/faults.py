@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from random import Random
 
 Timed = tuple[float, bytes]
-"""When to send a payload [s], and the payload."""
+"""Time at which a payload is sent [s], and the payload."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class PacketFaults:
     seed: int = 0
 
     def applied(self, packets: Iterable[Timed]) -> Iterator[Timed]:
-        """The packets with their faults; the same for the same seed."""
+        """Packets with faults, which the seed determines."""
         random = Random(self.seed)
         held: bytes | None = None
         for at_s, payload in packets:

@@ -20,15 +20,15 @@ HOUR_US, DAY_US = 3_600_000_000, 86_400_000_000
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How a Velodyne's packets hold its firings.
+    """Layout of the firings in a Velodyne's packets.
 
     Attributes:
-        elevations_deg: of the lasers, in the order of a firing.
-        firing_us: time from one firing to the next.
-        headers: of the blocks of a packet, repeated as often as they fit.
+        elevations_deg: elevations of the lasers, in the order of a firing.
+        firing_us: time from one firing to the next [us].
+        headers: headers of the blocks of a packet, repeated as often as they fit.
         tail: the last two bytes of a packet.
-        blocks, lasers: of a packet, and of a block.
-        unit_m: of distances.
+        blocks, lasers: number of blocks in a packet, and of lasers in a block.
+        unit_m: unit of distances [m].
     """
 
     elevations_deg: tuple[float, ...]
@@ -41,11 +41,11 @@ class Layout:
 
     @property
     def firings(self) -> int:
-        """In a packet."""
+        """Number of firings in a packet."""
         return self.blocks * self.lasers // len(self.elevations_deg)
 
     def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
-        """A packet of the azimuths of its blocks [0.01 deg], and (blocks, lasers, 2) distances and reflectances."""
+        """Packet for the azimuths of its blocks [0.01 deg], and (blocks, lasers, 2) distances and reflectances."""
         table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1")]))
         table["distance"], table["reflectance"] = cells[..., 0], cells[..., 1]
         body = b""
@@ -55,10 +55,10 @@ class Layout:
 
 
 class HesaiLayout(Layout):
-    """How the packets of an XT-32 hold its firings."""
+    """Layout of the firings in an XT-32's packets."""
 
     def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
-        """As of Layout; it is stamped with the time of the last firing since midnight."""
+        """Packet as in Layout, stamped with the time of the last firing since midnight."""
         table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1"), ("none", "u1")]))
         table["distance"], table["reflectance"] = cells[..., 0], cells[..., 1]
         head = bytes((0xEE, 0xFF, 6, 1, 0, 0, self.lasers, self.blocks, 1, round(1000 * self.unit_m), 1, 1))
@@ -82,7 +82,7 @@ MODELS = (*LAYOUTS, MID_360)
 
 
 def ideal_calibration(layout: Layout) -> str:
-    """The calibration of the ideal sensor: Hesai's table, or YAML of ROS's velodyne_pointcloud."""
+    """Calibration of the ideal sensor: Hesai's table, or YAML of ROS's velodyne_pointcloud."""
     if isinstance(layout, HesaiLayout):
         rows = (f"{i},{elevation},0" for i, elevation in enumerate(layout.elevations_deg, 1))
         return "\n".join(("Channel,Elevation,Azimuth", *rows))
@@ -104,7 +104,7 @@ def packets_of(frames: Sequence[Frame], model: str, period_s: float) -> Iterator
 
 
 def livox_packets_of(frames: Sequence[Frame], period_s: float) -> Iterator[tuple[float, bytes]]:
-    """As `packets_of`: the points of each sweep are spread over its time in their order, 96 a packet in mm."""
+    """Packets as in `packets_of`, for which the points of each sweep are spread over its time, 96 a packet in mm."""
     row = np.dtype([("xyz", "<i4", 3), ("reflectance", "u1"), ("tag", "u1")])
     for k, frame in enumerate(frames):
         n_packets = -(-len(frame.points) // LIVOX_POINTS)

@@ -1,4 +1,4 @@
-"""Captured packets, over and over, as if the sensor had gone on: its stamps and frame numbers continue."""
+"""Endless repetition of captured packets, with stamps and frame numbers that continue."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from tools.send.faults import Timed
 
 
 def endless(payloads: Sequence[bytes]) -> Iterator[Timed]:
-    """Packets of a Velodyne, a Hesai or a Livox, as if the sensor had gone on.
+    """Repeat the packets of a Velodyne, a Hesai or a Livox as if the sensor went on.
 
     Raises:
-        MisuseError: there is no whole turn of a head.
+        MisuseError: the packets hold no whole turn of a head.
     """
     return livox_loop(payloads) if livox.is_packet(payloads[0]) else turn_loop(payloads)
 
 
 def livox_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
-    """The packets of a Livox, endlessly."""
+    """Repeat the packets of a Livox endlessly."""
     stamps_ns = [int(livox.HEADER.unpack_from(p)[-1]) for p in payloads]
     step_ns = float(np.median(np.diff(stamps_ns)))
     sweeps = max(round((stamps_ns[-1] - stamps_ns[0] + step_ns) / livox.SWEEP_NS), 1)
@@ -41,10 +41,10 @@ def livox_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
 
 
 def turn_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
-    """The whole turns of the packets of a Velodyne or a Hesai, endlessly.
+    """Repeat the whole turns of a Velodyne's or a Hesai's packets endlessly.
 
     Raises:
-        MisuseError: there is no whole turn.
+        MisuseError: the packets hold no whole turn.
     """
     model = hesai.model_of(payloads[0])
     wire = VelodyneStamps() if model is None else HesaiStamps(model)
@@ -62,25 +62,25 @@ def turn_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
 
 
 class VelodyneStamps:
-    """Where a Velodyne's packets have azimuth and time."""
+    """Azimuth and time in a Velodyne's packets."""
 
     wrap_us = 3_600_000_000
 
     def azimuth(self, payload: bytes) -> int:
-        """Of the first block [0.01 deg]."""
+        """Azimuth of the first block [0.01 deg]."""
         return azimuths(payload)[0]
 
     def stamp_us(self, payload: bytes) -> int:
-        """Time of the packet."""
+        """Time of the packet [us]."""
         return int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little")
 
     def stamped(self, payload: bytes, stamp_us: int) -> bytes:
-        """The packet at another time."""
+        """Packet with another time."""
         return payload[:STAMP_AT] + struct.pack("<I", stamp_us) + payload[STAMP_AT + 4 :]
 
 
 class HesaiStamps:
-    """The same of a Hesai's packets."""
+    """Azimuth and time in a Hesai's packets."""
 
     wrap_us = 86_400_000_000
 
@@ -89,17 +89,17 @@ class HesaiStamps:
         self._hour_at, self._micros_at = model.tail + model.layout.date + 3, model.tail + model.layout.micros
 
     def azimuth(self, payload: bytes) -> int:
-        """Of the first block [0.01 deg]."""
+        """Azimuth of the first block [0.01 deg]."""
         return int(self._model.azimuths.unpack_from(payload)[0])
 
     def stamp_us(self, payload: bytes) -> int:
-        """Time of the packet."""
+        """Time of the packet [us]."""
         hour, minute, second = payload[self._hour_at :][:3]
         micros = int.from_bytes(payload[self._micros_at :][:4], "little")
         return (hour * 3600 + minute * 60 + second) * 1_000_000 + micros
 
     def stamped(self, payload: bytes, stamp_us: int) -> bytes:
-        """The packet at another time."""
+        """Packet with another time."""
         out = bytearray(payload)
         second, micros = divmod(stamp_us, 1_000_000)
         out[self._hour_at : self._hour_at + 3] = second // 3600, second // 60 % 60, second % 60
@@ -108,7 +108,7 @@ class HesaiStamps:
 
 
 def ouster_loop(payloads: Sequence[bytes], metadata: Path) -> Iterator[Timed]:
-    """The frames of an Ouster's packets, endlessly."""
+    """Repeat the frames of an Ouster's packets endlessly."""
     sdk = extra("ouster.sdk.core", "ouster")
     info = sdk.SensorInfo(metadata.read_text("utf-8"))
     layout, columns = sdk.PacketFormat(info), info.format.columns_per_packet

@@ -5,10 +5,10 @@
     ... --loss P --duplicates P --reordering P --garbage P --seed N
     ... --write FILE.pcap
 
-The whole turns of a capture are repeated as if the sensor had gone on, until --seconds are over; with --once it is
-sent as it is. Of a STREAM of scans (a KITTI drive; default: the synthetic street), the packets of an ideal sensor are
-made, whose calibration goes to FILE.yaml for the receiver. Faults are shares of the packets, the same for the same
-seed. With --write the packets go to a file instead.
+The whole turns of a capture are repeated as if the sensor went on, until --seconds are over; --once sends the capture
+unchanged. A STREAM of scans (a KITTI drive; default: the synthetic street) is turned into the packets of an ideal
+sensor, whose calibration is written to FILE.yaml for the receiver. Faults are shares of the packets; the seed
+determines them. With --write the packets go to a file instead.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def send(
             sleep(early_s)
         try:
             to.send(payload)
-        except ConnectionRefusedError:  # nobody listens yet, as of a sensor
+        except ConnectionRefusedError:  # nobody listens yet; a sensor sends all the same
             continue
         sent += 1
     return sent

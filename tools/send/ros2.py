@@ -1,10 +1,10 @@
-"""Publishes a stream as ROS 2 messages, PointCloud2 and Odometry, at the sensor's pace.
+"""Publish a stream as ROS 2 messages, PointCloud2 and Odometry, at the sensor's pace.
 
     python -m tools.send.ros2 DRIVE --domain 7 --loops 0 &
     modt run 'ros2:///points?domain=7' --odometry 'ros2:///odom?domain=7'
 
-Stamps are the wall clock at the start, and from there those of the stream, loop after loop. The poses are the
-sensor's. CYCLONEDDS_URI chooses interfaces and sizes of fragments, as for any program that uses Cyclone DDS.
+Stamps begin at the wall clock and advance as those of the stream, loop after loop. The poses are the sensor's.
+CYCLONEDDS_URI chooses interfaces and sizes of fragments, as for any program that uses Cyclone DDS.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from modt.types import Frame
 from tools.options import parser
 
 WAIT_S = 60.0
-"""For the first receiver."""
+"""Time to wait for the first receiver [s]."""
 FRAME_ID, WORLD = "lidar", "odom"
 
 
 class Sender:
-    """Publishes frames; the pose goes before the points, so that it is there when they are."""
+    """Publishes frames; the pose is sent before the points, so that it arrives first."""
 
     def __init__(self, joined: Participant, points: str = "points", poses: str = "odom") -> None:
         self.clouds = Publication(joined, points, point_cloud2.TYPE)
         self._poses = Publication(joined, poses, odometry.TYPE)
 
     def send(self, frame: Frame, stamp_s: float) -> int:
-        """Publish a frame under a stamp [s]; bytes of its points' message."""
+        """Publish a frame with a stamp [s]; return the size of the message of its points [bytes]."""
         if frame.T_world_sensor is not None:
             self._poses.write(write_odometry(stamp_s, WORLD, FRAME_ID, frame.T_world_sensor))
         message = write_cloud(stamp_s, FRAME_ID, frame.points)
@@ -45,7 +45,7 @@ class Sender:
         return len(message)
 
     def wait_for_receiver(self, timeout_s: float) -> bool:
-        """Whether there is a receiver of the points within the time."""
+        """Wait for a receiver of the points; False if there is none within the time."""
         deadline_s = time.monotonic() + timeout_s
         while not self.clouds.receivers and time.monotonic() < deadline_s:
             time.sleep(0.05)

@@ -151,8 +151,8 @@ def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream
     files = bag_files(path)
     topics: dict[str, BagTopic] = {}
     for file in files:
-        for name, found in file.topics().items():
-            topics[name] = BagTopic(found.type, found.count + (topics[name].count if name in topics else 0))
+        for name, entry in file.topics().items():
+            topics[name] = BagTopic(entry.type, entry.count + (topics[name].count if name in topics else 0))
     chosen = _choose(path, topics, topic)
     began = _first_clouds(path, files, chosen)
     stamps = [(_stamp_s(cloud, message), message.recorded_s) for cloud, message in began]

@@ -85,13 +85,13 @@ class StampCheck:
         steps, cause = self.steps, self.doubt(sweep.stamp_s, arrived_s)
         if not cause:
             try:
-                points, found = sanitised(sweep.points, subject)
+                points, broken = sanitised(sweep.points, subject)
             except ScanError as error:
                 cause = error.cause
         if cause:
             faults.report(index, subject, cause, skipped=True, place=name)
             return None
-        flaws = [*found, *flaws, *["a clock was set: stamps go on evenly"] * (self.steps > steps)]
+        flaws = [*broken, *flaws, *["a clock was set: stamps go on evenly"] * (self.steps > steps)]
         if flaws:
             faults.report(index, subject, "; ".join(flaws), skipped=False, place=name)
         stamp_s = sweep.stamp_s + self.shift_s - began_s

@@ -11,14 +11,12 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
-from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.hesai import HesaiDecoder
 from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.stream import StreamInfo
 from tests.sources.packets.simulated import packets
 from tools.send.loops import endless
 from tools.send.packets import send
@@ -74,15 +72,6 @@ def test_a_group_is_joined_and_what_is_none_is_refused(port):
             bound_socket("sensor", port, group)
 
 
-def test_what_is_received_from_the_sensor_is_decoded_at_once(port, to):
-    reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "127.0.0.1")
-    to.send(b"packet")
-    assert reader.read(60.0) == [(now(), b"packet")]
-    assert reader.read(0.0) == []
-    reader.close()
-    assert (reader.reception.messages, reader.reception.refused) == (1, {})
-
-
 def test_packets_are_as_of_when_the_kernel_received_them(port, to):
     reader = PacketReader(bound_socket("sensor", port), EchoDecoder())
     for _ in range(100):  # the kernel begins to take times a little after it was asked to
@@ -108,32 +97,6 @@ def test_packets_that_waited_for_a_stopped_process_are_discarded(port, to, caplo
     reader.close()
     assert sum(reader.reception.refused.values()) == 1
     assert "packet refused: late: this process was stopped" in caplog.text
-
-
-class PoisonedDecoder(EchoDecoder):
-    """Fails at some packets."""
-
-    def decode(self, received_s, payload, reception):
-        if payload == b"poison":
-            raise IndexError(payload)
-        return super().decode(received_s, payload, reception)
-
-
-def test_a_packet_that_the_decoder_fails_at_costs_itself(port, to, caplog):
-    info = StreamInfo("sensor", "packets", 0, None, 0.1, None, has_poses=False)
-    live = LiveStream(info, PacketReader(bound_socket("sensor", port), PoisonedDecoder()))
-    got = []
-    live._put = got.append
-    live.start()
-    for payload in (b"first", b"poison", b"poison", b"last"):
-        to.send(payload)
-    until_s = time.monotonic() + 60
-    while len(got) < 2 and time.monotonic() < until_s:
-        time.sleep(0.01)
-    live.close()
-    assert [payload for _, payload in got] == [b"first", b"last"]
-    assert live.health()["refused_messages"] == {"failed (IndexError)": 2}
-    assert caplog.text.count("a message is left out") == 1
 
 
 def test_packets_of_another_address_are_refused(port, to):

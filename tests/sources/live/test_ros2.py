@@ -15,7 +15,7 @@ from tests.ros2.network import FAR, NEAR, until
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds, point_cloud2
 from modt.ros2.point_cloud2 import write_cloud
-from modt.sources.live.ros2 import PointCloudReader
+from modt.sources.live.ros2 import MissingSweeps, PointCloudReader
 from tools.send.ros2 import Sender, looped, pace
 
 ADDRESS = f"ros2:///points?domain={NEAR}&reliability=reliable"
@@ -72,6 +72,26 @@ def test_sweeps_that_are_missing_by_their_stamps_are_counted_and_warned_of_once(
         reader.read(0.0)
     assert reader.reception.lost == 4
     assert caplog.text.count("sweeps are missing by their stamps; raise net.core.rmem_max") == 1
+
+
+def missing(stamps):
+    counter = MissingSweeps()
+    return [counter.before(stamp_s) for stamp_s in stamps]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.5])
+def test_those_that_are_lost_are_counted_whatever_their_share(share):
+    rng = np.random.default_rng(0)
+    kept = np.flatnonzero(rng.uniform(size=1000) > share)
+    lost = kept[-1] - kept[0] + 1 - len(kept)
+    assert sum(missing(kept * 0.05)) == pytest.approx(lost, abs=3)
+
+
+def test_silence_and_a_clock_that_is_set_are_no_loss():
+    stamps = [*np.arange(20) / 10, *(100 + np.arange(20) / 10), *np.arange(20) / 10]
+    assert sum(missing(stamps)) == 0
+    rng = np.random.default_rng(0)  # nor is jitter
+    assert sum(missing(0.1 * np.arange(500) + rng.uniform(-0.02, 0.02, 500))) == 0
 
 
 def test_after_it_is_closed_nothing_is_read():

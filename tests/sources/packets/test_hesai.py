@@ -11,8 +11,7 @@ from scipy.spatial import cKDTree
 
 from modt.errors import MisuseError
 from modt.sources.packets.hesai import GET_CALIBRATION, HesaiDecoder, asked_angles, model_of, read_angles
-from modt.sources.point_cloud_file import read_pcd
-from tests.sources.packets.simulated import BEGAN_S, decoded, packets, packets_of_bag
+from tests.sources.packets.simulated import BEGAN_S, decoded, packets
 
 TURN_S = 0.1
 RANGE = 2500
@@ -168,30 +167,3 @@ def test_the_sensor_is_asked_for_its_calibration(answer, n, caplog):
         giving.join()
     assert (None if angles_deg is None else angles_deg.tolist()) == (n and [[15.5, -1.04], [14, 3.1]])
     assert ("does not give its calibration" in caplog.text) is (n is None)
-
-
-@pytest.mark.kitti
-@pytest.mark.parametrize(
-    ("name", "table", "n_sweeps"),
-    [
-        ("40p-1673400149412331409", "Pandar40P", 3),
-        ("64-1673403880599376836", "Pandar64", 3),
-        ("qt64-1673401195788312575", "PandarQT64", 3),
-        ("qt128-1730273789074637152", "PandarQT128", 1),
-        ("xt16-1732848127890747768", "PandarXT16", 2),
-        ("xt32-1673400677802009732", "PandarXT32", 3),
-        ("xt32m-1660893203042895158", "PandarXT32M", 3),
-    ],
-)
-def test_points_are_those_of_another_decoder(kitti_root, name, table, n_sweeps):
-    folder = kitti_root / "packets"
-    decoder = HesaiDecoder("sensor", read_angles(folder / "calibration" / f"{table}.csv"))
-    sweeps, reception = decoded(decoder, packets_of_bag(folder / name, 1500, 1508))
-    assert (len(sweeps), reception.refused) == (n_sweeps, {})
-    assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * n_sweeps, abs=2e-4)
-    (cloud,) = (folder / name).glob("*.pcd")
-    theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # x right, y forward; cut elsewhere, both returns
-    ours = np.concatenate([s.points[:, :3] for s in sweeps])
-    distance, _ = cKDTree(ours).query(np.column_stack([theirs[:, 1], -theirs[:, 0], theirs[:, 2]]))
-    assert np.median(distance) < 1e-4
-    assert np.quantile(distance, 0.9) < 0.02

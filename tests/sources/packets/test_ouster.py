@@ -64,6 +64,13 @@ def test_it_looks_straight_ahead_at_the_stamp(timed, metadata):
     assert np.all(np.diff(np.unwrap(np.deg2rad(bearing_deg(beam)))) < 0.01)
 
 
+def test_a_sweep_that_had_begun_is_none_and_a_whole_lost_one_is_counted(timed, metadata):
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[10:])
+    assert ([s.complete for s in sweeps], reception.lost) == ([True, True], 0)
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[:64] + timed[128:])
+    assert (len(sweeps), reception.lost) == (2, 64)
+
+
 @pytest.mark.parametrize(
     ("name", "beams", "turn_s", "profile"),
     [

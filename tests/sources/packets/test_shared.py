@@ -9,14 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from modt.sources.packets.capture import Capture
-from modt.sources.packets.hesai import HesaiDecoder
+from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
-from tests.sources.packets.simulated import decoded, equal, packets
+from modt.sources.point_cloud_file import read_pcd
+from tests.sources.packets.simulated import decoded, equal, packets, packets_of_bag
 from tools.send.faults import Timed
 
 OTHER = "of another model than the packets before"
@@ -137,3 +139,40 @@ def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker: Maker
     expected |= {maker.of_foreign: n} if maker.foreign else {}
     assert reception.refused == expected
     assert sum("only counted" in r.message for r in caplog.records) == len(expected)  # one line a reason
+
+
+CLOUDS = {  # recorded packets: name, calibration, number of sweeps, greatest median distance [m]
+    "vlp16-1673400471837873222": (None, 3, 0.01),  # two returns a firing
+    "vlp32-1713492677464078412": (None, 4, 0.01),  # set to see the front half only
+    "vls128-1614315746471294674": (None, 3, 0.03),
+    "40p-1673400149412331409": ("Pandar40P", 3, 1e-4),
+    "64-1673403880599376836": ("Pandar64", 3, 1e-4),
+    "qt64-1673401195788312575": ("PandarQT64", 3, 1e-4),
+    "qt128-1730273789074637152": ("PandarQT128", 1, 1e-4),
+    "xt16-1732848127890747768": ("PandarXT16", 2, 1e-4),
+    "xt32-1673400677802009732": ("PandarXT32", 3, 1e-4),
+    "xt32m-1660893203042895158": ("PandarXT32M", 3, 1e-4),
+}
+
+
+@pytest.mark.kitti
+@pytest.mark.parametrize("name", CLOUDS)
+def test_points_are_those_of_another_decoder(kitti_root: Path, name: str) -> None:
+    table, n_sweeps, median_m = CLOUDS[name]
+    folder = kitti_root / "packets" / name
+    (cloud,) = folder.glob("*.pcd")
+    theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # cut elsewhere, with both returns
+    if table is None:
+        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+        sweeps, reception = decoded(VelodyneDecoder("sensor"), packets_of_bag(folder, 1206))
+        assert reception.lost == 0
+        assert all(s.complete for s in sweeps)
+    else:
+        angles_deg = read_angles(folder.parent / "calibration" / f"{table}.csv")
+        sweeps, reception = decoded(HesaiDecoder("sensor", angles_deg), packets_of_bag(folder, 1500, 1508))
+        assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * n_sweeps, abs=2e-4)
+        theirs = theirs[:, [1, 0, 2]] * [1, -1, 1]  # x right, y forward
+    assert (len(sweeps), reception.refused) == (n_sweeps, {})
+    distance, _ = cKDTree(np.concatenate([s.points[:, :3] for s in sweeps])).query(theirs)
+    assert np.median(distance) < median_m
+    assert np.quantile(distance, 0.9) < max(5 * median_m, 0.02)

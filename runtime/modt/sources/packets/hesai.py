@@ -146,7 +146,7 @@ MAX_ANSWER_BYTES = 65_536
 
 
 def asked_angles(host: str, port: int = PTC_PORT) -> Float64 | None:
-    """Angles as of `read_angles`, asked from the sensor; None with a warning if it does not answer."""
+    """Angles as in `read_angles`, requested from the sensor; None with a warning if it does not answer."""
     try:
         with socket.create_connection((host, port), TIMEOUT_S) as sensor, sensor.makefile("rb") as answer:
             sensor.sendall(GET_CALIBRATION)
@@ -180,7 +180,7 @@ class HesaiDecoder(TurnDecoder):
     signature = staticmethod(model_of)
 
     def __init__(self, name: str, angles_deg: Float64 | None = None) -> None:
-        """`angles_deg`: as of `read_angles`; None takes the angles that all units of the model share, if any."""
+        """`angles_deg`: as in `read_angles`; None takes the angles that all units of the model share, if any."""
         super().__init__(name)
         self._given_deg = angles_deg
         self._model = MODELS[0]
