@@ -34,8 +34,6 @@ from modt_desk.viewer.track_page import rows_of, track_page, views
 from modt_desk.viewer.truth_marks import LEGEND, truth_marks
 
 NO_CELLS = Cells(np.zeros(0, np.int64), np.zeros(0, np.int64))
-
-
 STEP_CM = 4
 """Least width of a cell [cm]."""
 
