@@ -19,8 +19,7 @@ from scipy.optimize import linear_sum_assignment
 
 from modt.types import Bool, Float64, Int
 from modt_desk.box_tracking.detections import Detections, boxes_from_kitti, files, merge, read
-from modt_desk.box_tracking.sequences import follow
-from modt_desk.box_tracking.whole_tracks import iou_3d
+from modt_desk.box_tracking.sequences import follow, iou_3d
 from modt_desk.evaluation.rows import Association
 from modt_desk.evaluation.track_score import track_metrics
 from tools.options import parser

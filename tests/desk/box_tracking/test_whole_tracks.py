@@ -5,7 +5,7 @@ from hypothesis.extra.numpy import arrays
 from shapely.geometry import Polygon
 
 from modt.geometry import corners
-from modt_desk.box_tracking.whole_tracks import (
+from modt_desk.box_tracking.sequences import (
     TrackedBoxes,
     birds_eye_intersection,
     bridged,

@@ -6,28 +6,19 @@ import shutil
 import pytest
 
 from tests.cli.commands import modt
+from tests.desk.recorded import drive_and_run
 from tests.viewer.chromium import LOADED, WIDE
 
 pytestmark = pytest.mark.command
 
 COLUMNS = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
-DAY = "2020_01_01/2020_01_01_drive_0000_sync"
 
 
 @pytest.fixture(scope="module")
 def drives(tmp_path_factory):
     """Two synthetic drives and the runs on them, by sensor."""
     root = tmp_path_factory.mktemp("drives")
-    made = {}
-    for sensor in ("vlp-16", "hdl-32e"):
-        for command in (
-            ("simulate", "--sensor", sensor, "--seconds", "0.5", "--seed", "5", "--out", sensor),
-            ("replay", f"{sensor}/{DAY}", "--profile", sensor, "--labels", "--quiet", "--out", f"run-{sensor}"),
-        ):
-            done = modt(*command, cwd=root)
-            assert done.returncode == 0, done.stderr
-        made[sensor] = (root / f"run-{sensor}", root / sensor / DAY)
-    return made
+    return {sensor: drive_and_run(root, sensor) for sensor in ("vlp-16", "hdl-32e")}
 
 
 def test_runs_are_pooled_by_sensor(drives, tmp_path):
@@ -64,11 +55,7 @@ def test_the_sector_is_that_of_the_truth(tmp_path):
     """A drive that is annotated on all sides is judged all round, and the report says so."""
     lines = []
     for name, options in (("ahead", ()), ("round", ("--all-around",))):
-        simulated = ("simulate", "--sensor", "vlp-16", "--seconds", "0.3", "--seed", "5", *options, "--out", name)
-        assert modt(*simulated, cwd=tmp_path).returncode == 0
-        drive, out = f"{name}/{DAY}", f"run-{name}"
-        replay = ("replay", drive, "--profile", "vlp-16", "--fov", "full", "--labels", "--quiet", "--out", out)
-        assert modt(*replay, cwd=tmp_path).returncode == 0
+        out, drive = drive_and_run(tmp_path, seconds=0.3, options=options, name=name)
         lines.append(modt("evaluate", out, drive, cwd=tmp_path).stdout.split("\n"))
     assert lines[0][0].endswith("judged within 40 degrees of straight ahead")
     assert lines[1][0].endswith("judged all round")

@@ -13,20 +13,13 @@ from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.cli.main import main
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
-
-DAY = "2020_01_01/2020_01_01_drive_0000_sync"
+from tests.desk.recorded import drive_and_run
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A run on a synthetic drive, and the drive."""
-    root = tmp_path_factory.mktemp("recorded")
-    drive, run = root / "drive", root / "run"
-    simulate = ("simulate", "--sensor", "vlp-16", "--seconds", "0.6", "--seed", "5", "--out", drive)
-    replay = ("replay", drive / DAY, "--profile", "vlp-16", "--labels", "--quiet", "--core", "none", "--out", run)
-    for command in (simulate, replay):
-        assert main([str(argument) for argument in command]) == 0
-    return run, drive / DAY
+    return drive_and_run(tmp_path_factory.mktemp("recorded"), seconds=0.6)
 
 
 def export(run, *arguments):

@@ -17,6 +17,7 @@ from modt.viewer.theme import LIGHT
 from modt_desk.reporting.run_report import run_tree
 from modt_desk.viewer.recorded_run import RecordedRun
 from tests.cli.commands import environment, modt
+from tests.desk.recorded import drive_and_run
 from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.viewer.chromium import LOADED, WIDE
 from tests.viewer.pages import Page
@@ -272,11 +273,10 @@ def test_a_drive_of_full_sweeps_fits_a_page(drive_0005, tmp_path, chromium):
 
 @pytest.fixture(scope="module")
 def labelled(tmp_path_factory):
-    """A simulated drive with its labels, and below `exact` a run on it with those of its points."""
-    folder = tmp_path_factory.mktemp("labelled")
-    done(folder, "simulate", "--sensor", "vlp-16", "--seconds", 1.5, "--all-around", "--out", "sim")
-    (drive,) = (folder / "sim").glob("*/*_sync")
-    done(folder, "replay", drive, "--profile", "vlp-16", "--quiet", "--out", "exact", "--labels")
+    """A simulated drive with its labels, and below `run-exact` a run on it with those of its points."""
+    _, drive = drive_and_run(
+        tmp_path_factory.mktemp("labelled"), seconds=1.5, options=("--all-around",), name="exact"
+    )
     return drive
 
 
@@ -294,7 +294,7 @@ def outcomes(run):
 
 
 def test_truth_beside_the_source_is_marked_and_drawn(labelled, tmp_path, chromium):
-    exact = labelled.parents[2] / "exact"
+    exact = labelled.parents[2] / "run-exact"
     done(tmp_path, "replay", labelled, "--profile", "vlp-16", "--quiet", "--out", "boxes")
     for run in (exact, tmp_path / "boxes"):
         done(tmp_path, "view", run)
@@ -320,7 +320,7 @@ def test_truth_of_a_recording_is_given_by_its_frame_numbers(labelled, tmp_path):
 
 
 def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled, tmp_path):
-    live = shutil.copytree(labelled.parents[2] / "exact", tmp_path / "live")
+    live = shutil.copytree(labelled.parents[2] / "run-exact", tmp_path / "live")
     shutil.rmtree(live / "labels")
     text = re.sub(r"path: .*\n(  .*\n)*", "path: null\n", (live / "run.yaml").read_text(), count=1)
     (live / "run.yaml").write_text(f"{text}service: true\n")
@@ -330,7 +330,7 @@ def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled,
     without = modt("view", "live", cwd=tmp_path)
     assert "a live source cannot be read again" in without.stderr
     done(tmp_path, "view", "live", "--truth", labelled)
-    copy = shutil.copytree(labelled.parents[2] / "exact", tmp_path / "exact")
+    copy = shutil.copytree(labelled.parents[2] / "run-exact", tmp_path / "exact")
     done(tmp_path, "view", copy)
     assert np.mean([a == b for a, b in zip(outcomes(live), outcomes(copy), strict=True)]) > 0.95
     assert min(len(cell) for cell, _ in Page(live / "view.html").points) > 1000

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from modt.geometry import transform_boxes
 from modt_desk.evaluation.unlabelled import moving
 from tests.cli.commands import modt
+from tests.desk.recorded import drive_and_run
 
 STAMPS_S = np.arange(30) / 10
 RNG = np.random.default_rng(3)
@@ -67,13 +68,11 @@ def test_a_label_that_is_left_out_is_found_and_put_back(tmp_path):
         return found.stdout
 
     def listed(folder, *options):
-        done("evaluate", "run", drive, *options, "--unlabelled", folder)
+        done("evaluate", run, drive, *options, "--unlabelled", folder)
         path = tmp_path / folder / "further.csv"
         return list(csv.DictReader(path.read_text().splitlines())) if path.exists() else []
 
-    done("simulate", "--sensor", "vlp-16", "--seconds", "2.5", "--seed", "5", "--all-around", "--out", "sim")
-    (drive,) = (tmp_path / "sim").glob("*/*_sync")
-    done("replay", drive, "--profile", "vlp-16", "--fov", "full", "--labels", "--quiet", "--out", "run")
+    run, drive = drive_and_run(tmp_path, seconds=2.5, options=("--all-around",))
     before = {row["object"] for row in listed("before")}
     labels = ET.parse(drive / "tracklet_labels.xml")
     tracklets = labels.find("tracklets")
@@ -92,7 +91,7 @@ def test_a_label_that_is_left_out_is_found_and_put_back(tmp_path):
     assert f"Track {track}<" in page
     assert page.count("from the side") >= len(rows) / 3
     further = ("--further", "after/further.csv")
-    assert f"--further adds {len(before) + 1} objects" in done("evaluate", "run", drive, *further)
+    assert f"--further adds {len(before) + 1} objects" in done("evaluate", run, drive, *further)
     assert listed("completed", *further) == []
 
 

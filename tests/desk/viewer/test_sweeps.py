@@ -3,7 +3,7 @@ import numpy as np
 from modt.profile import load
 from modt.viewer.point_cells import SIDE
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt_desk.viewer.sweeps import Grid
+from modt_desk.viewer.view import Grid
 
 
 def test_a_cell_shows_its_highest_point_and_ground_as_such():

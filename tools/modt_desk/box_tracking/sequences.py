@@ -1,21 +1,165 @@
-"""Tracks of the detections of whole sequences, as KITTI's tracking results."""
+"""Tracks of the detections of whole sequences, as KITTI's tracking results.
+
+After the last frame whole tracks are judged: by their confidence, by rival classes on one object, and short gaps.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from modt.classes import CLASSES
 from modt.errors import MisuseError
-from modt.geometry import inverse, transform_boxes
+from modt.geometry import corners, inverse, transform_boxes, wrap
 from modt.sources import kitti_calibration, oxts
 from modt.sources.pose_source import read_poses
-from modt.types import Float64
+from modt.types import Bool, Float64, Int
 from modt_desk.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
 from modt_desk.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, Detections, box_lines, boxes_to_kitti
-from modt_desk.box_tracking.whole_tracks import TrackedBoxes, bridged, confident, of_one_class
+
+TINY = 1e-9
+
+
+def birds_eye_intersection(a: Float64, b: Float64) -> Float64:
+    """(n,) bird's-eye area that boxes a (n, 7) share with boxes b (n, 7), row by row [m2].
+
+    The common polygon's vertices are the corners of one inside the other and the crossings of their edges; in the
+    order of their bearing from their mean they give its area.
+    """
+    origin = a[:, None, :2]  # near the boxes: far from it, cross products cancel
+    p, q = corners(a) - origin, corners(b) - origin
+    crossing, crosses = _crossings(p, q)
+    vertices = np.concatenate([p, q, crossing], axis=1)
+    valid = np.concatenate([_inside(p, q), _inside(q, p), crosses], axis=1)
+    n = np.maximum(valid.sum(axis=1), 1)
+    mean = (vertices * valid[..., None]).sum(axis=1) / n[:, None]
+    local = np.where(valid[..., None], vertices - mean[:, None], 0.0)
+    bearing = np.where(valid, np.arctan2(local[..., 1], local[..., 0]), np.inf)
+    order = np.argsort(bearing, axis=1)
+    ring = np.take_along_axis(local, order[..., None], axis=1)
+    placed = np.take_along_axis(valid, order, axis=1)
+    ring = np.where(placed[..., None], ring, ring[:, :1])  # the unused repeat the first vertex and add no area
+    after = np.roll(ring, -1, axis=1)
+    area: Float64 = 0.5 * np.abs((ring[..., 0] * after[..., 1] - ring[..., 1] * after[..., 0]).sum(axis=1))
+    return area
+
+
+def iou_3d(a: Float64, b: Float64) -> Float64:
+    """(n,) intersection over union of the boxes' volumes, row by row."""
+    top = np.minimum(a[:, 2] + a[:, 5] / 2, b[:, 2] + b[:, 5] / 2)
+    foot = np.maximum(a[:, 2] - a[:, 5] / 2, b[:, 2] - b[:, 5] / 2)
+    shared = birds_eye_intersection(a, b) * np.maximum(top - foot, 0.0)
+    union = np.prod(a[:, 3:6], axis=1) + np.prod(b[:, 3:6], axis=1) - shared
+    iou: Float64 = shared / np.maximum(union, TINY)
+    return iou
+
+
+def _inside(points: Float64, polygon: Float64) -> Bool:
+    """(n, k) whether points (n, k, 2) lie in counter-clockwise rectangles (n, 4, 2), edges included."""
+    edge = np.roll(polygon, -1, axis=1) - polygon
+    offset = points[:, :, None] - polygon[:, None]
+    cross = edge[:, None, :, 0] * offset[..., 1] - edge[:, None, :, 1] * offset[..., 0]
+    inside: Bool = np.logical_and.reduce(cross >= -TINY, axis=2)
+    return inside
+
+
+def _crossings(p: Float64, q: Float64) -> tuple[Float64, Bool]:
+    """(n, 16, 2) where the edges of p meet those of q, and whether they do so within both."""
+    d, e = np.roll(p, -1, axis=1) - p, np.roll(q, -1, axis=1) - q
+    offset = q[:, None] - p[:, :, None]
+    d, e = d[:, :, None], e[:, None]
+    denominator = d[..., 0] * e[..., 1] - d[..., 1] * e[..., 0]
+    parallel = np.less(np.abs(denominator), TINY)
+    denominator = np.where(parallel, 1.0, denominator)
+    t = (offset[..., 0] * e[..., 1] - offset[..., 1] * e[..., 0]) / denominator
+    u = (offset[..., 0] * d[..., 1] - offset[..., 1] * d[..., 0]) / denominator
+    meets = ~parallel & (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
+    point = p[:, :, None] + t[..., None] * d
+    return point.reshape(len(p), 16, 2), meets.reshape(len(p), 16)
+
+
+MIN_IOU = 0.25
+"""Overlap of boxes of two classes from which both are of one object."""
+REACH_M = 3.0
+"""Distance of centres up to which that is tested."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedBoxes:
+    """The n boxes of tracks, in the world frame."""
+
+    frame: Int  # (n,) index of the frame
+    id: Int  # (n,) of the track
+    image_box: Float64  # (n, 4) left, top, right, bottom [pixel]
+    box: Float64  # (n, 7)
+    confidence: Float64  # (n,) in the track, at that frame
+
+    def take(self, rows: Bool | Int) -> TrackedBoxes:
+        """The boxes at some rows."""
+        return TrackedBoxes(
+            self.frame[rows], self.id[rows], self.image_box[rows], self.box[rows], self.confidence[rows]
+        )
+
+    @classmethod
+    def none(cls) -> TrackedBoxes:
+        """No boxes."""
+        return cls(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 7)), np.zeros(0))
+
+    @classmethod
+    def join(cls, parts: Iterable[TrackedBoxes]) -> TrackedBoxes:
+        """The boxes of all parts."""
+        whole = list(parts)
+        return cls(*(np.concatenate([getattr(part, f.name) for part in whole]) for f in fields(cls)))
+
+
+def confident(found: TrackedBoxes, least: float) -> TrackedBoxes:
+    """Keep the tracks whose mean confidence reaches `least`."""
+    return found.take(_mean(found.id, found.confidence) >= least)
+
+
+def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
+    """Remove tracks most of whose boxes lie on a more confident track of another class; classes are (n,)."""
+    mean = _mean(found.id, found.confidence)
+    place = np.column_stack([found.box[:, :2], 2 * REACH_M * found.frame])
+    a, b = cKDTree(place).query_pairs(REACH_M, output_type="ndarray").T
+    rivals = (object_class[a] != object_class[b]) & (iou_3d(found.box[a], found.box[b]) > MIN_IOU)
+    a, b = a[rivals], b[rivals]
+    beaten = np.zeros(len(mean))
+    beaten[np.where(mean[a] < mean[b], a, b)] = 1.0
+    return found.take(_mean(found.id, beaten) <= 0.5)
+
+
+def _mean(ids: Int, values: Float64) -> Float64:
+    """(n,) mean of the values (n,) of each one's track."""
+    _, track = np.unique(ids, return_inverse=True)
+    mean: Float64 = (np.bincount(track, values) / np.bincount(track))[track]
+    return mean
+
+
+def bridged(found: TrackedBoxes, max_gap: int) -> TrackedBoxes:
+    """The boxes, ordered by frame, with those interpolated where a track is missing for max_gap frames at most."""
+    found = found.take(np.lexsort((found.frame, found.id)))
+    gap = np.diff(found.frame) - 1
+    before = np.flatnonzero((np.diff(found.id) == 0) & (gap > 0) & (gap <= max_gap))
+    missing = gap[before]
+    step = 1 + np.arange(missing.sum()) - np.repeat(np.cumsum(missing) - missing, missing)
+    row = np.repeat(before, missing)
+    share = (step / (1 + gap[row]))[:, None]
+    change = found.box[row + 1] - found.box[row]
+    change[:, 6] = wrap(change[:, 6])
+    filled = TrackedBoxes(
+        frame=found.frame[row] + step,
+        id=found.id[row],
+        image_box=found.image_box[row] + share * (found.image_box[row + 1] - found.image_box[row]),
+        box=found.box[row] + share * change,
+        confidence=found.confidence[row] + share[:, 0] * (found.confidence[row + 1] - found.confidence[row]),
+    )
+    both = TrackedBoxes.join([found, filled])
+    return both.take(np.lexsort((both.id, both.frame)))
 
 
 def follow(

@@ -23,13 +23,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("evaluate", help="judge recorded runs against labels")
     pairs = "run directories (of replay --labels) and their labels"
     p.add_argument("pairs", nargs="*", type=Path, metavar="RUN TRUTH", help=pairs)
-    p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
-    p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots, too")
-    vans = "KITTI's vans as cars (all), or ignored (paper)"
+    p.add_argument("--json", action="store_true", help="print JSON, modt.evaluation/1")
+    p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots as well")
+    vans = "count KITTI's vans as cars (all), or ignore them (paper)"
     p.add_argument("--classes", choices=("all", "paper"), default="all", help=vans)
     what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
     p.add_argument("--count", action="append", choices=IGNORABLE, default=[], metavar="WHAT", help=what)
-    sector = "half the labelled sector (default: 40; 180 where labels are all round)"
+    sector = "half the angle of the labelled sector [deg] (default: 40; 180 where labels are all round)"
     p.add_argument("--sector", type=float, metavar="DEG", help=sector)
     further = "table of objects that the labels of the one drive leave out (docs/evaluation.md)"
     p.add_argument("--further", type=Path, metavar="FILE", help=further)

@@ -14,14 +14,14 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("export", help="write a recorded run in the formats of others")
     p.add_argument("directory", type=Path, metavar="RUN", help="directory of the run")
     form = p.add_mutually_exclusive_group(required=True)
-    form.add_argument("--mcap", type=Path, metavar="FILE", help="ROS 2 messages, as of --sink mcap://")
-    form.add_argument("--kitti", type=Path, metavar="FILE", help="KITTI tracking results")
-    labels = "point labels (of replay --labels)"
+    form.add_argument("--mcap", type=Path, metavar="FILE", help="write ROS 2 messages, as --sink mcap:// does")
+    form.add_argument("--kitti", type=Path, metavar="FILE", help="write KITTI tracking results")
+    labels = "write point labels (of a run of replay --labels)"
     form.add_argument("--semantickitti", type=Path, metavar="DIR", help=labels)
-    form.add_argument("--csv", type=Path, metavar="FILE", help="a row a track and frame")
-    form.add_argument("--parquet", type=Path, metavar="FILE", help="the same as a Parquet table")
+    form.add_argument("--csv", type=Path, metavar="FILE", help="write a table with a row for each track and frame")
+    form.add_argument("--parquet", type=Path, metavar="FILE", help="write the same table as Parquet")
     options.add_frames_option(p)
-    p.add_argument("--no-points", action="store_true", help="MCAP without points: needs no source")
+    p.add_argument("--no-points", action="store_true", help="write MCAP without points, which needs no source")
     options.add_capture_option(p)
     options.add_examples(
         p,

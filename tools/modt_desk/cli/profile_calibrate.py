@@ -22,11 +22,18 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_stream_options(p, (0, 40))
     options.add_meter_option(p)
     p.add_argument("--board", default="this board", metavar="NAME", help="name of the board in the profile")
-    p.add_argument("--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="default: %(default)s")
+    p.add_argument(
+        "--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="profile (default: %(default)s)"
+    )
     count = options.integer(12, 100_000, "a count")
-    p.add_argument("--windows", type=count, default=60, metavar="N", help="of varied load (default: %(default)s)")
-    p.add_argument("--window-s", type=seconds, default=2.0, metavar="S", help="length of each (default: %(default)g)")
-    p.add_argument("--burst-s", type=seconds, default=10.0, metavar="S", help="of each burst (default: %(default)g)")
+    varied = "number of windows of varied load (default: %(default)s)"
+    p.add_argument("--windows", type=count, default=60, metavar="N", help=varied)
+    p.add_argument(
+        "--window-s", type=seconds, default=2.0, metavar="S", help="their length [s] (default: %(default)g)"
+    )
+    p.add_argument(
+        "--burst-s", type=seconds, default=10.0, metavar="S", help="length of a burst [s] (default: %(default)g)"
+    )
     options.add_examples(
         p,
         "modt-profile calibrate --board 'my board' --out board.yaml   some minutes on an idle machine",

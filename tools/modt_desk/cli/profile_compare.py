@@ -22,7 +22,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_meter_option(p)
     options.add_report_options(p)
     p.add_argument("--repeat", type=count, default=3, metavar="K", help="repetitions (default: %(default)s)")
-    turn = "consecutive frames of one mode (default: 1, with a meter all)"
+    turn = "consecutive frames of one mode (default: 1, with a meter all frames)"
     p.add_argument("--turn", type=count, metavar="N", help=turn)
     against = "measure how far this file of modt-profile predict was off"
     p.add_argument("--against", type=Path, metavar="PREDICTION", help=against)

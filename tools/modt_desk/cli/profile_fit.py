@@ -27,10 +27,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     stream = "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, or PCAP file; best of a drive that moves"
     p.add_argument("path", type=Path, metavar="RECORDING", help=stream)
     options.add_capture_option(p)
-    p.add_argument("--name", metavar="NAME", help="of the profile (default: that of the recording)")
-    p.add_argument("--out", type=Path, metavar="FILE", help="default: NAME.yaml")
+    p.add_argument("--name", metavar="NAME", help="name of the profile (default: that of the recording)")
+    p.add_argument("--out", type=Path, metavar="FILE", help="profile to write (default: NAME.yaml)")
     count = options.integer(1, MOST_FRAMES, "a count")
-    spread = f"spread evenly over its first {MOST_FRAMES} frames"
+    spread = f"number of sweeps, spread evenly over its first {MOST_FRAMES} frames"
     p.add_argument("--sweeps", type=count, default=20, metavar="N", help=f"{spread} (default: %(default)s)")
     options.add_examples(
         p,

@@ -19,7 +19,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--json", action="store_true", help="print JSON")
     calibration = "JSON of modt-profile compare of another stream; repeatable"
     p.add_argument("--calibration", type=Path, action="append", required=True, metavar="FILE", help=calibration)
-    seen = "frames tracked, without classifying (default: %(default)s)"
+    seen = "part of the frames to track without classifying (default: %(default)s)"
     p.add_argument("--observe", choices=("third", "all"), default="third", help=seen)
     p.add_argument("--out", type=Path, metavar="PREDICTION", help="write the JSON for modt-profile compare --against")
     options.add_examples(

@@ -28,7 +28,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = actions.add_parser(
         "install", help="write the unit, its drop-ins and /etc/modt/modt.env; repeating it is safe"
     )
-    p.add_argument("--source", default="", metavar="SOURCE", help="SOURCE of modt run")
+    p.add_argument("--source", default="", metavar="SOURCE", help="source of modt run")
     p.add_argument("--options", default="", metavar="TEXT", help="further options of modt run, as one text")
     drop_in = "grant what the unit withholds; drop-ins that are not named are removed; repeatable"
     p.add_argument("--with", action="append", default=[], choices=drop_ins(), dest="drop_ins", help=drop_in)

@@ -12,11 +12,11 @@ from modt.errors import MisuseError, ModtError
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("simulate", help="write a synthetic drive with its ground truth")
-    p.add_argument("--scene", default="street", metavar="NAME", help="scene (default: %(default)s)")
-    p.add_argument("--sensor", default="hdl-64e", metavar="NAME", help="sensor (default: %(default)s)")
-    p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration (default: %(default)g)")
-    p.add_argument("--seed", type=int, default=0, metavar="K", help="of the random numbers (default: %(default)s)")
-    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the drive")
+    p.add_argument("--scene", default="street", metavar="NAME", help="name of the scene (default: %(default)s)")
+    p.add_argument("--sensor", default="hdl-64e", metavar="NAME", help="name of the sensor (default: %(default)s)")
+    p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration [s] (default: %(default)g)")
+    p.add_argument("--seed", type=int, default=0, metavar="K", help="random seed (default: %(default)s)")
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory in which the drive is written")
     p.add_argument("--all-around", action="store_true", help="annotate objects on all sides, not only in the camera")
     p.add_argument("--distort", action="store_true", help="keep the distortion of scans by the motion of the sensor")
     options.add_examples(

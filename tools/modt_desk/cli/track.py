@@ -17,10 +17,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     motion = p.add_mutually_exclusive_group()
     file = "camera poses in KITTI odometry's format, or a folder"
     motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
-    motion.add_argument("--oxts", type=Path, metavar="DIR", help="OXTS records, KITTI tracking; calib/ beside it")
+    motion.add_argument("--oxts", type=Path, metavar="DIR", help="folder of OXTS records, with calib/ beside it")
     seconds, confidence = options.real(0.001, 10, "seconds"), options.real(-1000, 1000, "a confidence")
-    least = "minimum of the mean of a track, online of a track in a frame (default: by type, for PointRCNN)"
-    p.add_argument("--period", type=seconds, default=0.1, metavar="S", help="of the frames (default: %(default)g)")
+    least = "least mean confidence of a track, or online its confidence in a frame (default: by type, for PointRCNN)"
+    p.add_argument("--period", type=seconds, default=0.1, metavar="S", help="frame period [s] (default: %(default)g)")
     p.add_argument("--sure", type=confidence, metavar="CONFIDENCE", help=least)
     p.add_argument("--online", action="store_true", help="no look ahead: each frame as the tracker reports it")
     p.add_argument("--quiet", action="store_true", help="no summary")

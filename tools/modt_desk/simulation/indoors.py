@@ -79,9 +79,8 @@ def lift(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     back = -half[0] + deep
     for side in (-1, 1):
         builder.scenery(box((0, 0, low / 2), (2 * deep, 0.1, low), Material.METAL), back, side * (wide + 0.05), 0.0)
-        builder.scenery(
-            box((0, 0, low / 2), (0.1, half[1] - wide, low), Material.WALL), *_beside(back + deep, half, wide, side)
-        )
+        beside_door = box((0, 0, low / 2), (0.1, half[1] - wide, low), Material.WALL)
+        builder.scenery(beside_door, back + deep, side * (half[1] + wide) / 2, 0.0)
     roof = box((0, 0, low + 0.05), (2 * deep, 2 * wide, 0.1), Material.METAL)
     builder.scenery(roof, back, 0.0, 0.0)
     for _ in range(3):
@@ -107,11 +106,6 @@ def warehouse(rng: np.random.Generator, seconds: float, height_m: float) -> Worl
         builder.scenery(scenery.pallets(rng), rng.uniform(-18.0, 18.0), rng.choice([-1, 1]) * 3.0, rng.normal(0, 0.2))
     ego = Path.steady(np.array([[-14.0, 0.0], [14.0, 0.0]]), 0.0, 1.0, seconds)
     return _under(builder, half, float(rng.uniform(5.0, 8.0)), ego, height_m)
-
-
-def _beside(x: float, half: tuple[float, float], wide: float, side: int) -> tuple[float, float, float]:
-    """Place of the wall beside the door of a lift."""
-    return x, side * (half[1] + wide) / 2, 0.0
 
 
 def _furnish(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:

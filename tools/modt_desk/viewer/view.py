@@ -1,25 +1,134 @@
-"""A recorded run from above: a page that plays it, a picture of a frame, a film, or the page of a track."""
+"""A recorded run from above: a page that plays it without a network, a picture of a frame, a film, a track's page."""
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from modt.config import ProfileConfig
 from modt.errors import MisuseError, ModtError, install
+from modt.geometry import FieldOfView
+from modt.segmentation.grids import PointColumns
+from modt.segmentation.segmenter import Segmenter
+from modt.sinks.output import writing
 from modt.sources.stream import Stream
-from modt.viewer.point_cells import Cells
+from modt.types import Float32
+from modt.viewer import theme
+from modt.viewer.html_page import content, page
+from modt.viewer.packed import packed_cells, packed_table
+from modt.viewer.point_cells import LEVEL_M, LEVELS, SIDE, Cells, occupied
+from modt_desk.evaluation.run_record import FramesByNumber
 from modt_desk.evaluation.truth import by_stamp
 from modt_desk.evaluation.truth_files import labels_beside, open_truth
 from modt_desk.reporting.document import save
-from modt_desk.viewer.player import most_cells, save_player
 from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.sweeps import Grid, sweeps
+from modt_desk.viewer.recorded_tracks import reach_m
 from modt_desk.viewer.track_page import rows_of, track_page, views
-from modt_desk.viewer.truth_marks import truth_marks
+from modt_desk.viewer.truth_marks import LEGEND, truth_marks
+
+NO_CELLS = Cells(np.zeros(0, np.int64), np.zeros(0, np.int64))
+STEP_CM = 4
+"""Least width of a cell [cm]."""
+
+
+class Grid:
+    """Converts sweeps to cells; the segmenter of a profile finds the ground."""
+
+    def __init__(self, config: ProfileConfig) -> None:
+        self._segmenter = Segmenter(config.segmentation, config.sensor, FieldOfView())
+        self._clearance_m = config.segmentation.clearance_m
+        self._range_m = config.sensor.max_range_m
+        self.step_cm = max(STEP_CM, math.ceil(200 * self._range_m / SIDE))
+
+    def cells(self, points: Float32) -> Cells:
+        """Cells of (N, 4) points; those beyond the range of the sensor count as none."""
+        sweep = PointColumns.from_array(points)
+        height = self._segmenter.ground.height_above(sweep, self._segmenter.sensor_height_m(points))
+        sweep_range = sweep.sqrt_range**2
+        used = (sweep_range > 0) & (sweep_range < self._range_m)
+        level = np.clip(np.rint(height[used] / LEVEL_M), 1, LEVELS - 1).astype(np.int64)
+        level[height[used] <= self._clearance_m] = 0
+        return occupied(sweep.x[used], sweep.y[used], level, self.step_cm)
+
+
+def sweeps(numbers: Sequence[int], stream: Stream, grid: Grid, most: int) -> Iterator[Cells]:
+    """Cells of each frame, by ascending number, at most so many; none if the stream does not hold the frame."""
+    frames = FramesByNumber(stream.between(0, numbers[-1] + 1))
+    for number in numbers:
+        frame = frames.get(number)
+        yield NO_CELLS if frame is None else grid.cells(frame.points).thinned(most)
+
+
+SCRIPT = Path(__file__).parent / "recorded.js"
+POINT_BYTES = 20_000_000
+"""Approximate size of the points of a page."""
+CELL_BYTES = 1.5
+"""Size of a cell, compressed and in base64."""
+
+
+def most_cells(n_frames: int) -> int:
+    """Cells a sweep that a page of so many frames has room for."""
+    return int(POINT_BYTES / CELL_BYTES / n_frames)
+
+
+def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: Iterable[Cells] | None) -> None:
+    """Write the page of a run, which opens at a frame.
+
+    Args:
+        path: the file.
+        run: what is recorded.
+        start: index of the frame.
+        step_cm: width of a cell.
+        sweeps: cells of each frame, None without points.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    about = f"mode {run.facts['mode']}, field of view {run.facts.get('fov', 'full')}, profile {run.sensor}"
+    if sweeps is None:
+        about += "; the source of its points is not found"
+    head, tail = page(
+        run.facts["stream"]["name"], about, _content(run, start, None if sweeps is None else step_cm), SCRIPT
+    )
+    with writing(path), path.open("w", encoding="utf-8") as file:
+        file.write(head)
+        file.write(_data("tracks", packed_table(run.tracks)))
+        for at, cells in enumerate(sweeps or ()):
+            file.write(_data(f"points-{at}", packed_cells(cells)))
+        file.write(tail)
+
+
+def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any]:
+    """Content of the page beside the columns."""
+    poses = run.poses.round(4).tolist()
+    frames = [_rounded(f | {"pose": pose}) for f, pose in zip(run.frames, poses, strict=True)]
+    judged = any("truth" in frame for frame in run.frames)
+    return content(theme.states(run.states), run.budget, step_cm) | {
+        "frames": frames,
+        "truth": LEGEND if judged else None,
+        "reach_m": reach_m(run.tracks),
+        "start": start,
+    }
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_rounded(entry) for entry in value]
+    return round(value, 3) if isinstance(value, float) else value
+
+
+def _data(name: str, text: str) -> str:
+    return f'<script type="text/plain" id="{name}">{text}</script>\n'
+
 
 if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.figure import Figure
