@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.class_sizes import unknown_near
+from modt.classes import ObjectClass
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
 from modt.sinks.output import LineFile
@@ -61,6 +62,15 @@ def test_what_may_be_a_person_too_near_to_be_known_is_said_to_be_uncertain(size,
     r.proposals.box[0, 3:6], r.proposals.cut[0] = size, cut
     assert [track["uncertain"] for track in frame_record(r)["tracks"]] == [said, None]
     assert unknown_near(r).tolist() == [said is not None, False]
+
+
+@pytest.mark.parametrize(("pedestrian", "said"), [(0.45, "pedestrian?"), (0.55, None)])
+def test_an_object_of_less_than_one_half_is_reported_with_a_question_mark(pedestrian, said):
+    r = result(3, [7, 5], {0: 11}, {11: [0.9 - pedestrian, 0.05, pedestrian, 0.05]})
+    r.tracks.object_class[0] = ObjectClass.PEDESTRIAN
+    track = frame_record(r)["tracks"][0]
+    assert (track["class"], track["uncertain"]) == ("pedestrian", said)
+    assert json.loads(frame_line(r)) == frame_record(r)
 
 
 def test_the_pose_of_the_sensor_is_recorded_and_read_back():

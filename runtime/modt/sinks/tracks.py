@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.class_sizes import unknown_near
+from modt.class_sizes import doubtful, unknown_near
 from modt.classes import CLASS_NAMES
 from modt.sinks import json_columns as text
 from modt.sinks.records import line
@@ -21,6 +21,7 @@ from modt.types import NONE, Float64, FrameResult, Int
 SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 UNKNOWN_NEAR = "unknown, near"  # may be a person, too near for the sensor to show enough of it
+UNCERTAIN_NAMES = (None, *(f"{name}?" for name in CLASS_NAMES[1:]), UNKNOWN_NEAR)
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 
 
@@ -38,7 +39,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
         "witness": np.round(tracks.witness, 3).tolist(),
         "viewed": tracks.viewed.tolist(),
         "final": tracks.final.tolist(),
-        "uncertain": [UNKNOWN_NEAR if near else None for near in unknown_near(result).tolist()],
+        "uncertain": [UNCERTAIN_NAMES[doubt] for doubt in _doubts(result).tolist()],
         "proposal": [None if proposal == NONE else proposal for proposal in tracks.proposal.tolist()],
         "points": tracks.points.tolist(),
         "age": tracks.age.tolist(),
@@ -51,6 +52,12 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
     }
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     return _frame_fields(result) | {"tracks": rows}
+
+
+def _doubts(result: FrameResult) -> Int:
+    """(M,) index into UNCERTAIN_NAMES of each track."""
+    named: Int = np.where(unknown_near(result), len(CLASS_NAMES), result.tracks.object_class * doubtful(result))
+    return named
 
 
 def _frame_fields(result: FrameResult) -> dict[str, Any]:
@@ -81,7 +88,7 @@ def recorded_pose(record: dict[str, Any]) -> Float64:
 
 
 CLASSES = text.encode_table([json.dumps(name) for name in CLASS_NAMES])
-UNCERTAIN = text.encode_table(["null", json.dumps(UNKNOWN_NEAR)])
+UNCERTAIN = text.encode_table([json.dumps(name) for name in UNCERTAIN_NAMES])
 BOOLEANS = text.encode_table(["false", "true"])
 NULL = text.encode("null")[0]
 
@@ -128,7 +135,7 @@ def _encoded(result: FrameResult) -> str:
         "witness": _lists(text.rounded_to_3(tracks.witness)),
         "viewed": BOOLEANS[tracks.viewed.astype(np.int64)],
         "final": BOOLEANS[tracks.final.astype(np.int64)],
-        "uncertain": UNCERTAIN[unknown_near(result).astype(np.int64)],
+        "uncertain": UNCERTAIN[_doubts(result)],
         "proposal": proposal,
         "points": points,
         "age": age,
