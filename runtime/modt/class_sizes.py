@@ -54,3 +54,10 @@ def unknown_near(result: FrameResult) -> Bool:
     unknown: Bool = np.append(may_be, False)[own]  # the last is that of NONE
     unknown &= result.tracks.object_class == ObjectClass.BACKGROUND
     return unknown
+
+
+def doubtful(result: FrameResult) -> Bool:
+    """(M,) tracks that are reported as an object whose posterior is below one half."""
+    class_ = result.tracks.object_class
+    doubtful: Bool = (result.tracks.posterior[np.arange(len(class_)), class_] < 0.5) & (class_ > 0)
+    return doubtful

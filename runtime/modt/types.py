@@ -200,7 +200,6 @@ class Tracks:
     views: Int = column(int)  # views fused
     key_points: Int = column(int)  # at the last view, 0 before any
     key_age: Int = column(int)  # age at the last view
-    key_log_odds: Float64 = column(float)  # of an object by box and motion, at the last view
     # Column of the scheduler
     waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
     # Column of the decision

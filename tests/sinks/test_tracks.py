@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.class_sizes import unknown_near
-from modt.classes import CLASS_NAMES
+from modt.classes import CLASS_NAMES, ObjectClass
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
 from modt.sinks.records import BROKEN, line
@@ -62,6 +62,14 @@ def test_what_may_be_a_person_too_near_to_be_known_is_said_to_be_uncertain(size,
     assert unknown_near(r).tolist() == [said is not None, False]
 
 
+@pytest.mark.parametrize(("pedestrian", "said"), [(0.45, "pedestrian?"), (0.55, None)])
+def test_an_object_of_less_than_one_half_is_reported_with_a_question_mark(pedestrian, said):
+    r = result(3, [7, 5], {0: 11}, {11: [0.9 - pedestrian, 0.05, pedestrian, 0.05]})
+    r.tracks.object_class[0] = ObjectClass.PEDESTRIAN
+    track = frame_record(r)["tracks"][0]
+    assert (track["class"], track["uncertain"]) == ("pedestrian", said)
+
+
 def test_the_pose_of_the_sensor_is_recorded_and_read_back():
     T = se3(rotation_zyx(0.01, -0.02, 2.5), np.array([123.4567891, -1e4, 0.5]))
     record = frame_record(result(3, [5], {0: 1}, T_world_sensor=T))
@@ -97,6 +105,11 @@ def results(draw):
     return r
 
 
+def _question(t, k):
+    class_ = t.object_class[k]
+    return f"{CLASS_NAMES[class_]}?" if class_ > 0 and t.posterior[k, class_] < 0.5 else None
+
+
 def tracks_one_by_one(r):
     """The tracks of a record, slowly."""
     for k in range(len(r.tracks)):
@@ -110,7 +123,7 @@ def tracks_one_by_one(r):
             "witness": np.round(t.witness[k], 3).tolist(),
             "viewed": bool(t.viewed[k]),
             "final": bool(t.final[k]),
-            "uncertain": UNKNOWN_NEAR if unknown_near(r)[k] else None,
+            "uncertain": UNKNOWN_NEAR if unknown_near(r)[k] else _question(t, k),
             "proposal": None if proposal == NONE else proposal,
             "points": int(t.points[k]),
             "age": int(t.age[k]),

@@ -18,8 +18,8 @@ from modt.types import NONE, Float64, Tracks
 
 MIN_BACKGROUND = 0.1
 """Least frequency of background."""
-HYSTERESIS = 0.4
-"""The reported class is kept down to this share of its threshold; 1 would give it up at the threshold."""
+KEPT_FROM = 0.4
+"""A reported class is kept down to this probability if its threshold is higher; less: doubtful classes linger."""
 START_PROPOSALS, MEMORY_PROPOSALS = 2000, 20_000
 """Proposals that the frequency at the start counts for, and from which that of the stream is estimated."""
 MAX_CHANGE = 5.0
@@ -70,12 +70,13 @@ class Decision(LikeliestClass):
         self._start = frequency if start is None else np.array([1.0 - sum(start), *start])
         self.frequency = self._start.copy()
         self._mass = np.zeros(N_CLASSES)
+        self._kept = np.append(1.0, np.minimum(KEPT_FROM / self._threshold, 1.0))
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
         adapted = self.adapted(tracks.posterior)
         weighed = adapted.copy()
-        weighed[np.arange(len(weighed)), tracks.object_class] /= HYSTERESIS
+        weighed[np.arange(len(weighed)), tracks.object_class] /= self._kept[tracks.object_class]
         self._say(tracks, weighed)
         self._learn(adapted[tracks.proposal != NONE])
 

@@ -32,16 +32,17 @@ BOX_FORGETTING, BOX_WEIGHT = 0.5, 0.75
 """Weight of the boxes so far at a further one, and of their mean."""
 MISMATCH_PROBABILITY = 0.05
 """That a proposal is not the object of its track: the posterior is then the prior of its box."""
-SURPRISE = 2.3
-"""Change of the log-odds of an object by box and motion, since the last view, that is worth another one."""
-MORE_POINTS, MORE_POINTS_BY = 1.25, 5
-"""Clearly more points than at the last view: by this ratio, and so many beyond random variation."""
+MORE_POINTS, FAR_MORE_POINTS, MORE_POINTS_BY = 1.25, 2.0, 5
+"""An uncertain track is classified again at MORE_POINTS times the points of its last view, a certain one that may be
+an object at FAR_MORE_POINTS times; each by MORE_POINTS_BY more, which is random variation."""
 BACKGROUND_THRESHOLD = 0.5
 """Posterior under equal class frequencies at which background is final where it is looked at again; less: sooner."""
 FIRST_VIEW_MIN_HITS = 2
 """Frames with a proposal that mode efficient waits for: more of them spare calls on spurious proposals."""
-REVIEW_FRAMES = 10
-"""An object is looked at again after so many frames, then after twice as many, and so on."""
+REVIEW_GROWTH, REVIEW_FRAMES = 2.0, 10
+"""A certain object is classified again at REVIEW_GROWTH times its age at the last view, and REVIEW_FRAMES later."""
+UNSURE_GROWTH, UNSURE_FRAMES = 1.3, 2
+"""The same of an uncertain track. With longer intervals, fewer calls are made and cars are recognised later."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
@@ -49,15 +50,19 @@ def normalise(probability: Float64) -> Float64:
     """(R, 4) rows scaled to sum 1 with entries of at least MIN_PROBABILITY; uniform where no entry is above 0."""
     finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0)
     greatest = finite.max(axis=1, keepdims=True, initial=0.0)
-    relative = np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0)
-    floored = np.maximum(relative / relative.sum(axis=1, keepdims=True), MIN_PROBABILITY)
-    normalised: Float64 = floored / floored.sum(axis=1, keepdims=True)
-    return normalised
+    return _floored(np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0))
 
 
 def from_log_weights(log_weight: Float64) -> Float64:
-    """(R, 4) softmax of each row, with the floor of `normalise`."""
-    return normalise(np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf)))
+    """(R, 4) softmax of each row of finite numbers, with the floor of `normalise`."""
+    return _floored(np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf)))
+
+
+def _floored(weight: Float64) -> Float64:
+    """(R, 4) rows of positive sum scaled to sum 1 with entries of at least MIN_PROBABILITY."""
+    floored = np.maximum(weight / weight.sum(axis=1, keepdims=True), MIN_PROBABILITY)
+    normalised: Float64 = floored / floored.sum(axis=1, keepdims=True)
+    return normalised
 
 
 def log_frequency_of(prior: Prior) -> Float64:
@@ -147,14 +152,19 @@ class FusedTracks:
         tracks.weight[rows] = total
         tracks.views[rows] += 1
         tracks.key_points[rows], tracks.key_age[rows] = count, tracks.age[rows]
-        tracks.key_log_odds[rows] = _log_odds(_expected(tracks)[rows])
         self._conclude(tracks, rows)
         return self.certain(tracks.posterior[rows])
 
+    def _may_be_object(self, tracks: Tracks) -> Bool:
+        """(M,) tracks whose box and motion leave an object probable enough for a classification."""
+        weighed = tracks.prior * np.exp(tracks.witness)
+        probability = weighed / weighed.sum(axis=1, keepdims=True)
+        return self.prior.may_be_object(probability, self.config.min_object_probability)
+
     def _conclude(self, tracks: Tracks, rows: Int) -> None:
         """Write the posterior of the rows; the class of a remembered place has probability 1."""
-        weight = np.where(tracks.viewed[rows], np.maximum(tracks.views[rows], 1.0) ** GROWTH, 0.0)[:, None]
-        known = self._log_frequency + weight * tracks.evidence.take(rows, axis=0)
+        weight = tracks.views[rows] ** GROWTH
+        known = self._log_frequency + weight[:, None] * tracks.evidence.take(rows, axis=0)
         known += BOX_WEIGHT * tracks.box_evidence.take(rows, axis=0) + tracks.witness.take(rows, axis=0)
         posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
         posterior += MISMATCH_PROBABILITY * tracks.prior.take(rows, axis=0)
@@ -176,36 +186,28 @@ class FirstViews(FusedTracks):
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
         asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS)
-        asks &= self.prior.may_be_object(_expected(tracks), self.config.min_object_probability)
-        return asks & (~tracks.viewed | _shows_more(tracks, proposals))
+        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks))
 
 
 class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is certain, and where something changes (Table II).
 
-    A track, a remembered place too, is classified as soon as its box may be an object's; again where its box says
-    something else by now, where it is uncertain and shows clearly more points and, of a certain object, at growing
-    intervals.
+    A track, a remembered place too, is classified as soon as its box may be an object's. An uncertain one is
+    classified again where it shows clearly more points, and at growing intervals, as is a certain object. Certain
+    background is only where it shows far more points and may be an object by its box.
     """
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
         self.observe(tracks, proposals)
-        expected = _expected(tracks)
-        first = self.prior.may_be_object(expected, self.config.min_object_probability)
+        first = self._may_be_object(tracks)
         object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
-        due = object_ & (tracks.age >= 2 * tracks.key_age + REVIEW_FRAMES)
-        further = np.where(self.certain(tracks.posterior), due, _shows_more(tracks, proposals))
-        further |= np.abs(_log_odds(expected) - tracks.key_log_odds) > SURPRISE
+        review = object_ & (tracks.age >= REVIEW_GROWTH * tracks.key_age + REVIEW_FRAMES)
+        review |= first & _shows_more(tracks, FAR_MORE_POINTS)
+        unsure = _shows_more(tracks) | (tracks.age >= UNSURE_GROWTH * tracks.key_age + UNSURE_FRAMES)
+        further = np.where(self.certain(tracks.posterior), review, unsure)
         asks: Bool = (tracks.proposal != NONE) & np.where(tracks.viewed, further, first)
         return asks
-
-
-def _expected(tracks: Tracks) -> Float64:
-    """(M, 4) P(class | box, motion)."""
-    weighed = tracks.prior * np.exp(tracks.witness)
-    expected: Float64 = weighed / weighed.sum(axis=1, keepdims=True)
-    return expected
 
 
 def _log(probability: Float64) -> Float64:
@@ -214,16 +216,7 @@ def _log(probability: Float64) -> Float64:
     return logarithm
 
 
-def _log_odds(probability: Float64) -> Float64:
-    """(R,) of any object against background, of (R, 4)."""
-    log_odds: Float64 = _log(probability[:, 1:].sum(axis=1)) - _log(probability[:, 0])
-    return log_odds
-
-
-def _shows_more(tracks: Tracks, proposals: Proposals) -> Bool:
-    """(M,) tracks whose proposal shows clearly more of them than their last view."""
-    seen = (tracks.proposal != NONE).nonzero()[0]
-    count = np.zeros(len(tracks), np.int64)
-    count[seen] = proposals.count[tracks.proposal[seen]]
-    more: Bool = count > MORE_POINTS * tracks.key_points + MORE_POINTS_BY
+def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:
+    """(M,) tracks whose last proposal shows clearly more of them than their last view."""
+    more: Bool = tracks.points > ratio * tracks.key_points + MORE_POINTS_BY
     return more

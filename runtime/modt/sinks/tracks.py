@@ -7,11 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from modt.class_sizes import unknown_near
+from modt.class_sizes import doubtful, unknown_near
 from modt.classes import CLASS_NAMES
 from modt.sinks import json_columns as text
 from modt.sinks.records import line
-from modt.types import NONE, FrameResult
+from modt.types import NONE, FrameResult, Int
 
 SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
@@ -26,7 +26,7 @@ TRACK = (
 )
 """Format of a track. Columns of text, `_by_columns`, give the same characters in a third of the CPU time."""
 BOOLEANS, CLASSES = ("false", "true"), tuple(map(json.dumps, CLASS_NAMES))
-UNCERTAIN = ("null", json.dumps(UNKNOWN_NEAR))
+UNCERTAIN = ("null", *(json.dumps(f"{name}?") for name in CLASS_NAMES[1:]), json.dumps(UNKNOWN_NEAR))
 NUMBER_BYTES = 32
 """Room for the numbers in `part` and `parts` [bytes]."""
 
@@ -99,6 +99,12 @@ def _tracks(rows: str) -> str:
     return f'"tracks":[{rows}]}}\n'
 
 
+def _doubts(result: FrameResult) -> Int:
+    """(M,) index into UNCERTAIN of each track."""
+    doubt: Int = np.where(unknown_near(result), len(CLASS_NAMES), result.tracks.object_class * doubtful(result))
+    return doubt
+
+
 def _rows(result: FrameResult) -> list[str]:
     """JSON of each track."""
     tracks = result.tracks
@@ -117,7 +123,7 @@ def _rows(result: FrameResult) -> list[str]:
         np.round(tracks.witness, 3),
         tracks.viewed,
         tracks.final,
-        unknown_near(result),
+        _doubts(result),
         tracks.proposal,
         tracks.points,
         tracks.age,
@@ -129,7 +135,7 @@ def _rows(result: FrameResult) -> list[str]:
         % (
             *(id_, states[state], CLASSES[class_], *posterior, *witness, BOOLEANS[viewed], BOOLEANS[final]),
             *(
-                UNCERTAIN[near],
+                UNCERTAIN[doubt],
                 "null" if proposal == NONE else proposal,
                 points,
                 age,
@@ -138,7 +144,7 @@ def _rows(result: FrameResult) -> list[str]:
                 *world,
             ),
         )
-        for id_, state, class_, posterior, witness, viewed, final, near, proposal, points, age, missed, world in zip(
+        for id_, state, class_, posterior, witness, viewed, final, doubt, proposal, points, age, missed, world in zip(
             *(column.tolist() for column in columns), strict=True
         )
     ]
@@ -173,7 +179,7 @@ def _by_columns(result: FrameResult) -> str:
         "witness": _lists(text.rounded_to_3(tracks.witness)),
         "viewed": TEXT_OF_BOOLEAN[tracks.viewed.astype(np.int64)],
         "final": TEXT_OF_BOOLEAN[tracks.final.astype(np.int64)],
-        "uncertain": TEXT_OF_DOUBT[unknown_near(result).astype(np.int64)],
+        "uncertain": TEXT_OF_DOUBT[_doubts(result)],
         "proposal": proposal,
         "points": points,
         "age": age,
