@@ -21,6 +21,7 @@ import numpy as np
 
 from modt.app.inputs import Request, stream
 from tools.deploy.faults import FAULTS, NO_FAULT, Fault
+from tools.options import parser
 from tools.send.faults import Timed
 from tools.send.ideal_packets import packets_of
 from tools.send.loops import VelodyneStamps, turn_loop
@@ -68,17 +69,20 @@ def paced(packets: Iterable[Timed]) -> Iterator[Timed]:
         yield at_s, payload
 
 
-def main(port: str, drive: str | None = None) -> None:
-    """Send for ever."""
-    recording = stream(Request(path=Path(drive) if drive else None, frames=(0, FRAMES)))
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("port", type=int, metavar="PORT", help="UDP port of this machine")
+    options.add_argument("drive", nargs="?", type=Path, metavar="DRIVE", help="recording (default: a synthetic street)")
+    args = options.parse_args()
+    recording = stream(Request(path=args.drive, frames=(0, FRAMES)))
     payloads = [payload for _, payload in packets_of(list(recording), MODEL, recording.info.period_s)]
     faulty = Faulty()
     Thread(target=faulty.follow, args=(sys.stdin,), daemon=True).start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to:
-        to.connect(("127.0.0.1", int(port)))
+        to.connect(("127.0.0.1", args.port)))
         print("sending", flush=True)
         send(faulty.applied(paced(turn_loop(payloads))), to)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

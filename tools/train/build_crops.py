@@ -45,7 +45,7 @@ CELL_SCALES = (0.75, 1.4)
 """Cell sizes relative to the profile's, for training alone."""
 MAX_POINTS = 1200
 UNLABELLED_SHARE, FOREIGN_SHARE = 0.2, 0.2
-"""Of a proposal's points: more without a label make it unknown, more of an object that is not its own partial."""
+"""Shares of a proposal's points: more without a label make it unknown, more of another object make it partial."""
 MIN_BOX_POINTS, MIN_DETECTABLE_POINTS = 5, 10
 """Minimum points of an object for training, and for the ground truth of the validation."""
 TALL_M = 1.85

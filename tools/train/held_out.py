@@ -40,7 +40,7 @@ class Validation:
 
     @classmethod
     def of(cls, data: Dataset) -> Validation:
-        """Of a data set."""
+        """Validation part of a data set."""
         rows = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
         place = np.full(len(data) + 1, NONE)  # the last one is that of NONE
         place[rows] = np.arange(len(rows))

@@ -15,7 +15,7 @@ from tools.train.dataset import SYNTHETIC, Dataset, Sensors
 from tools.train.near_cut import cut_flags, cut_near
 
 SHARE = np.array([0.5, 0.08, 0.38, 0.04])
-"""Of the classes in a batch."""
+"""Shares of the classes in a batch."""
 NEAR_BATCH, CUT_BATCH = 72, 40
 """Simulated crops of a batch, and crops of the streets that are cut near; some show too little and are left out."""
 CUT_RANGE_M, CUT_POINTS, MAX_POINTS = 25.0, 60, 800

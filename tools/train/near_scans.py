@@ -29,7 +29,7 @@ HEIGHT_M, RANGE_M = (0.2, 1.0), (0.5, 6.0)
 SLOTS = 14
 """Directions in which something may stand."""
 PERSON_SHARE, CAR_SHARE, EMPTY_SHARE = 0.32, 0.05, 0.15
-"""Of the directions."""
+"""Shares of the directions in which a person, a car or nothing stands."""
 ROBOT_M = (0.4, 0.4)
 """Length and width of the robot, which nothing overlaps."""
 MIN_RANGE_M, LOW_CLEARANCE_M = 0.2, 0.12

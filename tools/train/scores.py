@@ -23,7 +23,7 @@ from tools.train.held_out import Validation
 from tools.train.temperature_scaling import fit_calibration
 
 MIN_OBJECT_POINTS = 20
-"""Of the objects of recall at a precision."""
+"""Least number of points of the objects that count for recall at a precision."""
 PRECISIONS = (0.9, 0.8)
 
 

@@ -33,7 +33,7 @@ from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
 
 STEPS, AUGMENTED_BATCHES = 2000, 250
-"""Of the training, and batches that are augmented for it: augmentation costs more than a step."""
+"""Steps of the training; batches that are augmented for it, since augmentation costs more than a step."""
 MAX_POINTS = 400
 """Maximum number of points of a crop before augmentation."""
 THRESHOLDS = (0.005, 0.01, 0.02, 0.05, 0.1)

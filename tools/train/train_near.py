@@ -43,13 +43,13 @@ from tools.train.train_pointnet import POINTS, tensors
 from tools.train.weights import Layer
 
 FREQUENCY = np.array([0.86, 0.03, 0.1, 0.01])
-"""Of the classes among proposals near a small robot."""
+"""Frequency of the classes among proposals near a small robot."""
 RATE = 5e-4
 """Greatest learning rate."""
 BOUND_CROPS, BOUND_STEPS = 60_000, 3000
 """Crops that the classifier of bounds is trained on, and steps."""
 SMOOTHING = 0.01
-"""Of the labels: probability spread evenly over the classes."""
+"""Label smoothing: probability spread evenly over the classes."""
 EVERY = 100
 """Steps whose mean loss is printed."""
 RANGES_M = ((0.5, 1.0), (1.0, 1.5), (1.5, 3.0), (3.0, 7.0))

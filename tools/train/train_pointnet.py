@@ -37,7 +37,7 @@ POINTS, MAX_POINTS = 128, 400
 MIN_FREQUENCY = 1e-4
 """Stated of a class that the validation has no crop of."""
 SMOOTHING = 0.02
-"""Of the labels: probability spread evenly over the classes."""
+"""Label smoothing: probability spread evenly over the classes."""
 BOX_STEPS, MIN_WORTH = 600, 0.03
 """Training steps of the box classifier that tells which background is worth drawing, and its least relative share."""
 

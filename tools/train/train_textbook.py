@@ -37,7 +37,7 @@ EPOCHS = {"pointnet-paper-40": 40, "pointnet-paper": 100}
 DEAR = {"pointnet-dear": 4}
 FOLDS, HELD_OUT = 5, 4
 RATE, DECAY, DECAY_EPOCHS = 1e-3, 0.7, 20
-"""Of the optimiser Adam, as PointNet's authors have it."""
+"""Learning rate of Adam, its decay, and the epochs between two decays, as PointNet's authors have them."""
 KINDS = {
     PointNet: "PointNet of section V-A of the paper (400 x 3; 32, 64, 512 shared; maximum; 256, 128, 4)",
     TransformedPointNet: "PointNet of full width with input transform (64, 64, 64, 128, 1024 shared; 256, 128, 4)",

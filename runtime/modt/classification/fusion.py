@@ -112,7 +112,7 @@ class EveryFrame:
 
 
 class FusedTracks:
-    """What is common to the modes that fuse: the posterior of every track with a proposal, in every frame.
+    """Common part of the modes that fuse: the posterior of every track with a proposal, in every frame.
 
     Args:
         config: condition of a view, threshold of certainty.

@@ -85,7 +85,7 @@ def read_model(path: Path) -> tuple[bytes, str]:
 
 
 def _flaws(raw: memoryview) -> Iterator[str]:
-    """What a model holds that is refused."""
+    """Parts of a model that are refused."""
     waiting = [(_MODEL, raw)]
     while waiting:
         kind, message = waiting.pop()
@@ -271,13 +271,13 @@ class PointNet:
 
 
 def _first_line(error: Exception) -> str:
-    """Of its message, or its kind where it has none."""
+    """First line of an error's message, or its type if it has no message."""
     return next(iter(str(error).splitlines()), type(error).__name__)
 
 
 @cache
 def _limit_memory() -> None:
-    """Of all sessions of this process together."""
+    """Limit the memory that all sessions of this process share."""
     info = ort.OrtMemoryInfo("Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT)
     automatic = ("arena_extend_strategy", "initial_chunk_size_bytes", "max_dead_bytes_per_chunk")
     arena = ort.OrtArenaCfg({"max_mem": MEMORY_BYTES, **dict.fromkeys(automatic, -1)})

@@ -42,7 +42,7 @@ class FieldOfView:
 
     @classmethod
     def of_camera(cls, camera: Camera) -> FieldOfView:
-        """What lies between the left and the right edge of a camera's image."""
+        """View between the left and the right edge of a camera's image."""
         u, w = camera.P_image_sensor[0], camera.P_image_sensor[2]
         planes = np.stack([u, camera.width_px * w - u])
         return cls(planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True))

@@ -83,7 +83,7 @@ def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
 
 
 HALF_ROOT = float(np.sqrt(0.5))
-"""Of the axes at 45 and 135 degrees."""
+"""Components of the axes at 45 and 135 degrees."""
 SOFT_M = 0.3
 """Added to widths that are compared: a difference of a few returns is noise."""
 PAD_M = SOFT_M / 3
@@ -91,7 +91,7 @@ PAD_M = SOFT_M / 3
 
 
 class PairWeights(NamedTuple):
-    """What a difference adds to the cost of a pair, beside the likelihood of its displacement."""
+    """Weights of the differences in the cost of a pair, beside the likelihood of its displacement."""
 
     size: float  # mean difference of the logarithms of the widths
     overlap: float  # of 1 - intersection over union
@@ -111,7 +111,7 @@ class Shapes:
 
     @classmethod
     def of(cls, kdop: Float64, bottom: Float64, top: Float64, count: Int) -> Self:
-        """Of (8, n) k-DOPs with (n,) bottoms, tops and numbers of points."""
+        """Make shapes from (8, n) k-DOPs with (n,) bottoms, tops and numbers of points."""
         return cls(kdop, np.log(widths(kdop) + SOFT_M), bottom, top, np.log(count))
 
     def __len__(self) -> int:

@@ -9,9 +9,9 @@ from modt.types import Float32
 ABOVE_M = 1.95
 """Above ground: returns from here on are those of which a ceiling has its share."""
 LOWEST_M = 2.15
-"""Of a ceiling above ground; what is lower is the lintel of a door."""
+"""Least height of a ceiling above ground; a lower surface is the lintel of a door."""
 BIN_M = 0.05
-"""Of the histogram of heights, two of which hold a ceiling."""
+"""Width of a bin of the histogram of heights; two neighbouring bins hold a ceiling."""
 MIN_RETURNS, MIN_SHARE = 50, 0.5
 """Returns above ABOVE_M in a room, and share of them that are on the ceiling."""
 EDGE_SHARE, CLEARANCE_M = 0.05, 0.05

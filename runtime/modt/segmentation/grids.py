@@ -46,7 +46,7 @@ class PointColumns:
 Int32 = NDArray[np.int32]
 
 SECTORS = 128
-"""Of the polar grid, a power of two."""
+"""Sectors of the polar grid, a power of two."""
 RING_STEP = 0.15
 """Width of a ring [sqrt(m)]: 0.9 m at 10 m, 1.9 m at 40 m."""
 

@@ -54,7 +54,7 @@ _PERSON_KEYS = "max_extent_m", "min_top_m", "min_height_m"
 
 
 class _GroundBuffers:
-    """What ground.c needs for one estimator: its constants, and scratch."""
+    """Constants and scratch of ground.c for one estimator."""
 
     def __init__(self, ground: GroundEstimator) -> None:
         grid = ground.grid

@@ -21,7 +21,7 @@ class UndefinedTransitionError(ValueError):
 
 
 class Event(IntEnum):
-    """What can happen to a proposal or to the track that it becomes."""
+    """Events in the life of a proposal and of its track."""
 
     ASSOCIATED = 0
     """Proposal and track found each other."""

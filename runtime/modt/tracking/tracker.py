@@ -34,7 +34,7 @@ STOPPED_MPS, REST_GAIN = 0.5, 0.1
 ENVELOPE_DECAY, MEAN_KDOP_DECAY = 0.98, 0.8
 """Share kept a frame of an extent that is not seen again; greatest weight of the past in a mean k-DOP."""
 CREEPING = 0.1
-"""Of the period: shorter steps are those of a clock that stands."""
+"""Share of the period; a shorter step means a stalled clock."""
 
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
@@ -105,7 +105,7 @@ class Tracker:
         return self.machine.names
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """What the odometry needs to know of the tracks that a frame at this time may continue."""
+        """Facts that the odometry needs of the tracks that a frame at this time may continue."""
         self._forget(stamp_s)
         t = self._tracks
         return StaticTracks(
