@@ -72,14 +72,16 @@ def paced(packets: Iterable[Timed]) -> Iterator[Timed]:
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("port", type=int, metavar="PORT", help="UDP port of this machine")
-    options.add_argument("drive", nargs="?", type=Path, metavar="DRIVE", help="recording (default: a synthetic street)")
+    options.add_argument(
+        "drive", nargs="?", type=Path, metavar="DRIVE", help="recording (default: a synthetic street)"
+    )
     args = options.parse_args()
     recording = stream(Request(path=args.drive, frames=(0, FRAMES)))
     payloads = [payload for _, payload in packets_of(list(recording), MODEL, recording.info.period_s)]
     faulty = Faulty()
     Thread(target=faulty.follow, args=(sys.stdin,), daemon=True).start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to:
-        to.connect(("127.0.0.1", args.port)))
+        to.connect(("127.0.0.1", args.port))
         print("sending", flush=True)
         send(faulty.applied(paced(turn_loop(payloads))), to)
 
