@@ -56,7 +56,7 @@ class Regime:
 
 
 def _network(name: str) -> str:
-    points = "max_points: 400, min_points: 400, batch: 1"
+    points = "max_points: 400, likelihood: network"
     return f"classification: {{model: {name}, {points}}}\nscheduler: {{calls_per_frame: null}}\n"
 
 
