@@ -30,15 +30,6 @@ def padded_points(count: Int, max_points: int, batch: int, min_points: int = 1) 
     return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
 
 
-def padded_each(count: Int, limits: ClassificationConfig) -> Int:
-    """(R,) the same of each proposal."""
-    size = np.maximum(np.minimum(count, limits.max_points), limits.min_points)
-    order = np.argsort(size, kind="stable")
-    last = np.minimum(np.arange(len(size)) // limits.batch * limits.batch + limits.batch, len(size)) - 1
-    size[order] = size[order[last]]
-    return size
-
-
 UNCERTAINTY_WEIGHT, NEARNESS_WEIGHT, NOVELTY_WEIGHT = 0.4, 0.3, 0.3
 """Weights in the worth of a call: of the normalised entropy of the posterior, of exp(-distance / NEARNESS_RANGE_M),
 and of the relative change of points since the last view. They decide who comes first where the budget binds."""
