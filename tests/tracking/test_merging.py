@@ -10,7 +10,7 @@ from modt.config import TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
 from modt.placement import Placement
-from modt.tracking.merging import CarMerging
+from modt.tracking.regrouping import Regrouping
 from tests.tracking.tracking_scenes import (
     EYE,
     Follower,
@@ -30,7 +30,7 @@ POINTS = 80
 
 def merging(tracks, frame):
     """The frame after merging."""
-    return CarMerging().regroup(tracks, frame, Placement(EYE))
+    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 def frame_at_rest(tracks, boxes, *rows):

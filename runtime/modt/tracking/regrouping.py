@@ -30,10 +30,10 @@ from modt.tracking.association import Matches
 from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals
 
-MIN_COVERAGE = 0.65
-"""Least part of a proposal within the known extent of a track, or of an expected object within a proposal."""
+MIN_COVERAGE = 0.6
+"""Least part of a proposal within the known extent of a track, or of the expected track within a proposal."""
 LONGER_M = 0.3
-"""A joined object exceeds the known extent by at most this; a proposal longer by more holds something else too [m]."""
+"""A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m]."""
 PAD_M = 0.2
 """Margin around the expected extent, and above the expected top, within which points are split off [m]."""
 MIN_POINTS, MIN_SHARE = 8, 0.4
@@ -64,7 +64,7 @@ class Pairs:
     Attributes:
         rows, proposals: (K,) of each pair.
         known: (8, K) known extent of the track, as a k-DOP [m].
-        free: (K,) the track may take the proposal, and most of this lies within the known extent.
+        free: (K,) the track may take the proposal, and most of one lies within the other.
     """
 
     rows: Int
@@ -92,6 +92,8 @@ class Regrouping:
             placement: of the frame in the world.
         """
         observations, matches, n = frame.observations, frame.matches, len(frame.proposals)
+        if not n:
+            return frame
         own, owner = np.full(len(tracks), NONE), np.full(n, NONE)  # proposal of each track, track of each proposal
         own[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
         pairs, before = self._pairs(tracks, frame, owner), own.copy()
@@ -105,8 +107,9 @@ class Regrouping:
         own[lost[lost != NONE]] = NONE
         own[rows] = n + np.arange(len(rows))
         changed = ((own != before) | ~measured[:-1]).nonzero()[0]
-        if len(changed):
-            matches = matches.reassigned(tracks, changed, own[changed])
+        if not len(changed) + len(joined):
+            return frame
+        matches = matches.reassigned(tracks, changed, own[changed])
         if not len(joined) + len(rows):
             return Associated(frame.proposals, observations, matches)
         yaw = np.append(frame.proposals.box[:, 6], tracks.box[rows, 6] - yaw_of(placement.T_world_sensor))
@@ -131,18 +134,19 @@ class Regrouping:
 
     def _pairs(self, tracks: TrackTable, frame: Associated, owner: Int) -> Pairs:
         """Pairs of tracks observed twice and proposals that overlap their known extents."""
-        seniority, position = tracks.hits * tracks.points, tracks.x[:, :2].copy()
-        position[frame.matches.rows] = frame.matches.position
-        rows = (tracks.hits > 1).nonzero()[0]
-        rows = rows[(-seniority[rows]).argsort(kind="stable")]
-        known = (tracks.envelope.take(rows, axis=0) + position.take(rows, axis=0) @ DIRECTIONS).T.copy()
+        order = (-tracks.hits * tracks.points).argsort(kind="stable")
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        rows = order[tracks.hits[order] > 1]
+        known = tracks.known_kdops(rows)
         k, part = self._kernels.overlapping_pairs(known, frame.observations.kdop)
-        rows, known = rows[k], known.take(k, axis=1)
+        rows, known, kdop = rows[k], known.take(k, axis=1), frame.observations.kdop.take(part, axis=1)
         other = owner[part]
         a, b = tracks.last_class[rows], tracks.last_class[other]
         one_class = (a == b) | ~(IS_PERSON[a] | IS_PERSON[b])  # background and cars are easily confused
-        free = (other == NONE) | (other == rows) | (seniority[other] < seniority[rows]) & one_class
-        free &= coverage(frame.observations.kdop.take(part, axis=1), known) > MIN_COVERAGE
+        free = (other == NONE) | (other == rows) | (rank[other] > rank[rows]) & one_class
+        within, around = coverage(kdop, known), coverage(tracks.predicted_kdops(rows), kdop)
+        free &= np.maximum(within, around) > MIN_COVERAGE
         return Pairs(rows, part, known, free)
 
     def _regrouped(
@@ -203,7 +207,9 @@ def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int
     k = (joins & ~IS_PERSON[tracks.last_class[pairs.rows]]).nonzero()[0]
     rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(k, axis=1), host[k]
     part = observations.kdop.take(parts, axis=1)
-    person = PART_PERSON.fits(widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts])
+    person = PART_PERSON.fits(
+        widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts]
+    )
     of_car = (owner[parts] != NONE) & car[owner[parts]]
     short = widths(known).max(axis=0, initial=0.0) < MAX_CAR_M
     joins = car[rows] | (short & ~person & ~of_car)

@@ -121,7 +121,7 @@ class Tracker:
         dt_s = self._predict(stamp_s)
         matches = self.association.match(self._tracks, located.observations)
         frame = Associated(proposals, located.observations, matches)
-        if self._extended and len(proposals):  # the paper takes proposals as they are
+        if self._extended:  # the paper takes proposals as they are
             frame = self._regrouping.regroup(self._tracks, frame, located.placement)
         known = self._tracks.box.take(frame.matches.rows, axis=0)
         self._update(frame.matches, frame.observations)

@@ -7,6 +7,7 @@ stage.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -28,7 +29,10 @@ def _ideal_tracks(
     drive: SegmentedDrive, tracking: TrackingConfig, odometry: OdometryConfig, period_s: float
 ) -> tuple[Int, ...]:
     """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
-    return tuple(_tracks(drive, Tracker(tracking, ACCURATE, regroupings=(), period_s=period_s), Odometry(odometry)))
+    tracker = Tracker(
+        replace(tracking, extensions="none"), ACCURATE, period_s=period_s
+    )  # takes proposals as they are
+    return tuple(_tracks(drive, tracker, Odometry(odometry)))
 
 
 def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: Odometry) -> Iterator[Int]:
