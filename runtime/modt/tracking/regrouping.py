@@ -32,6 +32,8 @@ from modt.types import NONE, Bool, Float64, Int, Proposals
 
 MIN_COVERAGE = 0.6
 """Least part of a proposal within the known extent of a track, or of the expected track within a proposal."""
+MIN_PART_COVERAGE = 0.7
+"""Least part of a proposal within the known extent of the track that it is joined with."""
 LONGER_M = 0.3
 """A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m]."""
 PAD_M = 0.2
@@ -64,12 +66,14 @@ class Pairs:
     Attributes:
         rows, proposals: (K,) of each pair.
         known: (8, K) known extent of the track, as a k-DOP [m].
+        within: (K,) part of the proposal that lies within the known extent.
         free: (K,) the track may take the proposal, and most of one lies within the other.
     """
 
     rows: Int
     proposals: Int
     known: Float64
+    within: Float64
     free: Bool
 
 
@@ -147,7 +151,7 @@ class Regrouping:
         free = (other == NONE) | (other == rows) | (rank[other] > rank[rows]) & one_class
         within, around = coverage(kdop, known), coverage(tracks.predicted_kdops(rows), kdop)
         free &= np.maximum(within, around) > MIN_COVERAGE
-        return Pairs(rows, part, known, free)
+        return Pairs(rows, part, known, within, free)
 
     def _regrouped(
         self, frame: Associated, placement: Placement, label: Int, source: Int, renewed: Bool, yaw: Float64
@@ -203,8 +207,9 @@ def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int
     """(P,) proposal into which each is joined, itself where it is not; the most senior track is served first."""
     into, car = np.arange(len(owner)), tracks.last_class == ObjectClass.CAR.value
     host = own[pairs.rows]
-    joins = pairs.free & (host != NONE) & (host != pairs.proposals) & (tracks.hits[pairs.rows] >= ESTABLISHED_HITS)
-    k = (joins & ~IS_PERSON[tracks.last_class[pairs.rows]]).nonzero()[0]
+    joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
+    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & ~IS_PERSON[tracks.last_class[pairs.rows]]
+    k = joins.nonzero()[0]
     rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(k, axis=1), host[k]
     part = observations.kdop.take(parts, axis=1)
     person = PART_PERSON.fits(
