@@ -167,6 +167,7 @@ class Regrouping:
             yaw: (Q,) heading of their boxes [rad, sensor frame].
         """
         old, changed, kernels = frame.proposals, renewed.nonzero()[0], self._kernels
+        # Sixteen bits hold every number of a proposal, and are sorted by radix.
         order, count = label.astype(np.uint16).argsort(kind="stable"), np.bincount(label, minlength=len(source))
         proposals = old.regrouped(old.members.take(order), old.coordinates.take(order, axis=1), count, source)
         runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))

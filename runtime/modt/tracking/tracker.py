@@ -30,8 +30,8 @@ STOPPED_MPS, REST_GAIN = 0.5, 0.1
 """A moving track slower than this has a new rest position; weight of a new position in the rest position."""
 ENVELOPE_DECAY, MEAN_KDOP_DECAY = 0.98, 0.8
 """Share kept a frame of an extent that is not seen again; greatest weight of the past in a mean k-DOP."""
-CREEPING = 0.1
-"""Of the period: shorter steps are those of a clock that stands."""
+MIN_STEP_SHARE = 0.1
+"""A time step shorter than this share of the period means a stalled clock."""
 
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
@@ -175,7 +175,7 @@ class Tracker:
         dt_s = self._lapse_s(stamp_s)
         self._stamp_s = stamp_s
         t = self._tracks
-        creeps = dt_s < CREEPING * self._period_s  # a clock that stands does not keep tracks alive
+        creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
         t.unseen_s += self._period_s if creeps else dt_s
         t.last_class = t.object_class
         x, P = components_first(t.x, t.P)
