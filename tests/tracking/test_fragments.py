@@ -1,55 +1,16 @@
-"""Fragments of one object go to its most senior track."""
+"""The larger part of an object goes to its most senior track; one seen three times does not join parts."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.geometry.kdop import DIRECTIONS
-from modt.tracking.fragments import Reunion, swap_proposals
+from modt.placement import Placement
+from modt.tracking.regrouping import Regrouping
 from modt.types import NONE
-from tests.tracking.tracking_scenes import EYE, Follower, associated, box, frame_of, tracks_at
+from tests.tracking.tracking_scenes import EYE, associated, box, frame_of, tracks_at
 
 BACKGROUND, CAR, PEDESTRIAN = ObjectClass.BACKGROUND, ObjectClass.CAR, ObjectClass.PEDESTRIAN
-
-
-def slow_swap(pairs, proposal, owner):
-    """Proposal of each track after one swap at a time, and the tracks that changed; each track changes once."""
-    proposal, owner, moved, changed = list(proposal), list(owner), set(), set()
-    for older, part in pairs:
-        younger, left = owner[part], proposal[older]
-        if part in moved or older in changed or younger in changed:
-            continue
-        proposal[older], owner[part] = part, older
-        moved |= {part, left}
-        changed.add(older)
-        if younger != NONE:
-            proposal[younger] = left
-            changed.add(younger)
-        if left != NONE:
-            owner[left] = younger
-    return proposal, changed
-
-
-@given(st.data(), st.integers(1, 6), st.integers(1, 6))
-def test_swaps_match_the_slow_reference_and_keep_one_track_a_proposal(data, n_tracks, n_proposals):
-    k = data.draw(st.integers(0, min(n_tracks, n_proposals)))
-    rows = data.draw(st.permutations(range(n_tracks)))[:k]
-    columns = data.draw(st.permutations(range(n_proposals)))[:k]
-    proposal, owner = np.full(n_tracks, NONE), np.full(n_proposals, NONE)
-    proposal[rows], owner[columns] = columns, rows
-    pair = st.tuples(st.integers(0, n_tracks - 1), st.integers(0, n_proposals - 1))
-    pairs = [(older, part) for older, part in data.draw(st.lists(pair, max_size=8)) if owner[part] != older]
-    older, parts = np.array(pairs, np.int64).reshape(-1, 2).T
-    changed, now = swap_proposals(older, parts, proposal, owner)
-    expected, expected_changed = slow_swap(pairs, proposal.tolist(), owner.tolist())
-    assert changed.tolist() == sorted(expected_changed)
-    after = proposal.copy()
-    after[changed] = now
-    assert after.tolist() == expected
-    held = after[after != NONE]
-    assert len(np.unique(held)) == len(held)
 
 
 WHOLE, REAR, FRONT = box(12, 4), box(11.0, 4, l=1.9), box(13.3, 4, l=1.3)
@@ -58,7 +19,7 @@ POST, PERSON = box(12, 4, 0.5, 0.5, 1.7), box(12.3, 4, 0.6, 0.6, 1.7)
 
 def ranked(boxes, *classes, **columns):
     """Tracks of which the first has had most points, and so on."""
-    tracks = tracks_at(boxes, *classes, **columns)
+    tracks = tracks_at(boxes, *classes, **{"hits": 3, **columns})
     tracks.points[:] = 100 * np.arange(len(tracks), 0, -1)
     return tracks
 
@@ -66,7 +27,7 @@ def ranked(boxes, *classes, **columns):
 def reunited(tracks, boxes, rows, points):
     """Proposal of each track after reunite, where the first proposals were matched with the rows given."""
     frame = associated(frame_of(boxes, points=points)[1], rows)
-    matches = Reunion().reunite(tracks, frame.observations, frame.matches)
+    matches = Regrouping().regroup(tracks, frame, Placement(EYE)).matches
     assert len(set(matches.rows.tolist())) == len(matches.rows)
     assert len(set(matches.proposals.tolist())) == len(matches.proposals)
     proposal = np.full(len(tracks), NONE)
@@ -83,7 +44,7 @@ def test_the_senior_track_takes_the_larger_part():
 
 def test_the_track_with_more_points_in_its_life_is_the_senior_one():
     tracks = ranked([WHOLE, FRONT], CAR, CAR)
-    for points, hits, expected in (((10, 90), (5, 5), [0, 1]), ((10, 90), (50, 5), [1, 0])):
+    for points, hits, expected in (((70, 90), (2, 2), [0, 1]), ((70, 90), (3, 2), [1, 0])):
         tracks.points[:], tracks.hits[:] = points, hits
         assert reunited(tracks, [REAR, FRONT], [0, 1], (40, 80))[0] == expected
 
@@ -148,21 +109,3 @@ def test_parts_of_different_classes_are_not_one_object(senior_class, junior_clas
 
 def test_an_empty_frame_is_no_fragment():
     assert reunited(tracks_at([WHOLE], CAR), [], [], 0)[0] == [NONE]
-
-
-def test_a_car_behind_a_pole_keeps_its_track():
-    follower, i = Follower(regroupings=()), 0
-    scenes = [
-        ([[WHOLE]] * 4, 60, 0),
-        ([[REAR, FRONT]], (80, 40), 0),
-        ([[FRONT, REAR]], (80, 40), 0),
-        ([[REAR, FRONT]], (80, 40), 0),
-        ([[box(11.0, 4, l=1.2), box(13.0, 4, l=1.9)]] * 2, (40, 80), 1),
-        ([[WHOLE]], 60, 0),
-    ]
-    for frames, points, larger in scenes:
-        for boxes in frames:
-            follower.follow(*frame_of(boxes, i, EYE, points=points))
-            follower.classify(CAR)
-            i += 1
-        assert follower.tracks.id[follower.tracks.proposal == larger].tolist() == [0]

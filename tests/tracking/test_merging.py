@@ -10,7 +10,7 @@ from modt.config import TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
 from modt.placement import Placement
-from modt.tracking.merging import CarMerging
+from modt.tracking.regrouping import Regrouping
 from tests.tracking.tracking_scenes import (
     EYE,
     Follower,
@@ -30,7 +30,7 @@ POINTS = 80
 
 def merging(tracks, frame):
     """The frame after merging."""
-    return CarMerging().regroup(tracks, frame, Placement(EYE))
+    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 def frame_at_rest(tracks, boxes, *rows):
@@ -232,3 +232,9 @@ def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length
     assert follow(follower, [box(10, 3, length_m)], KNOWN, classes=(object_class,)) == [0]
     envelope = follower.tracks.envelope[0]
     assert envelope[0] + envelope[4] == pytest.approx(known_m, abs=0.25)
+
+
+def test_what_surrounds_the_part_last_seen_and_lies_outside_the_known_extent_is_no_part():
+    tracks, strip = tracks_at([WHOLE], CAR), box(12, 3, 0.2, 1.8, 1.5)
+    tracks.kdop[:] = tracks_at([strip]).kdop
+    assert len(merging(tracks, frame_at_rest(tracks, [strip, box(12.7, 3, 1.5, 1.8, 1.5)], 0)).proposals) == 2

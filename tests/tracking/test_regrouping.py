@@ -1,158 +1,99 @@
-"""One way to regroup proposals: every member stays, boxes and observations follow the points."""
+"""Whatever is regrouped, every point stays in one proposal, and boxes and observations follow the points."""
 
 import dataclasses
-import itertools
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.geometry import corners
+from modt.classes import ObjectClass
 from modt.observations import observe
 from modt.placement import Placement
-from modt.tracking.association import Matches
-from modt.tracking.regrouping import Associated, Grouping, runs_of
-from tests.tracking.tracking_scenes import EYE, box, driving, frame_of
+from modt.tracking.regrouping import Regrouping
+from tests.tracking.tracking_scenes import EYE, associated, box, frame_of, joined, tracks_at
 
-NO_MATCHES = Matches(*(np.zeros((0, *shape)) for shape in ((), (), (2,), (2, 2), (4,))))
-
-
-@dataclasses.dataclass
-class Scene:
-    """A frame, and a grouping of its members drawn at random."""
-
-    points: np.ndarray
-    frame: Associated
-    placement: Placement
-    deskew: np.ndarray
-    label: np.ndarray
-    grouping: Grouping
+POINTS = 60
 
 
 @st.composite
 def scenes(draw):
-    """Proposals of which some members go to other groups; those of an unchanged one keep their order."""
-    n = draw(st.integers(1, 6))
-    frame, proposals = frame_of([box(6 * k + 5, k, yaw=0.3 * k) for k in range(n)], points=draw_counts(draw, n))
-    proposals = dataclasses.replace(
-        proposals,
-        cut=np.arange(n) % 3,
-        reflectance=np.arange(5.0 * n).reshape(n, 5),
-        ground_z_m=-1.0 - np.arange(n),
-    )
-    placement = Placement(driving(draw(st.integers(0, 5))) if draw(st.booleans()) else EYE)
-    deskew = np.random.default_rng(n).uniform(-0.3, 0.3, (n, 2))
-    observations = observe(proposals, placement.T_world_sensor).moved(deskew)
-    label = np.repeat(np.arange(n), proposals.count)
-    for _ in range(draw(st.integers(0, 3))):  # split off some points, or merge one proposal with another
-        host, part = draw(st.integers(0, label.max())), draw(st.integers(0, label.max()))
-        own = np.flatnonzero(label == host)
-        if draw(st.booleans()) and len(own) > 3:
-            label[own[:: draw(st.integers(2, 3))]] = label.max() + 1
+    """Tracks of cars and people, and proposals of cut cars, joined people and what nobody knows."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
+    known, seen, groups = [], [], []
+    for k in range(draw(st.integers(1, 3))):
+        x, kind = 8.0 * k + 8, draw(st.sampled_from(["cut", "touching", "whole"]))
+        first = len(seen)
+        if kind == "touching":
+            known.append(box(x, 2.5, 0.6, 0.6, 1.7, z=-0.85))
+            seen += [known[-1], box(x, 3.1, 6.0, 0.3, 2.5, z=-0.5)]
+            groups.append((first, first + 1))
+        elif kind == "cut":
+            known.append(box(x, 3, 4.2))
+            seen += [box(x - 1.4, 3, 1.4), box(x + 1.1, 3, 2.0)]
+            groups += [(first,), (first + 1,)]
         else:
-            label[label == part] = host
-    label = np.unique(label, return_inverse=True)[1]
-    members = [np.flatnonzero(label == q) for q in range(label.max() + 1)]
-    source = np.array([np.searchsorted(proposals.offsets, m[0], side="right") - 1 for m in members])
-    same = [np.array_equal(m, np.arange(*proposals.offsets[k : k + 2])) for m, k in zip(members, source, strict=True)]
-    changed = np.flatnonzero(~np.array(same))
-    yaw = draw(st.floats(-3, 3))
-    runs = runs_of(np.concatenate(members))
-    grouping = Grouping(runs, np.bincount(label), source, changed, np.full(len(changed), yaw))
-    return Scene(frame.points, Associated(proposals, observations, NO_MATCHES), placement, deskew, label, grouping)
+            known.append(box(x, 3))
+            seen.append(known[-1])
+            groups.append((first,))
+    classes = [ObjectClass.PEDESTRIAN if b[3] < 1 else ObjectClass.CAR for b in known]
+    tracks = tracks_at(known, *classes, points=POINTS)
+    proposals = joined(frame_of(seen, points=POINTS)[1], groups)
+    n = len(groups)
+    proposals = dataclasses.replace(proposals, reflectance=np.arange(5.0 * n).reshape(n, 5), ground_z_m=-np.ones(n))
+    matched = [k for k in range(min(n, len(known))) if draw(st.booleans())]
+    tracks.x[:, :2] += rng.normal(0, 0.05, (len(tracks), 2))
+    return tracks, associated(proposals, matched, matched)
 
 
-def draw_counts(draw, n):
-    return draw(st.lists(st.integers(6, 14), min_size=n, max_size=n))
-
-
-def sorted_rows(xyz):
-    return xyz[np.lexsort(xyz.T)]
+def regrouped(tracks, frame):
+    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 @given(scenes())
 def test_every_member_stays_once_with_its_coordinates(scene):
-    before = scene.frame.proposals
-    after, observations = scene.grouping.apply(scene.frame, scene.placement)
-    np.testing.assert_array_equal(np.sort(after.members), np.sort(before.members))
-    np.testing.assert_array_equal(after.coordinates.T, scene.points[after.members, :3])
-    np.testing.assert_array_equal(after.count, np.bincount(scene.label))
-    np.testing.assert_array_equal(after.label(len(scene.points)), scene.label)
-    np.testing.assert_array_equal(observations.count, after.count)
+    before, after = scene[1].proposals, regrouped(*scene).proposals
+    assert (after.count > 0).all()
+    old, new = before.members.argsort(), after.members.argsort()
+    np.testing.assert_array_equal(before.members[old], after.members[new])
+    np.testing.assert_array_equal(before.coordinates[:, old], after.coordinates[:, new])
 
 
 @given(scenes())
-def test_boxes_hold_their_points_and_centroids_are_their_means(scene):
-    after, _ = scene.grouping.apply(scene.frame, scene.placement)
-    for row in range(len(after)):
-        xyz = scene.points[scene.label == row, :3].astype(np.float64)
-        centre, (length, width, height), yaw = after.box[row, :3], after.box[row, 3:6], after.box[row, 6]
-        assert length >= width
-        c, s = np.cos(yaw), np.sin(yaw)
-        along = (xyz - centre) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-        assert (np.abs(along) <= np.array([length, width, height]) / 2 + 1e-5).all()
-        np.testing.assert_allclose(np.ptp(along, axis=0), [length, width, height], atol=1e-5)  # and no larger
-        np.testing.assert_allclose(after.centroid[row], xyz.mean(axis=0), atol=1e-5)
-    yaw = after.box[scene.grouping.changed, 6] - scene.grouping.yaw
-    np.testing.assert_allclose(np.sin(2 * yaw), 0, atol=1e-9)  # along the heading that was asked for, or across it
+def test_a_track_has_one_proposal_and_a_proposal_one_track(scene):
+    matches = regrouped(*scene).matches
+    assert len(set(matches.rows.tolist())) == len(matches.rows)
+    assert len(set(matches.proposals.tolist())) == len(matches.proposals)
 
 
 @given(scenes())
-def test_what_did_not_change_keeps_its_columns(scene):
-    before, source, n = scene.frame.proposals, scene.grouping.source, len(scene.grouping.source)
-    after, observations = scene.grouping.apply(scene.frame, scene.placement)
-    same = np.setdiff1d(np.arange(n), scene.grouping.changed)
-    np.testing.assert_array_equal(after.box[same], before.box[source[same]])
-    np.testing.assert_array_equal(after.centroid[same], before.centroid[source[same]])
-    np.testing.assert_array_equal(after.cut, before.cut[source])
-    np.testing.assert_array_equal(after.reflectance, before.reflectance[source])
-    np.testing.assert_array_equal(after.ground_z_m, before.ground_z_m[source])
-    for column in dataclasses.fields(observations):
-        old, new = getattr(scene.frame.observations, column.name), getattr(observations, column.name)
-        if column.name == "kdop":
-            old, new = old.T, new.T
-        if column.name != "sensor_xy":
-            np.testing.assert_array_equal(new[same], old[source[same]], err_msg=column.name)
-
-
-@given(scenes())
-def test_observations_of_changed_proposals_are_deskewed_at_their_positions_and_others_kept(scene):
-    after, observations = scene.grouping.apply(scene.frame, scene.placement)
-    fresh = observe(after, scene.placement.T_world_sensor)
-    step = scene.deskew[scene.grouping.source]
-    step[scene.grouping.changed] = scene.placement.deskew(fresh.centroid[scene.grouping.changed])
-    expected = fresh.moved(step)
-    for column in dataclasses.fields(expected):
-        found, want = getattr(observations, column.name), getattr(expected, column.name)
-        np.testing.assert_allclose(found, want, atol=1e-6, err_msg=column.name)
+def test_what_did_not_change_keeps_its_columns_and_boxes_enclose_what_did(scene):
+    tracks, frame = scene
+    after = regrouped(tracks, frame)
+    fresh = observe(after.proposals, EYE)
+    groups = [part.tolist() for part in np.split(frame.proposals.members, frame.proposals.offsets[1:-1])]
+    for q, (a, b) in enumerate(zip(after.proposals.offsets, after.proposals.offsets[1:], strict=False)):
+        members = after.proposals.members[a:b].tolist()
+        if members in groups:
+            p = groups.index(members)
+            for column in ("box", "centroid", "reflectance", "ground_z_m"):
+                np.testing.assert_array_equal(
+                    getattr(after.proposals, column)[q], getattr(frame.proposals, column)[p], err_msg=column
+                )
+        else:
+            xyz = after.proposals.coordinates[:, a:b]
+            np.testing.assert_allclose(after.proposals.centroid[q], xyz.mean(axis=1), atol=1e-5)
+            height = (after.proposals.box[q, 2] - after.proposals.box[q, 5] / 2, xyz[2].min())
+            np.testing.assert_allclose(*height, atol=1e-5)
+            assert after.observations.count[q] == b - a
+    whole = ~np.isnan(after.proposals.reflectance[:, 0])
+    np.testing.assert_allclose(after.observations.kdop[:, whole], fresh.kdop[:, whole], atol=1e-5)
 
 
 @given(scenes())
 def test_the_frame_before_is_left_as_it_was(scene):
-    def columns():
-        proposals, observations = scene.frame.proposals, scene.frame.observations
-        return [proposals.box, proposals.centroid, observations.box, observations.kdop]
-
-    before = [column.copy() for column in columns()]
-    scene.grouping.apply(scene.frame, scene.placement)
-    for was, column in zip(before, columns(), strict=True):
+    tracks, frame = scene
+    columns = (frame.proposals.box, frame.proposals.centroid, frame.observations.box, frame.observations.kdop)
+    before = [column.copy() for column in columns]
+    regrouped(tracks, frame)
+    for was, column in zip(before, columns, strict=True):
         np.testing.assert_array_equal(column, was)
-
-
-@given(st.lists(st.integers(1, 5), min_size=1, max_size=7), st.data())
-def test_runs_of_proposals_are_their_members_in_order_in_few_runs(counts, data):
-    offsets, order = np.cumsum([0, *counts]), np.array(data.draw(st.permutations(range(len(counts)))), np.int64)
-    runs = offsets.take(runs_of(order)).T.tolist()
-    rows = [row for run in runs for row in range(*run)]
-    assert rows == [row for k in order for row in range(*offsets[k : k + 2])]
-    assert all(end != begin for (_, end), (begin, _) in itertools.pairwise(runs))
-
-
-def test_corners_of_a_regrouped_box_enclose_both_parts():
-    _, proposals = frame_of([box(10, 0, 2.0), box(13, 0, 2.0)])
-    frame = Associated(proposals, observe(proposals, EYE), NO_MATCHES)
-    zero = np.array([0])
-    grouping = Grouping(np.array([[0], [120]]), np.array([120]), zero, zero, np.zeros(1))
-    after, _ = grouping.apply(frame, Placement(EYE))
-    np.testing.assert_allclose(corners(after.box)[0].min(axis=0), [9.0, -0.9], atol=1e-5)
-    np.testing.assert_allclose(corners(after.box)[0].max(axis=0), [14.0, 0.9], atol=1e-5)

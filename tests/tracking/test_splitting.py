@@ -12,7 +12,7 @@ from modt.config import TrackingConfig
 from modt.geometry import inverse, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
 from modt.placement import Placement
-from modt.tracking.splitting import ExpectedSplitting
+from modt.tracking.regrouping import Regrouping
 from tests.odometry.test_deskew import skewed
 from tests.tracking.tracking_scenes import (
     EYE,
@@ -41,7 +41,7 @@ def wall_with(*people, points=PERSON_POINTS, wall=WALL):
 def split(tracks, proposals, rows=(), matched=None):
     """The frame after splitting."""
     frame = associated(proposals, rows, matched)
-    return ExpectedSplitting().regroup(tracks, frame, Placement(EYE))
+    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 def tracks_of_person_and_wall(object_class=PEDESTRIAN, person=PERSON, **columns):

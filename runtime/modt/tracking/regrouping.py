@@ -1,18 +1,47 @@
-"""Regrouping of a frame's proposals by what the tracks know: objects split off, parts merged."""
+"""Regrouping: which proposals, and which part of a proposal, make up the object of each track.
+
+Segmentation cuts a car at the pole before it, and joins a person to the wall that is touched. The tracks know better.
+Pairs of a track and a proposal within its known extent are listed once, and serve three steps:
+
+- *Take*: a track takes the larger part of its object from a junior track, which gets the other part.
+- *Join*: parts of a car, or of background that may be one, are joined to the proposal of its track.
+- *Split*: the track of an object that is expected within a longer proposal takes the points where it is expected.
+
+The senior of two tracks is that of which more points were seen, not the older one: a fragment begins in the frame in
+which its car does, and a bush is older than the car that passes it.
+
+The risk: a person who steps close to a parked car, and is not classified yet, becomes a part of it.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_SIZE_M, PART_PERSON
+from modt.classes import ObjectClass
+from modt.geometry import yaw_of
+from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
-from modt.tracking.track_table import TrackTable
-from modt.types import Float64, Int, Proposals
+from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
+from modt.types import NONE, Bool, Float64, Int, Proposals
+
+MIN_COVERAGE = 0.6
+"""Least part of a proposal within the known extent of a track, or of the expected track within a proposal."""
+MIN_PART_COVERAGE = 0.7
+"""Least part of a proposal within the known extent of the track that it is joined with."""
+LONGER_M = 0.3
+"""A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m]."""
+PAD_M = 0.2
+"""Margin around the expected extent, and above the expected top, within which points are split off [m]."""
+MIN_POINTS, MIN_SHARE = 8, 0.4
+"""Least number of points that are split off and that remain; least share of the points last seen."""
+MAX_DROP_M = 0.4
+"""What is split off reaches at most this far below the expected top [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +59,33 @@ class Associated:
     matches: Matches
 
 
-class Regrouping(Protocol):
-    """Corrects the grouping of a frame's points."""
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """Tracks and the proposals that overlap their known extents, by falling seniority of the tracks.
+
+    Attributes:
+        rows, proposals: (K,) of each pair.
+        known: (8, K) known extent of the track, as a k-DOP [m].
+        within: (K,) part of the proposal that lies within the known extent.
+        free: (K,) the track may take the proposal, and most of one lies within the other.
+    """
+
+    rows: Int
+    proposals: Int
+    known: Float64
+    within: Float64
+    free: Bool
+
+
+class Regrouping:
+    """Corrects the grouping of a frame's points by what the tracks know.
+
+    Args:
+        kernels: passes over points and pairs.
+    """
+
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self._kernels = kernels
 
     def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
         """The frame in a better grouping; every point stays in one proposal.
@@ -41,50 +95,200 @@ class Regrouping(Protocol):
             frame: proposals, observations and matches.
             placement: of the frame in the world.
         """
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Grouping:
-    """How P proposals become Q.
-
-    Attributes:
-        runs: (2, R) of members in their new order, as for `modt.types.copy_runs`.
-        count: (Q,) members of each.
-        source: (Q,) proposal whose columns each takes over.
-        changed: (C,) those of the Q whose members changed.
-        yaw: (C,) heading of their boxes [rad, sensor frame].
-    """
-
-    runs: Int
-    count: Int
-    source: Int
-    changed: Int
-    yaw: Float64
-
-    def apply(
-        self, frame: Associated, placement: Placement, kernels: GeometryKernels = NUMPY_GEOMETRY
-    ) -> tuple[Proposals, Observations]:
-        """Proposals and observations in the new grouping; boxes and k-DOPs of what changed come from its points."""
-        old, changed = frame.proposals, self.changed
-        proposals = old.regrouped(
-            *kernels.copy_runs(old.members, old.coordinates, self.runs), self.count, self.source
+        observations, matches, n = frame.observations, frame.matches, len(frame.proposals)
+        if not n:
+            return frame
+        own, owner = np.full(len(tracks), NONE), np.full(n, NONE)  # proposal of each track, track of each proposal
+        own[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
+        pairs, before = self._pairs(tracks, frame, owner), own.copy()
+        _take_larger(tracks, observations, pairs, own, owner)
+        into = _join(tracks, observations, pairs, own, owner)
+        joined = (into != np.arange(n)).nonzero()[0]
+        rows, hosts, piece = _split(tracks, frame, placement, pairs, own)
+        measured = np.ones(len(tracks) + 1, np.bool_)  # the last is that of NONE
+        measured[owner[hosts]] = False
+        lost = owner[joined]
+        own[lost[lost != NONE]] = NONE
+        own[rows] = n + np.arange(len(rows))
+        changed = ((own != before) | ~measured[:-1]).nonzero()[0]
+        if not len(changed) + len(joined):
+            return frame
+        matches = matches.reassigned(tracks, changed, own[changed])
+        if not len(joined) + len(rows):
+            return Associated(frame.proposals, observations, matches)
+        yaw = np.append(frame.proposals.box[:, 6], tracks.box[rows, 6] - yaw_of(placement.T_world_sensor))
+        whole = into[joined]
+        yaw[whole] = tracks.box[owner[whole], 6] - yaw_of(placement.T_world_sensor)  # a part may lie across the car
+        source, into = np.append(np.arange(n), hosts), np.append(into, np.arange(n, n + len(rows)))
+        kept = into == np.arange(len(into))
+        number = (kept.cumsum() - 1)[into]
+        renewed = np.zeros(len(into), np.bool_)
+        renewed[whole] = renewed[hosts] = renewed[n:] = True
+        label = number.take(piece)
+        proposals, observations = self._regrouped(frame, placement, label, source[kept], renewed[kept], yaw[kept])
+        new = number[n:]
+        if proposals.reflectance is not None:
+            proposals.reflectance[new] = np.nan
+        # A piece shows nothing new of its track, least of all where too much was taken.
+        observations.kdop[:, new] = tracks.predicted_kdops(rows)
+        observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
+        return Associated(
+            proposals, observations, matches.take(np.arange(len(matches.rows)), number[matches.proposals])
         )
+
+    def _pairs(self, tracks: TrackTable, frame: Associated, owner: Int) -> Pairs:
+        """Pairs of tracks observed twice and proposals that overlap their known extents."""
+        order = (-tracks.hits * tracks.points).argsort(kind="stable")
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        rows = order[tracks.hits[order] > 1]
+        known = tracks.known_kdops(rows)
+        k, part = self._kernels.overlapping_pairs(known, frame.observations.kdop)
+        rows, known, kdop = rows[k], known.take(k, axis=1), frame.observations.kdop.take(part, axis=1)
+        other = owner[part]
+        a, b = tracks.last_class[rows], tracks.last_class[other]
+        one_class = (a == b) | ~(IS_PERSON[a] | IS_PERSON[b])  # background and cars are easily confused
+        free = (other == NONE) | (other == rows) | (rank[other] > rank[rows]) & one_class
+        within, around = coverage(kdop, known), coverage(tracks.predicted_kdops(rows), kdop)
+        free &= np.maximum(within, around) > MIN_COVERAGE
+        return Pairs(rows, part, known, within, free)
+
+    def _regrouped(
+        self, frame: Associated, placement: Placement, label: Int, source: Int, renewed: Bool, yaw: Float64
+    ) -> tuple[Proposals, Observations]:
+        """Proposals and observations in another grouping.
+
+        Args:
+            frame: the grouping before.
+            placement: of the frame in the world.
+            label: (K,) proposal of each member.
+            source: (Q,) former proposal whose columns each takes over.
+            renewed: (Q,) those whose members changed: box and k-DOP come from their points.
+            yaw: (Q,) heading of their boxes [rad, sensor frame].
+        """
+        old, changed, kernels = frame.proposals, renewed.nonzero()[0], self._kernels
+        # Sixteen bits hold every number of a proposal, and are sorted by radix.
+        order, count = label.astype(np.uint16).argsort(kind="stable"), np.bincount(label, minlength=len(source))
+        proposals = old.regrouped(old.members.take(order), old.coordinates.take(order, axis=1), count, source)
         runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
         copied = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
-        few = proposals.regrouped(*copied, self.count[changed], changed)
-        few.box[:] = kernels.upright_boxes(few.coordinates, few.offsets, self.yaw)
+        few = proposals.regrouped(*copied, count[changed], changed)
+        few.box[:] = kernels.upright_boxes(few.coordinates, few.offsets, yaw[changed])
         few.centroid[:] = (kernels.group_sums(few.coordinates, few.offsets) / few.count).T
         proposals.box[changed], proposals.centroid[changed] = few.box, few.centroid
-        observations = frame.observations.take(self.source)
+        observations = frame.observations.take(source)
         observed = observe(few, placement.T_world_sensor, kernels)
         observations.put(changed, observed.moved(placement.deskew(observed.centroid)))
         return proposals, observations
 
 
-def runs_of(rows: Int) -> Int:
-    """(2, R) runs of consecutive numbers among (n,) rows, as for `modt.types.copy_runs`."""
-    begin, end = np.ones((2, len(rows)), np.bool_)
-    np.not_equal(rows[1:], rows[:-1] + 1, out=begin[1:])
-    end[:-1] = begin[1:]
-    return np.array((rows[begin], rows[end] + 1))
+def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> None:
+    """Let senior tracks take larger parts of their objects: writes own (M,) and owner (P,), each track once."""
+    size = np.where(own == NONE, 0, observations.count[own])
+    larger = (pairs.free & (observations.count[pairs.proposals] > size[pairs.rows])).nonzero()[0]
+    rows, parts = pairs.rows[larger], pairs.proposals[larger]
+    box = tracks.box.take(rows, axis=0)
+    box[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
+    fits = _fit_together(box, observations.box.take(parts, axis=0), MAX_SIZE_M[tracks.last_class[rows]])
+    changed: set[int] = set()
+    for row, part in zip(rows[fits].tolist(), parts[fits].tolist(), strict=True):
+        former, left = int(owner[part]), int(own[row])
+        if row in changed or former in changed:
+            continue
+        own[row], owner[part] = part, row
+        changed.add(row)
+        if former != NONE:
+            own[former] = left
+            changed.add(former)
+        if left != NONE:
+            owner[left] = former
+
+
+def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> Int:
+    """(P,) proposal into which each is joined, itself where it is not; the most senior track is served first."""
+    into, car = np.arange(len(owner)), tracks.last_class == ObjectClass.CAR.value
+    host = own[pairs.rows]
+    joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
+    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & ~IS_PERSON[tracks.last_class[pairs.rows]]
+    k = joins.nonzero()[0]
+    rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(k, axis=1), host[k]
+    part = observations.kdop.take(parts, axis=1)
+    person = PART_PERSON.fits(
+        widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts]
+    )
+    of_car = (owner[parts] != NONE) & car[owner[parts]]
+    short = widths(known).max(axis=0, initial=0.0) < MAX_CAR_M
+    joins = car[rows] | (short & ~person & ~of_car)
+    joins &= (widths(np.maximum(part, observations.kdop.take(host, axis=1))) < widths(known) + LONGER_M).all(axis=0)
+    into[parts[joins][::-1]] = host[joins][::-1]  # the most senior is written last
+    whole = into[(into != np.arange(len(into)))]
+    into[whole] = whole  # a proposal that gains a part is no part itself
+    return into
+
+
+def _split(
+    tracks: TrackTable, frame: Associated, placement: Placement, pairs: Pairs, own: Int
+) -> tuple[Int, Int, Int]:
+    """Objects that are split off longer proposals.
+
+    Returns:
+        rows: (S,) tracks of objects that were observed a frame ago, and have no proposal now.
+        hosts: (S,) proposal off which each is split.
+        label: (K,) proposal of each member of the frame; those split off follow the others.
+    """
+    proposals, observations, n = frame.proposals, frame.observations, len(frame.proposals)
+    label = np.arange(n).repeat(proposals.count)
+    lost = (own == NONE) & (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
+    lost &= tracks.last_class != ObjectClass.BACKGROUND.value
+    k = lost[pairs.rows].nonzero()[0]
+    rows, hosts = pairs.rows[k], pairs.proposals[k]
+    expected, kdop = tracks.predicted_kdops(rows), observations.kdop.take(hosts, axis=1)
+    covered = coverage(expected, kdop)
+    longer = widths(kdop).max(axis=0, initial=0.0) > widths(expected).max(axis=0, initial=0.0) + LONGER_M
+    order = covered.argsort(kind="stable")
+    order = order[(longer & (covered > MIN_COVERAGE))[order]]
+    best = np.full(len(tracks), NONE)
+    best[rows[order]] = hosts[order]  # the last written covers most
+    rows = (best != NONE).nonzero()[0]
+    if not len(rows):
+        return rows, rows, label
+    hosts, top = best[rows], tracks.top[rows]
+    count = proposals.count[hosts]
+    pair = np.arange(len(rows)).repeat(count)
+    member = np.arange(len(pair)) + (proposals.offsets[hosts + 1] - count.cumsum()).repeat(count)
+    R, t = placement.T_world_sensor[:3, :3].astype(np.float32), placement.T_world_sensor[:3, 3:]
+    xyz = R @ proposals.coordinates.take(member, axis=1) + t
+    below = (xyz[2] < top[pair] + PAD_M).nonzero()[0]
+    member, pair, xyz = member[below], pair[below], xyz.take(below, axis=1)
+    xy = xyz[:2] + placement.deskew(tracks.x.take(rows, axis=0)[:, :2]).T.take(pair, axis=1)
+    within = (DIRECTIONS.T @ xy <= (tracks.predicted_kdops(rows) + PAD_M).take(pair, axis=1)).all(axis=0)
+    member, pair, z = member[within], pair[within], xyz[2, within]
+    label[member[::-1]] = n + pair[::-1]  # the first of two that expect a point takes it
+    mine = label[member] == n + pair
+    member, pair = member[mine], pair[mine]
+    size, highest = np.bincount(pair, minlength=len(rows)), np.full(len(rows), -np.inf)
+    np.maximum.at(highest, pair, z[mine])
+    taken = np.bincount(hosts, size, n)
+    splits = (size >= np.maximum(MIN_POINTS, MIN_SHARE * tracks.points[rows])) & (highest >= top - MAX_DROP_M)
+    splits &= count - taken[hosts] >= MIN_POINTS
+    label[member] = np.where(splits, n + splits.cumsum() - 1, hosts)[pair]
+    return rows[splits], hosts[splits], label
+
+
+def _fit_together(a: Float64, b: Float64, size: Float64) -> Bool:
+    """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer."""
+    yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
+    c, s = np.cos(yaw), np.sin(yaw)
+    x, y = (b[:, :2] - a[:, :2]).T
+    offset = np.array((x * c + y * s, y * c - x * s))
+    half_a, half_b = (_half_widths(box, yaw) for box in (a, b))
+    span = np.maximum(half_a, offset + half_b) - np.minimum(-half_a, offset - half_b)
+    fit: Bool = (np.maximum(*span) < size[:, 0]) & (np.minimum(*span) < size[:, 1])
+    return fit
+
+
+def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
+    """(2, k) half extent of each box (k, 7) along a heading yaw and across it [m]."""
+    (length, width), turn = boxes[:, 3:5].T / 2, yaw - boxes[:, 6]
+    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    return np.array((length * c + width * s, length * s + width * c))

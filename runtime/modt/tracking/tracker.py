@@ -13,12 +13,9 @@ from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
-from modt.tracking.fragments import Reunion
 from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
-from modt.tracking.merging import CarMerging
 from modt.tracking.regrouping import Associated, Regrouping
-from modt.tracking.splitting import ExpectedSplitting
 from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks
@@ -33,8 +30,8 @@ STOPPED_MPS, REST_GAIN = 0.5, 0.1
 """A moving track slower than this has a new rest position; weight of a new position in the rest position."""
 ENVELOPE_DECAY, MEAN_KDOP_DECAY = 0.98, 0.8
 """Share kept a frame of an extent that is not seen again; greatest weight of the past in a mean k-DOP."""
-CREEPING = 0.1
-"""Share of the period; a shorter step means a stalled clock."""
+MIN_STEP_SHARE = 0.1
+"""A time step shorter than this share of the period means a stalled clock."""
 
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
@@ -46,11 +43,6 @@ def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOM
     return KdopAssociation(kernels)
 
 
-def regroupings_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> tuple[Regrouping, ...]:
-    """The regroupings of a configuration; the paper takes proposals as they are."""
-    return (ExpectedSplitting(kernels), CarMerging(kernels)) if config.extensions == "all" else ()
-
-
 class Tracker:
     """Follows every proposal from frame to frame.
 
@@ -58,7 +50,6 @@ class Tracker:
         config: its parameters.
         machine: the table that drives the states.
         association: how proposals find their tracks; by default as the configuration says.
-        regroupings: how proposals are corrected; by default as the configuration says.
         period_s: of the sensor; what the configuration gives in frames of coasting is this many times as long.
         kernels: passes over points and pairs.
     """
@@ -68,17 +59,15 @@ class Tracker:
         config: TrackingConfig,
         machine: StateMachine,
         association: Association | None = None,
-        regroupings: tuple[Regrouping, ...] | None = None,
         period_s: float = 0.1,
         kernels: GeometryKernels = NUMPY_GEOMETRY,
     ) -> None:
         self.config, self.machine = config, machine
         self.association = association_of(config, kernels) if association is None else association
-        self.regroupings = regroupings_of(config, kernels) if regroupings is None else regroupings
         self._extended = config.extensions == "all"
         self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0)
         self._period_s = period_s
-        self._reunion = Reunion(kernels)
+        self._regrouping = Regrouping(kernels)
         position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
         self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
         self._tracks = TrackTable.blank()
@@ -131,11 +120,9 @@ class Tracker:
         self._forget(stamp_s)
         dt_s = self._predict(stamp_s)
         matches = self.association.match(self._tracks, located.observations)
-        if self._extended:
-            matches = self._reunion.reunite(self._tracks, located.observations, matches)
         frame = Associated(proposals, located.observations, matches)
-        for regrouping in self.regroupings:
-            frame = regrouping.regroup(self._tracks, frame, located.placement)
+        if self._extended:  # the paper takes proposals as they are
+            frame = self._regrouping.regroup(self._tracks, frame, located.placement)
         known = self._tracks.box.take(frame.matches.rows, axis=0)
         self._update(frame.matches, frame.observations)
         self._tracks.observe_motion(frame.matches.rows, dt_s)
@@ -188,7 +175,7 @@ class Tracker:
         dt_s = self._lapse_s(stamp_s)
         self._stamp_s = stamp_s
         t = self._tracks
-        creeps = dt_s < CREEPING * self._period_s  # a clock that stands does not keep tracks alive
+        creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
         t.unseen_s += self._period_s if creeps else dt_s
         t.last_class = t.object_class
         x, P = components_first(t.x, t.P)

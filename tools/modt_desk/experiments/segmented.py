@@ -102,7 +102,8 @@ def within(proposals: Proposals, range_m: float) -> Bool:
 @lru_cache(maxsize=2)
 def _ideal_tracks(drive: SegmentedDrive, tracking: TrackingConfig, period_s: float) -> tuple[Int, ...]:
     """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
-    return tuple(_tracks(drive, Tracker(tracking, ACCURATE, regroupings=(), period_s=period_s), Odometry()))
+    tracker = Tracker(replace(tracking, extensions="none"), ACCURATE, period_s=period_s)  # proposals as they are
+    return tuple(_tracks(drive, tracker, Odometry()))
 
 
 def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: Odometry) -> Iterator[Int]:
