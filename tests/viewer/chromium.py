@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.browser import Browser, Tab, browser, find
+from tests.viewer.browser import Browser, Tab, browser, find
 
 RECORD = """
 const drawn = [];
