@@ -41,7 +41,7 @@ PAD_M = 0.2
 MIN_POINTS, MIN_SHARE = 8, 0.4
 """Least number of points that are split off and that remain; least share of the points last seen."""
 MAX_DROP_M = 0.4
-"""What is split off reaches at most this far below the expected top [m]."""
+"""Greatest distance of the top of a part below the expected top [m]."""
 
 
 @dataclass(frozen=True, slots=True)
