@@ -19,16 +19,6 @@ def crops_parser(description: str | None, seed: int) -> ArgumentParser:
     return options
 
 
-def training_parser(description: str | None) -> ArgumentParser:
-    """Options of a training tool."""
-    options = parser(description)
-    options.add_argument("out", type=Path, help="folder to write to")
-    options.add_argument("crops", type=Path, nargs="+", help="data sets of crops (.npz)")
-    options.add_argument("--folds", type=int, default=3, help="of the cross-validation (default: %(default)s)")
-    options.add_argument("--seed", type=int, default=1)
-    return options
-
-
 def make_torch_deterministic() -> None:
     """One thread, deterministic algorithms."""
     import torch

@@ -14,7 +14,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-from modt.config.profile import REFLECTANCE_SCALES
 from tools.options import parser
 from tools.train.build_crops import add_sources
 
@@ -42,25 +41,18 @@ def run(name: str, *arguments: str | Path | int) -> None:
     subprocess.run(command, check=True)
 
 
-def build(
-    folder: Path, crops: list[Path], near: list[Path], out: Path, options: list[str], data: str, licence: str
-) -> None:
-    """Train and export a model and the network beside it for what the view cuts, with their cards.
+def build(crops: list[Path], near: list[Path], out: Path, steps: int, data: str, licence: str) -> None:
+    """Train a model and the network beside it for what the view cuts, with their cards.
 
     Args:
-        folder: for the trained weights.
         crops: data sets.
         near: two data sets of build_near_crops, one to train on and one for the card.
         out: the model.
-        options: of train_pointnet.
+        steps: of each network.
         data: description of the data, for the card.
         licence: for the card.
     """
-    run("train_pointnet", folder, *crops, *options)
-    run("train_box_classifier", folder, *crops)
-    for sensor in REFLECTANCE_SCALES:
-        run("train_reflectance_classifier", folder, *crops, "--sensor", sensor)
-    run("export_pointnet", folder, out, "--data", data, "--licence", licence)
+    run("train_pointnet", out, *crops, "--steps", steps, "--data", data, "--licence", licence)
     options = ["--steps", str(NEAR_STEPS), "--licence", licence]
     beside = out.with_stem(f"{out.stem}-near")
     run("train_near", out, beside, *options, "--near", near[0], "--held", near[1], "--crops", *crops)
@@ -68,7 +60,7 @@ def build(
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("work", type=Path, help="folder for crops and trained weights")
+    options.add_argument("work", type=Path, help="folder for crops")
     options.add_argument("--steps", type=int, default=24000, help="of each network (default: %(default)s)")
     add_sources(options)
     args = options.parse_args()
@@ -77,7 +69,6 @@ def main() -> None:
     near = [args.work / f"near-{seed}.npz" for seed in NEAR_WORLDS]
     for path, (seed, worlds) in zip(near, NEAR_WORLDS.items(), strict=True):
         run("build_near_crops", path, "--worlds", worlds, "--seed", seed)
-    steps = ["--steps", str(args.steps)]
     if args.kitti:
         run("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
         labels = args.kitti / "object" / "training_all_labels"
@@ -89,20 +80,12 @@ def main() -> None:
         crops, data = [own, real, placed] if args.kitti else [own, free], f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA
-        build(args.work / "scans", crops, near, args.work / "pointnet-scans.onnx", steps, data, licence)
+        build(crops, near, args.work / "pointnet-scans.onnx", args.steps, data, licence)
         return
     licence = "Apache-2.0: free for any use"
-    build(args.work / "synthetic", [free], near, MODELS / "pointnet-synthetic.onnx", steps, SYNTHETIC_DATA, licence)
+    build([free], near, MODELS / "pointnet-synthetic.onnx", args.steps, SYNTHETIC_DATA, licence)
     if args.kitti:
-        build(
-            args.work / "kitti",
-            [real, placed],
-            near,
-            MODELS / "pointnet-kitti.onnx",
-            steps,
-            KITTI_DATA,
-            KITTI_LICENCE,
-        )
+        build([real, placed], near, MODELS / "pointnet-kitti.onnx", args.steps, KITTI_DATA, KITTI_LICENCE)
 
 
 if __name__ == "__main__":

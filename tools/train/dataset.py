@@ -20,6 +20,8 @@ SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
 """Variants of crops: real scans under the default segmentation; real scans under other cell sizes; real scans with
 pasted objects; synthetic sweeps. All but the first are for training alone."""
 
+FOLDS, SEED = 3, 1
+"""Folds of the cross-validation, and seed of the first one and of the training on all crops."""
 NOT_CONCATENATED = ("offsets", "provenance", "truth_row")
 
 

@@ -1,9 +1,4 @@
-"""Export trained weights to ONNX, with a card (extra [train]).
-
-    python -m tools.train.export_pointnet TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
-
-TRAINED_DIR holds the output of train_pointnet, train_box_classifier and, for any number of sensors,
-train_reflectance_classifier. The layers of the box and the reflectance classifiers go to the model's metadata.
+"""Models in ONNX, each with its card; the layers of the box and the reflectance classifiers are its metadata.
 
 The maximum over points commutes with adding a bias and with ReLU, so the exported graph applies both after it, to one
 row instead of one for each point. Up to there the points are columns: ONNX Runtime finds a maximum along rows five
@@ -18,16 +13,18 @@ from pathlib import Path
 from typing import Any
 
 import onnx
+from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from modt.classes import CLASS_NAMES
 from modt.classification import box_classifier, reflectance_classifier
+from modt.classification.box_classifier import Layers
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.classification.pool import PoolWeights
-from tools.options import parser
 from tools.train.scores import MIN_OBJECT_POINTS, PRECISIONS
-from tools.train.weights import Layer, load_layers
 
+Layer = tuple[NDArray[Any], NDArray[Any]]
+"""(in, out) weight and (out,) bias."""
 N_SHARED = 3
 OPSET, IR = 17, 8
 
@@ -183,34 +180,38 @@ def _threshold_table(ruled_out: list[dict[str, Any]]) -> list[str]:
     return [f"| | {' | '.join(CLASS_NAMES)} |", "|---|" + "---|" * len(CLASS_NAMES), *rows, ""]
 
 
-def main() -> None:
-    options = parser(__doc__)
-    options.add_argument("trained", type=Path, help="folder written by tools.train.train_pointnet")
-    options.add_argument("out", type=Path, help="model to write (.onnx), with its card beside it (.md)")
-    options.add_argument("--data", required=True, help="description of the training data, for the card")
-    options.add_argument("--licence", required=True)
-    args = options.parse_args()
-    network = graph(load_layers(args.trained / "weights.npz"))
-    report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
-    report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
+def export(
+    out: Path,
+    layers: list[Layer],
+    boxes: Layers,
+    reflectance: dict[str, Layers],
+    report: dict[str, Any],
+    data: str,
+    licence: str,
+) -> None:
+    """Write a model (.onnx), and its card beside it (.md).
+
+    Args:
+        out: the model.
+        layers: of the network.
+        boxes: of the box classifier.
+        reflectance: of the reflectance classifier of each sensor.
+        report: facts of the training; those of the box and of each reflectance classifier under the names of both.
+        data: description of the training data, for the card.
+        licence: for the card.
+    """
+    network = graph(layers)
     metadata = {CLASS_FREQUENCY_KEY: json.dumps(report["class_frequency"])}
-    paths = sorted(args.trained.glob("reflectance-*.json"))
-    report["reflectance"] = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
-    classifiers = {
-        told["sensor"]: (load_layers(path.with_suffix(".npz")), PoolWeights.from_dict(told["weights"]))
-        for path, told in zip(paths, report["reflectance"], strict=True)
-    }
-    if classifiers:
-        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(classifiers)
+    weights = {told["sensor"]: PoolWeights.from_dict(told["weights"]) for told in report["reflectance"]}
+    if reflectance:
+        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
+            {sensor: (own, weights[sensor]) for sensor, own in reflectance.items()}
+        )
     metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(
-        load_layers(args.trained / "boxes.npz"), PoolWeights.from_dict(report["boxes"]["weights"])
+        boxes, PoolWeights.from_dict(report["boxes"]["weights"])
     )
     helper.set_model_props(network, metadata)
     model = network.SerializeToString(deterministic=True)
-    args.out.write_bytes(model)
-    text = card(args.out.stem, hashlib.sha256(model).hexdigest(), report, args.data, args.licence)
-    args.out.with_suffix(".md").write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    out.write_bytes(model)
+    text = card(out.stem, hashlib.sha256(model).hexdigest(), report, data, licence)
+    out.with_suffix(".md").write_text(text, encoding="utf-8")

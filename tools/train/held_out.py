@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -111,11 +110,3 @@ def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> H
         mine = np.flatnonzero(fold[data.drive[valid.rows]] == i)
         out[mine] = model(valid.rows[mine])
     return HeldOut(valid, out, fit_calibration(out, valid.label, valid.weight))
-
-
-def load_network(folder: Path, data: Dataset) -> Float64:
-    """(R, 4) out-of-fold probabilities of the PointNet, written by tools.train.train_pointnet for the same crops."""
-    with np.load(folder / "held_out.npz") as file:
-        assert file["crops"].tolist() == data.sha256, "held_out.npz belongs to other crops"
-        probability: Float64 = file["probability"]
-    return probability

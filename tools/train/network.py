@@ -14,7 +14,7 @@ import torch
 from scipy.sparse import csr_matrix
 from torch import Tensor, nn
 
-from tools.train.weights import Layer
+from tools.train.export_pointnet import Layer
 
 SHARED = (3, 32, 64, 512)
 HEAD = (512, 256, 128, 4)

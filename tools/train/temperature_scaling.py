@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
 from modt.classes import N_CLASSES
+from modt.classification.box_classifier import Layers, Weights
 from modt.types import Float64, Int
 
 
@@ -31,18 +31,11 @@ class Calibration:
         probability: Float64 = softmax(base + logits / self.temperature + self.offset, axis=1)
         return probability
 
-    def fold_into(self, last: tuple[NDArray[Any], NDArray[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Weight and bias of the last layer with the calibration folded in, float32."""
-        weight, bias = last
-        return (
-            (weight / self.temperature).astype(np.float32),
-            (bias / self.temperature + self.offset).astype(np.float32),
-        )
-
-    @classmethod
-    def from_dict(cls, report: dict[str, Any]) -> Calibration:
-        """Read from a report."""
-        return cls(float(report["temperature"]), np.array(report["offset"]))
+    def fold_into(self, layers: Layers) -> list[tuple[Weights, Weights]]:
+        """Layers with the calibration folded into the last one, float32."""
+        *hidden, (weight, bias) = layers
+        last = weight / self.temperature, bias / self.temperature + self.offset
+        return [(w.astype(np.float32), b.astype(np.float32)) for w, b in (*hidden, last)]
 
     def as_dict(self) -> dict[str, Any]:
         """Entries of a report, rounded."""

@@ -13,8 +13,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from modt.classes import CLASS_NAMES
-from tools.train.export_pointnet import IR, OPSET
-from tools.train.weights import Layer
+from tools.train.export_pointnet import IR, OPSET, Layer
 
 
 class GraphWriter:

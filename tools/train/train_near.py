@@ -34,13 +34,12 @@ from tools.options import make_torch_deterministic, parser
 from tools.train.augment import subsample
 from tools.train.box_features import crop_features
 from tools.train.dataset import Dataset, load
-from tools.train.export_pointnet import N_SHARED, graph
+from tools.train.export_pointnet import N_SHARED, Layer, graph
 from tools.train.mlp_training import Batch, train_mlp
 from tools.train.near_batches import SHARE, NearSource, distance_m
 from tools.train.near_cut import cut_flags
 from tools.train.network import MaxPooledLinear
 from tools.train.train_pointnet import POINTS, tensors
-from tools.train.weights import Layer
 
 FREQUENCY = np.array([0.86, 0.03, 0.1, 0.01])
 """Frequency of the classes among proposals near a small robot."""

@@ -1,17 +1,10 @@
-"""Train the reflectance classifier, modt.classification.reflectance_classifier (extra [train]).
+"""Training of the reflectance classifiers, modt.classification.reflectance_classifier, one for each sensor.
 
-    python -m tools.train.train_reflectance_classifier OUT_DIR CROPS.npz... --sensor NAME
-                                    [--steps N] [--folds K] [--seed S]
-
-OUT_DIR holds the output of train_pointnet and train_box_classifier for the same crops and folds. The crops of a
-sensor are those of this name, thinned ones too. Writes OUT_DIR/reflectance-NAME.npz for export_pointnet and
-OUT_DIR/reflectance-NAME.json: the weights of the pool of all three, and out-of-fold scores by sensor of box with
-reflectance and of all three.
+The crops of a sensor are those of this name, thinned ones too.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -20,19 +13,16 @@ import torch
 from scipy.special import softmax
 
 from modt.classification.box_classifier import Layers, logits
-from modt.config.profile import REFLECTANCE_SCALES
 from modt.types import Bool, Float64, Int
-from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier
 from tools.train.batches import draw_batch, sampling_pools
 from tools.train.box_features import dataset_features
-from tools.train.dataset import Dataset, load
-from tools.train.held_out import Model, Validation, load_network, out_of_fold
+from tools.train.dataset import FOLDS, SEED, Dataset
+from tools.train.held_out import Model, Validation, out_of_fold
 from tools.train.mlp_training import Batch, train_mlp
 from tools.train.pool_fit import fit_pool
 from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration, fit_calibration
-from tools.train.weights import load_layers, save_layers
 
 STEPS = 600
 JITTER = 0.1
@@ -107,8 +97,8 @@ def cross_validate(
     by_box = out_of_fold(data, k, box_model)
 
     def reflectance_model(among: Bool, i: int) -> Model:
-        calibrated = [*boxes[i][:-1], by_box.calibration.fold_into(boxes[i][-1])]
-        layers = train(data, features, np.flatnonzero(among & data.trainable), calibrated, steps, seed + i)
+        base = by_box.calibration.fold_into(boxes[i])
+        layers = train(data, features, np.flatnonzero(among & data.trainable), base, steps, seed + i)
         return lambda rows: logits(layers, np.nan_to_num(features.all[rows]))
 
     held = out_of_fold(data, k, reflectance_model)
@@ -128,26 +118,19 @@ def cross_validate(
     }
 
 
-def main() -> None:
-    parser = training_parser(__doc__)
-    parser.add_argument("--sensor", required=True, choices=REFLECTANCE_SCALES, help="that measured the reflectance")
-    parser.add_argument("--steps", type=int, default=STEPS)
-    args = parser.parse_args()
-    make_torch_deterministic()
-    data = on_scale(load(*args.crops), args.sensor)
-    features = Features(data)
-    network = load_network(args.out, data)
+def calibrated(data: Dataset, sensor: str, network: Float64, boxes: Layers) -> tuple[Layers, dict[str, Any]] | None:
+    """Calibrated layers of a sensor and their report; None without crops of it to validate by.
+
+    Args:
+        data: all R crops.
+        sensor: name of the sensor that measured the reflectance.
+        network: (R, 4) out-of-fold probabilities of the PointNet.
+        boxes: calibrated layers of the box classifier.
+    """
+    data = on_scale(data, sensor)
     if not has_reflectance(data, Validation.of(data).rows).any():
-        print(f"no reflectance of {args.sensor} to validate by: the model has no classifier of it")
-        return
-    calibration, report = cross_validate(data, features, network, args.folds, args.steps, args.seed)
-    boxes = load_layers(args.out / "boxes.npz")
-    layers = train(data, features, np.flatnonzero(data.trainable), boxes, args.steps, args.seed)
-    save_layers(args.out / f"reflectance-{args.sensor}.npz", [*layers[:-1], calibration.fold_into(layers[-1])])
-    report |= {"sensor": args.sensor, "steps": args.steps, "seed": args.seed}
-    (args.out / f"reflectance-{args.sensor}.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps(report))
-
-
-if __name__ == "__main__":
-    main()
+        return None
+    features = Features(data)
+    calibration, report = cross_validate(data, features, network, FOLDS, STEPS, SEED)
+    layers = train(data, features, np.flatnonzero(data.trainable), boxes, STEPS, SEED)
+    return calibration.fold_into(layers), report | {"sensor": sensor}
