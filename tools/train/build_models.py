@@ -14,11 +14,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+from modt import profile
 from tools.options import parser
-from tools.train.build_crops import add_sources
+from tools.train.build_crops import kitti_crops, near_crops, own_crops, synthetic_crops
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
-WORLDS, PASTES = 240, 120
+WORLDS = 240
+"""Simulated worlds of each kind."""
 NEAR_WORLDS, NEAR_STEPS = {1: 3000, 2: 550}, 4000
 """Seed and number of the worlds near the sensor: to train on, and for the card; steps."""
 KITTI_DATA = (
@@ -46,7 +48,7 @@ def build(crops: list[Path], near: list[Path], out: Path, steps: int, data: str,
 
     Args:
         crops: data sets.
-        near: two data sets of build_near_crops, one to train on and one for the card.
+        near: two data sets of near_crops, one to train on and one for the card.
         out: the model.
         steps: of each network.
         data: description of the data, for the card.
@@ -62,21 +64,22 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("work", type=Path, help="folder for crops")
     options.add_argument("--steps", type=int, default=24000, help="of each network (default: %(default)s)")
-    add_sources(options)
+    options.add_argument("--kitti", type=Path, help="KITTI root, with argoverse2/ and pandaset/ beside object/")
+    options.add_argument("--scans", type=Path, help="own scans: velodyne/, label_2/ and, for a camera's view, calib/")
+    options.add_argument("--profile", default=profile.DEFAULT, help="of their sensor")
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     free, placed, real, own = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti", "scans"))
     near = [args.work / f"near-{seed}.npz" for seed in NEAR_WORLDS]
     for path, (seed, worlds) in zip(near, NEAR_WORLDS.items(), strict=True):
-        run("build_near_crops", path, "--worlds", worlds, "--seed", seed)
+        near_crops(path, worlds, seed)
     if args.kitti:
-        run("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
-        labels = args.kitti / "object" / "training_all_labels"
-        run("build_synthetic_crops", placed, "--worlds", WORLDS, "--labels", labels)
+        kitti_crops(real, args.kitti)
+        synthetic_crops(placed, WORLDS, args.kitti / "object" / "training_all_labels")
     if args.kitti is None or args.scans is None:
-        run("build_synthetic_crops", free, "--worlds", WORLDS)
+        synthetic_crops(free, WORLDS)
     if args.scans:
-        run("build_crops", own, "--scans", args.scans, "--profile", args.profile)
+        own_crops(own, args.scans, profile.load(args.profile), Path(args.profile).stem)
         crops, data = [own, real, placed] if args.kitti else [own, free], f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA

@@ -1,4 +1,4 @@
-"""Data sets of crops, as written by build_crops and build_synthetic_crops."""
+"""Data sets of crops, as tools.train.build_crops writes them."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def _row(item: tuple[str, dict[str, Any]]) -> str:
         " / ".join(str(recalls[0][c]["objects"]) if c in recalls[0] else "0" for c in CLASS_NAMES[1:]),
         " / ".join(f"{100 * of['average_precision'][c]:.0f}" for c in CLASS_NAMES[1:]),
         str(of["log_loss"]),
-        str(of["calibration_error"]["likeliest"]),
+        str(of["calibration_error"]),
         str(of["temperature"]),
         *(" / ".join(_percent(recall.get(c)) for c in CLASS_NAMES[1:]) for recall in recalls),
     ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,19 +16,8 @@ from modt.types import Float64, Int
 HIDDEN = (32, 32)
 
 
-@dataclass(frozen=True)
-class Batch:
-    """Input of a training step.
-
-    Attributes:
-        feature: (R, F) of crops.
-        label: (R,) their classes.
-        base: (R, 4) logits that those of the network are added to.
-    """
-
-    feature: Float64
-    label: Int
-    base: Float64 | None = None
+Batch = tuple[Float64, Int, Float64 | float]
+"""(R, F) features of crops, (R,) their classes, and (R, 4) logits that those of the network are added to, or zero."""
 
 
 def train_mlp(batch: Callable[[], Batch], sample: Float64, steps: int, rate: float, decay: float) -> Layers:
@@ -50,11 +38,9 @@ def train_mlp(batch: Callable[[], Batch], sample: Float64, steps: int, rate: flo
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, total_steps=steps)
     criterion = nn.CrossEntropyLoss()
     for _ in range(steps):
-        shown = batch()
-        score = net(torch.from_numpy(((shown.feature - mean) / scale).astype(np.float32)))
-        if shown.base is not None:
-            score = score + torch.from_numpy(shown.base.astype(np.float32))
-        loss = criterion(score, torch.from_numpy(shown.label))
+        feature, label, base = batch()
+        score = net(torch.from_numpy(((feature - mean) / scale).astype(np.float32)))
+        loss = criterion(score + torch.from_numpy(np.asarray(base, np.float32)), torch.from_numpy(label))
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()

@@ -38,7 +38,7 @@ class NearSource:
     """Draws near crops.
 
     Args:
-        near: crops of build_near_crops.
+        near: crops of build_crops.near_crops.
         streets: crops of the streets; real ones that show enough are cut near.
     """
 

@@ -43,7 +43,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
 
     def batch() -> Batch:
         chosen = rng.integers(0, len(label), 2 * BATCH_SIZE)
-        return Batch(feature[chosen], label[chosen])
+        return feature[chosen], label[chosen], 0.0
 
     return train_mlp(batch, feature, steps, rate=1e-2, decay=1e-3)
 

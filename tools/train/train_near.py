@@ -3,7 +3,7 @@
     python -m tools.train.train_near MODEL.onnx NAME-near.onnx --near NEAR.npz --held NEAR.npz --crops CROPS.npz...
                          --licence TEXT [--steps N] [--seed S]
 
-It begins with the weights of the model, and learns near crops by their labels: those of build_near_crops, and those
+It begins with the weights of the model, and learns near crops by their labels: those of low sensors, and those
 of the streets cut near. A classifier of boxes whose sizes are bounds goes into its metadata. Logits are adjusted for
 the shares of the classes in a batch, so posteriors hold for FREQUENCY. The card is scored on --held, on which nothing
 is trained.
@@ -123,7 +123,7 @@ def train_bounds(source: NearSource, seed: int) -> Layers:
 
     def batch() -> Batch:
         chosen = rng.integers(0, len(label), 512)
-        return Batch(feature[chosen], label[chosen])
+        return feature[chosen], label[chosen], 0.0
 
     *hidden, (weight, bias) = train_mlp(batch, feature, BOUND_STEPS, rate=1e-2, decay=1e-3)
     share = np.bincount(label, minlength=N_CLASSES).clip(1) / len(label)
@@ -184,7 +184,7 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("model", type=Path)
     options.add_argument("out", type=Path)
-    options.add_argument("--near", type=Path, required=True, help="crops of build_near_crops")
+    options.add_argument("--near", type=Path, required=True, help="crops of low sensors")
     options.add_argument("--held", type=Path, required=True, help="others, for the card")
     options.add_argument("--crops", type=Path, nargs="+", required=True, help="of the streets")
     options.add_argument("--licence", required=True)

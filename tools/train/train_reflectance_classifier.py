@@ -65,7 +65,7 @@ def train(data: Dataset, features: Features, rows: Int, boxes: Layers, steps: in
     def batch() -> Batch:
         chosen = np.concatenate([draw_batch(pools, rng), draw_batch(pools, rng)])
         feature = features.all[chosen]
-        return Batch(feature + rng.normal(0.0, scale, feature.shape), data.label[chosen], base[chosen])
+        return feature + rng.normal(0.0, scale, feature.shape), data.label[chosen], base[chosen]
 
     return train_mlp(batch, sample, steps, rate=5e-3, decay=1e-2)
 
