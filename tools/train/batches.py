@@ -20,9 +20,11 @@ TALL_SHARE = 0.3
 """Share of vans among the cars."""
 BATCH_SIZE = 128
 """Labelled crops of a step."""
+Pools = list[tuple[Int, Float64 | None]]
+"""Rows of each class, and the probability of each row, None where they are equal."""
 
 
-def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> list[tuple[Int, Float64]]:
+def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> Pools:
     """Rows of each class and the probability of each row: equal within a class, variant and height.
 
     Args:
@@ -31,7 +33,7 @@ def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> li
         worth: (len(data),) relative probability within these groups, equal by default.
     """
     worth = np.ones(len(data)) if worth is None else worth
-    pools = []
+    pools: Pools = []
     for c in range(N_CLASSES):
         own = rows[data.label[rows] == c]
         group = 2 * data.variant[own] + data.tall[own]
@@ -42,7 +44,8 @@ def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> li
     return pools
 
 
-def draw_batch(pools: list[tuple[Int, Float64]], rng: Generator) -> Int:
-    """(BATCH_SIZE,) rows, classes by CLASS_SHARE."""
-    number = rng.multinomial(BATCH_SIZE, CLASS_SHARE / CLASS_SHARE.sum())
-    return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in zip(pools, number, strict=True)])
+def draw_batch(pools: Pools, rng: Generator, n: int = BATCH_SIZE, share: Float64 = CLASS_SHARE) -> Int:
+    """(n,) rows, classes by their shares; none of a class without rows."""
+    number = rng.multinomial(n, share / share.sum())
+    drawn = zip(pools, number, strict=True)
+    return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in drawn if len(own)])

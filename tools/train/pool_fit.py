@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import log_softmax
@@ -13,16 +11,10 @@ from modt.types import Float64
 from tools.train.held_out import Validation
 
 
-@dataclass(frozen=True)
-class Pool:
-    """Fitted weights, and the (R, 4) log posteriors of the pool."""
-
-    weights: PoolWeights
-    log_posterior: Float64
-
-
-def fit_pool(network: Float64, box: Float64, reflectance: Float64, valid: Validation, weight: Float64) -> Pool:
-    """The weights, all in 0 to 1, that minimise the log loss.
+def fit_pool(
+    network: Float64, box: Float64, reflectance: Float64, valid: Validation, weight: Float64
+) -> tuple[PoolWeights, Float64]:
+    """The weights, all in 0 to 1, that minimise the log loss, and the (R, 4) log posteriors of the pool.
 
     Args:
         network: (R, 4) P(class | points).
@@ -43,4 +35,4 @@ def fit_pool(network: Float64, box: Float64, reflectance: Float64, valid: Valida
     known = bool(reflectance.any())
     found = minimize(loss, x0=(0.8, 0.4, 0.5 * known), bounds=((0.0, 1.0), (0.0, 1.0), (0.0, float(known))))
     weights = PoolWeights(*(round(w, 2) for w in found.x.tolist()))
-    return Pool(weights, log_posterior(weights))
+    return weights, log_posterior(weights)

@@ -73,11 +73,11 @@ def cross_validate(
 
     held = out_of_fold(data, k, model)
     valid, box = held.validation, held.probability
-    pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
+    weights, pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
     return held.calibration, {
-        "weights": pool.weights.as_dict(),
+        "weights": weights.as_dict(),
         "cross_validation": by_sensor(np.log(box), valid, valid.clear),
-        "pool": by_sensor(pool.log_posterior, valid, valid.clear),
+        "pool": by_sensor(pool, valid, valid.clear),
         "ruled_out": ruled_out(held.probability[valid.clear], valid.label[valid.clear]),
     }
 

@@ -36,8 +36,7 @@ from tools.train.box_features import crop_features
 from tools.train.dataset import Dataset, load
 from tools.train.export_pointnet import N_SHARED, Layer, graph
 from tools.train.mlp_training import Batch, train_mlp
-from tools.train.near_batches import SHARE, NearSource, distance_m
-from tools.train.near_cut import cut_flags
+from tools.train.near_batches import SHARE, NearSource, cut_flags, distance_m
 from tools.train.network import MaxPooledLinear
 from tools.train.train_pointnet import POINTS, tensors
 

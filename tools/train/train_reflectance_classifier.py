@@ -108,12 +108,12 @@ def cross_validate(
     box = np.log(by_box.probability)
     calibration = fit_calibration(held.logits, valid.label, weight, box)
     evidence = (held.logits / calibration.temperature + calibration.offset) * known[:, None]
-    pool = fit_pool(network, by_box.probability, evidence, valid, weight)
+    weights, pool = fit_pool(network, by_box.probability, evidence, valid, weight)
     clear = valid.clear & known
     return calibration, {
-        "weights": pool.weights.as_dict(),
+        "weights": weights.as_dict(),
         "cross_validation": by_sensor(box + evidence, valid, known),
-        "pool": by_sensor(pool.log_posterior, valid, known),
+        "pool": by_sensor(pool, valid, known),
         "ruled_out": train_box_classifier.ruled_out(softmax((box + evidence)[clear], axis=1), valid.label[clear]),
     }
 
