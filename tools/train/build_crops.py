@@ -26,7 +26,7 @@ from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
 from modt_desk.simulation.sensors import SENSORS
-from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, Sensors
+from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, VARIANT_NAMES, Sensors
 from tools.train.labelled_scans import (
     THINNED,
     Scan,
@@ -168,12 +168,7 @@ class CropWriter:
         trainable = ~table["partial"] & ~(table["unknown"] & (table["label"] == 0))
         tally = {
             name: np.bincount(table["label"][trainable & (table["variant"] == v)], minlength=4).tolist()
-            for name, v in (
-                ("shipped", SHIPPED),
-                ("clustered", CLUSTERED),
-                ("pasted", PASTED),
-                ("synthetic", SYNTHETIC),
-            )
+            for v, name in enumerate(VARIANT_NAMES)
         }
         provenance |= {"scans": len(np.unique(table["name"])), "crops": tally, "modt": modt.__version__}
         provenance |= {"sensors": np.unique(table["sensor"]).tolist()}

@@ -227,7 +227,7 @@ def export(
     out: Path,
     layers: list[Layer],
     boxes: Layers,
-    reflectance: dict[str, Layers],
+    reflectance: list[Layers],
     report: dict[str, Any],
     data: str,
     licence: str,
@@ -238,17 +238,19 @@ def export(
         out: the model.
         layers: of the network.
         boxes: of the box classifier.
-        reflectance: of the reflectance classifier of each sensor.
+        reflectance: of the reflectance classifiers.
         report: facts of the training; those of the box and of each reflectance classifier under the names of both.
         data: description of the training data, for the card.
         licence: for the card.
     """
     network = graph(layers)
     metadata = {CLASS_FREQUENCY_KEY: json.dumps(report["class_frequency"])}
-    weights = {told["sensor"]: PoolWeights.from_dict(told["weights"]) for told in report["reflectance"]}
     if reflectance:
         metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
-            {sensor: (own, weights[sensor]) for sensor, own in reflectance.items()}
+            {
+                told["sensor"]: (own, PoolWeights.from_dict(told["weights"]))
+                for own, told in zip(reflectance, report["reflectance"], strict=True)
+            }
         )
     metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(
         boxes, PoolWeights.from_dict(report["boxes"]["weights"])

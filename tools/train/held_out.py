@@ -1,4 +1,4 @@
-"""Out-of-fold predictions: each validation crop by a model trained without its drive."""
+"""Out-of-fold predictions, each validation crop by a model trained without its drive, and the pool fitted to them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize
+from scipy.special import log_softmax
 
 from modt.classes import N_CLASSES
+from modt.classification.pool import PoolWeights, log_pool
 from modt.types import NONE, Bool, Float64, Int
 from tools.train.dataset import Dataset, LabelledObjects, folds
 from tools.train.temperature_scaling import Calibration, fit_calibration
@@ -110,3 +113,30 @@ def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> H
         mine = np.flatnonzero(fold[data.drive[valid.rows]] == i)
         out[mine] = model(valid.rows[mine])
     return HeldOut(valid, out, fit_calibration(out, valid.label, valid.weight))
+
+
+def fit_pool(
+    network: Float64, box: Float64, reflectance: Float64, valid: Validation, weight: Float64
+) -> tuple[PoolWeights, Float64]:
+    """Weights of modt.classification.pool, 0 to 1, that minimise the log loss; (R, 4) log posteriors of the pool.
+
+    Args:
+        network: (R, 4) P(class | points).
+        box: (R, 4) P(class | box).
+        reflectance: (R, 4) log P(reflectance | class, box), zeros without: its weight is then zero.
+        valid: the crops.
+        weight: (R,) of each, 1 in total.
+    """
+    log_frequency = np.log(valid.class_frequency.clip(1e-9))
+
+    def log_posterior(weights: PoolWeights) -> Float64:
+        out: Float64 = log_softmax(log_pool(network, np.log(box), reflectance, log_frequency, weights), axis=1)
+        return out
+
+    def loss(x: Float64) -> float:
+        return -float(weight @ log_posterior(PoolWeights(*x.tolist()))[np.arange(len(valid.label)), valid.label])
+
+    known = bool(reflectance.any())
+    found = minimize(loss, x0=(0.8, 0.4, 0.5 * known), bounds=((0.0, 1.0), (0.0, 1.0), (0.0, float(known))))
+    weights = PoolWeights(*(round(w, 2) for w in found.x.tolist()))
+    return weights, log_posterior(weights)

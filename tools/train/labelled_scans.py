@@ -150,11 +150,15 @@ def scan_from_boxes(
     return Scan(name, drive, points, objects, tuple(kinds), boxes, fov, unlabelled | ~fov.contains(points))
 
 
+def drives_of_frames(folder: Path) -> dict[str, str]:
+    """Raw drive of each frame of the object benchmark, from folder/frame_to_raw.tsv."""
+    rows = (line.split("\t") for line in (folder / "frame_to_raw.tsv").read_text(encoding="utf-8").splitlines())
+    return {row[0]: row[2] for row in rows}
+
+
 def object_scans(folder: Path) -> Iterator[Scan]:
     """Scans of the KITTI object benchmark: folder/velodyne*, folder/label_2, folder/calib."""
-    table = folder.parent / "training_all_labels" / "frame_to_raw.tsv"
-    rows = (line.split("\t") for line in table.read_text(encoding="utf-8").splitlines())
-    drive_of = {row[0]: row[2] for row in rows}
+    drive_of = drives_of_frames(folder.parent / "training_all_labels")
     for path in sorted(folder.glob("velodyne*/*.bin"), key=lambda p: p.stem):
         drive = drive_of[path.stem]
         assert drive != TEST_DRIVE, path
@@ -258,25 +262,18 @@ def pandaset_scans(folder: Path) -> Iterator[Scan]:
         for box, kind in zip(boxes, kinds, strict=True):
             if kind == ObjectClass.CAR:
                 box[6] += _turn_rad(points, box)
-        objects = [np.flatnonzero(points_in_box(points, box)) for box in boxes]
-        known = [k for k, kind in enumerate(kinds) if kind is not None]
+        known = np.array([kind is not None for kind in kinds])
         unlabelled = np.zeros(len(points), np.bool_)
-        for own, kind in zip(objects, kinds, strict=True):
-            unlabelled[own] |= kind is None
+        for box in boxes[~known]:
+            unlabelled |= points_in_box(points, box)
         for x, y in PANDASET_UNLABELLED.get(path.stem, ()):
             unlabelled |= np.hypot(points[:, 0] - x, points[:, 1] - y) < UNLABELLED_RADIUS_M
-        yield Scan(
-            name=f"pandaset/{path.stem}",
-            drive=f"pandaset/{PANDASET_DRIVE.get(path.stem, path.stem)}",
-            points=points,
-            objects=tuple(objects[k] for k in known),
-            kinds=tuple(kind for kind in kinds if kind is not None),
-            boxes=boxes[known],
-            fov=FieldOfView(),
-            unlabelled=unlabelled,
-            sensor="pandar64",
-            profile=PANDAR64,
+        drive = f"pandaset/{PANDASET_DRIVE.get(path.stem, path.stem)}"
+        classes = [kind for kind in kinds if kind is not None]
+        scan = scan_from_boxes(
+            f"pandaset/{path.stem}", drive, points, boxes[known], classes, FieldOfView(), unlabelled
         )
+        yield replace(scan, sensor="pandar64", profile=PANDAR64)
 
 
 def _turn_rad(points: Float32, box: Float64) -> float:

@@ -16,8 +16,7 @@ from modt.segmentation.view_ends import ViewEnds
 from modt.types import Cut, Float64, Int
 from modt_desk.simulation.sensors import SENSORS
 from tools.train.augment import subsample
-from tools.train.batches import Pools, draw_batch
-from tools.train.dataset import SYNTHETIC, Dataset, Sensors
+from tools.train.dataset import SYNTHETIC, Dataset, Pools, Sensors, draw_batch
 from tools.train.near_scans import HEIGHT_M, MIN_RANGE_M, RANGE_M
 
 SHARE = np.array([0.5, 0.08, 0.38, 0.04])

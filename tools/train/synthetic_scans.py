@@ -19,7 +19,7 @@ from modt_desk.simulation.sensors import sensor as model_of
 from modt_desk.simulation.simulator import Simulator, Truth
 from modt_desk.simulation.street import furnish, residential
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
-from tools.train.labelled_scans import AT_SENSOR, TEST_DRIVE, Scan
+from tools.train.labelled_scans import AT_SENSOR, TEST_DRIVE, Scan, drives_of_frames
 
 PEOPLE = ("Pedestrian", "Cyclist", "Person_sitting")
 SECONDS = 4.0
@@ -114,8 +114,7 @@ def label_scene(path: Path, seed: int, sensor: str = profile.DEFAULT) -> Simulat
 
 def label_files(folder: Path) -> list[Path]:
     """Label files under training_all_labels except those of the test drive; files with people listed four times."""
-    rows = (line.split("\t") for line in (folder / "frame_to_raw.tsv").read_text(encoding="utf-8").splitlines())
-    drive = {row[0]: row[2] for row in rows}
+    drive = drives_of_frames(folder)
     files = [p for p in sorted((folder / "label_2").glob("*.txt")) if drive.get(p.stem, TEST_DRIVE) != TEST_DRIVE]
     rich = [p for p in files if any(line.startswith(PEOPLE) for line in p.read_text(encoding="utf-8").splitlines())]
     return files + 3 * rich

@@ -15,12 +15,18 @@ from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.box_classifier import Layers, logits
 from modt.types import Bool, Float64, Int
 from tools.train.augment import augment, subsample
-from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
-from tools.train.box_features import crop_features, dataset_features
-from tools.train.dataset import FOLDS, SEED, Dataset
-from tools.train.held_out import Model, out_of_fold
-from tools.train.mlp_training import Batch, train_mlp
-from tools.train.pool_fit import fit_pool
+from tools.train.dataset import (
+    BATCH_SIZE,
+    FOLDS,
+    SEED,
+    Dataset,
+    crop_features,
+    dataset_features,
+    draw_batch,
+    sampling_pools,
+)
+from tools.train.held_out import Model, fit_pool, out_of_fold
+from tools.train.network import Batch, train_mlp
 from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration
 

@@ -3,7 +3,7 @@
     python -m tools.train.train_pointnet MODEL.onnx CROPS.npz... --data TEXT --licence TEXT [--steps N]
 
 Writes the model, with all three calibrated, and beside it a card with out-of-fold scores by sensor
-(tools.train.scores; folds split by drive). Prints the loss curve of the network.
+(tools.train.scores; folds split by drive).
 """
 
 from __future__ import annotations
@@ -24,9 +24,18 @@ from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, parser
 from tools.train import train_box_classifier, train_reflectance_classifier
 from tools.train.augment import augment, subsample
-from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
-from tools.train.box_features import dataset_features
-from tools.train.dataset import FOLDS, SEED, Dataset, Sensors, load
+from tools.train.dataset import (
+    BATCH_SIZE,
+    FOLDS,
+    SEED,
+    Dataset,
+    Pools,
+    Sensors,
+    dataset_features,
+    draw_batch,
+    load,
+    sampling_pools,
+)
 from tools.train.export_pointnet import export
 from tools.train.held_out import Model, out_of_fold
 from tools.train.network import PointNet
@@ -36,6 +45,8 @@ POINTS, MAX_POINTS = 128, 400
 """Maximum number of points of a crop in a batch, and before augmentation."""
 MIN_FREQUENCY = 1e-4
 """Stated of a class that the validation has no crop of."""
+PRINTED_STEPS = 1000
+"""Steps between two printed losses."""
 SMOOTHING = 0.02
 """Label smoothing: probability spread evenly over the classes."""
 BOX_STEPS, MIN_WORTH = 600, 0.03
@@ -65,31 +76,34 @@ def worth(data: Dataset, box: Float64, rows: Int, seed: int) -> Float64:
     return np.where(data.label == ObjectClass.BACKGROUND, like_an_object, 1.0)
 
 
-def train(data: Dataset, box: Float64, rows: Int, steps: int, seed: int) -> tuple[PointNet, list[float]]:
-    """Train on rows of the data set, with (R, 7) features of boxes; the network and its loss, mean of 50 steps."""
+def batch_loss(
+    net: torch.nn.Module, data: Dataset, pools: Pools, rng: np.random.Generator, smoothing: float = 0.0
+) -> torch.Tensor:
+    """Loss of a network on a batch of augmented crops."""
+    drawn = draw_batch(pools, rng)
+    crops, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
+    scores, label = net(*tensors(subsample(crops, POINTS, rng), sensors)), torch.from_numpy(data.label[drawn])
+    return torch.nn.functional.cross_entropy(scores, label, label_smoothing=smoothing)
+
+
+def train(data: Dataset, box: Float64, rows: Int, steps: int, seed: int) -> PointNet:
+    """Train on rows of the data set, with (R, 7) features of boxes; prints the loss now and then."""
     pools = sampling_pools(data, rows, worth(data, box, rows, seed))
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     net = PointNet()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
-    criterion = torch.nn.CrossEntropyLoss(label_smoothing=SMOOTHING)
-    losses: list[float] = []
-    running = 0.0
     for step in range(steps):
-        drawn = draw_batch(pools, rng)
-        crops, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
-        loss = criterion(net(*tensors(subsample(crops, POINTS, rng), sensors)), torch.from_numpy(data.label[drawn]))
+        loss = batch_loss(net, data, pools, rng, SMOOTHING)
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
         optimiser.step()
         schedule.step()
-        running += float(loss.detach()) / 50
-        if (step + 1) % 50 == 0:
-            losses.append(round(running, 4))
-            running = 0.0
-    return net.eval(), losses
+        if (step + 1) % PRINTED_STEPS == 0:
+            print(step + 1, round(loss.item(), 4), flush=True)
+    return net.eval()
 
 
 @torch.no_grad()
@@ -119,27 +133,24 @@ def main() -> None:
     box = dataset_features(data, np.arange(len(data)))
 
     def fold_model(among: Bool, i: int) -> Model:
-        net, _ = train(data, box, np.flatnonzero(among & data.trainable), args.steps, SEED + i)
+        net = train(data, box, np.flatnonzero(among & data.trainable), args.steps, SEED + i)
         return lambda rows: logits(net, data, rows)
 
     held = out_of_fold(data, FOLDS, fold_model)
     valid = held.validation
-    net, losses = train(data, box, np.flatnonzero(data.trainable), args.steps, SEED)
-    print("loss", *losses, flush=True)
+    net = train(data, box, np.flatnonzero(data.trainable), args.steps, SEED)
     report: dict[str, Any] = {"seed": SEED, "steps": args.steps, "cpu_s": round(time.process_time() - started)}
     report |= {"crops_sha256": data.sha256, "provenance": data.provenance, "torch": torch.__version__}
     report |= {"calibration": held.calibration.as_dict()}
     report |= {"class_frequency": valid.class_frequency.clip(MIN_FREQUENCY).round(4).tolist()}
     report |= {"cross_validation": by_sensor(np.log(held.probability), valid, valid.clear)}
     boxes, report["boxes"] = train_box_classifier.calibrated(data, held.probability)
-    reflectance, report["reflectance"] = {}, []
-    for sensor in sorted(REFLECTANCE_SCALES):
-        trained = train_reflectance_classifier.calibrated(data, sensor, held.probability, boxes)
-        if trained is None:
-            print(f"no reflectance of {sensor} to validate by: the model has no classifier of it")
-            continue
-        reflectance[sensor] = trained[0]
-        report["reflectance"].append(trained[1])
+    each = (
+        train_reflectance_classifier.calibrated(data, sensor, held.probability, boxes)
+        for sensor in sorted(REFLECTANCE_SCALES)
+    )
+    trained = [pair for pair in each if pair]
+    reflectance, report["reflectance"] = [layers for layers, _ in trained], [told for _, told in trained]
     layers = held.calibration.fold_into(net.layers())
     export(args.out, layers, boxes, reflectance, report, args.data, args.licence)
 

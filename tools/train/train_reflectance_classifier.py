@@ -12,15 +12,12 @@ import numpy as np
 import torch
 from scipy.special import softmax
 
-from modt.classification.box_classifier import Layers, logits
+from modt.classification.box_classifier import N_FEATURES, Layers, logits
 from modt.types import Bool, Float64, Int
 from tools.train import train_box_classifier
-from tools.train.batches import draw_batch, sampling_pools
-from tools.train.box_features import dataset_features
-from tools.train.dataset import FOLDS, SEED, Dataset
-from tools.train.held_out import Model, Validation, out_of_fold
-from tools.train.mlp_training import Batch, train_mlp
-from tools.train.pool_fit import fit_pool
+from tools.train.dataset import FOLDS, SEED, Dataset, dataset_features, draw_batch, sampling_pools
+from tools.train.held_out import Model, Validation, fit_pool, out_of_fold
+from tools.train.network import Batch, train_mlp
 from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration, fit_calibration
 
@@ -29,17 +26,9 @@ JITTER = 0.1
 """Noise added to the features of a batch, as a fraction of their standard deviation; few crops are drawn often."""
 
 
-class Features:
-    """Features of all crops of a data set, without augmentation.
-
-    Attributes:
-        box: (R, 7) of the boxes.
-        all: (R, 12) of box and reflectance.
-    """
-
-    def __init__(self, data: Dataset) -> None:
-        self.box = dataset_features(data, np.arange(len(data)))
-        self.all = np.hstack([self.box, data.reflectance])
+def features_of(data: Dataset) -> Float64:
+    """(R, 12) features of box and reflectance of all crops of a data set, without augmentation."""
+    return np.hstack([dataset_features(data, np.arange(len(data))), data.reflectance])
 
 
 def on_scale(data: Dataset, sensor: str) -> Dataset:
@@ -53,25 +42,25 @@ def has_reflectance(data: Dataset, rows: Int) -> Bool:
     return np.asarray(np.isfinite(data.reflectance[rows]).all(axis=1))
 
 
-def train(data: Dataset, features: Features, rows: Int, boxes: Layers, steps: int, seed: int) -> Layers:
+def train(data: Dataset, features: Float64, rows: Int, boxes: Layers, steps: int, seed: int) -> Layers:
     """Train on rows of the data set; uncalibrated layers whose logits are added to those of the box layers."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     pools = sampling_pools(data, rows[has_reflectance(data, rows)])
-    base = logits(boxes, features.box)
-    sample = features.all[np.concatenate([draw_batch(pools, rng) for _ in range(16)])]
+    base = logits(boxes, features[:, :N_FEATURES])
+    sample = features[np.concatenate([draw_batch(pools, rng) for _ in range(16)])]
     scale = JITTER * sample.std(axis=0)
 
     def batch() -> Batch:
         chosen = np.concatenate([draw_batch(pools, rng), draw_batch(pools, rng)])
-        feature = features.all[chosen]
+        feature = features[chosen]
         return feature + rng.normal(0.0, scale, feature.shape), data.label[chosen], base[chosen]
 
     return train_mlp(batch, sample, steps, rate=5e-3, decay=1e-2)
 
 
 def cross_validate(
-    data: Dataset, features: Features, network: Float64, k: int, steps: int, seed: int
+    data: Dataset, features: Float64, network: Float64, k: int, steps: int, seed: int
 ) -> tuple[Calibration, dict[str, Any]]:
     """Calibration, pool weights and scores from out-of-fold predictions for the crops with reflectance.
 
@@ -79,7 +68,7 @@ def cross_validate(
 
     Args:
         data: all crops.
-        features: of them.
+        features: (R, 12) of them.
         network: (R, 4) out-of-fold probabilities of the PointNet.
         k: number of folds.
         steps: training steps of a fold.
@@ -92,14 +81,14 @@ def cross_validate(
             data, np.flatnonzero(among & data.trainable), train_box_classifier.STEPS, seed + i
         )
         boxes[i] = layers
-        return lambda rows: logits(layers, features.box[rows])
+        return lambda rows: logits(layers, features[rows, :N_FEATURES])
 
     by_box = out_of_fold(data, k, box_model)
 
     def reflectance_model(among: Bool, i: int) -> Model:
         base = by_box.calibration.fold_into(boxes[i])
         layers = train(data, features, np.flatnonzero(among & data.trainable), base, steps, seed + i)
-        return lambda rows: logits(layers, np.nan_to_num(features.all[rows]))
+        return lambda rows: logits(layers, np.nan_to_num(features[rows]))
 
     held = out_of_fold(data, k, reflectance_model)
     valid = held.validation
@@ -129,8 +118,9 @@ def calibrated(data: Dataset, sensor: str, network: Float64, boxes: Layers) -> t
     """
     data = on_scale(data, sensor)
     if not has_reflectance(data, Validation.of(data).rows).any():
+        print(f"no reflectance of {sensor} to validate by: the model has no classifier of it")
         return None
-    features = Features(data)
+    features = features_of(data)
     calibration, report = cross_validate(data, features, network, FOLDS, STEPS, SEED)
     layers = train(data, features, np.flatnonzero(data.trainable), boxes, STEPS, SEED)
     return calibration.fold_into(layers), report | {"sensor": sensor}

@@ -24,14 +24,12 @@ from scipy.special import softmax
 from modt.classes import CLASS_NAMES
 from modt_desk.evaluation.class_score import average_precision
 from tools.options import make_torch_deterministic, parser
-from tools.train.augment import augment, subsample
-from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
 from tools.train.build_models import KITTI_LICENCE
-from tools.train.dataset import SEED, SHIPPED, Dataset, folds, load
+from tools.train.dataset import BATCH_SIZE, SEED, SHIPPED, Dataset, folds, load, sampling_pools
 from tools.train.export_pointnet import graph
 from tools.train.held_out import Validation
 from tools.train.network import PointNet, TransformedPointNet
-from tools.train.train_pointnet import MAX_POINTS, POINTS, logits, tensors
+from tools.train.train_pointnet import batch_loss, logits
 
 EPOCHS = {"pointnet-paper-40": 40, "pointnet-paper": 100}
 DEAR = {"pointnet-dear": 4}
@@ -59,10 +57,7 @@ def trained(net: torch.nn.Module, data: Dataset, epochs: int) -> Iterator[tuple[
     for epoch in range(1, epochs + 1):
         total = 0.0
         for _ in range(steps):
-            drawn = draw_batch(pools, rng)
-            few, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
-            scores = net.train()(*tensors(subsample(few, POINTS, rng), sensors))
-            loss = torch.nn.functional.cross_entropy(scores, torch.from_numpy(data.label[drawn]))
+            loss = batch_loss(net.train(), data, pools, rng)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -143,12 +138,7 @@ def main() -> None:
         print(epoch, round(loss, 4), round(time.process_time() - started), flush=True)
         if epoch not in names:
             continue
-        facts = {
-            "epochs": epoch,
-            "loss": loss,
-            "crops": crops_of_epoch(data),
-            "sha256": data.sha256,
-        }
+        facts = {"epochs": epoch, "loss": loss, "crops": crops_of_epoch(data), "sha256": data.sha256}
         facts |= {"cpu_s": round(time.process_time() - started), "scores": held_out_scores(net, data)}
         model = exported(net.eval()).SerializeToString(deterministic=True)
         (args.out / f"{names[epoch]}.onnx").write_bytes(model)

@@ -7,8 +7,7 @@ from scipy.special import softmax
 
 from modt.classification.crops import Crops
 from tests.tools.train.datasets import data_of, truth_of
-from tools.train.held_out import Validation
-from tools.train.pool_fit import fit_pool
+from tools.train.held_out import Validation, fit_pool
 
 LABEL = np.arange(400) % 4
 SURE = np.log(np.eye(4)[LABEL] * 0.96 + 0.01)
