@@ -1,22 +1,70 @@
-"""Out-of-fold predictions, each validation crop by a model trained without its drive, and the pool fitted to them."""
+"""Out-of-fold predictions, each validation crop by a model trained without its drive; calibration and pool."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import log_softmax
+from scipy.special import log_softmax, softmax
 
 from modt.classes import N_CLASSES
+from modt.classification.box_classifier import Layers, Weights
 from modt.classification.pool import PoolWeights, log_pool
 from modt.types import NONE, Bool, Float64, Int
 from tools.train.dataset import Dataset, LabelledObjects, folds
-from tools.train.temperature_scaling import Calibration, fit_calibration
 
 Model = Callable[[Int], Float64]
 """Maps rows (R,) to logits (R, 4)."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """probability = softmax(base + logits / temperature + offset); base is usually 0."""
+
+    temperature: float
+    offset: Float64
+
+    @classmethod
+    def identity(cls) -> Calibration:
+        """Calibration without effect."""
+        return cls(1.0, np.zeros(N_CLASSES))
+
+    def apply(self, logits: Float64, base: Float64 | float = 0.0) -> Float64:
+        """(R, 4) probabilities of logits (R, 4), added to calibrated logits `base`."""
+        probability: Float64 = softmax(base + logits / self.temperature + self.offset, axis=1)
+        return probability
+
+    def fold_into(self, layers: Layers) -> list[tuple[Weights, Weights]]:
+        """Layers with the calibration folded into the last one, float32."""
+        *hidden, (weight, bias) = layers
+        last = weight / self.temperature, bias / self.temperature + self.offset
+        return [(w.astype(np.float32), b.astype(np.float32)) for w, b in (*hidden, last)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Entries of a report, rounded."""
+        return {"temperature": round(self.temperature, 4), "offset": [round(float(v), 4) for v in self.offset]}
+
+
+def fit_calibration(logits: Float64, label: Int, weight: Float64, base: Float64 | float = 0.0) -> Calibration:
+    """Maximum-likelihood calibration on held-out logits; the offsets absorb the weighted class frequencies.
+
+    Args:
+        logits: (R, 4) uncalibrated.
+        label: (R,) classes.
+        weight: (R,) of each, 1 in total.
+        base: (R, 4) calibrated logits that they are added to.
+    """
+
+    def loss(theta: Float64) -> float:
+        z = log_softmax(base + logits * np.exp(-theta[0]) + np.append(0.0, theta[1:]), axis=1)
+        prior = 0.05 * float(np.sum(theta**2)) / np.count_nonzero(weight)
+        return prior - float(weight @ z[np.arange(len(label)), label])
+
+    found = minimize(loss, np.zeros(N_CLASSES), method="L-BFGS-B")
+    return Calibration(float(np.exp(found.x[0])), np.append(0.0, found.x[1:]))
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from tools.train.export_pointnet import Layer
 SHARED = (3, 32, 64, 512)
 HEAD = (512, 256, 128, 4)
 HIDDEN = (32, 32)
-
-
+"""Widths of the small networks."""
 Batch = tuple[Float64, Int, Float64 | float]
 """(R, F) features of crops, (R,) their classes, and (R, 4) logits that those of the network are added to, or zero."""
 

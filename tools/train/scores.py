@@ -18,8 +18,7 @@ from modt_desk.evaluation.class_score import (
     precision_recall,
     top_calibration_error,
 )
-from tools.train.held_out import Validation
-from tools.train.temperature_scaling import fit_calibration
+from tools.train.held_out import Validation, fit_calibration
 
 MIN_OBJECT_POINTS = 20
 """Least number of points of the objects that count for recall at a precision."""

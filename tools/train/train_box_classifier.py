@@ -25,10 +25,9 @@ from tools.train.dataset import (
     draw_batch,
     sampling_pools,
 )
-from tools.train.held_out import Model, fit_pool, out_of_fold
+from tools.train.held_out import Calibration, Model, fit_pool, out_of_fold
 from tools.train.network import Batch, train_mlp
 from tools.train.scores import by_sensor
-from tools.train.temperature_scaling import Calibration
 
 STEPS, AUGMENTED_BATCHES = 2000, 250
 """Steps of the training; batches that are augmented for it, since augmentation costs more than a step."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modt_desk.evaluation.class_score import top_calibration_error
-from tools.train.temperature_scaling import Calibration, fit_calibration
+from tools.train.held_out import Calibration, fit_calibration
 
 
 def test_calibration_recovers_temperature_and_class_offsets() -> None:
