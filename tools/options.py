@@ -3,30 +3,11 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from pathlib import Path
 
 
 def parser(description: str | None) -> ArgumentParser:
     """A parser whose description is the module's docstring, line breaks kept."""
     return ArgumentParser(description=description, formatter_class=RawDescriptionHelpFormatter)
-
-
-def crops_parser(description: str | None, seed: int) -> ArgumentParser:
-    """Options of a tool that writes a data set of crops."""
-    options = parser(description)
-    options.add_argument("out", type=Path, help="file to write (.npz)")
-    options.add_argument("--seed", type=int, default=seed)
-    return options
-
-
-def training_parser(description: str | None) -> ArgumentParser:
-    """Options of a training tool."""
-    options = parser(description)
-    options.add_argument("out", type=Path, help="folder to write to")
-    options.add_argument("crops", type=Path, nargs="+", help="data sets of crops (.npz)")
-    options.add_argument("--folds", type=int, default=3, help="of the cross-validation (default: %(default)s)")
-    options.add_argument("--seed", type=int, default=1)
-    return options
 
 
 def make_torch_deterministic() -> None:

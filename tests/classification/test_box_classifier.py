@@ -15,8 +15,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, Float64, Int
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.tools.train.datasets import data_of, truth_of
-from tools.train.box_features import crop_features, dataset_features
-from tools.train.dataset import Dataset, Sensors
+from tools.train.dataset import Dataset, Sensors, crop_features, dataset_features
 
 
 def test_features_of_crops_and_proposals_agree() -> None:
@@ -70,7 +69,7 @@ def test_training_separates_classes_by_size() -> None:
 def test_training_separates_classes_by_reflectance() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.box_classifier import logits
-    from tools.train.train_reflectance_classifier import Features, cross_validate, has_reflectance, on_scale, train
+    from tools.train.train_reflectance_classifier import cross_validate, features_of, has_reflectance, on_scale, train
 
     rng = np.random.default_rng(0)
     label = np.arange(160) // 2 % 4
@@ -78,17 +77,17 @@ def test_training_separates_classes_by_reflectance() -> None:
     told = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
     told[::20] = np.nan  # not measured
     data = on_scale(dataclasses.replace(alike, reflectance=told), "hdl-64e")
-    features = Features(data)
+    features = features_of(data)
     dumb = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
     layers = train(data, features, np.arange(160), dumb, 200, seed=1)
     known = np.isfinite(told).all(axis=1)
-    assert np.mean(logits(layers, features.all[known]).argmax(axis=1) == label[known]) > 0.9
+    assert np.mean(logits(layers, features[known]).argmax(axis=1) == label[known]) > 0.9
 
     assert not has_reflectance(on_scale(data, "pandar64"), np.arange(160)).any()
 
     data = dataclasses.replace(alike, reflectance=np.nan_to_num(told, nan=0.3))
     network = np.full((160, 4), 0.25)
-    _, report = cross_validate(data, Features(data), network, 2, 200, seed=1)
+    _, report = cross_validate(data, features_of(data), network, 2, 200, seed=1)
     assert report["weights"]["reflectance"] > 0.9  # a network that knows nothing leaves all of it
     pool = report["pool"]["hdl-64e"]
     assert min(pool["average_precision"].values()) > 0.7

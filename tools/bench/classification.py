@@ -28,8 +28,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.sources.recognise import open_stream
 from modt.types import Float32, Float64, Proposals
 from tools.options import parser
-from tools.train.export_pointnet import N_SHARED, graph
-from tools.train.weights import Layer
+from tools.train.export_pointnet import N_SHARED, Layer, graph
 
 TEXTBOOK_POINTS = 400
 TEXTBOOK_BATCHES = (1, 8, 64)

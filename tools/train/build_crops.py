@@ -1,11 +1,9 @@
-"""Build a data set of crops from real scans: proposals of the segmentation, labelled by overlap with objects.
-
-    python -m tools.train.build_crops OUT.npz [--kitti ROOT [--paste N]] [--scans FOLDER --profile PROFILE]
+"""Data sets of crops: proposals of the segmentation, labelled by overlap with objects.
 
 A proposal takes the class of an object if they share more than half of the points of each. Fragments and merged
 objects are marked partial, proposals outside the annotated regions unknown. Neither is used for training; unknown
 ones are not validated either. Every scan is segmented by the profile of its sensor; KITTI's are thinned to 32 and to
-16 beams too. The file contains its provenance.
+16 beams too. A file contains its provenance. Simulated sweeps are seen by every simulated sensor in turn.
 """
 
 from __future__ import annotations
@@ -13,22 +11,22 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from argparse import ArgumentParser
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain, cycle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import modt
-from modt import profile
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.crops import gather, ground_z_m
+from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
-from tools.options import crops_parser
-from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, Sensors
+from modt_desk.simulation.sensors import SENSORS
+from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, VARIANT_NAMES, Sensors
 from tools.train.labelled_scans import (
     THINNED,
     Scan,
@@ -39,10 +37,21 @@ from tools.train.labelled_scans import (
     semantic_scans,
     thinned,
 )
+from tools.train.near_scans import near_scans
 from tools.train.paste import cut_objects, paste_objects
+from tools.train.synthetic_scans import label_files, scans_from_labels, simulated_scans
 
 CELL_SCALES = (0.75, 1.4)
 """Cell sizes relative to the profile's, for training alone."""
+SYNTHETIC_CELL_SCALES = (0.75, 1.0, 1.0, 1.4)
+"""Those of simulated sweeps, one after another."""
+SCENES, TIMES_S = ("street", "crossing"), (0.0, 2.5)
+PASTES = 120
+"""Pasting attempts in each scan of KITTI."""
+MIN_HOST_POINTS = 60_000
+"""Points of a scan that objects are pasted into: more."""
+SEEDS_APART = 100_000
+"""Between the first worlds of two seeds."""
 MAX_POINTS = 1200
 UNLABELLED_SHARE, FOREIGN_SHARE = 0.2, 0.2
 """Shares of a proposal's points: more without a label make it unknown, more of another object make it partial."""
@@ -150,8 +159,8 @@ class CropWriter:
             self.columns.setdefault(key, []).append(value)
         self.rows += n
 
-    def save(self, path: Path, provenance: dict[str, object]) -> dict[str, object]:
-        """Write the file; returns its hash and the number of trainable crops by variant and class."""
+    def save(self, path: Path, provenance: dict[str, object]) -> None:
+        """Write the file; prints its hash and the number of trainable crops by variant and class."""
         table: dict[str, Any] = {key: np.concatenate(parts) for key, parts in self.columns.items()}
         table["offsets"] = np.append(0, np.cumsum(table.pop("count")))
         for key in ("label", "points", "row", "drive", "sensor"):
@@ -159,17 +168,12 @@ class CropWriter:
         trainable = ~table["partial"] & ~(table["unknown"] & (table["label"] == 0))
         tally = {
             name: np.bincount(table["label"][trainable & (table["variant"] == v)], minlength=4).tolist()
-            for name, v in (
-                ("shipped", SHIPPED),
-                ("clustered", CLUSTERED),
-                ("pasted", PASTED),
-                ("synthetic", SYNTHETIC),
-            )
+            for v, name in enumerate(VARIANT_NAMES)
         }
         provenance |= {"scans": len(np.unique(table["name"])), "crops": tally, "modt": modt.__version__}
         provenance |= {"sensors": np.unique(table["sensor"]).tolist()}
         np.savez_compressed(path, provenance=np.array(json.dumps(provenance)), **table)
-        return {"sha256": hashlib.sha256(path.read_bytes()).hexdigest(), **tally}
+        print(path, hashlib.sha256(path.read_bytes()).hexdigest(), json.dumps(tally), flush=True)
 
 
 def kitti(root: Path) -> Iterator[Scan]:
@@ -185,9 +189,14 @@ def add_labelled(writer: CropWriter, scan: Scan) -> None:
         writer.add(scan, CLUSTERED, scale)
 
 
-def add_kitti(writer: CropWriter, root: Path, pastes: int, seed: int) -> None:
-    """Add real scans, and real scans with pasted objects."""
-    scans = list(kitti(root))
+def kitti_crops(path: Path, root: Path) -> None:
+    """Write crops of real scans, and of scans of KITTI with pasted objects.
+
+    Args:
+        path: file to write (.npz).
+        root: of KITTI, with argoverse2/ and pandaset/ beside object/.
+    """
+    writer, scans = CropWriter(), list(kitti(root))
     for scan in scans:
         add_labelled(writer, scan)
         for step in THINNED:
@@ -196,36 +205,46 @@ def add_kitti(writer: CropWriter, root: Path, pastes: int, seed: int) -> None:
         writer.add(scan, CLUSTERED)
     for scan in (*argoverse_scans(root / "argoverse2"), *pandaset_scans(root / "pandaset")):
         add_labelled(writer, scan)
-    cuts = cut_objects(scans)
-    rng = np.random.default_rng(seed)
-    hosts: Iterable[Scan] = [scan for scan in scans if len(scan.points) > 60_000]
-    for scan in hosts if pastes else ():
-        for made in paste_objects(scan, cuts, pastes, rng):
-            writer.add(made, PASTED)
+    cuts, rng = cut_objects(scans), np.random.default_rng(0)
+    for scan in scans:
+        if len(scan.points) > MIN_HOST_POINTS:
+            for made in paste_objects(scan, cuts, PASTES, rng):
+                writer.add(made, PASTED)
+    writer.save(path, {"paste": PASTES, "seed": 0})
 
 
-def add_sources(parser: ArgumentParser) -> None:
-    """Add the options that name labelled scans."""
-    parser.add_argument("--kitti", type=Path, help="KITTI root, with argoverse2/ and pandaset/ beside object/")
-    parser.add_argument(
-        "--scans", type=Path, help="your own scans: velodyne/, label_2/ and, for a camera's view, calib/"
-    )
-    parser.add_argument("--profile", default=profile.DEFAULT, help="of their sensor")
-
-
-def main() -> None:
-    parser = crops_parser(__doc__, seed=0)
-    add_sources(parser)
-    parser.add_argument("--paste", type=int, default=0, help="pasting attempts in each scan of KITTI")
-    args = parser.parse_args()
+def own_crops(path: Path, folder: Path, config: ProfileConfig, sensor: str) -> None:
+    """Write crops of one's own labelled scans, as labelled_scans.folder_scans reads them."""
     writer = CropWriter()
-    if args.kitti:
-        add_kitti(writer, args.kitti, args.paste, args.seed)
-    if args.scans:
-        for scan in folder_scans(args.scans, Path(args.profile).stem, profile.load(args.profile)):
-            add_labelled(writer, scan)
-    print(json.dumps(writer.save(args.out, {"paste": args.paste, "seed": args.seed})))
+    for scan in folder_scans(folder, sensor, config):
+        add_labelled(writer, scan)
+    writer.save(path, {"paste": 0, "seed": 0})
 
 
-if __name__ == "__main__":
-    main()
+def synthetic_crops(path: Path, worlds: int, labels: Path | None = None) -> None:
+    """Write crops of simulated streets and crossings.
+
+    Args:
+        path: file to write (.npz).
+        worlds: number of the streets and crossings.
+        labels: folder with label_2/ and frame_to_raw.tsv; as many worlds again are built from these label files of
+            KITTI, whose ranges, headings and occlusions are those of real objects.
+    """
+    sensors, seeds = tuple(SENSORS), range(SEEDS_APART, SEEDS_APART + worlds)
+    scans = simulated_scans(SCENES, seeds[: worlds // 2], TIMES_S, camera=False, sensors=sensors)
+    if labels:
+        scans = chain(scans, scans_from_labels(label_files(labels), seeds, sensors))
+    _save_simulated(path, scans, {"synthetic": worlds, "placed": bool(labels), "seed": 1})
+
+
+def near_crops(path: Path, worlds: int, seed: int) -> None:
+    """Write crops of simulated sweeps of low sensors among people at arm's length, one sweep of each world."""
+    scans = near_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
+    _save_simulated(path, scans, {"near": worlds, "seed": seed})
+
+
+def _save_simulated(path: Path, scans: Iterable[Scan], provenance: dict[str, object]) -> None:
+    writer = CropWriter()
+    for scan, scale in zip(scans, cycle(SYNTHETIC_CELL_SCALES), strict=False):
+        writer.add(scan, SYNTHETIC, scale, validation=True)
+    writer.save(path, provenance)

@@ -14,12 +14,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from modt.config.profile import REFLECTANCE_SCALES
+from modt import profile
 from tools.options import parser
-from tools.train.build_crops import add_sources
+from tools.train.build_crops import kitti_crops, near_crops, own_crops, synthetic_crops
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
-WORLDS, PASTES = 240, 120
+WORLDS = 240
+"""Simulated worlds of each kind."""
 NEAR_WORLDS, NEAR_STEPS = {1: 3000, 2: 550}, 4000
 """Seed and number of the worlds near the sensor: to train on, and for the card; steps."""
 KITTI_DATA = (
@@ -42,25 +43,18 @@ def run(name: str, *arguments: str | Path | int) -> None:
     subprocess.run(command, check=True)
 
 
-def build(
-    folder: Path, crops: list[Path], near: list[Path], out: Path, options: list[str], data: str, licence: str
-) -> None:
-    """Train and export a model and the network beside it for what the view cuts, with their cards.
+def build(crops: list[Path], near: list[Path], out: Path, steps: int, data: str, licence: str) -> None:
+    """Train a model and the network beside it for what the view cuts, with their cards.
 
     Args:
-        folder: for the trained weights.
         crops: data sets.
-        near: two data sets of build_near_crops, one to train on and one for the card.
+        near: two data sets of near_crops, one to train on and one for the card.
         out: the model.
-        options: of train_pointnet.
+        steps: of each network.
         data: description of the data, for the card.
         licence: for the card.
     """
-    run("train_pointnet", folder, *crops, *options)
-    run("train_box_classifier", folder, *crops)
-    for sensor in REFLECTANCE_SCALES:
-        run("train_reflectance_classifier", folder, *crops, "--sensor", sensor)
-    run("export_pointnet", folder, out, "--data", data, "--licence", licence)
+    run("train_pointnet", out, *crops, "--steps", steps, "--data", data, "--licence", licence)
     options = ["--steps", str(NEAR_STEPS), "--licence", licence]
     beside = out.with_stem(f"{out.stem}-near")
     run("train_near", out, beside, *options, "--near", near[0], "--held", near[1], "--crops", *crops)
@@ -68,41 +62,33 @@ def build(
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("work", type=Path, help="folder for crops and trained weights")
+    options.add_argument("work", type=Path, help="folder for crops")
     options.add_argument("--steps", type=int, default=24000, help="of each network (default: %(default)s)")
-    add_sources(options)
+    options.add_argument("--kitti", type=Path, help="KITTI root, with argoverse2/ and pandaset/ beside object/")
+    options.add_argument("--scans", type=Path, help="own scans: velodyne/, label_2/ and, for a camera's view, calib/")
+    options.add_argument("--profile", default=profile.DEFAULT, help="of their sensor")
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     free, placed, real, own = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti", "scans"))
     near = [args.work / f"near-{seed}.npz" for seed in NEAR_WORLDS]
     for path, (seed, worlds) in zip(near, NEAR_WORLDS.items(), strict=True):
-        run("build_near_crops", path, "--worlds", worlds, "--seed", seed)
-    steps = ["--steps", str(args.steps)]
+        near_crops(path, worlds, seed)
     if args.kitti:
-        run("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
-        labels = args.kitti / "object" / "training_all_labels"
-        run("build_synthetic_crops", placed, "--worlds", WORLDS, "--labels", labels)
+        kitti_crops(real, args.kitti)
+        synthetic_crops(placed, WORLDS, args.kitti / "object" / "training_all_labels")
     if args.kitti is None or args.scans is None:
-        run("build_synthetic_crops", free, "--worlds", WORLDS)
+        synthetic_crops(free, WORLDS)
     if args.scans:
-        run("build_crops", own, "--scans", args.scans, "--profile", args.profile)
+        own_crops(own, args.scans, profile.load(args.profile), Path(args.profile).stem)
         crops, data = [own, real, placed] if args.kitti else [own, free], f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA
-        build(args.work / "scans", crops, near, args.work / "pointnet-scans.onnx", steps, data, licence)
+        build(crops, near, args.work / "pointnet-scans.onnx", args.steps, data, licence)
         return
     licence = "Apache-2.0: free for any use"
-    build(args.work / "synthetic", [free], near, MODELS / "pointnet-synthetic.onnx", steps, SYNTHETIC_DATA, licence)
+    build([free], near, MODELS / "pointnet-synthetic.onnx", args.steps, SYNTHETIC_DATA, licence)
     if args.kitti:
-        build(
-            args.work / "kitti",
-            [real, placed],
-            near,
-            MODELS / "pointnet-kitti.onnx",
-            steps,
-            KITTI_DATA,
-            KITTI_LICENCE,
-        )
+        build([real, placed], near, MODELS / "pointnet-kitti.onnx", args.steps, KITTI_DATA, KITTI_LICENCE)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Data sets of crops, as written by build_crops and build_synthetic_crops."""
+"""Data sets of crops, as tools.train.build_crops writes them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,40 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from modt.classes import N_CLASSES
+from modt.classification.box_classifier import box_features
 from modt.classification.crops import Crops
 from modt.config import SensorConfig
+from modt.geometry import upright_boxes
+from modt.segmentation.groups import HEADINGS, Groups, best_headings
+from modt.segmentation.segmenter import SIDE_NOISE_M
 from modt.types import NONE, Bool, Float64, Int
 
+VARIANT_NAMES = ("shipped", "clustered", "pasted", "synthetic")
 SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
 """Variants of crops: real scans under the default segmentation; real scans under other cell sizes; real scans with
 pasted objects; synthetic sweeps. All but the first are for training alone."""
 
+FOLDS, SEED = 3, 1
+"""Folds of the cross-validation, and seed of the first one and of the training on all crops."""
+CLASS_SHARE = np.array([0.46, 0.24, 0.16, 0.14])
+"""Share of each class in a batch; objects are rarer, background is more varied."""
+VARIANT_SHARE = np.array(
+    [[0.4, 0.35, 0.0, 0.25], [0.3, 0.25, 0.3, 0.15], [0.2, 0.15, 0.3, 0.35], [0.2, 0.15, 0.3, 0.35]]
+)
+"""Share of each variant (shipped, clustered, pasted, synthetic) in each class, where present; more generated crops
+for the classes that are rare in real scans."""
+TALL_SHARE = 0.3
+"""Share of vans among the cars."""
+BATCH_SIZE = 128
+"""Labelled crops of a step."""
+Pools = list[tuple[Int, Float64 | None]]
+"""Rows of each class, and the probability of each row, None where they are equal."""
+CHUNK = 2000
+"""Crops processed at a time."""
 NOT_CONCATENATED = ("offsets", "provenance", "truth_row")
 
 
@@ -152,9 +175,9 @@ def load(*paths: Path) -> Dataset:
         unknown=joined["unknown"],
         tall=joined["tall"],
         variant=joined["variant"].astype(np.int64),
+        reflectance=joined["reflectance"],
         drive=drive,
         sensor=sensor,
-        reflectance=joined["reflectance"],
         truth=LabelledObjects(
             joined["truth_label"].astype(np.int64),
             joined["truth_points"],
@@ -187,3 +210,45 @@ def folds(data: Dataset, k: int) -> Int:
         fold[drive] = np.argmin((load + weight[drive]).max(axis=1) + load.sum(axis=1) * 1e-3)
         load[fold[drive]] += weight[drive]
     return fold
+
+
+def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> Pools:
+    """Rows of each class and the probability of each row: equal within a class, variant and height.
+
+    Args:
+        data: all crops.
+        rows: to draw from.
+        worth: (len(data),) relative probability within these groups, equal by default.
+    """
+    worth = np.ones(len(data)) if worth is None else worth
+    pools: Pools = []
+    for c in range(N_CLASSES):
+        own = rows[data.label[rows] == c]
+        group = 2 * data.variant[own] + data.tall[own]
+        share = np.outer(VARIANT_SHARE[c], [1 - TALL_SHARE, TALL_SHARE]).ravel()
+        total = np.bincount(group, worth[own], minlength=len(share))
+        weight = worth[own] * (share / np.where(total > 0, total, 1.0))[group]
+        pools.append((own, weight / weight.sum()))
+    return pools
+
+
+def draw_batch(pools: Pools, rng: Generator, n: int = BATCH_SIZE, share: Float64 = CLASS_SHARE) -> Int:
+    """(n,) rows, classes by their shares; none of a class without rows."""
+    number = rng.multinomial(n, share / share.sum())
+    drawn = zip(pools, number, strict=True)
+    return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in drawn if len(own)])
+
+
+def crop_features(crops: Crops, sensors: Sensors) -> Float64:
+    """(R, 7) features of the boxes fitted to crops."""
+    x, y, z = crops.xyz.astype(np.float32).T
+    groups = Groups(np.arange(len(x)), crops.offsets)
+    heading = best_headings(x, y, groups, len(x), SIDE_NOISE_M)
+    box = upright_boxes(np.stack([x, y, z]), groups.offsets, HEADINGS[heading])
+    return box_features(crops.count, box, sensors.ground_z_m, sensors.beam_sr)
+
+
+def dataset_features(data: Dataset, rows: Int) -> Float64:
+    """(R, 7) features of rows of a data set, without augmentation."""
+    chunks = np.split(rows, np.arange(CHUNK, len(rows), CHUNK))
+    return np.concatenate([crop_features(data.take(part), data.sensors.take(part)) for part in chunks])

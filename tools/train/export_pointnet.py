@@ -1,9 +1,4 @@
-"""Export trained weights to ONNX, with a card (extra [train]).
-
-    python -m tools.train.export_pointnet TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
-
-TRAINED_DIR holds the output of train_pointnet, train_box_classifier and, for any number of sensors,
-train_reflectance_classifier. The layers of the box and the reflectance classifiers go to the model's metadata.
+"""Models in ONNX, each with its card; the layers of the box and the reflectance classifiers are its metadata.
 
 The maximum over points commutes with adding a bias and with ReLU, so the exported graph applies both after it, to one
 row instead of one for each point. Up to there the points are columns: ONNX Runtime finds a maximum along rows five
@@ -14,57 +9,102 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import onnx
+from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from modt.classes import CLASS_NAMES
 from modt.classification import box_classifier, reflectance_classifier
+from modt.classification.box_classifier import Layers
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.classification.pool import PoolWeights
-from tools.options import parser
 from tools.train.scores import MIN_OBJECT_POINTS, PRECISIONS
-from tools.train.weights import Layer, load_layers
 
+Layer = tuple[NDArray[Any], NDArray[Any]]
+"""(in, out) weight and (out,) bias."""
 N_SHARED = 3
 OPSET, IR = 17, 8
 
 
-def graph(layers: list[Layer], *, pool_first: bool = True) -> onnx.ModelProto:
-    """The ONNX graph; without `pool_first` in the textbook order: a point a row, bias and ReLU on every one."""
-    value = "points"
-    nodes: list[onnx.NodeProto] = []
-    initial: list[TensorProto] = []
+class GraphWriter:
+    """Nodes and weights of a graph, one after another.
 
-    def add(op: str, *inputs: str, **attributes: Any) -> None:
-        nonlocal value
-        result = f"v{len(nodes)}"
-        nodes.append(helper.make_node(op, inputs, [result], **attributes))
-        value = result
+    Args:
+        half: store weights in half precision; they are used in single.
+    """
 
-    if pool_first:
-        add("Transpose", value, perm=[0, 2, 1])
-    for i, (weight, bias) in enumerate(layers):
-        in_columns = pool_first and i < N_SHARED
-        last_shared = i == N_SHARED - 1
-        constants = (weight.T.copy(), bias if last_shared else bias[:, None]) if in_columns else (weight, bias)
-        initial += map(numpy_helper.from_array, constants, (f"weight{i}", f"bias{i}"))
-        add("MatMul", *((f"weight{i}", value) if in_columns else (value, f"weight{i}")))
-        if last_shared and pool_first:
-            add("ReduceMax", value, axes=[2], keepdims=0)
-        add("Add", value, f"bias{i}")
-        add("Softmax", value, axis=-1) if i == len(layers) - 1 else add("Relu", value)
-        if last_shared and not pool_first:
-            add("ReduceMax", value, axes=[1], keepdims=0)
-    nodes[-1].output[0] = "probability"
+    def __init__(self, *, half: bool) -> None:
+        self.nodes: list[onnx.NodeProto] = []
+        self.weights: list[TensorProto] = []
+        self.half = half
+
+    def add(self, operator: str, *inputs: str, **attributes: Any) -> str:
+        """Add a node; returns the name of its output."""
+        name = f"v{len(self.nodes)}"
+        self.nodes.append(helper.make_node(operator, inputs, [name], **attributes))
+        return name
+
+    def constant(self, name: str, value: NDArray[Any]) -> str:
+        """Add a constant; returns its name in single precision."""
+        half = self.half and value.dtype.kind == "f"
+        self.weights.append(numpy_helper.from_array(value.astype(np.float16) if half else value, name))
+        return self.add("Cast", name, to=TensorProto.FLOAT) if half else name
+
+    def pointnet(
+        self, points: str, layers: Sequence[Layer], shared: int, *, pool_first: bool, prefix: str = ""
+    ) -> str:
+        """Name of the (batch, out) logits; the first `shared` layers are applied to every point."""
+        value = self.add("Transpose", points, perm=[0, 2, 1]) if pool_first else points
+        for i, (weight, bias) in enumerate(layers):
+            columns, last_shared = pool_first and i < shared, i == shared - 1
+            weights = self.constant(f"{prefix}weight{i}", weight.T.copy() if columns else weight)
+            value = self.add("MatMul", *((weights, value) if columns else (value, weights)))
+            if columns and last_shared:
+                value = self.add("ReduceMax", value, axes=[2], keepdims=0)
+            biases = bias[:, None] if columns and not last_shared else bias
+            value = self.add("Add", value, self.constant(f"{prefix}bias{i}", biases))
+            if i < len(layers) - 1:
+                value = self.add("Relu", value)
+            if last_shared and not pool_first:
+                value = self.add("ReduceMax", value, axes=[1], keepdims=0)
+        return value
+
+
+def graph(
+    layers: Sequence[Layer],
+    *,
+    pool_first: bool = True,
+    shared: int = N_SHARED,
+    transform: tuple[Sequence[Layer], int] | None = None,
+    half: bool = False,
+) -> onnx.ModelProto:
+    """The ONNX graph of a PointNet.
+
+    Args:
+        layers: first to last.
+        pool_first: False for the textbook order: a point a row, bias and ReLU on every one.
+        shared: number of layers applied to every point.
+        transform: layers of a PointNet that finds a matrix (3, 3) for the points, and how many of them are shared.
+        half: store weights in half precision.
+    """
+    write, points = GraphWriter(half=half), "points"
+    if transform:
+        matrix = write.pointnet(points, *transform, pool_first=pool_first, prefix="transform_")
+        matrix = write.add("Reshape", matrix, write.constant("shape", np.array([-1, 3, 3])))
+        points = write.add("MatMul", points, matrix)
+    write.add("Softmax", write.pointnet(points, layers, shared, pool_first=pool_first), axis=-1)
+    write.nodes[-1].output[0] = "probability"
     ends = (
         [helper.make_tensor_value_info("points", TensorProto.FLOAT, ["batch", "points", 3])],
         [helper.make_tensor_value_info("probability", TensorProto.FLOAT, ["batch", len(CLASS_NAMES)])],
     )
     model = helper.make_model(
-        helper.make_graph(nodes, "pointnet", *ends, initial),
+        helper.make_graph(write.nodes, "pointnet", *ends, write.weights),
         opset_imports=[helper.make_opsetid("", OPSET)],
         ir_version=IR,
         producer_name="modt",
@@ -164,7 +204,7 @@ def _row(item: tuple[str, dict[str, Any]]) -> str:
         " / ".join(str(recalls[0][c]["objects"]) if c in recalls[0] else "0" for c in CLASS_NAMES[1:]),
         " / ".join(f"{100 * of['average_precision'][c]:.0f}" for c in CLASS_NAMES[1:]),
         str(of["log_loss"]),
-        str(of["calibration_error"]["likeliest"]),
+        str(of["calibration_error"]),
         str(of["temperature"]),
         *(" / ".join(_percent(recall.get(c)) for c in CLASS_NAMES[1:]) for recall in recalls),
     ]
@@ -183,34 +223,40 @@ def _threshold_table(ruled_out: list[dict[str, Any]]) -> list[str]:
     return [f"| | {' | '.join(CLASS_NAMES)} |", "|---|" + "---|" * len(CLASS_NAMES), *rows, ""]
 
 
-def main() -> None:
-    options = parser(__doc__)
-    options.add_argument("trained", type=Path, help="folder written by tools.train.train_pointnet")
-    options.add_argument("out", type=Path, help="model to write (.onnx), with its card beside it (.md)")
-    options.add_argument("--data", required=True, help="description of the training data, for the card")
-    options.add_argument("--licence", required=True)
-    args = options.parse_args()
-    network = graph(load_layers(args.trained / "weights.npz"))
-    report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
-    report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
+def export(
+    out: Path,
+    layers: list[Layer],
+    boxes: Layers,
+    reflectance: list[Layers],
+    report: dict[str, Any],
+    data: str,
+    licence: str,
+) -> None:
+    """Write a model (.onnx), and its card beside it (.md).
+
+    Args:
+        out: the model.
+        layers: of the network.
+        boxes: of the box classifier.
+        reflectance: of the reflectance classifiers.
+        report: facts of the training; those of the box and of each reflectance classifier under the names of both.
+        data: description of the training data, for the card.
+        licence: for the card.
+    """
+    network = graph(layers)
     metadata = {CLASS_FREQUENCY_KEY: json.dumps(report["class_frequency"])}
-    paths = sorted(args.trained.glob("reflectance-*.json"))
-    report["reflectance"] = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
-    classifiers = {
-        told["sensor"]: (load_layers(path.with_suffix(".npz")), PoolWeights.from_dict(told["weights"]))
-        for path, told in zip(paths, report["reflectance"], strict=True)
-    }
-    if classifiers:
-        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(classifiers)
+    if reflectance:
+        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
+            {
+                told["sensor"]: (own, PoolWeights.from_dict(told["weights"]))
+                for own, told in zip(reflectance, report["reflectance"], strict=True)
+            }
+        )
     metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(
-        load_layers(args.trained / "boxes.npz"), PoolWeights.from_dict(report["boxes"]["weights"])
+        boxes, PoolWeights.from_dict(report["boxes"]["weights"])
     )
     helper.set_model_props(network, metadata)
     model = network.SerializeToString(deterministic=True)
-    args.out.write_bytes(model)
-    text = card(args.out.stem, hashlib.sha256(model).hexdigest(), report, args.data, args.licence)
-    args.out.with_suffix(".md").write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    out.write_bytes(model)
+    text = card(out.stem, hashlib.sha256(model).hexdigest(), report, data, licence)
+    out.with_suffix(".md").write_text(text, encoding="utf-8")

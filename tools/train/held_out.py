@@ -1,20 +1,70 @@
-"""Out-of-fold predictions: each validation crop by a model trained without its drive."""
+"""Out-of-fold predictions, each validation crop by a model trained without its drive; calibration and pool."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
+from scipy.special import log_softmax, softmax
 
 from modt.classes import N_CLASSES
+from modt.classification.box_classifier import Layers, Weights
+from modt.classification.pool import PoolWeights, log_pool
 from modt.types import NONE, Bool, Float64, Int
 from tools.train.dataset import Dataset, LabelledObjects, folds
-from tools.train.temperature_scaling import Calibration, fit_calibration
 
 Model = Callable[[Int], Float64]
 """Maps rows (R,) to logits (R, 4)."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """probability = softmax(base + logits / temperature + offset); base is usually 0."""
+
+    temperature: float
+    offset: Float64
+
+    @classmethod
+    def identity(cls) -> Calibration:
+        """Calibration without effect."""
+        return cls(1.0, np.zeros(N_CLASSES))
+
+    def apply(self, logits: Float64, base: Float64 | float = 0.0) -> Float64:
+        """(R, 4) probabilities of logits (R, 4), added to calibrated logits `base`."""
+        probability: Float64 = softmax(base + logits / self.temperature + self.offset, axis=1)
+        return probability
+
+    def fold_into(self, layers: Layers) -> list[tuple[Weights, Weights]]:
+        """Layers with the calibration folded into the last one, float32."""
+        *hidden, (weight, bias) = layers
+        last = weight / self.temperature, bias / self.temperature + self.offset
+        return [(w.astype(np.float32), b.astype(np.float32)) for w, b in (*hidden, last)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Entries of a report, rounded."""
+        return {"temperature": round(self.temperature, 4), "offset": [round(float(v), 4) for v in self.offset]}
+
+
+def fit_calibration(logits: Float64, label: Int, weight: Float64, base: Float64 | float = 0.0) -> Calibration:
+    """Maximum-likelihood calibration on held-out logits; the offsets absorb the weighted class frequencies.
+
+    Args:
+        logits: (R, 4) uncalibrated.
+        label: (R,) classes.
+        weight: (R,) of each, 1 in total.
+        base: (R, 4) calibrated logits that they are added to.
+    """
+
+    def loss(theta: Float64) -> float:
+        z = log_softmax(base + logits * np.exp(-theta[0]) + np.append(0.0, theta[1:]), axis=1)
+        prior = 0.05 * float(np.sum(theta**2)) / np.count_nonzero(weight)
+        return prior - float(weight @ z[np.arange(len(label)), label])
+
+    found = minimize(loss, np.zeros(N_CLASSES), method="L-BFGS-B")
+    return Calibration(float(np.exp(found.x[0])), np.append(0.0, found.x[1:]))
 
 
 @dataclass(frozen=True)
@@ -113,9 +163,28 @@ def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> H
     return HeldOut(valid, out, fit_calibration(out, valid.label, valid.weight))
 
 
-def load_network(folder: Path, data: Dataset) -> Float64:
-    """(R, 4) out-of-fold probabilities of the PointNet, written by tools.train.train_pointnet for the same crops."""
-    with np.load(folder / "held_out.npz") as file:
-        assert file["crops"].tolist() == data.sha256, "held_out.npz belongs to other crops"
-        probability: Float64 = file["probability"]
-    return probability
+def fit_pool(
+    network: Float64, box: Float64, reflectance: Float64, valid: Validation, weight: Float64
+) -> tuple[PoolWeights, Float64]:
+    """Weights of modt.classification.pool, 0 to 1, that minimise the log loss; (R, 4) log posteriors of the pool.
+
+    Args:
+        network: (R, 4) P(class | points).
+        box: (R, 4) P(class | box).
+        reflectance: (R, 4) log P(reflectance | class, box), zeros without: its weight is then zero.
+        valid: the crops.
+        weight: (R,) of each, 1 in total.
+    """
+    log_frequency = np.log(valid.class_frequency.clip(1e-9))
+
+    def log_posterior(weights: PoolWeights) -> Float64:
+        out: Float64 = log_softmax(log_pool(network, np.log(box), reflectance, log_frequency, weights), axis=1)
+        return out
+
+    def loss(x: Float64) -> float:
+        return -float(weight @ log_posterior(PoolWeights(*x.tolist()))[np.arange(len(valid.label)), valid.label])
+
+    known = bool(reflectance.any())
+    found = minimize(loss, x0=(0.8, 0.4, 0.5 * known), bounds=((0.0, 1.0), (0.0, 1.0), (0.0, float(known))))
+    weights = PoolWeights(*(round(w, 2) for w in found.x.tolist()))
+    return weights, log_posterior(weights)

@@ -1,4 +1,4 @@
-"""Labelled scans of KITTI (object, raw, odometry), Argoverse 2 and PandaSet in one form, each with its sensor."""
+"""Labelled scans of KITTI (object, odometry), Argoverse 2 and PandaSet in one form, each with its sensor."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from modt.classes import CLASSES, ObjectClass, class_of_kitti
 from modt.config import ProfileConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.geometry import Camera, FieldOfView
-from modt.sources.kitti_calibration import camera_of_raw, camera_of_sequence
+from modt.sources.kitti_calibration import camera_of_sequence
 from modt.types import Bool, Float32, Float64, Int
 from modt_desk.evaluation import overlap
-from modt_desk.evaluation.kitti_labels import DONT_CARE, read_labels, read_tracklets
+from modt_desk.evaluation.kitti_labels import DONT_CARE, read_labels
 from modt_desk.evaluation.truth import PANDASET_TYPES, Regions, Role
 
 SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.semantic_kitti} | dict.fromkeys(
@@ -126,14 +126,7 @@ def beams(points: Float32) -> Int:
 
 def points_in_box(points: Float32, box: Float64) -> Bool:
     """(N,) points of the object in a box: a little beyond its faces, and clear of the ground."""
-    return overlap.inside(points, centred(box))
-
-
-def centred(boxes: Float64) -> Float64:
-    """(..., 7) boxes about their centres, of boxes about the centres of their bottom faces."""
-    out = boxes.copy()
-    out[..., 2] += boxes[..., 5] / 2
-    return out
+    return overlap.inside(points, box + np.eye(7)[2] * box[5] / 2)
 
 
 def on_bottom(boxes: Float64) -> Float64:
@@ -147,23 +140,25 @@ def scan_from_boxes(
     name: str,
     drive: str,
     points: Float32,
-    boxes: list[list[float]],
-    kinds: list[str],
+    boxes: Float64,
+    kinds: list[ObjectClass],
     fov: FieldOfView,
     unlabelled: Bool,
 ) -> Scan:
     """A scan with the points of each object taken from its box."""
-    table = np.array(boxes).reshape(-1, 7)
-    objects = tuple(np.flatnonzero(points_in_box(points, box)) for box in table)
-    classes = tuple(class_of_kitti(kind) for kind in kinds)
-    return Scan(name, drive, points, objects, classes, table, fov, unlabelled | ~fov.contains(points))
+    objects = tuple(np.flatnonzero(points_in_box(points, box)) for box in boxes)
+    return Scan(name, drive, points, objects, tuple(kinds), boxes, fov, unlabelled | ~fov.contains(points))
+
+
+def drives_of_frames(folder: Path) -> dict[str, str]:
+    """Raw drive of each frame of the object benchmark, from folder/frame_to_raw.tsv."""
+    rows = (line.split("\t") for line in (folder / "frame_to_raw.tsv").read_text(encoding="utf-8").splitlines())
+    return {row[0]: row[2] for row in rows}
 
 
 def object_scans(folder: Path) -> Iterator[Scan]:
     """Scans of the KITTI object benchmark: folder/velodyne*, folder/label_2, folder/calib."""
-    table = folder.parent / "training_all_labels" / "frame_to_raw.tsv"
-    rows = (line.split("\t") for line in table.read_text(encoding="utf-8").splitlines())
-    drive_of = {row[0]: row[2] for row in rows}
+    drive_of = drives_of_frames(folder.parent / "training_all_labels")
     for path in sorted(folder.glob("velodyne*/*.bin"), key=lambda p: p.stem):
         drive = drive_of[path.stem]
         assert drive != TEST_DRIVE, path
@@ -172,15 +167,18 @@ def object_scans(folder: Path) -> Iterator[Scan]:
             yield object_scan(path, folder / "label_2" / f"{path.stem}.txt", camera, drive)
 
 
-def object_scan(path: Path, label: Path, camera: Camera, drive: str) -> Scan:
-    """One scan of the object benchmark."""
+def object_scan(path: Path, label: Path, camera: Camera | None, drive: str) -> Scan:
+    """One scan of the object benchmark; without a camera its labels are complete over the full circle."""
     points = np.fromfile(path, np.float32).reshape(-1, 4)
-    labels = read_labels(label, camera, tracking=False)
+    labels = read_labels(label, camera or AT_SENSOR, tracking=False)
     objects = [item for item in labels if item.type_ != DONT_CARE]
-    edges = np.array([item.image_box for item in labels if item.type_ == DONT_CARE]).reshape(-1, 4)
-    unlabelled = Regions(edges, camera).contains(points)
-    boxes, kinds = [on_bottom(item.box).tolist() for item in objects], [item.type_ for item in objects]
-    return scan_from_boxes(path.stem, drive, points, boxes, kinds, FieldOfView.of_camera(camera), unlabelled)
+    fov, unlabelled = FieldOfView(), np.zeros(len(points), np.bool_)
+    if camera:
+        edges = np.array([item.image_box for item in labels if item.type_ == DONT_CARE]).reshape(-1, 4)
+        fov, unlabelled = FieldOfView.of_camera(camera), Regions(edges, camera).contains(points)
+    boxes = on_bottom(np.array([item.box for item in objects]).reshape(-1, 7))
+    kinds = [class_of_kitti(item.type_) for item in objects]
+    return scan_from_boxes(path.stem, drive, points, boxes, kinds, fov, unlabelled)
 
 
 def folder_scans(folder: Path, sensor: str, config: ProfileConfig) -> Iterator[Scan]:
@@ -203,29 +201,8 @@ def folder_scans(folder: Path, sensor: str, config: ProfileConfig) -> Iterator[S
     for path in paths:
         label, calib = folder / "label_2" / f"{path.stem}.txt", folder / "calib" / f"{path.stem}.txt"
         drive = path.stem.rpartition("_")[0] or path.stem
-        if calib.parent.is_dir():
-            scan = object_scan(path, label, camera_of_sequence(calib), drive)
-        else:
-            points = np.fromfile(path, np.float32).reshape(-1, 4)
-            labels = [item for item in read_labels(label, AT_SENSOR, tracking=False) if item.type_ != DONT_CARE]
-            boxes, kinds = [on_bottom(item.box).tolist() for item in labels], [item.type_ for item in labels]
-            none = np.zeros(len(points), np.bool_)
-            scan = scan_from_boxes(path.stem, drive, points, boxes, kinds, FieldOfView(), none)
-        yield replace(scan, sensor=sensor, profile=config)
-
-
-def raw_scans(drive: Path) -> Iterator[Scan]:
-    """Scans of a KITTI raw drive with tracklets, other than the test drive."""
-    assert drive.name != TEST_DRIVE, drive
-    camera = camera_of_raw(drive.parent / "calib_cam_to_cam.txt")
-    tracklets = read_tracklets(drive / "tracklet_labels.xml")
-    for path in sorted((drive / "velodyne_points" / "data").glob("*.bin")):
-        frame = int(path.stem)
-        present = [label for label in tracklets if label.frame == frame]
-        points = np.fromfile(path, np.float32).reshape(-1, 4)
-        boxes, kinds = [on_bottom(label.box).tolist() for label in present], [label.type_ for label in present]
-        name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
-        yield scan_from_boxes(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
+        camera = camera_of_sequence(calib) if calib.parent.is_dir() else None
+        yield replace(object_scan(path, label, camera, drive), sensor=sensor, profile=config)
 
 
 def semantic_scans(folder: Path) -> Iterator[Scan]:
@@ -259,10 +236,10 @@ def argoverse_scans(folder: Path) -> Iterator[Scan]:
         columns = ("x_m", "y_m", "z_centre_m", "length_m", "width_m", "height_m", "yaw_rad")
         boxes = on_bottom(np.array([[float(row[c]) for c in columns] for row in objects]))
         boxes[:, :3] -= ARGOVERSE_SENSOR_M
-        kinds = [ARGOVERSE_CLASS.get(row["category"], "") for row in objects]
+        kinds = [class_of_kitti(ARGOVERSE_CLASS.get(row["category"], "")) for row in objects]
         drive = f"argoverse2/{path.stem.split('_')[0]}"
         none = np.zeros(len(points), np.bool_)
-        scan = scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
+        scan = scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes, kinds, FieldOfView(), none)
         yield replace(scan, sensor="argoverse2", profile=ARGOVERSE)
 
 
@@ -285,25 +262,18 @@ def pandaset_scans(folder: Path) -> Iterator[Scan]:
         for box, kind in zip(boxes, kinds, strict=True):
             if kind == ObjectClass.CAR:
                 box[6] += _turn_rad(points, box)
-        objects = [np.flatnonzero(points_in_box(points, box)) for box in boxes]
-        known = [k for k, kind in enumerate(kinds) if kind is not None]
+        known = np.array([kind is not None for kind in kinds])
         unlabelled = np.zeros(len(points), np.bool_)
-        for own, kind in zip(objects, kinds, strict=True):
-            unlabelled[own] |= kind is None
+        for box in boxes[~known]:
+            unlabelled |= points_in_box(points, box)
         for x, y in PANDASET_UNLABELLED.get(path.stem, ()):
             unlabelled |= np.hypot(points[:, 0] - x, points[:, 1] - y) < UNLABELLED_RADIUS_M
-        yield Scan(
-            name=f"pandaset/{path.stem}",
-            drive=f"pandaset/{PANDASET_DRIVE.get(path.stem, path.stem)}",
-            points=points,
-            objects=tuple(objects[k] for k in known),
-            kinds=tuple(kind for kind in kinds if kind is not None),
-            boxes=boxes[known],
-            fov=FieldOfView(),
-            unlabelled=unlabelled,
-            sensor="pandar64",
-            profile=PANDAR64,
+        drive = f"pandaset/{PANDASET_DRIVE.get(path.stem, path.stem)}"
+        classes = [kind for kind in kinds if kind is not None]
+        scan = scan_from_boxes(
+            f"pandaset/{path.stem}", drive, points, boxes[known], classes, FieldOfView(), unlabelled
         )
+        yield replace(scan, sensor="pandar64", profile=PANDAR64)
 
 
 def _turn_rad(points: Float32, box: Float64) -> float:

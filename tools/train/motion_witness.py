@@ -1,9 +1,8 @@
 """Count the table of the motion witness on simulated drives.
 
-    python -m tools.train.motion_witness [--sensors NAME ...] [--scene NAME ...] [--seeds 800:806] [--seconds 8]
+    python -m tools.train.motion_witness
 
-Prints LOG_LIKELIHOOD_RATIO of modt.classification.motion_witness in tenths. Seeds of the documents' tables (450 to
-452) are refused.
+Prints LOG_LIKELIHOOD_RATIO of modt.classification.motion_witness in tenths.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ import numpy as np
 from modt.app import assembly
 from modt.classes import N_CLASSES
 from modt.classification.motion_witness import LENGTH_M, MOVED_M, YOUNG_S, cells
-from modt.cli.options import frames as number_range
 from modt.types import Float64, Int
 from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
@@ -26,7 +24,8 @@ WEIGHT, MOST = 0.5, 1.5
 """Weight of the witness beside network and box; its greatest absolute logarithm."""
 SMOOTHING = 200
 """Counts of a class over all lengths that are added to those of one length."""
-TEST_SEEDS = range(450, 453)
+SCENES, SEEDS, SECONDS = ("street", "crossing"), range(800, 806), 8.0
+"""Drives that are counted, by every sensor; the seeds are not those of any published figure."""
 
 
 def counted(drive: Drive, number: int) -> Int:
@@ -57,19 +56,9 @@ def log_likelihood_ratio(counts: Int) -> Float64:
 
 
 def main() -> None:
-    options = parser(__doc__)
-    options.add_argument("--sensors", nargs="+", choices=SENSORS, default=list(SENSORS))
-    options.add_argument("--scene", nargs="+", default=["street", "crossing"])
-    options.add_argument("--seeds", type=number_range, default=(800, 806), metavar="A:B")
-    options.add_argument("--seconds", type=float, default=8.0)
-    args = options.parse_args()
-    seeds = range(*args.seeds)
-    if set(seeds) & set(TEST_SEEDS):
-        options.error("seeds 450 to 452 are those of the documents' tables")
-    drives = [(sensor, scene, seed) for sensor in args.sensors for scene in args.scene for seed in seeds]
-    counts = sum(
-        counted(simulated(scene, sensor, args.seconds, seed), k) for k, (sensor, scene, seed) in enumerate(drives)
-    )
+    parser(__doc__).parse_args()
+    drives = [(scene, sensor, SECONDS, seed) for sensor in SENSORS for scene in SCENES for seed in SEEDS]
+    counts = sum(counted(simulated(*drive), k) for k, drive in enumerate(drives))
     print(np.round(10 * log_likelihood_ratio(np.asarray(counts))).astype(int).tolist())
 
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
 
+from modt import profile
 from modt.classes import N_CLASSES
 from modt.classification.crops import Crops
+from modt.config import SegmentationConfig
+from modt.segmentation.view_ends import ViewEnds
 from modt.types import Cut, Float64, Int
+from modt_desk.simulation.sensors import SENSORS
 from tools.train.augment import subsample
-from tools.train.dataset import SYNTHETIC, Dataset, Sensors
-from tools.train.near_cut import cut_flags, cut_near
+from tools.train.dataset import SYNTHETIC, Dataset, Pools, Sensors, draw_batch
+from tools.train.near_scans import HEIGHT_M, MIN_RANGE_M, RANGE_M
 
 SHARE = np.array([0.5, 0.08, 0.38, 0.04])
 """Shares of the classes in a batch."""
@@ -22,6 +27,12 @@ CUT_RANGE_M, CUT_POINTS, MAX_POINTS = 25.0, 60, 800
 """Crops of the streets that are cut near: how far they may be, points that they need, and points used of each."""
 HIDDEN_SHARE, MAX_HIDDEN, MIN_POINTS = 0.2, 0.45, 8
 """Crops hidden at a side, how much of one may be hidden, and points that are left of it."""
+MAX_HEIGHT_M = SegmentationConfig().max_height_m
+MIN_CUT_POINTS = 20
+"""A crop of which the beams show fewer points is left out."""
+LOG_RANGE = math.log(RANGE_M[0]), math.log(RANGE_M[1])
+SPANS: Float64 = np.tan(np.deg2rad([s for s in (profile.load(n).sensor.span_deg for n in SENSORS) if s is not None]))
+"""(S, 2) rise over distance of the lowest and the highest beam, sensor by sensor."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +49,7 @@ class NearSource:
     """Draws near crops.
 
     Args:
-        near: crops of build_near_crops.
+        near: crops of build_crops.near_crops.
         streets: crops of the streets; real ones that show enough are cut near.
     """
 
@@ -52,7 +63,8 @@ class NearSource:
 
     def draw(self, rng: Generator) -> NearBatch:
         """A batch."""
-        rows, street = _draw(self._pools, NEAR_BATCH, rng), _draw(self._cuttable, CUT_BATCH, rng)
+        rows = draw_batch(self._pools, rng, NEAR_BATCH, SHARE)
+        street = draw_batch(self._cuttable, rng, CUT_BATCH, SHARE)
         simulated, side = varied(self._near.take(rows), rng)
         crops = subsample(self._streets.take(street), MAX_POINTS, rng)
         crops, sensors, kept, flags = cut_near(crops, self._streets.sensors.take(street), rng)
@@ -71,13 +83,8 @@ def distance_m(crops: Crops) -> Float64:
     return np.asarray(np.hypot(*middle.T), np.float64)
 
 
-def _by_class(data: Dataset, rows: Int) -> list[Int]:
-    return [rows[data.label[rows] == c] for c in range(N_CLASSES)]
-
-
-def _draw(pools: list[Int], n: int, rng: Generator) -> Int:
-    number = rng.multinomial(n, SHARE)
-    return np.concatenate([rng.choice(own, k) for own, k in zip(pools, number, strict=True) if len(own)])
+def _by_class(data: Dataset, rows: Int) -> Pools:
+    return [(rows[data.label[rows] == c], None) for c in range(N_CLASSES)]
 
 
 def _joined(a: Crops, b: Crops) -> Crops:
@@ -108,3 +115,52 @@ def varied(crops: Crops, rng: Generator) -> tuple[Crops, Int]:
     keep |= few[owner]
     cut = Cut.SIDE * ((hidden > 0) & ~few & (rng.random(n) < 0.5))
     return Crops(xyz[keep].astype(np.float32), np.append(0, np.cumsum(np.bincount(owner[keep], minlength=n)))), cut
+
+
+def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sensors, Int, Int]:
+    """The crops that a random sensor still shows at a random mount and distance.
+
+    Args:
+        crops: in the frame of the sensors that measured them.
+        sensors: of the crops.
+        rng: of the random choices.
+
+    Returns:
+        crops, the sensors that would measure them so, (R,) rows of the crops given, and (R,) flags of Cut.
+    """
+    n, owner = len(crops), np.repeat(np.arange(len(crops)), crops.count)
+    low, high = SPANS[rng.integers(len(SPANS), size=n)].T
+    mount_m, near_m = rng.uniform(*HEIGHT_M, n), np.exp(rng.uniform(*LOG_RANGE, n))
+    xyz = crops.xyz.astype(np.float64)
+    distance = np.hypot(xyz[:, 0], xyz[:, 1])
+    nearest = np.minimum.reduceat(distance, crops.offsets[:-1])
+    bearing = np.arctan2(xyz[:, 1], xyz[:, 0])
+    first = bearing[crops.offsets[:-1]]
+    unit = np.stack([np.cos(first), np.sin(first)], axis=1)
+    xyz[:, :2] += ((near_m - nearest)[:, None] * unit)[owner]
+    xyz[:, 2] -= (sensors.ground_z_m + mount_m)[owner]
+    tangent = xyz[:, 2] / np.maximum(np.hypot(xyz[:, 0], xyz[:, 1]), 0.1)
+    above, below = tangent > high[owner], tangent < low[owner]
+    keep = ~above & ~below
+    cut = Cut.TOP * np.maximum.reduceat(above, crops.offsets[:-1])
+    cut |= Cut.BOTTOM * np.maximum.reduceat(below, crops.offsets[:-1])
+    count = np.bincount(owner[keep], minlength=n)
+    rows = np.flatnonzero((count >= MIN_CUT_POINTS) & (cut > 0))
+    kept = keep & np.isin(owner, rows)
+    wider = np.square(np.maximum(nearest, 1.0) / np.maximum(near_m, 1.0))  # the same area a point
+    near = replace(sensors, ground_z_m=-mount_m, elevation_deg=sensors.elevation_deg * wider)
+    out = Crops(xyz[kept].astype(np.float32), np.append(0, np.cumsum(count[rows])))
+    return out, near.take(rows), rows, cut[rows]
+
+
+def cut_flags(data: Dataset) -> Int:
+    """(R,) flags of Cut of the crops of a data set, by the beams of their sensors."""
+    flags = np.zeros(len(data), np.int64)
+    for number, name in enumerate(data.sensor_names):
+        rows = np.flatnonzero(data.sensor == number)
+        if name in SENSORS and len(rows):
+            sensor = replace(profile.load(name).sensor, min_range_m=MIN_RANGE_M)
+            crops = data.take(rows)
+            at_sensor = np.zeros((len(rows), 7))  # none is too far away
+            flags[rows] = ViewEnds(sensor, MAX_HEIGHT_M).cut(crops.xyz.T, crops.offsets, at_sensor)
+    return flags

@@ -1,4 +1,4 @@
-"""The PointNet of section V-A at half width in PyTorch, and its weights as arrays.
+"""The PointNet of section V-A at half width in PyTorch, its weights as arrays, and the small networks beside it.
 
 Crops of a batch are concatenated, without padding. The last shared layer is normalised after the maximum, with a
 positive scale, so that maximum, normalisation and ReLU commute.
@@ -6,6 +6,7 @@ positive scale, so that maximum, normalisation and ReLU commute.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -14,10 +15,17 @@ import torch
 from scipy.sparse import csr_matrix
 from torch import Tensor, nn
 
-from tools.train.weights import Layer
+from modt.classes import N_CLASSES
+from modt.classification.box_classifier import Layers
+from modt.types import Float64, Int
+from tools.train.export_pointnet import Layer
 
 SHARED = (3, 32, 64, 512)
 HEAD = (512, 256, 128, 4)
+HIDDEN = (32, 32)
+"""Widths of the small networks."""
+Batch = tuple[Float64, Int, Float64 | float]
+"""(R, F) features of crops, (R,) their classes, and (R, 4) logits that those of the network are added to, or zero."""
 
 
 class MaxPooledLinear(torch.autograd.Function):
@@ -123,3 +131,34 @@ class TransformedPointNet(nn.Module):
         matrix = self.transform(xyz, count).reshape(-1, 3, 3).repeat_interleave(count, dim=0)
         logits: Tensor = self.classifier((xyz[:, None] @ matrix)[:, 0], count)
         return logits
+
+
+def train_mlp(batch: Callable[[], Batch], sample: Float64, steps: int, rate: float, decay: float) -> Layers:
+    """Train a network; uncalibrated layers that take unnormalised features.
+
+    Args:
+        batch: returns the next batch.
+        sample: (S, F) features, for their mean and standard deviation.
+        steps: number of batches.
+        rate: maximum learning rate.
+        decay: weight decay.
+    """
+    mean, scale = sample.mean(axis=0), sample.std(axis=0)
+    scale = np.where(scale > 0, scale, 1.0)  # of a feature that never varies
+    linear = [nn.Linear(a, b) for a, b in pairwise((sample.shape[1], *HIDDEN, N_CLASSES))]
+    net = nn.Sequential(*[part for layer in linear for part in (layer, nn.Tanh())][:-1])
+    optimiser = torch.optim.AdamW(net.parameters(), weight_decay=decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, total_steps=steps)
+    criterion = nn.CrossEntropyLoss()
+    for _ in range(steps):
+        feature, label, base = batch()
+        score = net(torch.from_numpy(((feature - mean) / scale).astype(np.float32)))
+        loss = criterion(score + torch.from_numpy(np.asarray(base, np.float32)), torch.from_numpy(label))
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+    layers = [(p.weight.detach().double().numpy().T, p.bias.detach().double().numpy()) for p in linear]
+    weight, bias = layers[0]
+    weight = weight / scale[:, None]
+    return [(weight, bias - mean @ weight), *layers[1:]]

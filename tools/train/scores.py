@@ -15,12 +15,10 @@ from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.types import NONE, Bool, Float64, Int
 from modt_desk.evaluation.class_score import (
     average_precision,
-    expected_calibration_error,
     precision_recall,
     top_calibration_error,
 )
-from tools.train.held_out import Validation
-from tools.train.temperature_scaling import fit_calibration
+from tools.train.held_out import Validation, fit_calibration
 
 MIN_OBJECT_POINTS = 20
 """Least number of points of the objects that count for recall at a precision."""
@@ -38,16 +36,15 @@ def by_sensor(log_probability: Float64, valid: Validation, rows: Bool) -> dict[s
 def sensor_scores(log_probability: Float64, valid: Validation, mine: Bool) -> dict[str, Any]:
     """Scores of the crops of a mask (R,).
 
-    Keys: `average_precision` over all objects; `log_loss`; `log_loss_unadapted`, under the class frequency of the
-    calibration; `temperature`, by which the logits of this sensor are still to be divided; `calibration_error` of the
-    likeliest class and of each; `recall`, by precision and class, of the objects of MIN_OBJECT_POINTS points, found
-    and called right: `of_all` and `of_found`, those with a proposal of their own.
+    Keys: `average_precision` over all objects; `log_loss`; `temperature`, by which the logits of this sensor are
+    still to be divided; `calibration_error` of the likeliest class; `recall`, by precision and class, of the objects
+    of MIN_OBJECT_POINTS points, found and called right: `of_all` and `of_found`, those with a proposal of their own.
     """
     score = log_softmax(log_probability, axis=1)
     clear = mine & valid.clear
     label = valid.label[clear]
     adapted = score[clear] + shift(np.bincount(label, minlength=N_CLASSES) / len(label), valid.class_frequency)
-    posterior = softmax(adapted, axis=1)
+    error = top_calibration_error(softmax(adapted, axis=1), label)
     truth = valid.truth
     objects = np.isin(truth.sensor, np.unique(valid.sensor[mine]))
     number = np.bincount(truth.label[objects] if objects.any() else label, minlength=N_CLASSES)
@@ -62,18 +59,10 @@ def sensor_scores(log_probability: Float64, valid: Validation, mine: Bool) -> di
         for precision in PRECISIONS
     }
     return {
-        "proposals": np.bincount(label, minlength=N_CLASSES).tolist(),
         "average_precision": average_precision(probability, valid.label[rows], number),
-        "log_loss": round(log_loss(adapted, label), 4),
-        "log_loss_unadapted": round(log_loss(score[clear], label), 4),
+        "log_loss": round(-float(log_softmax(adapted, axis=1)[np.arange(len(label)), label].mean()), 4),
         "temperature": round(fit_calibration(adapted, label, np.full(len(label), 1 / len(label))).temperature, 2),
-        "calibration_error": {
-            "likeliest": _rounded(top_calibration_error(posterior, label)),
-            **{
-                name: _rounded(expected_calibration_error(posterior[:, c], label == c))
-                for c, name in enumerate(CLASS_NAMES)
-            },
-        },
+        "calibration_error": None if error is None else round(error, 4),
         "recall": recall,
     }
 
@@ -103,12 +92,3 @@ def recall_at(
     called = int((score[row[found]] >= least).sum())
     n, with_own = int(wanted.sum()), int(found.sum())
     return {"objects": n, "of_all": round(called / n, 4), "of_found": round(called / max(with_own, 1), 4)}
-
-
-def log_loss(log_posterior: Float64, label: Int) -> float:
-    """Mean negative log probability of the true classes, of log posteriors up to a constant each."""
-    return -float(log_softmax(log_posterior, axis=1)[np.arange(len(label)), label].mean())
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 4)

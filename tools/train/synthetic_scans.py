@@ -1,4 +1,4 @@
-"""Simulated sweeps as labelled scans."""
+"""Simulated sweeps as labelled scans, and worlds built from KITTI's label files."""
 
 from __future__ import annotations
 
@@ -11,13 +11,24 @@ import numpy as np
 from modt import profile
 from modt.geometry import FieldOfView
 from modt.types import Frame
-from modt_desk.simulation.simulator import Truth
+from modt_desk.evaluation.kitti_labels import read_labels
+from modt_desk.simulation import kinds, road, roadside
+from modt_desk.simulation.builder import SceneBuilder
+from modt_desk.simulation.motion import Path as Trajectory
+from modt_desk.simulation.sensors import sensor as model_of
+from modt_desk.simulation.simulator import Simulator, Truth
+from modt_desk.simulation.street import furnish, residential
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
-from tools.train.label_scenes import label_scene
-from tools.train.labelled_scans import TEST_DRIVE, Scan
+from tools.train.labelled_scans import AT_SENSOR, TEST_DRIVE, Scan, drives_of_frames
 
 PEOPLE = ("Pedestrian", "Cyclist", "Person_sitting")
 SECONDS = 4.0
+CAMERA_AHEAD_M = 0.27
+"""Place of the camera of the label files, ahead of the sensor."""
+KINDS = {
+    kind.name: kind for kind in (kinds.CAR, kinds.VAN, kinds.TRUCK, kinds.PEDESTRIAN, kinds.SITTER, kinds.CYCLIST)
+} | {"Tram": kinds.TRUCK}
+"""Kind that a KITTI object type is simulated by."""
 
 
 def labelled_scan(
@@ -68,10 +79,42 @@ def scans_from_labels(files: Sequence[Path], seeds: Sequence[int], sensors: Sequ
         yield labelled_scan(frame, truth, f"{path.stem}-{seed}", f"placed-{seed}", camera=True, sensor=sensor)
 
 
+def label_scene(path: Path, seed: int, sensor: str = profile.DEFAULT) -> Simulator:
+    """Simulator of a residential street with the objects of a label file alone, all at rest, as is the sensor.
+
+    Raises:
+        MisuseError: the file is unreadable or no label file.
+    """
+    labels, model = read_labels(path, AT_SENSOR, tracking=False), model_of(sensor)
+    rng = np.random.default_rng([seed, 0])
+    street = residential(rng, 60.0)
+    builder = SceneBuilder(rng, model.period_s)
+    x0, y0, yaw0 = street.place(0.0, -street.half_m * roadside.LANE)
+    c, s = np.cos(yaw0), np.sin(yaw0)
+    for label in labels:
+        kind = KINDS.get(label.type_)
+        if kind is None:
+            continue
+        x, y, _, length, width, height, yaw = label.box.tolist()
+        x += CAMERA_AHEAD_M
+        spot = Trajectory.standing(x0 + c * x - s * y, y0 + s * x + c * y, yaw0 + yaw)
+        if kind in (kinds.CAR, kinds.VAN, kinds.TRUCK):
+            builder.vehicle(kind, spot, (length, width, height))
+        elif kind is kinds.CYCLIST:
+            builder.cyclist(spot, 0.0, height=height * 0.97)
+        elif kind is kinds.SITTER:
+            builder.sitter(spot)
+        else:
+            walking = rng.random() < 0.7
+            builder.pedestrian(spot, float(rng.uniform(0.8, 1.8)) if walking else 0.0, height=height)
+    furnish(builder, street)
+    world = builder.world(road.terrain_along(rng, street), Trajectory.standing(x0, y0, yaw0), model.height_m)
+    return Simulator(world, model, seed)
+
+
 def label_files(folder: Path) -> list[Path]:
     """Label files under training_all_labels except those of the test drive; files with people listed four times."""
-    rows = (line.split("\t") for line in (folder / "frame_to_raw.tsv").read_text(encoding="utf-8").splitlines())
-    drive = {row[0]: row[2] for row in rows}
+    drive = drives_of_frames(folder)
     files = [p for p in sorted((folder / "label_2").glob("*.txt")) if drive.get(p.stem, TEST_DRIVE) != TEST_DRIVE]
     rich = [p for p in files if any(line.startswith(PEOPLE) for line in p.read_text(encoding="utf-8").splitlines())]
     return files + 3 * rich

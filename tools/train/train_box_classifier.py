@@ -1,16 +1,10 @@
-"""Train the box classifier, modt.classification.box_classifier (extra [train]).
+"""Training of the box classifier, modt.classification.box_classifier.
 
-    python -m tools.train.train_box_classifier OUT_DIR CROPS.npz... [--steps N] [--folds K] [--seed S]
-
-OUT_DIR holds the output of train_pointnet for the same crops and folds. Writes OUT_DIR/boxes.npz for export_pointnet
-and OUT_DIR/boxes.json: the weights of the pool with the network, out-of-fold scores by sensor of the box
-alone and of the pool and, for several thresholds, the share of each class below the threshold. Crops are augmented as
-for the PointNet, and the boxes fitted to the augmented crops.
+Crops are augmented as for the PointNet, and the boxes fitted to the augmented crops.
 """
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -20,23 +14,27 @@ from numpy.random import Generator
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.box_classifier import Layers, logits
 from modt.types import Bool, Float64, Int
-from tools.options import make_torch_deterministic, training_parser
 from tools.train.augment import augment, subsample
-from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
-from tools.train.box_features import crop_features, dataset_features
-from tools.train.dataset import Dataset, load
-from tools.train.held_out import Model, load_network, out_of_fold
-from tools.train.mlp_training import Batch, train_mlp
-from tools.train.pool_fit import fit_pool
+from tools.train.dataset import (
+    BATCH_SIZE,
+    FOLDS,
+    SEED,
+    Dataset,
+    crop_features,
+    dataset_features,
+    draw_batch,
+    sampling_pools,
+)
+from tools.train.held_out import Calibration, Model, fit_pool, out_of_fold
+from tools.train.network import Batch, train_mlp
 from tools.train.scores import by_sensor
-from tools.train.temperature_scaling import Calibration
-from tools.train.weights import save_layers
 
 STEPS, AUGMENTED_BATCHES = 2000, 250
 """Steps of the training; batches that are augmented for it, since augmentation costs more than a step."""
 MAX_POINTS = 400
 """Maximum number of points of a crop before augmentation."""
 THRESHOLDS = (0.005, 0.01, 0.02, 0.05, 0.1)
+"""Object probabilities below which the share of each class is reported."""
 
 
 def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
@@ -50,7 +48,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
 
     def batch() -> Batch:
         chosen = rng.integers(0, len(label), 2 * BATCH_SIZE)
-        return Batch(feature[chosen], label[chosen])
+        return feature[chosen], label[chosen], 0.0
 
     return train_mlp(batch, feature, steps, rate=1e-2, decay=1e-3)
 
@@ -80,11 +78,11 @@ def cross_validate(
 
     held = out_of_fold(data, k, model)
     valid, box = held.validation, held.probability
-    pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
+    weights, pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
     return held.calibration, {
-        "weights": pool.weights.as_dict(),
+        "weights": weights.as_dict(),
         "cross_validation": by_sensor(np.log(box), valid, valid.clear),
-        "pool": by_sensor(pool.log_posterior, valid, valid.clear),
+        "pool": by_sensor(pool, valid, valid.clear),
         "ruled_out": ruled_out(held.probability[valid.clear], valid.label[valid.clear]),
     }
 
@@ -105,21 +103,11 @@ def _share_below(probability: Float64, label: Int, threshold: float) -> list[flo
     return [round(float(below[label == c].mean()), 4) if (label == c).any() else 0.0 for c in range(N_CLASSES)]
 
 
-def main() -> None:
-    parser = training_parser(__doc__)
-    parser.add_argument("--steps", type=int, default=STEPS)
-    args = parser.parse_args()
-    make_torch_deterministic()
-    data = load(*args.crops)
-    network = load_network(args.out, data)
-    calibration, report = cross_validate(data, network, args.folds, args.steps, args.seed)
-    layers = train(data, np.flatnonzero(data.trainable), args.steps, args.seed)
-    save_layers(args.out / "boxes.npz", [*layers[:-1], calibration.fold_into(layers[-1])])
-    (args.out / "boxes.json").write_text(
-        json.dumps(report | {"steps": args.steps, "seed": args.seed}, indent=1) + "\n", encoding="utf-8"
-    )
-    print(json.dumps(report))
+def calibrated(data: Dataset, network: Float64) -> tuple[Layers, dict[str, Any]]:
+    """Calibrated layers trained on all crops, and their report, of (R, 4) out-of-fold probabilities of the PointNet.
 
-
-if __name__ == "__main__":
-    main()
+    The report holds the weights of the pool with the network, out-of-fold scores by sensor of the box alone and of
+    the pool, and the share of each class below each of THRESHOLDS.
+    """
+    calibration, report = cross_validate(data, network, FOLDS, STEPS, SEED)
+    return calibration.fold_into(train(data, np.flatnonzero(data.trainable), STEPS, SEED)), report

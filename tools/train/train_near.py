@@ -3,7 +3,7 @@
     python -m tools.train.train_near MODEL.onnx NAME-near.onnx --near NEAR.npz --held NEAR.npz --crops CROPS.npz...
                          --licence TEXT [--steps N] [--seed S]
 
-It begins with the weights of the model, and learns near crops by their labels: those of build_near_crops, and those
+It begins with the weights of the model, and learns near crops by their labels: those of low sensors, and those
 of the streets cut near. A classifier of boxes whose sizes are bounds goes into its metadata. Logits are adjusted for
 the shares of the classes in a batch, so posteriors hold for FREQUENCY. The card is scored on --held, on which nothing
 is trained.
@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,15 +32,11 @@ from modt.classification.pool import log_pool
 from modt.types import Bool, Cut, Float64, Int
 from tools.options import make_torch_deterministic, parser
 from tools.train.augment import subsample
-from tools.train.box_features import crop_features
-from tools.train.dataset import Dataset, load
-from tools.train.export_pointnet import N_SHARED, graph
-from tools.train.mlp_training import Batch, train_mlp
-from tools.train.near_batches import SHARE, NearSource, distance_m
-from tools.train.near_cut import cut_flags
-from tools.train.network import MaxPooledLinear
+from tools.train.dataset import Dataset, crop_features, dataset_features, load
+from tools.train.export_pointnet import N_SHARED, Layer, graph
+from tools.train.near_batches import SHARE, NearSource, cut_flags, distance_m
+from tools.train.network import Batch, MaxPooledLinear, train_mlp
 from tools.train.train_pointnet import POINTS, tensors
-from tools.train.weights import Layer
 
 FREQUENCY = np.array([0.86, 0.03, 0.1, 0.01])
 """Frequency of the classes among proposals near a small robot."""
@@ -124,40 +120,20 @@ def train_bounds(source: NearSource, seed: int) -> Layers:
 
     def batch() -> Batch:
         chosen = rng.integers(0, len(label), 512)
-        return Batch(feature[chosen], label[chosen])
+        return feature[chosen], label[chosen], 0.0
 
     *hidden, (weight, bias) = train_mlp(batch, feature, BOUND_STEPS, rate=1e-2, decay=1e-3)
     share = np.bincount(label, minlength=N_CLASSES).clip(1) / len(label)
     return [*hidden, (weight, bias + np.log(FREQUENCY / share))]
 
 
-@dataclass(frozen=True)
-class Judges:
-    """A network and the box classifiers beside it.
-
-    Attributes:
-        network: PointNet.
-        boxes: both box classifiers, and the weights of the pool.
-        log_frequency: (4,) that both assume.
-    """
-
-    network: Student
-    boxes: MlpBoxClassifier
-    log_frequency: Float64
-
-    @torch.no_grad()
-    def posteriors(self, data: Dataset, rows: Int) -> tuple[Float64, Float64, Float64]:
-        """(R, 4) of rows of a data set by the network, by the boxes, and by the pool of both."""
-        rng, flags = np.random.default_rng(0), cut_flags(data)
-        network, boxes = [], []
-        for part in np.array_split(rows, max(1, len(rows) // 500)):
-            crops, sensors = data.take(part), data.sensors.take(part)
-            network.append(self.network(*tensors(subsample(crops, POINTS, rng), sensors)).double().numpy())
-            boxes.append(self.boxes.log_probability(crop_features(crops, sensors), flags[part]))
-        by_network, by_box = softmax(np.concatenate(network), axis=1), log_softmax(np.concatenate(boxes), axis=1)
-        none = np.zeros_like(by_box)
-        pool = softmax(log_pool(by_network, by_box, none, self.log_frequency, self.boxes.weights), axis=1)
-        return by_network, np.exp(by_box), pool
+@torch.no_grad()
+def network_posterior(network: Student, data: Dataset, rows: Int) -> Float64:
+    """(R, 4) of rows of a data set by a network."""
+    rng = np.random.default_rng(0)
+    parts = [(data.take(part), data.sensors.take(part)) for part in np.array_split(rows, max(1, len(rows) // 500))]
+    logits = [network(*tensors(subsample(crops, POINTS, rng), sensors)).double().numpy() for crops, sensors in parts]
+    return np.asarray(softmax(np.concatenate(logits), axis=1), np.float64)
 
 
 def score(probability: Float64, person: Bool) -> str:
@@ -166,17 +142,28 @@ def score(probability: Float64, person: Bool) -> str:
     return f"{100 * called[person].mean():.0f} / {100 * person[called].mean() if called.any() else 0:.0f}"
 
 
-def table(before: Judges, now: Judges, held: Dataset) -> list[str]:
-    """Markdown of the people found near, by their distance."""
+def table(first: Student, net: Student, boxes: MlpBoxClassifier, log_frequency: Float64, held: Dataset) -> list[str]:
+    """Markdown of the people found near, by their distance.
+
+    Args:
+        first: the network before training.
+        net: the network after it.
+        boxes: both box classifiers, and the weights of the pool.
+        log_frequency: (4,) that networks and boxes assume.
+        held: crops that nothing was trained on.
+    """
     rows = np.flatnonzero(held.trainable)
     cut, distance, person = cut_flags(held)[rows], distance_m(held.crops)[rows], held.label[rows] == 2
-    former, answers = before.posteriors(held, rows)[0], now.posteriors(held, rows)
+    by_network = network_posterior(net, held, rows)
+    by_box = log_softmax(boxes.log_probability(dataset_features(held, rows), cut), axis=1)
+    pool = log_pool(by_network, by_box, np.zeros_like(by_box), log_frequency, boxes.weights)
+    answers = network_posterior(first, held, rows), by_network, np.exp(by_box), softmax(pool, axis=1)
     lines = ["| distance, cut above or below | people | network before | network | box | pool |", "|" + "---|" * 6]
     for low, high in RANGES_M:
         for word, is_cut in (("cut", True), ("not cut", False)):
             own = (distance > low) & (distance <= high) & ((cut & (Cut.TOP | Cut.BOTTOM) > 0) == is_cut)
             if person[own].any():
-                cells = [score(p[own], person[own]) for p in (former, *answers)]
+                cells = [score(p[own], person[own]) for p in answers]
                 lines.append(f"| {low} to {high} m, {word} | {person[own].sum()} | {' | '.join(cells)} |")
     return lines
 
@@ -185,7 +172,7 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("model", type=Path)
     options.add_argument("out", type=Path)
-    options.add_argument("--near", type=Path, required=True, help="crops of build_near_crops")
+    options.add_argument("--near", type=Path, required=True, help="crops of low sensors")
     options.add_argument("--held", type=Path, required=True, help="others, for the card")
     options.add_argument("--crops", type=Path, nargs="+", required=True, help="of the streets")
     options.add_argument("--licence", required=True)
@@ -209,7 +196,6 @@ def main() -> None:
     assert isinstance(classifier, MlpBoxClassifier)
     classifier = replace(classifier, bounds=bounds)
     log_frequency = np.log(json.loads(metadata[CLASS_FREQUENCY_KEY]))
-    before, now = (Judges(judge, classifier, log_frequency) for judge in (Student(first), net))
     tally = [np.bincount(d.label[d.trainable], minlength=N_CLASSES).tolist() for d in (near, streets)]
     card = [
         f"# {args.out.stem}",
@@ -230,7 +216,7 @@ def main() -> None:
         f"People of {held.provenance[0]['near']} simulated sweeps that nothing was trained on, a proposal at a time:",
         f"share with a posterior above one half, and precision of these [%]. Before: {args.model.stem}.",
         "",
-        *table(before, now, held),
+        *table(Student(first), net, classifier, log_frequency, held),
         "",
     ]
     args.out.with_suffix(".md").write_text("\n".join(card), encoding="utf-8")

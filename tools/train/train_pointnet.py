@@ -1,16 +1,15 @@
-"""Train the PointNet on a data set of crops (extra [train]).
+"""Train a model on data sets of crops: PointNet, box and reflectance classifiers (extra [train]).
 
-    python -m tools.train.train_pointnet OUT_DIR CROPS.npz... [--steps N] [--folds K] [--seed S]
+    python -m tools.train.train_pointnet MODEL.onnx CROPS.npz... --data TEXT --licence TEXT [--steps N]
 
-Writes OUT_DIR/weights.npz for export_pointnet, with the calibration folded into the last layer; OUT_DIR/report.json
-with the loss curve and out-of-fold scores by sensor (tools.train.scores; folds split by drive); and
-OUT_DIR/held_out.npz, the out-of-fold probabilities for the box and the reflectance classifier.
+Writes the model, with all three calibrated, and beside it a card with out-of-fold scores by sensor
+(tools.train.scores; folds split by drive).
 """
 
 from __future__ import annotations
 
-import json
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,22 +19,34 @@ from scipy.special import softmax
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.crops import Crops, canonical
+from modt.config.profile import REFLECTANCE_SCALES
 from modt.types import Bool, Float64, Int
-from tools.options import make_torch_deterministic, training_parser
-from tools.train import train_box_classifier
+from tools.options import make_torch_deterministic, parser
+from tools.train import train_box_classifier, train_reflectance_classifier
 from tools.train.augment import augment, subsample
-from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
-from tools.train.box_features import dataset_features
-from tools.train.dataset import Dataset, Sensors, load
-from tools.train.held_out import HeldOut, Model, out_of_fold
+from tools.train.dataset import (
+    BATCH_SIZE,
+    FOLDS,
+    SEED,
+    Dataset,
+    Pools,
+    Sensors,
+    dataset_features,
+    draw_batch,
+    load,
+    sampling_pools,
+)
+from tools.train.export_pointnet import export
+from tools.train.held_out import Model, out_of_fold
 from tools.train.network import PointNet
 from tools.train.scores import by_sensor
-from tools.train.weights import save_layers
 
 POINTS, MAX_POINTS = 128, 400
 """Maximum number of points of a crop in a batch, and before augmentation."""
 MIN_FREQUENCY = 1e-4
 """Stated of a class that the validation has no crop of."""
+PRINTED_STEPS = 1000
+"""Steps between two printed losses."""
 SMOOTHING = 0.02
 """Label smoothing: probability spread evenly over the classes."""
 BOX_STEPS, MIN_WORTH = 600, 0.03
@@ -65,31 +76,34 @@ def worth(data: Dataset, box: Float64, rows: Int, seed: int) -> Float64:
     return np.where(data.label == ObjectClass.BACKGROUND, like_an_object, 1.0)
 
 
-def train(data: Dataset, box: Float64, rows: Int, steps: int, seed: int) -> tuple[PointNet, list[float]]:
-    """Train on rows of the data set, with (R, 7) features of boxes; the network and its loss, mean of 50 steps."""
+def batch_loss(
+    net: torch.nn.Module, data: Dataset, pools: Pools, rng: np.random.Generator, smoothing: float = 0.0
+) -> torch.Tensor:
+    """Loss of a network on a batch of augmented crops."""
+    drawn = draw_batch(pools, rng)
+    crops, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
+    scores, label = net(*tensors(subsample(crops, POINTS, rng), sensors)), torch.from_numpy(data.label[drawn])
+    return torch.nn.functional.cross_entropy(scores, label, label_smoothing=smoothing)
+
+
+def train(data: Dataset, box: Float64, rows: Int, steps: int, seed: int) -> PointNet:
+    """Train on rows of the data set, with (R, 7) features of boxes; prints the loss now and then."""
     pools = sampling_pools(data, rows, worth(data, box, rows, seed))
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     net = PointNet()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
-    criterion = torch.nn.CrossEntropyLoss(label_smoothing=SMOOTHING)
-    losses: list[float] = []
-    running = 0.0
     for step in range(steps):
-        drawn = draw_batch(pools, rng)
-        crops, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
-        loss = criterion(net(*tensors(subsample(crops, POINTS, rng), sensors)), torch.from_numpy(data.label[drawn]))
+        loss = batch_loss(net, data, pools, rng, SMOOTHING)
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
         optimiser.step()
         schedule.step()
-        running += float(loss.detach()) / 50
-        if (step + 1) % 50 == 0:
-            losses.append(round(running, 4))
-            running = 0.0
-    return net.eval(), losses
+        if (step + 1) % PRINTED_STEPS == 0:
+            print(step + 1, round(loss.item(), 4), flush=True)
+    return net.eval()
 
 
 @torch.no_grad()
@@ -105,40 +119,40 @@ def logits(net: torch.nn.Module, data: Dataset, rows: Int) -> Float64:
     return out
 
 
-def cross_validate(data: Dataset, box: Float64, k: int, steps: int, seed: int) -> tuple[HeldOut, dict[str, Any]]:
-    """Out-of-fold predictions and their scores by sensor."""
-
-    def model(among: Bool, i: int) -> Model:
-        net, _ = train(data, box, np.flatnonzero(among & data.trainable), steps, seed + i)
-        return lambda rows: logits(net, data, rows)
-
-    held = out_of_fold(data, k, model)
-    return held, by_sensor(np.log(held.probability), held.validation, held.validation.clear)
-
-
 def main() -> None:
-    parser = training_parser(__doc__)
-    parser.add_argument("--steps", type=int, default=24000, help="of each network (default: %(default)s)")
-    args = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("out", type=Path, help="model to write (.onnx), with its card beside it (.md)")
+    options.add_argument("crops", type=Path, nargs="+", help="data sets of crops (.npz)")
+    options.add_argument("--data", required=True, help="description of the training data, for the card")
+    options.add_argument("--licence", required=True)
+    options.add_argument("--steps", type=int, default=24000, help="of each network (default: %(default)s)")
+    args = options.parse_args()
     make_torch_deterministic()
     data = load(*args.crops)
-    args.out.mkdir(parents=True, exist_ok=True)
     started = time.process_time()
     box = dataset_features(data, np.arange(len(data)))
-    report: dict[str, Any] = {"seed": args.seed, "steps": args.steps}
+
+    def fold_model(among: Bool, i: int) -> Model:
+        net = train(data, box, np.flatnonzero(among & data.trainable), args.steps, SEED + i)
+        return lambda rows: logits(net, data, rows)
+
+    held = out_of_fold(data, FOLDS, fold_model)
+    valid = held.validation
+    net = train(data, box, np.flatnonzero(data.trainable), args.steps, SEED)
+    report: dict[str, Any] = {"seed": SEED, "steps": args.steps, "cpu_s": round(time.process_time() - started)}
     report |= {"crops_sha256": data.sha256, "provenance": data.provenance, "torch": torch.__version__}
-    held, report["cross_validation"] = cross_validate(data, box, args.folds, args.steps, args.seed)
-    calibration = held.calibration
-    report["class_frequency"] = held.validation.class_frequency.clip(MIN_FREQUENCY).round(4).tolist()
-    np.savez(args.out / "held_out.npz", probability=held.probability, crops=data.sha256)
-    print(json.dumps(report["cross_validation"]))
-    net, losses = train(data, box, np.flatnonzero(data.trainable), args.steps, args.seed)
-    report |= {"loss": losses, "calibration": calibration.as_dict(), "cpu_s": round(time.process_time() - started)}
-    layers = net.layers()
-    layers[-1] = calibration.fold_into(layers[-1])
-    save_layers(args.out / "weights.npz", layers)
-    (args.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps({"loss": losses[-1:], "cpu_s": report["cpu_s"]}))
+    report |= {"calibration": held.calibration.as_dict()}
+    report |= {"class_frequency": valid.class_frequency.clip(MIN_FREQUENCY).round(4).tolist()}
+    report |= {"cross_validation": by_sensor(np.log(held.probability), valid, valid.clear)}
+    boxes, report["boxes"] = train_box_classifier.calibrated(data, held.probability)
+    each = (
+        train_reflectance_classifier.calibrated(data, sensor, held.probability, boxes)
+        for sensor in sorted(REFLECTANCE_SCALES)
+    )
+    trained = [pair for pair in each if pair]
+    reflectance, report["reflectance"] = [layers for layers, _ in trained], [told for _, told in trained]
+    layers = held.calibration.fold_into(net.layers())
+    export(args.out, layers, boxes, reflectance, report, args.data, args.licence)
 
 
 if __name__ == "__main__":

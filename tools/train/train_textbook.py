@@ -24,14 +24,12 @@ from scipy.special import softmax
 from modt.classes import CLASS_NAMES
 from modt_desk.evaluation.class_score import average_precision
 from tools.options import make_torch_deterministic, parser
-from tools.train.augment import augment, subsample
-from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
 from tools.train.build_models import KITTI_LICENCE
-from tools.train.dataset import SHIPPED, Dataset, folds, load
+from tools.train.dataset import BATCH_SIZE, SEED, SHIPPED, Dataset, folds, load, sampling_pools
+from tools.train.export_pointnet import graph
 from tools.train.held_out import Validation
 from tools.train.network import PointNet, TransformedPointNet
-from tools.train.textbook_graph import textbook_graph
-from tools.train.train_pointnet import MAX_POINTS, POINTS, logits, tensors
+from tools.train.train_pointnet import batch_loss, logits
 
 EPOCHS = {"pointnet-paper-40": 40, "pointnet-paper": 100}
 DEAR = {"pointnet-dear": 4}
@@ -49,9 +47,9 @@ def crops_of_epoch(data: Dataset) -> int:
     return int((data.trainable & (data.variant == SHIPPED)).sum())
 
 
-def trained(net: torch.nn.Module, data: Dataset, epochs: int, seed: int) -> Iterator[tuple[int, float]]:
-    """Trains a network; epochs done, and mean loss of the last one."""
-    rng, fold = np.random.default_rng(seed), folds(data, FOLDS)
+def trained(net: torch.nn.Module, data: Dataset, epochs: int) -> Iterator[tuple[int, float]]:
+    """Train a network; yields the epochs done, and the mean loss of the last one."""
+    rng, fold = np.random.default_rng(SEED), folds(data, FOLDS)
     pools = sampling_pools(data, np.flatnonzero(data.trainable & (fold[data.drive] != HELD_OUT)))
     optimiser = torch.optim.Adam(net.parameters(), RATE)
     schedule = torch.optim.lr_scheduler.StepLR(optimiser, DECAY_EPOCHS, DECAY)
@@ -59,10 +57,7 @@ def trained(net: torch.nn.Module, data: Dataset, epochs: int, seed: int) -> Iter
     for epoch in range(1, epochs + 1):
         total = 0.0
         for _ in range(steps):
-            drawn = draw_batch(pools, rng)
-            few, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
-            scores = net.train()(*tensors(subsample(few, POINTS, rng), sensors))
-            loss = torch.nn.functional.cross_entropy(scores, torch.from_numpy(data.label[drawn]))
+            loss = batch_loss(net.train(), data, pools, rng)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -72,12 +67,12 @@ def trained(net: torch.nn.Module, data: Dataset, epochs: int, seed: int) -> Iter
 
 
 def exported(net: torch.nn.Module) -> onnx.ModelProto:
-    """In the textbook order."""
+    """The network in the textbook order, weights in half precision."""
+    transform = None
     if isinstance(net, TransformedPointNet):
-        classifier, transform = net.classifier, net.transform
-        return textbook_graph(classifier.layers(), len(classifier.shared), transform.layers(), len(transform.shared))
+        net, transform = net.classifier, (net.transform.layers(), len(net.transform.shared))
     assert isinstance(net, PointNet)
-    return textbook_graph(net.layers(), len(net.shared))
+    return graph(net.layers(), pool_first=False, shared=len(net.shared), transform=transform, half=True)
 
 
 def held_out_scores(net: torch.nn.Module, data: Dataset) -> dict[str, tuple[list[int], dict[str, float]]]:
@@ -114,7 +109,7 @@ def card(name: str, model: bytes, net: torch.nn.Module, facts: dict[str, Any]) -
             "- input and output: as pointnet-kitti",
             f"- data: crops {', '.join(facts['sha256'])} (see the card of pointnet-kitti), one drive in {FOLDS} held "
             "out; nothing of drive 0005",
-            f"- training: tools.train.train_textbook, seed {facts['seed']}, {facts['epochs']} epochs of "
+            f"- training: tools.train.train_textbook, seed {SEED}, {facts['epochs']} epochs of "
             f"{facts['crops']} crops drawn by class, loss {facts['loss']:.3f}, torch {torch.__version__}, "
             f"{facts['cpu_s']} s on one core",
             "",
@@ -133,24 +128,17 @@ def main() -> None:
     options.add_argument("out", type=Path, help="folder of the models")
     options.add_argument("data", type=Path, help="data set of crops (.npz)")
     options.add_argument("--dear", action="store_true", help="the dearer network")
-    options.add_argument("--seed", type=int, default=1)
     args = options.parse_args()
     make_torch_deterministic()
-    torch.manual_seed(args.seed)
+    torch.manual_seed(SEED)
     data, started = load(args.data), time.process_time()
     net: torch.nn.Module = TransformedPointNet() if args.dear else PointNet()
     names = {epoch: name for name, epoch in (DEAR if args.dear else EPOCHS).items()}
-    for epoch, loss in trained(net, data, max(names), args.seed):
+    for epoch, loss in trained(net, data, max(names)):
         print(epoch, round(loss, 4), round(time.process_time() - started), flush=True)
         if epoch not in names:
             continue
-        facts = {
-            "epochs": epoch,
-            "loss": loss,
-            "crops": crops_of_epoch(data),
-            "seed": args.seed,
-            "sha256": data.sha256,
-        }
+        facts = {"epochs": epoch, "loss": loss, "crops": crops_of_epoch(data), "sha256": data.sha256}
         facts |= {"cpu_s": round(time.process_time() - started), "scores": held_out_scores(net, data)}
         model = exported(net.eval()).SerializeToString(deterministic=True)
         (args.out / f"{names[epoch]}.onnx").write_bytes(model)

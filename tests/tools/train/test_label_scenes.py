@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from tools.train.label_scenes import label_scene, read_placements
+from tools.train.synthetic_scans import label_scene
 
 
 def test_objects_of_a_label_file_stand_where_it_states(tmp_path):
@@ -26,7 +26,7 @@ def test_objects_of_a_label_file_stand_where_it_states(tmp_path):
 def test_an_invalid_label_file_is_refused(tmp_path, text):
     (tmp_path / "x.txt").write_text(text)
     with pytest.raises(MisuseError, match="label"):
-        read_placements(tmp_path / "x.txt")
+        label_scene(tmp_path / "x.txt", seed=0)
 
 
 @pytest.mark.kitti

@@ -11,8 +11,7 @@ from modt.classification.crops import Crops
 from modt.types import Cut
 from tests.tools.train.datasets import data_of
 from tools.train.dataset import Sensors
-from tools.train.near_batches import NearSource, varied
-from tools.train.near_cut import MIN_POINTS, cut_near
+from tools.train.near_batches import MIN_CUT_POINTS, NearSource, cut_near, varied
 from tools.train.near_scans import HEIGHT_M, near_scans
 
 
@@ -30,7 +29,7 @@ def test_crops_cut_near_lie_between_the_beams_and_keep_their_places_above_the_gr
     crops, sensors = boards(20)
     cut, near, rows, flags = cut_near(crops, sensors, np.random.default_rng(seed))
     assert len(cut) == len(rows) == len(flags)
-    assert (cut.count >= MIN_POINTS).all()
+    assert (cut.count >= MIN_CUT_POINTS).all()
     assert (flags > 0).all()
     mount_m = np.repeat(-near.ground_z_m, cut.count)
     assert ((near.ground_z_m <= -HEIGHT_M[0]) & (near.ground_z_m >= -HEIGHT_M[1])).all()

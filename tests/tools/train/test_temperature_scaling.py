@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modt_desk.evaluation.class_score import top_calibration_error
-from tools.train.temperature_scaling import Calibration, fit_calibration
+from tools.train.held_out import Calibration, fit_calibration
 
 
 def test_calibration_recovers_temperature_and_class_offsets() -> None:
@@ -26,7 +26,8 @@ def test_calibration_folds_into_the_last_layer() -> None:
     rng = np.random.default_rng(0)
     calibration = Calibration(1.7, np.array([0.0, -1.0, 0.5, 2.0]))
     x, weight, bias = rng.normal(size=(5, 8)), rng.normal(size=(8, 4)), rng.normal(size=4)
-    folded = calibration.fold_into((weight, bias))
+    *hidden, folded = calibration.fold_into([(weight, bias), (weight, bias)])
+    np.testing.assert_allclose(hidden[0][0], weight, atol=1e-6)
     np.testing.assert_allclose(
         Calibration.identity().apply(x @ folded[0] + folded[1]), calibration.apply(x @ weight + bias), atol=1e-5
     )
