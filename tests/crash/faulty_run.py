@@ -65,12 +65,7 @@ class InTurn(Background[Any]):
             super().__init__(name, writer, 128, encode=encode, retry_s=0.0, clock=lambda: faults.now_s)
 
     def _put(self, job: Callable[[], None]) -> None:
-        try:
-            job()
-        except Exception as error:
-            self._fail(error)
-        else:
-            self._succeed()
+        self._attempt(job)
 
     def close(self) -> None:
         self._writer.close()

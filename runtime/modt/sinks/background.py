@@ -111,14 +111,17 @@ class Background(Generic[T]):
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # real-time priority is for the loop alone
         while (job := self._next()) is not None:
-            try:
-                job()
-            except Exception as error:
-                self._fail(error)
-            else:
-                self._succeed()
+            self._attempt(job)
         with suppress(Exception):
             self._writer.close()
+
+    def _attempt(self, job: Callable[[], None]) -> None:
+        try:
+            job()
+        except Exception as error:
+            self._fail(error)
+        else:
+            self._succeed()
 
     def _next(self) -> Callable[[], None] | None:
         """Wait for the oldest job; None at the end."""
