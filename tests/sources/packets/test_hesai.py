@@ -10,8 +10,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from modt.errors import MisuseError
-from modt.sources.packets.hesai import GET_CALIBRATION, HesaiDecoder, asked_angles, model_of, read_angles
+from modt.sources.packets.hesai import GET_CALIBRATION, REMEDY, HesaiDecoder, asked_angles, model_of, read_angles
+from modt.sources.packets.open_capture import open_capture
 from tests.sources.packets.simulated import BEGAN_S, decoded, packets
+from tools.send.pcap_writer import write_capture
 
 TURN_S = 0.1
 RANGE = 2500
@@ -126,11 +128,22 @@ def test_an_ideal_xt_32_sees_the_scene_it_is_in(caplog):
         assert np.quantile(distance, 0.95) < 0.05  # m
 
 
-def test_a_model_whose_units_differ_needs_its_calibration(tmp_path):
-    with pytest.raises(MisuseError, match="the calibration of this Pandar64 is not given; give calibration=FILE"):
-        decoded(HesaiDecoder("sensor"), WRITTEN["Pandar64"].turns(0.1))
-    with pytest.raises(MisuseError, match="the calibration of this Pandar64 has 32 channels"):
-        decoded(HesaiDecoder("sensor", angles_of(32)), WRITTEN["Pandar64"].turns(0.1))
+@pytest.mark.parametrize(("angles_deg", "given"), [(None, "is not given"), (angles_of(32), "has 32 channels")])
+def test_a_model_whose_units_differ_needs_its_calibration(tmp_path, angles_deg, given):
+    timed = WRITTEN["Pandar64"].turns(1)
+    decoder = HesaiDecoder("sensor", angles_deg)
+    sweeps, reception = decoded(decoder, timed)
+    reason = f"the calibration of this Pandar64 {given}; {REMEDY}"
+    assert (sweeps, reception.refused) == ([], {reason: len(timed)})
+    sweeps, _ = decoded(decoder, WRITTEN["PandarXT-32"].turns(3.7))  # forged packets at start blind nobody
+    assert len(sweeps) == 3
+    path = tmp_path / "forged.pcap"
+    write_capture(path, timed, 2368)
+    with pytest.raises(MisuseError, match="no whole sweep of a Hesai, packets are refused: the calibration"):
+        open_capture(path, {})
+
+
+def test_a_table_without_plausible_angles_is_no_calibration(tmp_path):
     path = tmp_path / "angles.csv"
     for text in ("", "Channel,Elevation,Azimuth\n", "1,95.0,0\n", "1,nan,0\n"):
         path.write_text(text)
