@@ -4,9 +4,9 @@
     python -m tools.sequences --live hesai livox --seconds 1800
 
 Frames are empty, huge, repeated, late or not finite; poses leap, clocks are set, sensors change in mid-run. With
---live the input is packets of some makers or clouds, and poses, thousands in a sequence. They are lost, forged or late on their way to
-the loop of a robot, whose process is stopped at times. The first broken promise is printed with the shortest sequence
-that breaks it; then the exit status is 1.
+--live the input is packets of a maker or clouds, and poses, thousands in a sequence. They are lost, forged or late on
+their way to the loop of a robot, whose process is stopped at times. The first broken promise is printed with the
+shortest sequence that breaks it; then the exit status is 1.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def main() -> None:
     options.add_argument("--steps", type=int, default=25, help="longest sequence (default: %(default)s)")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--seconds", type=float, default=math.inf, help="CPU time after which no block begins")
-    options.add_argument("--live", nargs="*", metavar="SOURCE", help="packets and clouds instead of frames; default: all")
+    options.add_argument("--live", nargs="*", metavar="SOURCE", help="live inputs instead of frames; default: all")
     given = options.parse_args()
     from hypothesis import HealthCheck, Phase, seed, settings
     from hypothesis.stateful import run_state_machine_as_test

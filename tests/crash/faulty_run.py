@@ -151,13 +151,15 @@ class FaultyRun:
             notified.setblocking(False)
             posed, received = odometry.getsockname(), sensor.getsockname()
             reader = PacketReader(sensor, VelodyneDecoder("sensor"), clock=faults.calendar)
-            poses, payloads = PoseSocket(odometry, ProfileConfig().odometry, "odometry"), MAKERS["velodyne"].turns()[0]
+            poses = PoseSocket(odometry, ProfileConfig().odometry, "odometry")
+            maker = MAKERS["velodyne"]
+            payloads = maker.turns()[0]
             plain = socket.socket.__base__.sendto  # type: ignore[union-attr]
 
             def send() -> None:
                 for k, payload in enumerate(payloads):
                     at_s = faults.now_s + TURN_S * (k / len(payloads) - 1)
-                    plain(sender, MAKERS["velodyne"].stamped(payload, at_s), received)
+                    plain(sender, maker.stamped(payload, at_s), received)
                 pose = {"stamp": faults.now_s + faults.calendar_s, "x": faults.now_s, "y": 0.0, "yaw": 0.0}
                 plain(sender, json.dumps(pose).encode(), posed)
 
