@@ -95,13 +95,15 @@ class LiveSequences(RuleBasedStateMachine):
         seed=SEED,
         scale_s=st.sampled_from([0.0, 1e-6, 0.001, 0.05, 0.3, 3.0, 3600.0]),
         ahead=st.sampled_from([0.0, 0.5]),
-        n=st.sampled_from([1, 30, 1000]),
+        n=st.sampled_from([1, 30, 4000]),
+        stands=st.booleans(),
     )
-    def valid_packets_of_any_time(self, seed, scale_s, ahead, n) -> None:
+    def valid_packets_of_any_time(self, seed, scale_s, ahead, n, stands) -> None:
         rng, world = np.random.default_rng(seed), self.world
-        payloads = world.payloads
-        for _ in range(n):
-            world.packet(world.stamped(payloads[rng.integers(len(payloads))], scale_s * rng.uniform(-1, ahead)))
+        payloads = world.payloads[:1] if stands else world.payloads
+        ahead_s = scale_s * rng.uniform(-1, ahead, n)
+        for k, by_s in zip(rng.integers(len(payloads), size=n), np.sort(ahead_s) if stands else ahead_s, strict=True):
+            world.packet(world.stamped(payloads[k], by_s))
         world.take()
         self.check()
 
