@@ -33,12 +33,6 @@ def test_stamps_that_begin_again_continue():
     assert host_s(clock, 3599.99, 50.1) - before == pytest.approx(0.04, abs=1e-4)  # one that was overtaken
 
 
-def test_a_sensor_that_was_switched_on_again_is_placed_anew():
-    clock = DeviceClock(wrap_s=3600.0)
-    host_s(clock, 1000.0, 50.0)
-    assert host_s(clock, 3.0, 60.0) == pytest.approx(60.0)
-
-
 @pytest.mark.parametrize("step_s", [-3600.0, -0.5, 0.5, 3600.0])
 def test_a_clock_of_the_host_that_is_set_is_followed(step_s):
     clock, rng = DeviceClock(), np.random.default_rng(0)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from modt.errors import MisuseError
 from modt.sources.packets.hesai import GET_CALIBRATION, HesaiDecoder, asked_angles, model_of, read_angles
-from tests.sources.packets.simulated import BEGAN_S, decoded, packets
+from tests.sources.packets.simulated import BEGAN_S, decoded
 
 TURN_S = 0.1
 RANGE = 2500
@@ -110,20 +109,6 @@ def test_of_several_returns_the_one_of_the_greatest_reflectance_is_taken(mode, s
     assert [s.complete for s in sweeps] == [True, True]
     assert np.linalg.norm(sweeps[0].points[:, :3], axis=1) == pytest.approx(seen, rel=1e-4)
     assert reception.lost == 0
-
-
-def test_an_ideal_xt_32_sees_the_scene_it_is_in(caplog):
-    from modt_desk.simulation.synthetic_stream import SyntheticStream
-
-    decoder = HesaiDecoder("sensor")
-    sweeps, _ = decoded(decoder, packets("xt-32", 4))
-    assert decoder.profile == "xt-32"
-    assert "beams as of any PandarXT-32" in caplog.text
-    scene = list(SyntheticStream("street", "xt-32", 0.4, seed=1))
-    assert len(sweeps) == 3
-    for sweep, frame in zip(sweeps, scene[1:4], strict=True):
-        distance, _ = cKDTree(frame.points[:, :3]).query(sweep.points[:, :3])
-        assert np.quantile(distance, 0.95) < 0.05  # m
 
 
 def test_a_model_whose_units_differ_needs_its_calibration(tmp_path):

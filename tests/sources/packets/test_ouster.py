@@ -8,7 +8,6 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
-from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets import ouster
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.ouster import OusterDecoder
@@ -151,12 +150,3 @@ def test_a_sensor_that_was_switched_on_again_is_still_the_one_of_the_metadata(ti
     for at_s, payload in [*timed[:128], *again[128:]]:
         sweeps += decoder.decode(at_s, payload, reception)
     assert [len(s.points) for s in sweeps] == [len(s.points) for s in whole]
-
-
-def test_a_frame_sent_twice_is_no_negative_loss(timed, metadata):
-    decoder, reception = OusterDecoder("sensor", metadata), Reception()
-    for k, (at_s, payload) in enumerate(timed[:64]):
-        if k == 63:
-            decoder._last_id = decoder._frame.frame_id
-        decoder.decode(at_s, payload, reception)
-    assert reception.lost == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from modt.errors import MisuseError
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
@@ -18,7 +20,7 @@ from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.point_cloud_file import read_pcd
-from tests.sources.packets.simulated import decoded, equal, packets, packets_of_bag
+from tests.sources.packets.simulated import BEGAN_S, decoded, equal, packets, packets_of_bag, scene
 from tools.send.faults import Timed
 
 OTHER = "of another model than the packets before"
@@ -97,6 +99,37 @@ def maker(request: pytest.FixtureRequest) -> Maker:
         request.getfixturevalue("kitti_root")
         pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
     return MAKERS[request.param]
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "n", "whole", "turn_s"),
+    [("velodyne", "vlp-16", 5, 3, 0.1), ("hesai", "xt-32", 4, 3, 0.1), ("livox", "mid-360", 4, 2, 0.0)],
+)
+def test_sweeps_are_those_of_the_scene(name: str, model: str, n: int, whole: int, turn_s: float) -> None:
+    """The first turn began before it was heard."""
+    if name == "velodyne":
+        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    decoder = MAKERS[name].decoder()
+    sweeps, reception = decoded(decoder, packets(model, n))
+    assert decoder.profile == model
+    assert (len(sweeps), reception.lost, reception.refused) == (whole, 0, {})
+    for k, (sweep, frame) in enumerate(zip(sweeps, scene(model, n)[1:], strict=False), 1):
+        assert sweep.complete
+        assert sweep.turn_s == pytest.approx(turn_s, abs=1e-4)
+        assert sweep.stamp_s == pytest.approx(BEGAN_S + 0.1 * k + 0.05, abs=2e-3)  # straight ahead
+        assert sweep.points.dtype == np.float32
+        assert 0 < sweep.points[:, 3].max() <= 1
+        returns = frame.points[frame.points[:, :3].any(axis=1)]
+        assert len(sweep.points) == pytest.approx(len(returns), rel=0.02)
+        distance, _ = cKDTree(returns[:, :3]).query(sweep.points[:, :3])
+        assert np.quantile(distance, 0.95) < 0.05  # m; a packet's azimuths are those of its blocks
+
+
+def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module, name in (("velodyne_decoder", "velodyne"), ("ouster.sdk.core", "ouster")):
+        monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(MisuseError, match=rf"pip install '\.\[{name}\]'"):
+            MAKERS[name].decoder()
 
 
 def test_lost_packets_are_counted_and_their_sweep_is_incomplete(maker: Maker) -> None:
