@@ -108,15 +108,7 @@ def test_reflectance_is_scaled(form, kind, values, reflectance):
     np.testing.assert_allclose(form(rows)[0][:, 3], reflectance, atol=1e-6)
 
 
-NAMES = (
-    "Intensity",
-    "I",
-    "scalar_Intensity",
-    "Scalar_field_intensity",
-    "scalar_Scalar_field_Reflectance",
-    "Remission",
-)
-NAMES += ("scalar_reflectivity", "remissions", "scalar_Scalar_field_Intensity")
+NAMES = ("I", "scalar_Intensity", "Scalar_field_intensity", "scalar_Scalar_field_Reflectance", "remissions")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -130,6 +122,8 @@ def test_reflectance_is_known_by_the_names_of_the_field_s_tools(form, name):
 def test_a_calibrated_reflectance_goes_before_an_intensity(form):
     rows = table(x="f4", y="f4", z="f4", scalar_Intensity="u1", scalar_Reflectance="u1")
     np.testing.assert_allclose(form(rows)[0][:, 3], rows["scalar_Reflectance"] / 255, atol=1e-6)
+    cloud = read_cloud(messages.encode(messages.cloud(rows[None])))
+    np.testing.assert_allclose(cloud.points[:, 3], rows["scalar_Reflectance"] / 255, atol=1e-6)
 
 
 def test_fields_of_no_numbers_hold_no_bytes(tmp_path):
@@ -146,26 +140,6 @@ def test_without_reflectance_none_is_recorded(form):
     assert (form(table(x="f4", y="f4", z="f4"))[0][:, 3] == UNRECORDED).all()
 
 
-def test_repeated_names_and_several_numbers_a_field(tmp_path):
-    rows = table(x="f4", y="f4", z="f4", a="u1", b="u1")
-    points, _ = read(tmp_path / "scan.pcd", pcd(rows, FIELDS="x y z _ _"))
-    np.testing.assert_allclose(points[:, 2], np.arange(5) + 2)
-    rows = np.zeros(3, [("normal", "f4", 3), ("x", "f4"), ("y", "f4"), ("z", "f4")])
-    rows["z"] = [1, 2, 3]
-    flat = table(x="f4", y="f4", z="f4")
-    head = pcd(flat, FIELDS="normal x y z", SIZE="4 4 4 4", TYPE="F F F F", COUNT="3 1 1 1", WIDTH=3, POINTS=3)
-    points, _ = read(tmp_path / "scan.pcd", head[: head.index(b"binary\n") + 7] + rows.tobytes())
-    assert points[:, 2].tolist() == [1, 2, 3]
-
-
-def test_elements_before_the_vertices_are_passed_over(tmp_path):
-    rows = table(x="f4", y="f4", z="f4")
-    raw = ply(rows, before="element camera 2\nproperty float a\nproperty uchar b\n")
-    at = raw.index(b"end_header\n") + 11
-    points, _ = read(tmp_path / "scan.ply", raw[:at] + bytes(10) + raw[at:])
-    np.testing.assert_allclose(points[:, 0], np.arange(5))
-
-
 ROWS = table(x="f4", y="f4", z="f4", i="u1")
 
 
@@ -178,25 +152,19 @@ ROWS = table(x="f4", y="f4", z="f4", i="u1")
         ("a.pcd", pcd(ROWS, COUNT="1 1 1 1000000000"), "i of COUNT 1000000000"),
         ("a.pcd", pcd(ROWS, COUNT="0 1 1 1"), "no column x"),
         ("a.pcd", pcd(ROWS, COUNT="0 0 0 0", POINTS=9_000_000), "promises"),
-        ("a.pcd", pcd(ROWS, COUNT="1 1 1"), "promises"),
         ("a.pcd", pcd(ROWS, SIZE="4 4 4 3"), "lacks a line, or one is broken"),
-        ("a.pcd", pcd(ROWS, TYPE="F F F X"), "lacks a line, or one is broken"),
         ("a.pcd", pcd(ROWS, FIELDS=None), "lacks a line, or one is broken"),
-        ("a.pcd", pcd(ROWS, POINTS="many"), "lacks a line, or one is broken"),
         ("a.pcd", pcd(ROWS, "zipped"), "DATA 'zipped' is unknown"),
         ("a.pcd", pcd(ROWS, FIELDS="a b c d"), "no column x, y, z"),
         ("a.pcd", pcd(ROWS)[:-1], "truncated: 64 bytes for 5 points"),
         ("a.pcd", pcd(ROWS, "ascii")[:-6], "truncated: 19 numbers"),
         ("a.pcd", pcd(ROWS, "ascii").replace(b"4.0", b"4.o"), "no number"),
-        ("a.pcd", pcd(ROWS, "binary_compressed")[:-1], "truncated"),
         ("a.pcd", pcd(ROWS, "binary_compressed", POINTS=4_000_000), "of another size"),
         ("a.ply", b"nothing", "no header"),
         ("a.ply", ply(ROWS, n=10**15), "promises"),
-        ("a.ply", ply(ROWS, n=-1), "promises"),
         ("a.ply", ply(ROWS, "binary"), "cannot be read"),
         ("a.ply", ply(ROWS, before="element face 1\nproperty list uchar int n\n"), "lists"),
         ("a.ply", ply(ROWS, before="element many 10000000000\nproperty uchar n\n"), "promises"),
-        ("a.ply", ply(ROWS).replace(b"element vertex", b"element point"), "cannot be read"),
         ("a.ply", ply(ROWS)[:-1], "truncated"),
         ("a.ply", ply(ROWS, "ascii")[:-6], "truncated"),
     ],
@@ -221,13 +189,3 @@ def test_lzf_repeats():
 def test_broken_lzf_is_refused_without_growing(data, length):
     out = decompress(data, length)
     assert out is None or len(out) == length
-
-
-@pytest.mark.kitti
-def test_real_clouds(kitti_root):
-    clouds = sorted((kitti_root / "packets").glob("*/*.pcd"))
-    assert len(clouds) == 10
-    for cloud in clouds:
-        points, flaws = read_scan(cloud)
-        assert len(points) > 10_000
-        assert not flaws

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
-from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, read_poses
+from modt.sources.pose_source import PoseFile, read_poses
 from modt.sources.recognise import open_stream
 
 from . import layouts
@@ -86,13 +86,3 @@ def test_too_few_lines_are_refused_before_the_start(tmp_path):
     posed = PosedStream(stream, PoseFile(path, None, endless.end))
     with pytest.raises(MisuseError, match="too few for frame 4"):
         list(posed)
-
-
-def test_the_streams_own_may_be_kept_or_switched_off(tmp_path):
-    stream = open_stream(layouts.raw_drive(tmp_path))
-    own, none = PosedStream(stream, PoseSource()), PosedStream(stream, NoPoses())
-    assert (own.info.has_poses, none.info.has_poses) == (True, False)
-    assert all(f.T_world_sensor is None for f in none)
-    for a, b in zip(own, stream, strict=True):
-        np.testing.assert_array_equal(a.T_world_sensor, b.T_world_sensor)
-        assert a.points.tobytes() == b.points.tobytes()
