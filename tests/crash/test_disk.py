@@ -13,14 +13,9 @@ import pytest
 
 from modt.app.status import SCHEMA as STATUS_SCHEMA
 from modt.cli.status import read
-from modt.config import RecordingConfig
-from modt.sinks.recording import RETRY_S, AtOnce, Recording
-from modt.sinks.records import read_records
-from modt.sinks.run_directory import RunDirectory, status_paths
-from modt.sinks.tracks import SCHEMA
-from tests.crash.test_power_cut import OURS
-from tests.results import CAR, result
-from tests.sinks.test_recording import Time
+from modt.sinks.recording import RETRY_S
+from modt.sinks.run_directory import status_paths
+from tests.sinks.recordings import OURS, Time, begun, frame, frames
 
 
 @pytest.fixture(autouse=True)
@@ -52,23 +47,18 @@ class Service:
     def __init__(self, folder):
         self.time, self.n = Time(), 0
         self.path = folder / "run"
-        config = RecordingConfig(disk_mb=10.0, keep="tracks")
-        self.recording = Recording(RunDirectory(self.path), config, AtOnce(), lambda: OURS, self.time)
-        self.recording.start()
+        self.recording = begun(folder, time=self.time, disk_mb=10.0, keep="tracks")
 
     def run(self, frames):
         for _ in range(frames):
             self.time.now += 0.1
-            self.recording.write(result(self.n, [5, 4], {0: 1, 1: 2}, {1: CAR}))
+            self.recording.write(frame(self.n))
             self.n += 1
             if self.n % 10 == 0:
                 self.recording.state(json.dumps({"schema": STATUS_SCHEMA, "frames": self.n}))
 
     def lost(self):
-        parts = sorted(
-            self.path.parent.glob("run*/tracks.jsonl"), key=lambda part: part.parent.name.replace("~", " ")
-        )
-        kept = [record["frame"] for part in parts for record in read_records(part, SCHEMA)]
+        kept = frames(self.path.parent)
         assert len(kept) == len({*kept})
         assert self.recording.health()["lost_lines"] == self.n - len(kept)
         return sorted({*range(self.n)} - {*kept})
@@ -95,7 +85,7 @@ def test_removed_records_are_begun_anew_within_a_second_and_their_lines_counted(
     for name in ("tracks.jsonl", "run.yaml"):
         (service.path / name).unlink()
         service.run(35)
-    service.path.rename(tmp_path / "run-moved")
+    service.path.rename(tmp_path / "run~0")
     service.run(35)
     service.recording.finish()
     lost = service.lost()
@@ -188,6 +178,6 @@ def test_without_descriptors_open_files_go_on_and_a_new_part_waits(tmp_path):
     service.run(40)
     service.recording.finish()
     assert 20 <= service.recording.health()["lost_lines"] <= 20 + RETRY_S / 0.1
-    kept = [r["frame"] for p in ("run~1", "run") for r in read_records(tmp_path / p / "tracks.jsonl", SCHEMA)]
+    kept = frames(tmp_path)
     assert kept[:40] == list(range(40))
     assert kept[-1] == 99

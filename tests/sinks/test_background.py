@@ -33,11 +33,10 @@ class Slow:
 class Records(Slow):
     """A writer that counts, and takes lines of the ledger too."""
 
+    ledger = Slow.write
+
     def health(self):
         return {"unsent": 2, "written": 100}
-
-    def ledger(self, record):
-        self.write(record)
 
 
 def settled(background, **expected):
@@ -58,29 +57,19 @@ def slow():
         writer.released.release()
 
 
-def test_items_are_written_in_their_order_and_the_writer_is_closed(slow):
-    background = Background("test", slow, 10)
-    for n in range(5):
-        background.write(n)
-        slow.released.release()
-    background.close()
-    assert slow.items == [0, 1, 2, 3, 4]
-    assert slow.closed.wait(LIMIT_S)
-    assert background.health() == {"written": 5, "dropped": 0, "failed": 0, "waiting": 0, "state": "ok"}
-
-
-def test_a_full_queue_drops_its_oldest(slow):
+def test_items_are_written_in_their_order_and_a_full_queue_drops_its_oldest(slow):
     background = Background("test", slow, 3)
     background.write("in work")
     assert slow.entered.acquire(timeout=LIMIT_S)
     for n in range(5):
         background.write(n)
-    assert background.health()["dropped"] == 2
-    assert background.health()["waiting"] == 3
+    assert background.health() == {"written": 0, "dropped": 2, "failed": 0, "waiting": 3, "state": "ok"}
     for _ in range(4):
         slow.released.release()
     background.close()
     assert slow.items == ["in work", 2, 3, 4]
+    assert slow.closed.wait(LIMIT_S)
+    assert background.health() == {"written": 4, "dropped": 2, "failed": 0, "waiting": 0, "state": "ok"}
 
 
 @pytest.mark.parametrize(
@@ -104,9 +93,9 @@ def test_a_failure_is_logged_once_counted_and_tried_again(error, said, slow, cap
     assert settled(background, written=1, state="ok")
     background.close()
     failed, again = caplog.records
-    assert failed.getMessage().startswith(f"test: {said}; tried again")
+    assert said in failed.getMessage()
     assert bool(failed.exc_info) == isinstance(error, KeyError)  # a traceback of what is no failure of the system
-    assert again.getMessage().startswith("test: written again")
+    assert "written again" in again.getMessage()
     assert slow.items == ["again"]
 
 

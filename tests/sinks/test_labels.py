@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from modt.sinks.labels import PointLabels, encode
+from modt.sinks.labels import PointLabels
 from tests.results import CAR, PEDESTRIAN, result
 
 
@@ -12,7 +12,3 @@ def test_every_point_of_the_input_has_its_label_in_order(tmp_path):
     labels = np.fromfile(tmp_path / "labels" / "000005.label", np.uint32)
     assert (labels >> 16).tolist() == [1, 1, 1, 2, 2, 0, 0]
     assert (labels & 0xFFFF).tolist() == [1, 1, 1, 2, 2, 0, 0]
-
-
-def test_a_frame_without_proposals_is_all_zero():
-    assert encode(result(0, [], {}, n_points=4)).tolist() == [0, 0, 0, 0]

@@ -18,7 +18,7 @@ from modt.sinks.mcap_file import McapFile
 from modt.sinks.messages import topics
 from modt.sources.recognise import open_stream
 from tests.results import CAR, PEDESTRIAN, result
-from tests.sinks.full_disk import files_of_at_most
+from tests.sinks.recordings import files_of_at_most
 
 
 def moving(index):
@@ -51,8 +51,8 @@ def n_frames(path):
     return count
 
 
-def record(path, *frames, records=(), **options):
-    sink = McapFile(path, **{"points": True, **options})
+def record(path, *frames, records=()):
+    sink = McapFile(path, points=True)
     for frame in frames:
         sink.write(frame)
     for line in records:
