@@ -1,7 +1,6 @@
 """The rule that turns readings into joules, with faults of real meters and on a model that knows the truth."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -14,14 +13,14 @@ from modt.energy.readings import History, judge
 RANGE_J = 65_532.610987
 
 
-def facts(kind: Kind = Kind.MEASURED, wrap_J: float | None = RANGE_J, scope: Scope = Scope.CPU) -> Facts:
+def facts(kind=Kind.MEASURED, wrap_J=RANGE_J, scope=Scope.CPU):
     return Facts(name="test", unit="J", resolution=61e-6, max_W=1000.0, scope=scope, kind=kind, wrap_J=wrap_J)
 
 
 RAIL = facts(Kind.INTEGRATED, None, Scope.SOC)
 
 
-def judged(meter: Facts, readings: list[float | None], seconds: float = 1.0) -> list[tuple[float | None, str]]:
+def judged(meter, readings, seconds=1.0):
     """Energy and mark of each interval between readings a second apart."""
     history, found = History(), []
     for reading in readings:
@@ -51,7 +50,7 @@ KNOWN = [1000.0, 1040.0, 1080.0]
     ],
     ids=["steady", "zero", "jump", "stuck", "lost", "none", "reset", "busier", "idle", "garbage", "out of range"],
 )
-def test_faults_of_a_counter(readings: list[float | None], found: list[tuple[float | None, str]]) -> None:
+def test_faults_of_a_counter(readings, found):
     assert judged(facts(), KNOWN + readings)[2:] == found
 
 
@@ -69,18 +68,18 @@ def test_faults_of_a_counter(readings: list[float | None], found: list[tuple[flo
     ],
     ids=["steady", "spike", "zero", "drop", "reversed", "first", "busier", "beyond"],
 )
-def test_faults_of_a_power_sensor(readings: list[float | None], found: list[tuple[float | None, str]]) -> None:
+def test_faults_of_a_power_sensor(readings, found):
     assert judged(RAIL, readings) == found
 
 
-def test_a_rail_that_feeds_nothing_now_draws_nothing() -> None:
+def test_a_rail_that_feeds_nothing_now_draws_nothing():
     rail = facts(Kind.INTEGRATED, None, Scope.RAIL)
     assert judged(rail, [0.0, 0.0, 0.0, 2.0, 2.0]) == [
         (0.0, ""), (0.0, ""), (None, "implausible"), (2.0, ""),
     ]  # fmt: skip
 
 
-def test_a_counter_that_passes_its_range_is_measured_and_one_that_is_reset_below_it_is_not() -> None:
+def test_a_counter_that_passes_its_range_is_measured_and_one_that_is_reset_below_it_is_not():
     near = [RANGE_J - J for J in (100.0, 60.0, 20.0)]
     assert judged(facts(), [*near, 20.0, 60.0])[2:] == [(40.0, "wrap"), (40.0, "")]
     assert judged(facts(), [RANGE_J - 700.0 + J for J in (0.0, 40.0, 80.0)] + [0.0, 40.0])[2:] == [
@@ -88,13 +87,13 @@ def test_a_counter_that_passes_its_range_is_measured_and_one_that_is_reset_below
     ]  # fmt: skip
 
 
-def test_a_counter_is_ambiguous_over_an_interval_in_which_it_may_go_round() -> None:
+def test_a_counter_is_ambiguous_over_an_interval_in_which_it_may_go_round():
     meter = facts(wrap_J=200.0)
     assert judged(meter, [0.0, 10.0, 20.0, 30.0], seconds=0.1)[-1] == (10.0, "")
     assert judged(meter, [0.0, 40.0, 80.0, 120.0], seconds=1.0)[-1] == (None, "ambiguous")
 
 
-def counted(random: np.random.Generator, energy_J: np.ndarray) -> Iterator[float | None]:
+def counted(random, energy_J):
     """Readings of a faulty counter, from the true energy of the interval before each.
 
     A fault is one that can be told: a value, alone among five, that no machine of several times the power reaches, a
@@ -122,13 +121,13 @@ def counted(random: np.random.Generator, energy_J: np.ndarray) -> Iterator[float
         rest -= 1
 
 
-def floor(joules: float) -> float:
+def floor(joules):
     """Energy rounded down to a step of the counter [J]."""
     return math.floor(joules / 61e-6) * 61e-6
 
 
 @pytest.mark.slow
-def test_no_joule_is_invented_and_none_is_lost_unmarked() -> None:
+def test_no_joule_is_invented_and_none_is_lost_unmarked():
     """Over 1,000 random counters each interval with energy has the true one, each other a cause, and most have it."""
     intervals = measured = wraps = 0
     for seed in range(1000):
@@ -148,7 +147,7 @@ def test_no_joule_is_invented_and_none_is_lost_unmarked() -> None:
     st.lists(st.tuples(st.one_of(st.none(), st.floats()), st.floats(0.0, 100.0))),
     st.sampled_from([facts(), facts(wrap_J=None), RAIL]),
 )
-def test_any_readings_give_energy_in_range_or_a_cause(tape: list[tuple[float | None, float]], meter: Facts) -> None:
+def test_any_readings_give_energy_in_range_or_a_cause(tape, meter):
     history = History()
     for reading, seconds in tape:
         history, joules, mark = judge(meter, history, reading, seconds)
