@@ -36,32 +36,28 @@ def bombs() -> list[bytes]:
 
 TOPICS = "CREATE TABLE topics(id INTEGER{key}, name, type, serialization_format, offered_qos_profiles)"
 MESSAGES = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp{stamp}, data{data})"
+PLAIN_TOPICS, PLAIN_MESSAGES = TOPICS.format(key=""), MESSAGES.format(stamp="", data="")
+VIEWED = "CREATE VIEW messages AS " + ENDLESS
 SCHEMAS: list[list[str]] = [
-    *([TOPICS.format(key=key), MESSAGES.format(stamp="", data="")] for key in ("", " PRIMARY KEY")),
+    [PLAIN_TOPICS, PLAIN_MESSAGES],
+    [TOPICS.format(key=" PRIMARY KEY"), PLAIN_MESSAGES],
+    [PLAIN_TOPICS, VIEWED.format(columns="n id, 1 topic_id, n timestamp, n data")],
+    [PLAIN_TOPICS, VIEWED.format(columns="n id, 1 topic_id, n timestamp, zeroblob(1000000000) data")],
     [
-        TOPICS.format(key=""),
-        f"CREATE VIEW messages AS {ENDLESS.format(columns='n id, 1 topic_id, n timestamp, n data')}",
-    ],
-    [
-        TOPICS.format(key=""),
-        "CREATE VIEW messages AS "
-        + ENDLESS.format(columns="n id, 1 topic_id, n timestamp, zeroblob(1000000000) data"),
-    ],
-    [
-        MESSAGES.format(stamp="", data=""),
+        PLAIN_MESSAGES,
         "CREATE VIEW topics AS "
         + ENDLESS.format(columns=f"n id, 'a' || n name, '{CLOUD}' type, 'cdr' serialization_format"),
     ],
-    [TOPICS.format(key=""), MESSAGES.format(stamp="", data=" AS (zeroblob(1000000000))")],
-    [TOPICS.format(key=""), MESSAGES.format(stamp="", data=" AS (randomblob(60000))")],
-    [TOPICS.format(key=""), MESSAGES.format(stamp=" AS (length(hex(hex(zeroblob(500000000)))))", data="")],
-    [TOPICS.format(key=""), "CREATE VIRTUAL TABLE messages USING fts5(id, topic_id, timestamp, data)"],
+    [PLAIN_TOPICS, MESSAGES.format(stamp="", data=" AS (zeroblob(1000000000))")],
+    [PLAIN_TOPICS, MESSAGES.format(stamp="", data=" AS (randomblob(60000))")],
+    [PLAIN_TOPICS, MESSAGES.format(stamp=" AS (length(hex(hex(zeroblob(500000000)))))", data="")],
+    [PLAIN_TOPICS, "CREATE VIRTUAL TABLE messages USING fts5(id, topic_id, timestamp, data)"],
     [
-        TOPICS.format(key=""),
-        MESSAGES.format(stamp="", data=""),
+        PLAIN_TOPICS,
+        PLAIN_MESSAGES,
         "CREATE TRIGGER t AFTER INSERT ON topics BEGIN INSERT INTO topics VALUES (1, 2, 3, 4, 5); END",
     ],
-    [TOPICS.format(key="")],
+    [PLAIN_TOPICS],
     [],
 ]
 

@@ -101,6 +101,3 @@ def exported_run(folder: Path) -> Feed:
             FORMS[form](Export(recorded, points=False), out)
 
     return of_file(run / "tracks.jsonl", read, json_lines(map(frame_record, range(2))))
-
-
-TARGETS = (calibrations, predictions, viewed_run, exported_run)

@@ -189,9 +189,3 @@ def service_status(folder: Path) -> Feed:
             status.run(Namespace(directory=folder, json=False))
 
     return of_file(folder / STATUS, read, json.dumps(seed))
-
-
-TARGETS = (
-    *(profiles, models, model_metadata, run_description, ledger, tracks, judged_run, labels_of_points),
-    *(service_status,),
-)

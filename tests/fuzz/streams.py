@@ -184,20 +184,3 @@ def _of_packets(decoder: PacketDecoder, seed: bytes) -> Feed:
         fresh.finish(reception)
 
     return [seed], call
-
-
-TARGETS = (
-    *(
-        pcap,
-        velodyne_capture,
-        velodyne_packets,
-        velodyne_calibration,
-        hesai_packets,
-        livox_packets,
-        hesai_calibration,
-        ouster_packets,
-        ouster_metadata,
-        database,
-    ),
-    *(mcap, point_cloud, odometry, transforms, pose_datagram),
-)

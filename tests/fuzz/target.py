@@ -24,14 +24,18 @@ class Target:
 
     name: str
     prepare: Callable[[Path], Feed]
-    refusals: tuple[type[Exception], ...] = (ModtError,)
+    refusals: tuple[type[Exception], ...]
 
 
-def target(*refusals: type[Exception]) -> Callable[[Callable[[Path], Feed]], Target]:
+TARGETS: dict[str, Target] = {}
+
+
+def target(*refusals: type[Exception]) -> Callable[[Callable[[Path], Feed]], Callable[[Path], Feed]]:
     """Make a target of a function that prepares it, named as the function."""
 
-    def made(prepare: Callable[[Path], Feed]) -> Target:
-        return Target(prepare.__name__, prepare, (ModtError, *refusals))
+    def made(prepare: Callable[[Path], Feed]) -> Callable[[Path], Feed]:
+        TARGETS[prepare.__name__] = Target(prepare.__name__, prepare, (ModtError, *refusals))
+        return prepare
 
     return made
 

@@ -77,19 +77,12 @@ def placed(kind: str, position: list[float], quaternion: list[float]) -> Any:
     return made("geometry_msgs/Transform", translation=made("geometry_msgs/Vector3", **at), rotation=orientation)
 
 
-def cloud(
-    data: np.ndarray,
-    *,
-    stamp_s: float = 1.0,
-    frame_id: str = "lidar",
-    datatypes: dict[str, int] | None = None,
-    padding: int = 0,
-) -> Any:
+def cloud(data: np.ndarray, *, stamp_s: float = 1.0, frame_id: str = "lidar", padding: int = 0) -> Any:
     """A PointCloud2 of a structured (height, width) array, its rows padded by some bytes."""
     kinds = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
     fields = []
     for name, (kind, offset) in data.dtype.fields.items():
-        datatype = (datatypes or {}).get(name, kinds.get(kind.str[1:], 0))
+        datatype = kinds.get(kind.str[1:], 0)
         fields.append(made("sensor_msgs/PointField", name=name, offset=offset, datatype=datatype, count=1))
     rows = np.frombuffer(data.tobytes(), np.uint8).reshape(len(data), -1)
     rows = np.pad(rows, ((0, 0), (0, padding)))
@@ -126,15 +119,12 @@ def odometry(stamp_s: float, position: list[float], quaternion: list[float], chi
 
 def transforms(*edges: tuple[str, str, list[float], list[float]]) -> Any:
     """A TFMessage of (parent, child, translation, quaternion)."""
-    return made(
-        "tf2_msgs/TFMessage",
-        transforms=[
-            made(
-                "geometry_msgs/TransformStamped",
-                header=header(0.0, parent),
-                child_frame_id=child,
-                transform=placed("Transform", at, turned),
-            )
-            for parent, child, at, turned in edges
-        ],
-    )
+    stamped = []
+    for parent, child, at, turned in edges:
+        values = {
+            "header": header(0.0, parent),
+            "child_frame_id": child,
+            "transform": placed("Transform", at, turned),
+        }
+        stamped.append(made("geometry_msgs/TransformStamped", **values))
+    return made("tf2_msgs/TFMessage", transforms=stamped)

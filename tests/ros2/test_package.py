@@ -34,18 +34,6 @@ FRAME = result(3, [5, 4], {0: 1, 1: 12}, {1: CAR})
 PUBLISHED = {topic.name: topic.type for topic in topics(PREFIX, world_frame_id="world", points=True)}
 
 
-def figures():
-    """Topics of energy and CPU time."""
-    pytest.importorskip("foxglove")
-    from modt.sinks.foxglove_server import FIGURES
-
-    return {f"/{PREFIX}/{name}" for name in FIGURES}
-
-
-def named(text):
-    return set(re.findall(rf"/{PREFIX}/\w+(?:/\w+)?", text))
-
-
 def test_the_manifest_has_the_version_of_modt_and_the_setup_holds_every_file():
     manifest = ET.parse(PACKAGE / "package.xml").getroot()
     assert manifest.findtext("version") == modt.__version__
@@ -66,12 +54,15 @@ def test_rviz_shows_topics_of_modt_with_their_types():
 
 
 def test_the_layout_of_foxglove_shows_topics_of_modt():
+    pytest.importorskip("foxglove")
+    from modt.sinks.foxglove_server import FIGURES
+
     text = (PACKAGE / "config" / "foxglove.json").read_text()
-    layout = json.loads(text)
     panels = set(re.findall(r'"(?:first|second)": "([^"]+)"', text))
-    assert panels == layout["configById"].keys()
-    assert named(text) <= PUBLISHED.keys() | figures()
-    assert {"/modt/markers", "/modt/points", "/modt/detections"} <= named(text)
+    assert panels == json.loads(text)["configById"].keys()
+    named = set(re.findall(rf"/{PREFIX}/\w+(?:/\w+)?", text))
+    assert named <= PUBLISHED.keys() | {f"/{PREFIX}/{name}" for name in FIGURES}  # of energy and CPU time
+    assert {"/modt/markers", "/modt/points", "/modt/detections"} <= named
 
 
 @pytest.fixture(name="launched")

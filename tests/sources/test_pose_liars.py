@@ -186,7 +186,7 @@ def test_silence_of_the_sender_is_no_lie(robot):
 
 
 @pytest.mark.slow
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     seed=st.integers(0, 2**32 - 1),
     share=st.floats(0.0, 0.3),
