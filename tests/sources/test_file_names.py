@@ -41,21 +41,17 @@ def test_numbers_are_played_in_their_order(tmp_path, form, suffix):
 
 FORMS = {
     "seconds": (lambda t: str(t // 10**9), 10**9),
-    "float": (lambda t: str(round(t * 1e-9, 6)), 10**8),
     "sec.nsec": (lambda t: f"{t // 10**9}.{t % 10**9:09d}", 10**8),
     "sec_nsec": (lambda t: f"{t // 10**9}_{t % 10**9:09d}", 10**8),
     "sec_nsec without zeros": (lambda t: f"{t // 10**9}_{t % 10**9}", 10**8),
-    "sec.nsec without zeros": (lambda t: f"{t // 10**9}.{t % 10**9}", 10**8),
     "sec-usec without zeros": (lambda t: f"{t // 10**9}-{t % 10**9 // 1000}", 10**8),
     "nanoseconds": (str, 10**8),
-    "microseconds": (lambda t: str(t // 10**3), 10**8),
     "milliseconds": (lambda t: str(t // 10**6), 10**8),
-    "prefix": (lambda t: f"cloud_{t}", 10**8),
-    "suffix": (lambda t: f"{t}_lidar_top", 10**8),
+    "prefix and suffix": (lambda t: f"cloud_{t}_lidar_top", 10**8),
     "since the begin": (lambda t: f"{(t - BEGAN_NS) // 10**9}.{(t - BEGAN_NS) % 10**9 // 10**6:03d}", 10**8),
 }
-CALENDARS = ["%Y-%m-%dT%H:%M:%S.%f", "%Y-%m-%d-%H-%M-%S-%f", "%Y%m%dT%H%M%S.%f", "%Y%m%d_%H%M%S_%f", "%Y%m%d%H%M%S%f"]
-CALENDARS += ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "lidar-%Y.%m.%d-%H.%M.%S.%f"]
+CALENDARS = ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d-%H-%M-%S-%f", "%Y%m%d_%H%M%S_%f", "%Y%m%d%H%M%S%f"]
+CALENDARS += ["lidar-%Y.%m.%d-%H.%M.%S.%f"]
 
 
 def calendar(form):
@@ -66,7 +62,7 @@ def calendar(form):
 
 
 FORMS |= {form: (calendar(form), 10**8) for form in CALENDARS}
-FORMS |= {f"{form} in ms": (lambda t, form=form: calendar(form)(t)[:-3], 10**8) for form in CALENDARS[1:5]}
+FORMS |= {f"{form} in ms": (lambda t, form=form: calendar(form)(t)[:-3], 10**8) for form in CALENDARS[1:4]}
 
 
 @pytest.mark.parametrize(("name", "step_ns"), FORMS.values(), ids=FORMS)

@@ -41,13 +41,10 @@ GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
         (None, "No such file"),
         ("", "no poses"),
         (GOOD + "1 0 0\n", r"p\.txt:2: 3 numbers, not 12"),
-        (GOOD + "\n" + GOOD, r"p\.txt:2: 0 numbers"),
         (GOOD * 2 + "1 0 0 0 0 1 0 0 0 0 1 x\n", r"p\.txt:3: no numbers"),
         (GOOD + "1 0 0 nan 0 1 0 0 0 0 1 0\n", r"p\.txt:2: not finite"),
         ("2 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
-        ("-1 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
         ("1 0 0 5e8 0 1 0 0 0 0 1 0\n", r"p\.txt:1: farther than 100000 km"),
-        ("\u00e9", "1 numbers"),
     ],
 )
 def test_an_invalid_file_is_refused_with_its_line(tmp_path, text, named):

@@ -81,18 +81,17 @@ def test_each_model_is_decoded_by_its_angles(name):
     model = WRITTEN[name]
     angles_deg = angles_of(model.channels)
     decoder = HesaiDecoder("sensor", angles_deg)
-    sweeps, reception = decoded(decoder, model.turns(2.7))
+    (sweep,), reception = decoded(decoder, model.turns(1.7))
     assert model_of(model.packet(0.0)).name == name
-    assert (len(sweeps), reception.lost, reception.refused) == (2, 0, {})
-    for k, sweep in enumerate(sweeps, 1):
-        assert sweep.complete
-        assert sweep.turn_s == pytest.approx(TURN_S, rel=1e-3)
-        assert sweep.stamp_s == pytest.approx(BEGAN_S + 36_000 + TURN_S * k, abs=1e-3)  # straight ahead
-        x, y, z, reflectance = sweep.points.T
-        distance = np.sqrt(x * x + y * y + z * z)
-        assert distance == pytest.approx(RANGE * model.unit_m, rel=1e-4)
-        assert reflectance == pytest.approx(0.2)
-        assert len(x) == pytest.approx(TURN_S / model.firing_s * model.channels, rel=0.002)
+    assert (reception.lost, reception.refused) == (0, {})
+    assert sweep.complete
+    assert sweep.turn_s == pytest.approx(TURN_S, rel=1e-3)
+    assert sweep.stamp_s == pytest.approx(BEGAN_S + 36_000 + TURN_S, abs=1e-3)  # straight ahead
+    x, y, z, reflectance = sweep.points.T
+    distance = np.sqrt(x * x + y * y + z * z)
+    assert distance == pytest.approx(RANGE * model.unit_m, rel=1e-4)
+    assert reflectance == pytest.approx(0.2)
+    assert len(x) == pytest.approx(TURN_S / model.firing_s * model.channels, rel=0.002)
     elevation = np.rad2deg(np.arcsin(z / distance))
     assert np.unique(elevation.round(2)) == pytest.approx(np.sort(angles_deg[:, 0]), abs=0.02)
     top = np.abs(elevation - angles_deg[0, 0]) < 0.01
@@ -105,9 +104,9 @@ def test_each_model_is_decoded_by_its_angles(name):
 def test_of_several_returns_the_one_of_the_greatest_reflectance_is_taken(mode, seen):
     model = WRITTEN["PandarXT-32M"]
     cells = b"".join(struct.pack("<HBB", round(m / 0.005), r, 0) * 32 for m, r in ((3.0, 10), (7.0, 90), (9.0, 5)))
-    sweeps, reception = decoded(HesaiDecoder("sensor", angles_of(32)), model.turns(2.7, mode=mode, cells=cells))
-    assert [s.complete for s in sweeps] == [True, True]
-    assert np.linalg.norm(sweeps[0].points[:, :3], axis=1) == pytest.approx(seen, rel=1e-4)
+    (sweep,), reception = decoded(HesaiDecoder("sensor", angles_of(32)), model.turns(1.7, mode=mode, cells=cells))
+    assert sweep.complete
+    assert np.linalg.norm(sweep.points[:, :3], axis=1) == pytest.approx(seen, rel=1e-4)
     assert reception.lost == 0
 
 
@@ -123,21 +122,19 @@ def test_a_model_whose_units_differ_needs_its_calibration(tmp_path):
             read_angles(path)
 
 
+TABLE = b"Laser id,Elevation,Azimuth\r\n1,15.5,-1.04\r\n2,14,3.1\r\n"
+
+
 @pytest.mark.parametrize(
-    ("answer", "n"),
+    ("answer", "angles"),
     [
-        (
-            b"\x47\x74\x05\x00"
-            + struct.pack(">I", 52)
-            + b"Laser id,Elevation,Azimuth\r\n1,15.5,-1.04\r\n2,14,3.1\r\n",
-            2,
-        ),
+        (b"\x47\x74\x05\x00" + struct.pack(">I", len(TABLE)) + TABLE, [[15.5, -1.04], [14, 3.1]]),
         (b"\x47\x74\x05\x01" + bytes(4), None),
         (b"\x47\x74\x05\x00\xff\xff\xff\xff", None),
         (b"\x47", None),
     ],
 )
-def test_the_sensor_is_asked_for_its_calibration(answer, n, caplog):
+def test_the_sensor_is_asked_for_its_calibration(answer, angles, caplog):
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def give():
@@ -150,5 +147,5 @@ def test_the_sensor_is_asked_for_its_calibration(answer, n, caplog):
         giving.start()
         angles_deg = asked_angles("127.0.0.1", server.getsockname()[1])
         giving.join()
-    assert (None if angles_deg is None else angles_deg.tolist()) == (n and [[15.5, -1.04], [14, 3.1]])
-    assert ("does not give its calibration" in caplog.text) is (n is None)
+    assert (None if angles_deg is None else angles_deg.tolist()) == angles
+    assert ("does not give its calibration" in caplog.text) is (angles is None)

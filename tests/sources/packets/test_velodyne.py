@@ -20,21 +20,15 @@ def sweeps_of(timed, **options):
     return decoded(VelodyneDecoder("sensor", **options), timed)
 
 
-@pytest.fixture
-def calibration(tmp_path):
-    path = tmp_path / "ideal.yaml"
-    path.write_text(ideal_calibration(LAYOUTS["hdl-64e"]))
-    return path
-
-
 @pytest.mark.slow
-def test_an_hdl_64e_is_recognised_and_warned_of_without_its_calibration(calibration, caplog):
+def test_an_hdl_64e_is_recognised_and_warned_of_without_its_calibration(tmp_path, caplog):
     decoder = VelodyneDecoder("sensor")
     assert len(decoded(decoder, packets("hdl-64e", 4))[0]) == 2
     assert decoder.profile == "hdl-64e"
     assert "give its own by calibration=FILE" in caplog.text
     caplog.clear()
-    sweeps, _ = sweeps_of(packets("hdl-64e", 4), calibration=calibration)
+    (tmp_path / "ideal.yaml").write_text(ideal_calibration(LAYOUTS["hdl-64e"]))
+    sweeps, _ = sweeps_of(packets("hdl-64e", 4), calibration=tmp_path / "ideal.yaml")
     assert [s.complete for s in sweeps] == [True, True]
     elevation = np.rad2deg(np.arcsin(sweeps[0].points[:, 2] / np.linalg.norm(sweeps[0].points[:, :3], axis=1)))
     off = np.abs(elevation[:, None] - LAYOUTS["hdl-64e"].elevations_deg).min(axis=1)
@@ -98,8 +92,9 @@ def azimuth_deg(payload):
     return struct.unpack_from("<H", payload, 2)[0] / 100
 
 
-def with_identity(timed, identity):
-    return [(at_s, payload[:1205] + bytes([identity])) for at_s, payload in timed]
+def with_tail(timed, tail):
+    """Packets with a return mode and an identity."""
+    return [(at_s, payload[:1204] + bytes(tail)) for at_s, payload in timed]
 
 
 @pytest.mark.parametrize(
@@ -113,7 +108,7 @@ def with_identity(timed, identity):
     ],
 )
 def test_the_model_is_by_its_pace_or_as_declared_and_a_contradiction_is_one_line(identity, declared, warning, caplog):
-    timed = with_identity(packets(), identity)
+    timed = with_tail(packets(), (0x37, identity))
     decoder = VelodyneDecoder("sensor", model_named(declared) if declared else None)
     with caplog.at_level(logging.WARNING):
         sweeps, _ = decoded(decoder, timed)
@@ -125,17 +120,11 @@ def test_the_model_is_by_its_pace_or_as_declared_and_a_contradiction_is_one_line
         assert equal(sweeps, sweeps_of(packets())[0])
 
 
-def test_single_returns_of_any_kind_are_taken():
-    single, _ = sweeps_of(packets())
-    last = [(at_s, payload[:1204] + b"\x38" + payload[1205:]) for at_s, payload in packets()]
-    assert equal(sweeps_of(last)[0], single)
-
-
-def test_an_unknown_model_is_counted():
-    timed = with_identity(packets(), 0x77)
-    sweeps, reception = sweeps_of(timed)
+def test_single_returns_of_any_kind_are_taken_but_no_unknown_model():
+    assert equal(sweeps_of(with_tail(packets(), (0x38, 0x22)))[0], sweeps_of(packets())[0])
+    sweeps, reception = sweeps_of(with_tail(packets(), (0x37, 0x77)))
     assert sweeps == []
-    assert reception.refused == {"of a model of Velodyne that is unknown; give model=": len(timed)}
+    assert reception.refused == {"of a model of Velodyne that is unknown; give model=": len(packets())}
 
 
 @pytest.mark.kitti
