@@ -14,16 +14,11 @@ Feed = tuple[Sequence[bytes], Callable[[bytes], object]]
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A reader.
-
-    Attributes:
-        name: of the target.
-        prepare: its seeds and call, which keeps its files in a folder; skips where an extra is missing.
-        refusals: the errors by which it may refuse an input.
-    """
+    """A reader, and the errors by which it may refuse an input."""
 
     name: str
     prepare: Callable[[Path], Feed]
+    """Seeds and call, which keeps its files in a folder; skips where an extra is missing."""
     refusals: tuple[type[Exception], ...]
 
 

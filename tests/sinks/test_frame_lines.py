@@ -53,22 +53,15 @@ sink.close()
     assert done.stderr == ""
 
 
-@pytest.fixture
-def pipe():
-    ends = list(os.pipe())
-    yield ends
-    for end in ends:
-        os.close(end)
-
-
-def test_a_reader_that_leaves_is_counted_and_ends_nothing(pipe, caplog):
-    reader, writer = pipe
+def test_a_reader_that_leaves_is_counted_and_ends_nothing(caplog):
+    reader, writer = os.pipe()
     sink = Background("pipe", Descriptor(writer), 3, encode=frame_line, retry_s=0.0)
     os.dup2(writer, reader)  # the reading end is gone, its number is not
-    sink.write(FRAMES[0])
-    assert settled(sink, failed=1)
-    sink.write(FRAMES[1])
-    assert settled(sink, failed=2)
+    for k in range(2):
+        sink.write(FRAMES[k])
+        assert settled(sink, failed=k + 1)
     sink.close()
+    for end in (reader, writer):
+        os.close(end)
     assert "Broken pipe" in str(sink.health()["state"])
     assert len(caplog.records) == 1

@@ -96,12 +96,6 @@ def test_points_can_be_left_out(tmp_path):
     assert "/modt/points" not in {topic for topic, *_ in read(tmp_path / "a.mcap")}
 
 
-def test_an_earlier_recording_is_kept(tmp_path):
-    for _ in range(3):
-        record(tmp_path / "a.mcap", moving(0))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.mcap", "a-2.mcap", "a.mcap"]
-
-
 def test_the_oldest_parts_make_room_and_nothing_else(tmp_path):
     (tmp_path / "a-note.mcap").write_bytes(bytes(100_000))
     sizes = []
