@@ -1,7 +1,5 @@
 """A disk that keeps what was synced, and of the rest as much or as little as a disk may."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

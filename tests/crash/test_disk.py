@@ -1,7 +1,5 @@
 """Full and read-only disks, and descriptors used up, as the system itself has them: lines are lost and counted."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

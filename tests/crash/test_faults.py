@@ -1,7 +1,5 @@
 """Each kind of call that a service makes fails once; `python -m tools.faults` fails thousands, alone and in pairs."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")

@@ -1,7 +1,5 @@
 """After a power cut at any moment: what was synced is there, and a restart works and keeps to its limit."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.crash.power_cut import PowerCuts

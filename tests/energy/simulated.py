@@ -1,7 +1,5 @@
 """A simulated machine that draws power. Its clocks advance with its work, and its sysfs files with its clocks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

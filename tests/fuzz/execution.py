@@ -1,7 +1,5 @@
 """One input read, within a CPU time and a memory."""
 
-from __future__ import annotations
-
 import resource
 import signal
 import traceback

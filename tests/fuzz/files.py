@@ -1,7 +1,5 @@
 """Scans and KITTI's files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Recordings made by a grammar to take time and memory: every one is a small file of some parts that lie."""
 
-from __future__ import annotations
-
 import random
 import sqlite3
 import struct

@@ -1,7 +1,5 @@
 """Inputs of a running robot: sweeps of any numbers, and requests for its page."""
 
-from __future__ import annotations
-
 import ctypes
 from io import BytesIO
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Mutations of bytes: every one is one of a few kinds, at random places."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Comparisons and predictions, which the package has written and others may have changed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Profiles, models, and the directories of runs."""
 
-from __future__ import annotations
-
 import json
 from argparse import Namespace
 from collections.abc import Callable

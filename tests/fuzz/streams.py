@@ -1,7 +1,5 @@
 """Captures, packets, recordings and messages of ROS 2, datagrams."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

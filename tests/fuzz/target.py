@@ -1,7 +1,5 @@
 """Targets of fuzzing: readers, the bytes that they are fed with, and how they may refuse them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Findings of fuzzing: inputs that once made a reader fail by another error than ours."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

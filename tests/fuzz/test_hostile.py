@@ -1,7 +1,5 @@
 """Recordings of 64 KiB, made to take time and memory, are read or refused within what SECURITY.md promises."""
 
-from __future__ import annotations
-
 import random
 import struct
 import tracemalloc

@@ -1,11 +1,11 @@
 """Whatever the bytes: they are read, or refused by an error of ours, in time and within the memory."""
 
-from __future__ import annotations
-
+import time
 from pathlib import Path
 
 import pytest
 
+from tests.fuzz import execution
 from tests.fuzz.execution import execute, limits
 from tests.fuzz.mutation import mutations
 from tests.fuzz.target import Target
@@ -27,3 +27,23 @@ def test_broken_bytes_are_refused(target: Target, n: int, seed: int, tmp_path: P
     with limits():
         findings = [execute(call, raw, target.refusals) for raw in mutations(seeds, n, seed)]
     assert [f"{f.error} ({f.place})" for f in findings if f is not None] == []
+
+
+def spin(_: bytes) -> None:
+    while True:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("limit", "call", "error"),
+    [
+        ("CPU_TIME_S", spin, "DeadlineError: longer than 0.05 s of CPU time"),
+        ("CPU_TIME_S", lambda _: time.sleep(0.3), None),  # the process does not run
+        ("HANG_S", lambda _: time.sleep(60.0), "DeadlineError: longer than 0.05 s"),
+    ],
+)
+def test_an_input_that_takes_too_long_is_a_finding(limit, call, error, monkeypatch):
+    monkeypatch.setattr(execution, limit, 0.05)
+    with limits():
+        finding = execute(call, b"", ())
+    assert (finding and finding.error) == error

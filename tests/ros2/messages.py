@@ -1,7 +1,5 @@
 """ROS 2 messages encoded and decoded by another implementation, `rosbags`."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Two domains of this process that meet over the loopback interface as two processes do."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 

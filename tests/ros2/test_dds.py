@@ -1,7 +1,5 @@
 """Messages over loopback, between two domains of this process."""
 
-from __future__ import annotations
-
 import gc
 import os
 import time

@@ -1,7 +1,5 @@
 """Odometry messages and static transforms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

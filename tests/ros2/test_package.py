@@ -1,7 +1,5 @@
 """The files of the package modt_ros agree with modt, and its node exchanges messages by a fake rclpy."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import re

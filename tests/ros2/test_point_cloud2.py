@@ -1,7 +1,5 @@
 """PointCloud2 messages of any layout, compared with a simple reader, and hostile messages."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Results as messages of ROS 2, decoded by another implementation."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -108,3 +108,6 @@ def test_a_replay_is_recorded_whole_whatever_the_profile_keeps(tmp_path):
     names = {str(p.relative_to(tmp_path / "run")) for p in (tmp_path / "run").rglob("*") if p.is_file()}
     labels = {"labels/000000.label", "labels/000001.label"}
     assert names == {"run.yaml", "tracks.jsonl", "ledger.jsonl", "kitti/0003.txt", *labels}
+    points = np.fromfile(tmp_path / "run" / "labels" / "000001.label", np.uint32)  # track and class of each, in order
+    assert (points >> 16).tolist() == [1] * 5 + [2] * 4 + [0] * 31
+    assert (points & 0xFFFF).tolist() == [1] * 5 + [0] * 35

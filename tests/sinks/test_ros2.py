@@ -1,7 +1,5 @@
 """Results on topics of ROS 2, over loopback."""
 
-from __future__ import annotations
-
 import pytest
 
 from modt.address import parse_address

@@ -23,13 +23,8 @@ def test_a_record_describes_the_frame_and_its_tracks():
     assert (record["frame"], record["stamp_s"], record["proposals"]) == (3, 0.3, 2)
     assert (record["classifications"], record["deferred"]) == (2, 0)
     seen, unsure, lost = record["tracks"]
-    assert (seen["id"], seen["state"], seen["class"], seen["posterior"], seen["proposal"]) == (
-        11,
-        "tracked",
-        "car",
-        CAR,
-        0,
-    )
+    assert (seen["id"], seen["state"], seen["class"], seen["proposal"]) == (11, "tracked", "car", 0)
+    assert seen["posterior"] == CAR
     assert seen["box"] == {"x": 10.0, "y": 0.0, "z": -1.0, "l": 4.0, "w": 2.0, "h": 1.5, "yaw": 0.0}
     assert seen["world"] == {"x": 0.0, "y": 0.0, "heading": 0.0, "speed_mps": 0.0}
     assert unsure["class"] == "background"

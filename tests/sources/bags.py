@@ -1,7 +1,5 @@
 """Small recordings of ROS 2, for tests."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Recordings of ROS 2, in both kinds of files."""
 
-from __future__ import annotations
-
 import gc
 import tempfile
 import threading

@@ -1,7 +1,5 @@
 """Poses of an Odometry topic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The newest sweep is handed over; everything else is counted."""
 
-from __future__ import annotations
-
 import logging
 import threading
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Packets over loopback."""
 
-from __future__ import annotations
-
 import socket
 import threading
 import time

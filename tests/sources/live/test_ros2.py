@@ -1,7 +1,5 @@
 """PointCloud2 topics as a live source."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

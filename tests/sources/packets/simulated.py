@@ -1,7 +1,5 @@
 """Packets of simulated sensors."""
 
-from __future__ import annotations
-
 import sqlite3
 import struct
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Promises that the decoders of all makers share: faults of the network are counted and change no other sweep."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable
