@@ -14,7 +14,6 @@ from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
-from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
@@ -38,14 +37,6 @@ def pcap(folder: Path) -> Feed:
     frames = [ethernet(part) for part in parts]
     fragmented = whole[:24] + b"".join(struct.pack("<IIII", 1, 0, len(f), len(f)) + f for f in frames)
     return of_file(path, lambda: list(Capture(path)), whole, fragmented)
-
-
-@target()
-def velodyne_capture(folder: Path) -> Feed:
-    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-    path = folder / "a.pcap"
-    write_capture(path, packets("vlp-16", 3)[60:240], 2368)  # more than two turns
-    return of_file(path, lambda: list(open_capture(path, {})), path.read_bytes())
 
 
 @target()

@@ -235,6 +235,7 @@ def test_a_path_without_a_stream_is_refused(tmp_path, make, cause):
     [
         ("a.bag", r"ROS 1; convert it: .*rosbags-convert"),
         ("a.LAS", r"LAS file; convert it: pdal translate"),
+        ("a.npy", r"array of NumPy; convert it: numpy.load"),
         ("a.xyz", r"table of text; convert it: numpy.loadtxt"),
         ("a.osf", r"Ouster's SDK; convert it: ouster-cli"),
         ("a.lvx2", r"Livox Viewer; record the packets instead: tcpdump"),
@@ -250,18 +251,6 @@ def test_a_known_file_that_is_not_read_is_one_line_with_its_conversion(tmp_path,
         assert "\n" not in str(refused.value)
     (path.parent / "000000.bin").write_bytes(np.ones((9, 4), np.float32).tobytes())
     assert open_stream(path.parent).info.n_frames == 1
-
-
-def test_the_conversion_of_an_array_is_one_that_is_read(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    np.save("a.npy", np.arange(50.0).reshape(10, 5))
-    with pytest.raises(MisuseError) as refused:
-        open_stream(tmp_path / "a.npy")
-    (tmp_path / "scans").mkdir()
-    code = refused.value.remedy.removeprefix("convert it: ").split(", columns")[0].replace("FILE", "'a.npy'")
-    exec(code, {"numpy": np})
-    (frame,) = open_stream(tmp_path / "scans")
-    assert frame.points[1, :3].tolist() == [5.0, 6.0, 7.0]
 
 
 @pytest.mark.kitti
