@@ -2,7 +2,6 @@
 
 import pytest
 
-pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
 from tests.crash.faulty_run import FaultyRun
 
 DISK = (

@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import zstandard
+
 from tests.ros2 import messages
 
 MOST_BYTES = 65_536
@@ -25,8 +27,6 @@ def sweep() -> bytes:
 @cache
 def bombs() -> list[bytes]:
     """Messages of few bytes that stand for many: with their size, without it, and in several layers."""
-    import zstandard
-
     sized = zstandard.compress(bytes(2**29))
     unsized = zstandard.ZstdCompressor(write_content_size=False).compress(bytes(2**26))
     return [sized, unsized, zstandard.compress(sized), zstandard.compress(sweep()), b"\x28\xb5\x2f\xfd" + bytes(20)]
@@ -104,7 +104,6 @@ def message(at_ns: int, data: bytes, channel: int = 1) -> bytes:
 def chunk(chance: Chance, records: bytes, *, honest: bool) -> bytes:
     """A chunk, of which sizes and compression may lie."""
     import lz4.frame
-    import zstandard
 
     packers: dict[bytes, Callable[[bytes], bytes]] = {
         b"zstd": zstandard.compress,
@@ -169,8 +168,6 @@ def packed(path: Path, chance: Chance) -> None:
 @cache
 def packed_zeros() -> list[bytes]:
     """Zeros behind the first bytes of each kind of file."""
-    import zstandard
-
     return [zstandard.compress(begin + bytes(2**27)) for begin in (b"", b"SQLite format 3\0", MAGIC)]
 
 

@@ -15,6 +15,7 @@ from modt.sources.packets.capture import Capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
 from tests.fuzz.target import Feed, of_file, target
@@ -41,9 +42,6 @@ def pcap(folder: Path) -> Feed:
 
 @target()
 def velodyne_packets(folder: Path) -> Feed:
-    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-    from modt.sources.packets.velodyne import VelodyneDecoder
-
     return _of_packets(VelodyneDecoder("sensor"), _framed(packets("vlp-16", 3)[60:180]))
 
 
@@ -65,9 +63,6 @@ def hesai_calibration(folder: Path) -> Feed:
 
 @target()
 def velodyne_calibration(folder: Path) -> Feed:
-    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-    from modt.sources.packets.velodyne import VelodyneDecoder
-
     path = folder / "ideal.yaml"
     return of_file(path, lambda: VelodyneDecoder("sensor", None, path), ideal_calibration(LAYOUTS["vlp-16"]))
 

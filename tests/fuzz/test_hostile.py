@@ -6,14 +6,12 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
+import zstandard
 
 from modt.errors import ModtError
 from modt.sources.recognise import open_stream
 from tests.fuzz import hostile
 from tests.fuzz.execution import execute, limits
-
-pytest.importorskip("zstandard")
-pytest.importorskip("mcap")
 
 
 def read(path: Path) -> None:
@@ -63,8 +61,6 @@ def test_what_unpacks_to_too_much_is_refused_with_the_limit(maker: str, tmp_path
 
 
 def test_an_index_that_begins_at_a_bomb_unpacks_nothing(tmp_path: Path) -> None:
-    import zstandard
-
     packed = zstandard.compress(bytes(2**28))
     body = struct.pack("<QQQI", 0, 0, 2**28, 0) + hostile.text(b"zstd") + struct.pack("<Q", len(packed)) + packed
     footer = hostile.record(hostile.FOOTER, struct.pack("<QQI", 8, 0, 0))

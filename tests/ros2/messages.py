@@ -4,7 +4,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 VISION_MSGS_4 = {
     "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
@@ -25,11 +25,10 @@ VISION_MSGS_4 = {
 @cache
 def store() -> Any:
     """Types of ROS 2 Humble and of vision_msgs 4."""
-    typesys = pytest.importorskip("rosbags.typesys")
-    found = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    found = get_typestore(Stores.ROS2_HUMBLE)
     for name, definition in VISION_MSGS_4.items():
         if name not in found.types:
-            found.register(typesys.get_types_from_msg(definition, name))
+            found.register(get_types_from_msg(definition, name))
     return found
 
 

@@ -22,6 +22,7 @@ from modt.errors import MisuseError
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.schemes import POSES, SENSORS, SINKS, open_poses, open_sensor, open_sink
+from modt.sinks.foxglove_server import FIGURES
 from modt.sinks.messages import PREFIX, topics
 from tests.results import CAR, result
 from tests.ros2 import fake_rclpy
@@ -52,9 +53,6 @@ def test_rviz_shows_topics_of_modt_with_their_types():
 
 
 def test_the_layout_of_foxglove_shows_topics_of_modt():
-    pytest.importorskip("foxglove")
-    from modt.sinks.foxglove_server import FIGURES
-
     text = (PACKAGE / "config" / "foxglove.json").read_text()
     panels = set(re.findall(r'"(?:first|second)": "([^"]+)"', text))
     assert panels == json.loads(text)["configById"].keys()

@@ -10,8 +10,6 @@ import struct
 import psutil
 import pytest
 
-pytest.importorskip("foxglove")
-
 from modt.errors import MisuseError
 from modt.schemes import open_sink
 from modt.sinks.foxglove_server import FoxgloveServer

@@ -4,12 +4,9 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-
-pytest.importorskip("foxglove")
-pytest.importorskip("mcap")
-
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
+from rosbags.highlevel import AnyReader
 
 from modt.errors import ModtError
 from modt.geometry import rotation_zyx, se3
@@ -61,10 +58,9 @@ def record(path, *frames, records=()):
 
 
 def test_another_reader_of_ros_2_finds_what_the_topics_hold(tmp_path):
-    highlevel = pytest.importorskip("rosbags.highlevel")
     unknown = {**WINDOW, "energy_J": None, "kind": "unavailable"}
     record(tmp_path / "a.mcap", moving(3), records=(WINDOW, unknown, LEDGER))
-    with highlevel.AnyReader([tmp_path / "a.mcap"]) as reader:
+    with AnyReader([tmp_path / "a.mcap"]) as reader:
         found = {c.topic: (raw, reader.deserialize(raw, c.msgtype), stamp) for c, stamp, raw in reader.messages()}
     assert {stamp for *_, stamp in found.values()} == {300_000_000}
     for topic in topics(world_frame_id="world", points=True):

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rosbags.typesys import get_types_from_msg
 
 from modt.geometry import rotation_zyx, se3, transform
 from modt.placement import Mount
@@ -46,9 +47,8 @@ def test_topics_are_named_by_the_prefix_and_tf_and_points_are_asked_for():
 
 
 def test_definitions_are_those_of_another_implementation():
-    typesys = pytest.importorskip("rosbags.typesys")
     for name in DEFINITIONS:
-        parsed = typesys.get_types_from_msg(schema(name), name.replace("/", "/msg/"))
+        parsed = get_types_from_msg(schema(name), name.replace("/", "/msg/"))
         assert {kind: fields for kind, (_, fields) in parsed.items()} == {
             kind: messages.store().fielddefs[kind][1] for kind in parsed
         }

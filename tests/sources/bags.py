@@ -3,7 +3,8 @@
 import itertools
 from pathlib import Path
 
-import pytest
+from mcap.writer import Writer as McapWriter
+from rosbags import rosbag2
 
 from tests.ros2 import messages
 
@@ -16,7 +17,6 @@ Recorded = list[tuple[str, str, float, bytes]]
 
 def write_rosbag2(path: Path, recorded: Recorded, compressed: str | None = None) -> Path:
     """A folder; compressed with zstd as a "file" or by "message"."""
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
     writer = rosbag2.Writer(path, version=8)
     if compressed is not None:
         writer.set_compression(rosbag2.CompressionMode[compressed.upper()], rosbag2.CompressionFormat.ZSTD)
@@ -30,10 +30,9 @@ def write_rosbag2(path: Path, recorded: Recorded, compressed: str | None = None)
 
 
 def write_mcap(path: Path, recorded: Recorded, **options: object) -> Path:
-    writing = pytest.importorskip("mcap.writer")
     path = path.with_suffix(".mcap")
     with path.open("wb") as file:
-        writer = writing.Writer(file, **options)
+        writer = McapWriter(file, **options)
         writer.start("ros2")
         channels = {}
         for topic, kind, recorded_s, data in recorded:

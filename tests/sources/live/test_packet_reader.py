@@ -178,8 +178,6 @@ def received(address, timed, to, n):
 
 @pytest.mark.parametrize("model", MAKERS)
 def test_sweeps_over_loopback_are_those_of_the_file(model, port, to, tmp_path):
-    if MAKERS[model] == "velodyne":
-        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
     timed = packets(model)[:-5]  # a file's last sweep does not wait for the packet after it
     write_capture(tmp_path / "drive.pcap", timed, port)
     began_s = timed[0][0]

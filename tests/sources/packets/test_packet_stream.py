@@ -9,8 +9,6 @@ from modt.sources.recognise import open_stream
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-
 
 @pytest.fixture
 def path(tmp_path):

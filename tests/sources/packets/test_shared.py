@@ -91,8 +91,6 @@ MAKERS = {
 
 @pytest.fixture(params=[pytest.param(name, marks=[pytest.mark.kitti] * (name == "ouster")) for name in MAKERS])
 def maker(request: pytest.FixtureRequest) -> Maker:
-    if request.param == "velodyne":
-        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
     if request.param == "ouster":
         request.getfixturevalue("kitti_root")
         pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
@@ -105,8 +103,6 @@ def maker(request: pytest.FixtureRequest) -> Maker:
 )
 def test_sweeps_are_those_of_the_scene(name: str, model: str, n: int, whole: int, turn_s: float) -> None:
     """The first turn began before it was heard."""
-    if name == "velodyne":
-        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
     decoder = MAKERS[name].decoder()
     sweeps, reception = decoded(decoder, packets(model, n))
     assert decoder.profile == model
@@ -194,7 +190,6 @@ def test_points_are_those_of_another_decoder(kitti_root: Path, name: str) -> Non
     (cloud,) = folder.glob("*.pcd")
     theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # cut elsewhere, with both returns
     if table is None:
-        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
         sweeps, reception = decoded(VelodyneDecoder("sensor"), packets_of_bag(folder, 1206))
         assert reception.lost == 0
         assert all(s.complete for s in sweeps)

@@ -13,8 +13,6 @@ from modt.sources.packets.velodyne import VelodyneDecoder, model_named
 from tests.sources.packets.simulated import bearing_deg, decoded, equal, packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 
-pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-
 
 def sweeps_of(timed, **options):
     return decoded(VelodyneDecoder("sensor", **options), timed)
