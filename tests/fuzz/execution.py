@@ -15,7 +15,7 @@ CPU_TIME_S = 10.0
 HANG_S = 120.0
 """Wall time after which an input counts as hanging, without CPU time."""
 MEMORY_BYTES = 1 << 30
-"""Beyond what the process has when the reading begins."""
+"""Limit of memory, in addition to what the process has when the reading begins."""
 
 
 class DeadlineError(BaseException):

@@ -38,7 +38,7 @@ def viewed_run(folder: Path) -> Feed:
 
 @target()
 def exported_run(folder: Path) -> Feed:
-    """Its tracks as a table, and as KITTI's results."""
+    """Tracks of a run as a table, and as KITTI's results."""
     run, out = folder / "run", folder / "out"
     run.mkdir()
     (run / "run.yaml").write_text(DESCRIPTION + "service: true\n")

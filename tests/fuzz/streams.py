@@ -26,7 +26,7 @@ from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
 
 LENGTH = struct.Struct("<Id")
-"""Before a packet in an input: its bytes, and when it was received."""
+"""Header of a packet in an input: its length, and the time of its reception."""
 
 
 @target()

@@ -1,4 +1,4 @@
-"""Whatever the bytes: they are read, or refused by an error of ours, in time and within the memory."""
+"""Readers read any bytes, or refuse them with an error of modt, within a time and a memory."""
 
 import time
 from pathlib import Path

@@ -99,14 +99,6 @@ def test_sizes_that_do_not_fit_are_refused(changes, reason):
     assert caught.value.reason == reason
 
 
-@pytest.mark.parametrize("datatype", [4, 9, 255])
-def test_coordinates_of_another_type_are_refused(datatype):
-    message = messages.cloud(messages.xyzi(20))
-    message.fields[0].datatype = datatype
-    with pytest.raises(MessageError, match="no x, y, z"):
-        read_cloud(messages.encode(message))
-
-
 def test_a_written_cloud_is_read_by_another_implementation():
     points = np.random.default_rng(0).uniform(0, 1, (30, 4)).astype(np.float32)
     message = messages.decode(write_cloud(12.5, "lidar", points), "sensor_msgs/msg/PointCloud2")

@@ -1,7 +1,7 @@
 """JSON Lines: complete lines, read back as written."""
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.errors import MisuseError, ModtError
@@ -17,6 +17,7 @@ json_values = st.recursive(
 record = st.dictionaries(st.text().filter(lambda k: k != "schema"), json_values, max_size=4)
 
 
+@settings(max_examples=40)
 @given(st.lists(record, max_size=5))
 def test_records_are_read_back(tmp_path_factory, records):
     path = tmp_path_factory.getbasetemp() / "r.jsonl"

@@ -70,16 +70,6 @@ def test_a_path_that_is_no_run_is_refused(tmp_path):
             RunDirectory(out)
 
 
-def test_two_services_do_not_share_a_directory(tmp_path):
-    out = tmp_path / "state" / "run"
-    with RunDirectory(out).locked():
-        second = RunDirectory(out).locked()
-        with pytest.raises(ModtError, match="another run of modt records into it"):
-            second.__enter__()
-    with RunDirectory(out).locked(), RunDirectory(tmp_path / "other").locked():
-        pass
-
-
 @pytest.mark.parametrize("first", ["the run that is in", "another one"])
 def test_the_lock_outlasts_the_removal_of_the_folder_around_the_run(tmp_path, first, monkeypatch):
     monkeypatch.setattr("modt.sinks.run_directory.MEMORY", tmp_path)

@@ -9,8 +9,7 @@ from hypothesis.extra.numpy import arrays
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.geometry import rotation_zyx, se3
-from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
-from modt.sinks.records import BROKEN, line
+from modt.sinks.records import line
 from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
 from modt.types import NONE, Cut
 from modt_desk.evaluation.recorded_result import recorded_pose
@@ -63,14 +62,9 @@ def test_the_pose_of_the_sensor_is_recorded_and_read_back():
     np.testing.assert_allclose(recorded_pose(record), T, rtol=0, atol=5.1e-7)
 
 
-@pytest.mark.parametrize("pose", [[1.0] * 11, ["a"] * 12, None, [np.nan] * 12])
-def test_what_is_no_pose_is_a_broken_record(pose):
-    for record in ({"T_world_sensor": pose}, {}):
-        with pytest.raises(BROKEN):
-            recorded_pose(record)
-
-
-NUMBERS = st.one_of(st.floats(-200, 200), st.sampled_from([0.0, -0.0, 0.0005, 1e8, -1e17, 5e-324]))
+NUMBERS = st.one_of(
+    st.floats(-200, 200), st.floats(-1e7, 1e7), st.sampled_from([0.0, -0.0, 0.0005, 1e8, -1e17, 5e-324])
+)
 LIKELIHOODS = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 1.0, 1e-6, 1.2e-5, 1 + 1e-9, -1e-9]))
 COUNTS = st.integers(0, 10**12)
 
@@ -122,17 +116,6 @@ def tracks_one_by_one(r):
 def test_a_line_is_what_json_makes_of_the_tracks_one_by_one(r):
     record = frame_record(r)
     assert frame_line(r) == line(record | {"tracks": list(tracks_one_by_one(r))})
-
-
-@given(st.integers(0, 2**32))
-def test_numbers_are_written_like_repr(seed):
-    rng = np.random.default_rng(seed)
-    lengths, likely = rng.normal(0, 10.0 ** rng.integers(-4, 7), 200), rng.random(200) ** rng.integers(1, 12)
-    for text, rounded in (
-        (rounded_to_3(lengths), np.round(lengths, 3)),
-        (probabilities(likely), np.round(likely, 6)),
-    ):
-        assert decode(join_columns(200, text, ",")) == "".join(f"{v!r}," for v in rounded.tolist())
 
 
 @pytest.mark.parametrize("column", ["x", "posterior"])

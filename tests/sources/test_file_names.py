@@ -76,11 +76,6 @@ def test_times_are_stamps(tmp_path, name, step_ns):
     assert any("stamped by their names" in note for note in stream.info.notes)
 
 
-def test_kitti_s_own_form():
-    found = times_ns(["2011-09-26-13-02-25-950", "2011-09-26-13-02-26-053"])
-    assert found == [1317042145_950_000_000, 1317042146_053_000_000]
-
-
 @pytest.mark.parametrize(
     "names", [["a", "b"], ["1", "2"], ["0.1", "0.10"], ["2011-09-26-13-02-61"] * 2, ["²", "³"], []]
 )

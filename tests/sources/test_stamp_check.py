@@ -10,7 +10,7 @@ from modt.sources.stamp_check import StampCheck
 
 PERIOD_S = 0.1
 MOST_LOST = 10
-"""Sweeps of a second."""
+"""Greatest number of sweeps that are lost when a clock is set: a second of them."""
 AT = st.integers(1, 58)
 STEP_S = st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2)
 

@@ -14,7 +14,7 @@ from tests.sources.packets.simulated import BEGAN_S, decoded
 
 TURN_S = 0.1
 RANGE = 2500
-"""Of every point, in units."""
+"""Range of every point, in units."""
 
 
 @dataclass(frozen=True)

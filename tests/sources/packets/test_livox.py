@@ -10,7 +10,7 @@ from modt.sources.packets.livox import MAX_PACKETS, LivoxDecoder
 from tests.sources.packets.simulated import BEGAN_S, decoded
 
 STEP_S = 480e-6
-"""Between the packets of a Mid-360."""
+"""Interval between the packets of a Mid-360 [s]."""
 
 
 def packet(at_s, points, kind=1):
