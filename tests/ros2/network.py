@@ -17,6 +17,18 @@ LOOPBACK = (
 DEADLINE_S = 60.0
 
 
+class Scripted:
+    """A subscription that hands over batches of messages, one at a time, all sent at 77 s."""
+
+    def __init__(self, *batches: list[bytes]) -> None:
+        self.batches = list(batches)
+
+    def take(self, timeout_s: float = 0.0) -> list[object]:
+        from modt.ros2.dds import Message
+
+        return [Message(data, 77.0) for data in (self.batches.pop(0) if self.batches else [])]
+
+
 @pytest.fixture
 def loopback(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Join the domains NEAR and FAR, which meet, until the test ends."""

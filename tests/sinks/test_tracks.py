@@ -62,9 +62,7 @@ def test_the_pose_of_the_sensor_is_recorded_and_read_back():
     np.testing.assert_allclose(recorded_pose(record), T, rtol=0, atol=5.1e-7)
 
 
-NUMBERS = st.one_of(
-    st.floats(-200, 200), st.floats(-1e7, 1e7), st.sampled_from([0.0, -0.0, 0.0005, 1e8, -1e17, 5e-324])
-)
+NUMBERS = st.floats(-200, 200) | st.floats(-1e7, 1e7) | st.sampled_from([0.0, -0.0, 0.0005, 1e8, -1e17, 5e-324])
 LIKELIHOODS = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 1.0, 1e-6, 1.2e-5, 1 + 1e-9, -1e-9]))
 COUNTS = st.integers(0, 10**12)
 

@@ -113,6 +113,7 @@ def test_both_forms_give_the_same_pose():
         (b'{"stamp": 1}', "malformed", "neither"),
         (b'{"stamp": 1, "x": 0, "yaw": 0}', "malformed", "no y"),
         (b'{"stamp": 1, "x": NaN, "y": 0, "yaw": 0}', "non_finite", "x is not finite"),
+        (b'{"stamp": 1, "x": 1%s, "y": 0, "yaw": 0}' % (b"0" * 400), "non_finite", "x is not finite"),
         (b'{"stamp": 1, "x": 6e8, "y": 0, "yaw": 0}', "malformed", "100000 km"),
         (b'{"stamp": 1, "pose": [1, 2]}', "malformed", "12 or 16"),
         (b'{"stamp": 1, "pose": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}', "malformed", "no rotation"),

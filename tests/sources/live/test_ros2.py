@@ -8,7 +8,7 @@ import pytest
 from modt.schemes import open_sensor
 from modt.types import Frame
 from tests.ros2 import messages
-from tests.ros2.network import FAR, NEAR, until
+from tests.ros2.network import FAR, NEAR, Scripted, until
 
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds
@@ -17,16 +17,6 @@ from modt.sources.live.ros2 import MissingSweeps, PointCloudReader
 from tools.send.ros2 import Sender, looped, pace
 
 ADDRESS = f"ros2:///points?domain={NEAR}&reliability=reliable"
-
-
-class Scripted:
-    """A subscription that holds what the test says."""
-
-    def __init__(self, *batches):
-        self.batches = list(batches)
-
-    def take(self, timeout_s):
-        return [dds.Message(data, sent_s=77.0) for data in self.batches.pop(0)]
 
 
 def cloud(stamp_s=5.0, frame_id="lidar", n=10):
