@@ -1,11 +1,9 @@
-"""Full and read-only disks, and descriptors used up, as the system itself has them: lines are lost and counted."""
+"""Full, read-only, removed and unmounted disks as the system itself has them: lines are lost and counted."""
 
 import json
-import os
-import resource
 import shutil
 import subprocess
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 import pytest
 
@@ -137,36 +135,3 @@ def test_the_status_stays_readable_and_the_lines_meanwhile_are_lost(disk, fault)
     assert lost == list(range(lost[0], lost[-1] + 1))
     assert back - 1 <= lost[-1] <= back + RETRY_S / 0.1
     assert not status_paths(service.path)[1].exists()
-
-
-@contextmanager
-def no_more_descriptors():
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    taken = [os.open(os.devnull, os.O_RDONLY)]
-    resource.setrlimit(resource.RLIMIT_NOFILE, (max(map(int, os.listdir("/proc/self/fd"))) + 1, hard))
-    with suppress(OSError):
-        while True:  # until the gaps below the limit are filled
-            taken.append(os.dup(taken[0]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-        for number in taken:
-            os.close(number)
-
-
-def test_without_descriptors_open_files_go_on_and_a_new_part_waits(tmp_path):
-    service = Service(tmp_path)
-    service.run(20)
-    with no_more_descriptors():
-        service.run(20)
-        assert service.recording.health()["lost_lines"] == 0
-        service.recording._bytes = 100_000_000  # the part is full
-        service.run(20)
-        assert "Too many open files" in service.recording.health()["failing"]
-    service.run(40)
-    service.recording.finish()
-    assert 20 <= service.recording.health()["lost_lines"] <= 20 + RETRY_S / 0.1
-    kept = frames(tmp_path)
-    assert kept[:40] == list(range(40))
-    assert kept[-1] == 99

@@ -15,12 +15,6 @@ def test_parts_sum_to_the_window(energy_J, frames, load):
         assert sum(attribute(line, board).values()) == pytest.approx(energy_J)
 
 
-def test_cpu_time_splits_the_energy_above_idling():
-    parts = attribute(line_of(5.0, 1), EnergyConfig())
-    assert parts == pytest.approx({"idle": 3.0, "segmentation": 1.2, "classification": 0.4, "unattributed": 0.4})
-    assert attribute(line_of(None, 1), EnergyConfig()) == {}
-
-
 def test_coefficients_split_the_reading_of_a_calibrated_board_but_not_the_model():
     parts = attribute(line_of(5.0, 2, 4), CALIBRATED)
     expected = {"idle": 3.0, "segmentation": 0.2, "classification": 0.04 + 0.036, "unattributed": 1.724}

@@ -1,9 +1,8 @@
 """Packets over loopback."""
 
 import socket
-import threading
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from itertools import islice
 
 import pytest
@@ -115,22 +114,6 @@ def test_packets_of_another_address_are_refused(listen, to):
     assert reader.reception.refused == {"from another address than the sensor's": 1}
 
 
-def test_closing_ends_a_read(listen):
-    reader, ended = listen(), threading.Event()
-
-    def read():
-        with suppress(OSError):
-            reader.read(60.0)
-        ended.set()
-
-    thread = threading.Thread(target=read)
-    thread.start()
-    while not ended.wait(0.05) and reader._socket.fileno() >= 0:
-        reader.close()
-    assert ended.wait(60.0)
-    thread.join()
-
-
 def test_a_small_buffer_is_said(port, monkeypatch, caplog):
     monkeypatch.setattr("modt.sources.live.packets.BUFFER_BYTES", 2**30)
     bound_socket("sensor", port).close()
@@ -190,19 +173,6 @@ def test_sweeps_over_loopback_are_those_of_the_file(model, port, to, tmp_path):
     health = live.health()
     assert (health["messages"], health["lost_messages"], health["refused_messages"]) == (len(timed), 0, {})
     assert (health["sweeps"], health["incomplete_sweeps"], health["dropped_sweeps"]) == (len(file), 0, 0)
-
-
-@pytest.mark.kitti
-def test_an_ouster_over_loopback_is_that_of_the_file(port, to, kitti_root):
-    pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
-    metadata = kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10.json"
-    stream = open_capture(kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", {"metadata": str(metadata)})
-    timed = [(0.0016 * k, d.payload) for k, d in enumerate(stream.capture)]
-    file = list(stream)
-    frames, live = received(f"ouster://127.0.0.1:{port}?metadata={metadata}", timed, to, len(file))
-    assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in file]
-    assert live.info.profile == "os1-128"
-    assert live.reader.reception.lost == 0
 
 
 @pytest.mark.parametrize(("model", "made", "n"), [("xt-32", HesaiDecoder, 3000), ("mid-360", LivoxDecoder, 1000)])
