@@ -25,7 +25,9 @@ class Metered:
 
     def frame(self, index, wait_s):
         self.machine.wait(wait_s)
-        return self.windows.add(self.ledger.close_frame(index))
+        line = self.ledger.close_frame(index)
+        assert line["marks"] == []
+        return self.windows.add(line)
 
     def second(self, index=0):
         """Work for a second, as one frame that fills one window."""
