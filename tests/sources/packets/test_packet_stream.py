@@ -58,7 +58,7 @@ def test_missing_packets_and_refused_ones_are_faults_but_no_clock_that_is_set(pa
 
 
 def test_invalid_options_are_refused(path):
-    with pytest.raises(MisuseError, match="nowhere.yaml: no calibration"):
+    with pytest.raises(MisuseError, match="no calibration"):
         open_stream(path, capture={"calibration": "nowhere.yaml"})
     with pytest.raises(MisuseError, match="model does not apply"):
         open_stream(path.parent, capture={"model": "vlp-16"})
