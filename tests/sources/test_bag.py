@@ -88,28 +88,6 @@ def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
     assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
 
 
-def stamped(stamps, arrivals=None):
-    """Sweeps of a point more each, by their stamps and recorded times after BEGAN_S."""
-    arrivals = stamps if arrivals is None else arrivals
-    made = [messages.cloud(messages.xyzi(20 + k), stamp_s=BEGAN_S + s) for k, s in enumerate(stamps)]
-    return [("/points", CLOUD, BEGAN_S + a, messages.encode(m)) for m, a in zip(made, arrivals, strict=True)]
-
-
-@pytest.mark.parametrize("liar", [0, 1, 7])
-def test_one_stamp_an_hour_ahead_costs_its_sweep_alone(write, tmp_path, liar):
-    even = [k / 10 for k in range(20)]
-    lying = [s + 3600.0 * (k == liar) for k, s in enumerate(even)]
-    stream = open_stream(write(tmp_path / "drive", by_time(stamped(lying, even), poses())))
-    frames = list(stream)
-    assert [frame.index for frame in frames] == [k for k in range(20) if k != liar]
-    began = frames[0].index / 10
-    assert [frame.stamp_s for frame in frames] == pytest.approx([f.index / 10 - began for f in frames], abs=1e-5)
-    assert stream.info.period_s == pytest.approx(0.1, abs=1e-3)
-    placed = {f.index: f.T_world_sensor[0, 3] for f in frames if f.T_world_sensor is not None and f.index < 6}
-    assert placed == pytest.approx({k: 10 + k / 10 for k in placed}, abs=1e-5)
-    assert len(placed) >= 5
-
-
 @pytest.mark.parametrize("lying", [lambda k, s: s + 3600 * (k == 3), lambda k, s: s + 3600 * (k == 0)])
 def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
     recorded = []

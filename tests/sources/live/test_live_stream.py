@@ -160,15 +160,6 @@ def test_steady_time_is_that_of_the_stamps_where_sweeps_arrive_late(driven):
     assert driven.sweep(0.0, 1.7).time_s == pytest.approx(1.7)
 
 
-def test_a_set_clock_is_followed_once_though_no_sweep_can_be_used(driven, caplog):
-    driven.sweep(0.1, 1000.0)
-    for k in range(100):
-        assert driven.sweep(0.1, 500.0 + 0.1 * k, x=5000.0) is None
-    assert driven.stream.health()["time_steps"] == 1
-    assert caplog.text.count("have stepped by") == 1
-    assert driven.sweep(0.1, 510.0).stamp_s == 510.0
-
-
 def test_a_sweep_from_before_the_process_was_stopped_is_discarded_and_no_sensor_blamed(driven, caplog):
     driven.sweep(0.1, 1.0)
     driven.stream._put(sweep(1.1))

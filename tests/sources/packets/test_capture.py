@@ -113,12 +113,7 @@ def test_only_the_flow_wanted_is_read(tmp_path):
 
 @pytest.mark.parametrize(
     ("end", "flaw"),
-    [
-        (RECORD[:-1], "truncated"),
-        (RECORD[:-40], "truncated"),
-        (RECORD[:13], "truncated"),
-        (ABSURD, "promises 262145"),
-    ],
+    [*((RECORD[:at], "truncated") for at in (-1, -40, 13)), (ABSURD, "promises 262145 bytes")],
 )
 def test_a_file_is_read_up_to_its_broken_end(tmp_path, end, flaw):
     path = file_of(tmp_path / "a.pcap", [ethernet(DATAGRAM)])
