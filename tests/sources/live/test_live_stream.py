@@ -110,16 +110,6 @@ def test_a_failure_of_the_receiving_thread_costs_a_message_and_the_end_comes_aft
     stream.close()
 
 
-def test_a_sweep_is_waited_for_and_closing_ends_the_thread():
-    reader = ScriptedReader()
-    stream = LiveStream(INFO, reader, clock=lambda: 0.0)
-    stream.start()
-    reader._batches.append([sweep(1.0)])
-    assert stream.take(60.0).frame.stamp_s == 1.0
-    stream.close()
-    assert not stream._thread.is_alive()
-
-
 def test_a_silent_sensor_is_diagnosed_once_and_its_return_is_logged(driven, caplog):
     with caplog.at_level(logging.WARNING):
         driven.pass_time(1.8)
