@@ -29,7 +29,7 @@ def disks(tmp_path_factory):
 
 
 @pytest.mark.parametrize("kind", ["lost", "named", "kept"])
-def test_what_was_synced_is_there_and_a_restart_works(disk, kind, tmp_path):
+def test_synced_records_survive_and_a_restart_works(disk, kind, tmp_path):
     cuts = [(state, safe) for of, state, safe in disk.cuts if of == kind]
     assert len(cuts) > 20
     for number, (state, safe) in enumerate(cuts):

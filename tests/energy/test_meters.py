@@ -142,7 +142,7 @@ CHIP = {"name": "ina226", "in1_input": 5000, "curr1_input": 900}
         ("power_supply/AC", {"type": "Mains", "online": 1}, None),
     ],
 )
-def test_power_is_read_of_what_supplies_the_machine(tmp_path, folder, files, watts):
+def test_power_is_read_from_the_sensors_of_the_supply(tmp_path, folder, files, watts):
     write_files(tmp_path / "class" / folder, **files)
     best = look(tmp_path).best
     assert best.facts.kind is (Kind.ESTIMATED if watts is None else Kind.INTEGRATED)
@@ -183,7 +183,7 @@ def watts_of(found, name):
     ],
 )
 @pytest.mark.parametrize("named", [True, False])
-def test_the_module_of_a_board_by_its_table(tmp_path, rails, model, module, watts, best, named):
+def test_the_rails_of_a_module_follow_the_table_of_its_board(tmp_path, rails, model, module, watts, best, named):
     found = board(tmp_path, rails, model if named else "")
     chosen = found.choose(module)
     assert watts_of(found, module) == pytest.approx(watts)

@@ -61,7 +61,7 @@ FOUND = {
 
 
 @pytest.mark.parametrize(("target", "raw"), FOUND.values(), ids=FOUND)
-def test_it_is_refused(target: str, raw: bytes | str, tmp_path: Path) -> None:
+def test_a_finding_is_refused(target: str, raw: bytes | str, tmp_path: Path) -> None:
     _, call = TARGETS[target].prepare(tmp_path)
     with limits(), pytest.raises(TARGETS[target].refusals):
         call(raw.encode() if isinstance(raw, str) else raw)

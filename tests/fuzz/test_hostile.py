@@ -55,7 +55,7 @@ def test_views_and_triggers_are_refused_by_their_name(schema: int, tmp_path: Pat
 
 
 @pytest.mark.parametrize("maker", ["packed database", "packed mcap"])
-def test_what_unpacks_to_too_much_is_refused_with_the_limit(maker: str, tmp_path: Path) -> None:
+def test_a_file_that_unpacks_to_too_much_is_refused_with_the_limit(maker: str, tmp_path: Path) -> None:
     with limits(), pytest.raises(ModtError, match=r"unpacks to more than 64 times its size and 16 MiB"):
         open_stream(made(tmp_path, maker, 0))
 

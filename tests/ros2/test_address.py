@@ -31,7 +31,7 @@ def test_the_environment_states_the_domain_where_the_address_does_not(monkeypatc
         ("ros2:///points?colour=red", "option 'colour' is unknown"),
     ],
 )
-def test_an_address_that_cannot_be_is_refused(text, cause):
+def test_an_invalid_address_of_a_topic_is_refused(text, cause):
     pytest.importorskip("cyclonedds")
     with pytest.raises(MisuseError, match=cause):
         open_sensor(text)

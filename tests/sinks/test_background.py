@@ -105,7 +105,7 @@ def test_the_end_does_not_wait_for_a_writer_that_hangs(slow, caplog):
     assert background.health()["dropped"] == 3
 
 
-def test_the_thread_of_a_loop_of_real_time_is_not(slow):
+def test_a_real_time_loop_starts_its_writer_without_real_time_priority(slow):
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))

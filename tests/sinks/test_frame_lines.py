@@ -16,7 +16,7 @@ FRAMES = [result(k, [5, 4], {0: 1, 1: 2}, {1: CAR}) for k in range(5)]
 
 @pytest.mark.parametrize("rest", ["", '{"schema":"mo'])
 @pytest.mark.parametrize("whole", [FRAMES[:2], []])
-def test_a_file_is_continued_and_what_a_killed_run_left_of_a_line_is_cut_off(tmp_path, whole, rest):
+def test_a_file_is_continued_without_the_broken_line_of_a_killed_run(tmp_path, whole, rest):
     (tmp_path / "lines.jsonl").write_text("".join(map(frame_line, whole)) + rest)
     sink = open_sink(f"file://{tmp_path}/lines.jsonl")
     sink.write(FRAMES[2])

@@ -19,7 +19,7 @@ def test_sinks_that_hang_are_closed_together():
 
 
 @pytest.mark.parametrize("left", ["a link", "half a file"])
-def test_a_file_is_replaced_whatever_was_left_or_planted_there(tmp_path, left):
+def test_a_file_is_replaced_whatever_was_left_in_its_place(tmp_path, left):
     victim, part = tmp_path / "victim", tmp_path / ".run.yaml.part"
     victim.write_text("kept")
     part.symlink_to(victim) if left == "a link" else part.write_text("half")

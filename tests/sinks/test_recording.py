@@ -12,7 +12,7 @@ from tests.sinks.recordings import OURS, Time, begun, files_of_at_most, frame, f
 
 
 @pytest.mark.parametrize("keep", KEPT)
-def test_the_profile_says_what_is_kept(tmp_path, keep):
+def test_the_profile_decides_which_records_are_kept(tmp_path, keep):
     recording = begun(tmp_path, keep=keep)
     recording.write(frame(0))
     recording.ledger({"schema": "modt.ledger/1", "frame": 0})

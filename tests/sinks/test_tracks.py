@@ -40,7 +40,7 @@ def test_a_record_describes_the_frame_and_its_tracks():
         ((0.5, 0.4, 0.5), Cut.TOP, {11: PEDESTRIAN}, None),
     ],
 )
-def test_what_may_be_a_person_too_near_to_be_known_is_said_to_be_uncertain(size, cut, posteriors, said):
+def test_a_possible_person_too_near_to_be_recognised_is_reported_as_uncertain(size, cut, posteriors, said):
     r = result(3, [7, 5], {0: 11}, posteriors, lost=(9,))
     r.proposals.box[0, 3:6], r.proposals.cut[0] = size, cut
     assert [track["uncertain"] for track in frame_record(r)["tracks"]] == [said, None]
@@ -111,7 +111,7 @@ def tracks_one_by_one(r):
 
 
 @given(results())
-def test_a_line_is_what_json_makes_of_the_tracks_one_by_one(r):
+def test_a_line_equals_the_json_of_its_tracks_one_by_one(r):
     record = frame_record(r)
     assert frame_line(r) == line(record | {"tracks": list(tracks_one_by_one(r))})
 

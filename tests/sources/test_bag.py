@@ -34,7 +34,7 @@ def test_sweeps_are_frames_and_stamps_count_from_the_first(write, tmp_path):
     assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-6)
 
 
-def test_the_sensor_s_place_on_the_robot_is_taken_from_the_static_transforms(write, tmp_path):
+def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(write, tmp_path):
     turned = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
     mount = messages.encode(messages.transforms(("base_link", "lidar", [1.0, 0.0, 2.0], turned)))
     recorded = by_time(clouds(), poses("base_link"), [("/tf_static", TF, BEGAN_S - 1, mount)])

@@ -79,12 +79,12 @@ def test_times_are_stamps(tmp_path, name, step_ns):
 @pytest.mark.parametrize(
     "names", [["a", "b"], ["1", "2"], ["0.1", "0.10"], ["2011-09-26-13-02-61"] * 2, ["²", "³"], []]
 )
-def test_what_is_no_time_is_none(names):
+def test_names_without_a_time_give_none(names):
     assert times_ns(names) is None
 
 
 @given(st.lists(st.text(min_size=1, max_size=30), max_size=8))
-def test_any_names(names):
+def test_any_names_have_a_time_each_or_none(names):
     times = times_ns(names)
     assert times is None or len(times) == len(names)
 

@@ -105,7 +105,7 @@ NAMES += [("scalar_Intensity", "scalar_Reflectance")]  # a calibrated one goes b
 
 
 @pytest.mark.parametrize("names", NAMES)
-def test_reflectance_is_known_by_the_names_of_the_field_s_tools(form, names):
+def test_reflectance_is_recognised_by_its_usual_names(form, names):
     rows = table(**{"x": "f4", "y": "f4", "z": "f4", "scalar_Time": "f4", **dict.fromkeys(names, "u1")})
     cloud = read_cloud(messages.encode(messages.cloud(rows[None])))
     for points in (form(rows)[0], cloud.points):

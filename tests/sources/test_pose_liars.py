@@ -133,7 +133,7 @@ def test_a_source_that_fails_costs_poses_and_recovers(robot, broken, monkeypatch
         (1.7e9, 1e-3, "the sensor's seem to be in milliseconds; give seconds"),
     ],
 )
-def test_stamps_in_another_unit_are_said_to_be(clock_s, factor, cause, caplog):
+def test_the_unit_of_stamps_that_are_no_seconds_is_named(clock_s, factor, cause, caplog):
     robot = Robot()
     robot.sent = round(clock_s / robot.interval_s)
     for _ in range(10):
@@ -153,7 +153,7 @@ def test_a_step_of_the_clock_of_both_is_followed(robot, step_s):
     assert robot.odometry.restarts == 0
 
 
-def test_a_step_of_the_senders_clock_is_followed_but_gives_no_pose_where_it_is_not_the_streams(robot):
+def test_a_step_of_the_senders_clock_alone_is_followed_but_gives_no_pose(robot):
     robot.drive(1.0)
     robot.sender_s = 5.0
     assert np.isnan(robot.drive(2.0)[5:]).all()

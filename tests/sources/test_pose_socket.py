@@ -205,7 +205,7 @@ def test_no_motion_below_the_speed_limit_is_a_restart(steps):
             assert odometry.place(frame(stamp_s)).restarts == 0
 
 
-def test_of_a_flood_the_newest_are_kept(monkeypatch):
+def test_the_newest_poses_of_a_flood_are_kept(monkeypatch):
     monkeypatch.setattr("modt.sources.pose_socket.CAPACITY", 4)
     with connected() as (there, odometry):
         for k in range(6):

@@ -34,7 +34,7 @@ def test_a_frame_has_the_pose_of_the_sensor_at_its_stamp():
     assert topic.report()["used"] == 3
 
 
-def test_what_cannot_be_used_is_counted_by_its_reason():
+def test_unusable_poses_are_counted_by_their_reason():
     bad = [pose(10.0, 3.0), pose(9.0, 3.0), pose(10.02, np.nan), pose(10.03, 1e9), b"\0"]
     topic = PoseTopic(Scripted([pose(10.0, 3.0), *bad]), OdometryConfig(), "odom", np.eye(4))
     assert topic.place(frame(10.0)).T_world_sensor is not None

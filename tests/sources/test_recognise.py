@@ -128,7 +128,7 @@ def without(row):
         (layouts.tracking, "training/calib/0003.txt", [without("Tr_imu_velo")], "no odometry"),
     ],
 )
-def test_what_is_missing_is_noted_and_the_stream_works(tmp_path, build, files, edits, named):
+def test_missing_files_and_rows_are_noted_and_the_stream_works(tmp_path, build, files, edits, named):
     for k, edit in enumerate(edits):
         root = build(tmp_path / str(k))
         for path in list((tmp_path / str(k)).glob(files)):

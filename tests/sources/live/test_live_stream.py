@@ -167,7 +167,7 @@ def test_a_sweep_from_before_the_process_was_stopped_is_discarded_and_no_sensor_
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
-def test_stamps_in_another_unit_are_said_to_be(driven, factor, unit, caplog):
+def test_the_unit_of_stamps_that_are_no_seconds_is_named(driven, factor, unit, caplog):
     for k in range(20):
         driven.sweep(0.1, factor * 0.1 * k)
     assert f"are they in {unit}? have its driver write s" in caplog.text

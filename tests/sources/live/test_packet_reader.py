@@ -68,7 +68,7 @@ def listening(port):
         yield listen
 
 
-def test_a_group_is_joined_and_what_is_none_is_refused(port, listen):
+def test_a_multicast_group_is_joined_and_another_address_is_refused(port, listen):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         if probe.connect_ex(("239.7.7.7", port)):
             pytest.skip("no route to a multicast group")
@@ -82,7 +82,7 @@ def test_a_group_is_joined_and_what_is_none_is_refused(port, listen):
             bound_socket("sensor", port, group)
 
 
-def test_packets_are_as_of_when_the_kernel_received_them(listen, to):
+def test_packets_have_the_time_at_which_the_kernel_received_them(listen, to):
     reader = listen()
     for _ in range(100):  # the kernel begins to take times a little after it was asked to
         sent_s = time.time()
@@ -114,13 +114,13 @@ def test_packets_of_another_address_are_refused(listen, to):
     assert reader.reception.refused == {"from another address than the sensor's": 1}
 
 
-def test_a_small_buffer_is_said(port, monkeypatch, caplog):
+def test_a_small_receive_buffer_is_warned_of(port, monkeypatch, caplog):
     monkeypatch.setattr("modt.sources.live.packets.BUFFER_BYTES", 2**30)
     bound_socket("sensor", port).close()
     assert "sysctl -w net.core.rmem_max=1073741824" in caplog.text
 
 
-def test_what_cannot_be_bound_or_found_is_refused(port):
+def test_a_port_or_host_that_cannot_be_used_is_refused(port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("", port))
         with pytest.raises(MisuseError, match=f"port {port} cannot be bound"):

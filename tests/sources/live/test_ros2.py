@@ -41,7 +41,7 @@ def test_messages_become_sweeps_and_the_frame_is_reported(caplog):
 
 
 @pytest.mark.parametrize(("frame_id", "warned"), [("velodyne", False), ("base_link", True), ("/map", True)])
-def test_points_in_a_frame_that_is_no_sensor_s_are_warned_of(caplog, frame_id, warned):
+def test_points_in_the_frame_of_a_robot_or_map_are_warned_of(caplog, frame_id, warned):
     read([cloud(frame_id=frame_id)])
     assert ("not in the sensor's: subscribe to what its driver publishes" in caplog.text) is warned
 
@@ -67,7 +67,7 @@ def missing(stamps):
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.5])
-def test_those_that_are_lost_are_counted_whatever_their_share(share):
+def test_lost_sweeps_are_counted_whatever_their_share(share):
     rng = np.random.default_rng(0)
     kept = np.flatnonzero(rng.uniform(size=1000) > share)
     lost = kept[-1] - kept[0] + 1 - len(kept)

@@ -97,7 +97,7 @@ def test_any_bytes_are_a_packet_or_none(raw, first):
     Fragments().whole(bytes([first]) + raw)
 
 
-def test_what_is_no_datagram_is_passed_over(tmp_path):
+def test_packets_that_hold_no_datagram_are_skipped(tmp_path):
     tcp = bytearray(DATAGRAM)
     tcp[9] = 6
     frames = [b"", b"short", bytes(12) + b"\x86\xdd" + bytes(60), ethernet(bytes(tcp)), ethernet(DATAGRAM[:24])]

@@ -101,7 +101,7 @@ def test_each_model_is_decoded_by_its_angles(name):
 
 
 @pytest.mark.parametrize(("mode", "seen"), [(0x37, 3.0), (0x39, 7.0), (0x3D, 7.0)])
-def test_of_several_returns_the_one_of_the_greatest_reflectance_is_taken(mode, seen):
+def test_the_brightest_of_several_returns_is_taken(mode, seen):
     model = WRITTEN["PandarXT-32M"]
     cells = b"".join(struct.pack("<HBB", round(m / 0.005), r, 0) * 32 for m, r in ((3.0, 10), (7.0, 90), (9.0, 5)))
     (sweep,), reception = decoded(HesaiDecoder("sensor", angles_of(32)), model.turns(1.7, mode=mode, cells=cells))

@@ -56,7 +56,7 @@ def test_sweeps_are_the_frames_of_the_sdk(timed, metadata):
     assert np.all(np.diff(np.unwrap(np.deg2rad(bearing_deg(beam)))) < 0.01)
 
 
-def test_a_sweep_that_had_begun_is_none_and_a_whole_lost_one_is_counted(timed, metadata):
+def test_a_sweep_that_had_begun_is_dropped_and_a_lost_one_is_counted(timed, metadata):
     sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[10:])
     assert ([s.complete for s in sweeps], reception.lost) == ([True, True], 0)
     sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[:64] + timed[128:])
@@ -85,7 +85,7 @@ def test_each_packet_format(kitti_root, name, beams, turn_s, profile):
 
 
 @pytest.mark.parametrize("text", ["{}", "no JSON"])
-def test_what_is_no_metadata_is_refused(tmp_path, text):
+def test_invalid_metadata_are_refused(tmp_path, text):
     path = tmp_path / "metadata.json"
     path.write_text(text)
     with pytest.raises(MisuseError, match=r"no metadata of an Ouster.*api/v1/sensor/metadata"):

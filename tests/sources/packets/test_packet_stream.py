@@ -37,7 +37,7 @@ def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
     assert "sweep 3: truncated within a record" in caplog.text
 
 
-def test_missing_packets_and_refused_ones_are_faults_but_no_clock_that_is_set(path):
+def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(path):
     timed = [*packets()]
     del timed[110:113]
     timed.insert(50, (timed[50][0], bytes(1206)))
