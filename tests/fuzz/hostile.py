@@ -1,4 +1,4 @@
-"""Recordings made by a grammar to take time and memory: every one is a small file of some parts that lie."""
+"""Small recordings that are made to take time and memory, at random from parts with wrong sizes and contents."""
 
 import random
 import sqlite3
@@ -102,7 +102,7 @@ def message(at_ns: int, data: bytes, channel: int = 1) -> bytes:
 
 
 def chunk(chance: Chance, records: bytes, *, honest: bool) -> bytes:
-    """A chunk, of which sizes and compression may lie."""
+    """A chunk whose sizes and compression may be wrong."""
     import lz4.frame
 
     packers: dict[bytes, Callable[[bytes], bytes]] = {

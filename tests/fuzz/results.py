@@ -15,7 +15,7 @@ from tests.fuzz.target import Feed, of_file, target
 
 
 def json_lines(records: Iterable[dict[str, Any]]) -> bytes:
-    """A line a record."""
+    """Records as lines of JSON."""
     return "".join(json.dumps(record) + "\n" for record in records).encode()
 
 

@@ -30,7 +30,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
     for before, name in zip("abcdefgh", "bcdefghi", strict=True)
 )
-"""Nine to the ninth words."""
+"""YAML whose aliases expand to nine to the ninth words."""
 DESCRIPTION = "schema: modt.run/1\nstream: {name: street, path: null}\nmode: efficient\nfov: full\nprofile: {}\n"
 DESCRIPTION += "recognition: {used: vlp-16}\n"
 SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.splitlines())}]}}\n"

@@ -13,7 +13,7 @@ LIMIT_S = 60.0
 
 
 class Slow:
-    """A writer that a test lets go on, and that fails when told to."""
+    """A writer that waits for the test, and fails with the error that the test sets."""
 
     def __init__(self):
         self.items, self.closed, self.failure = [], threading.Event(), None

@@ -52,7 +52,7 @@ def clouds(n: int = 4, topic: str = "/points") -> Recorded:
 
 
 def poses(child: str = "lidar", topic: str = "/odom") -> Recorded:
-    """A metre a second along x, fifty poses a second, from 0.2 s before the first sweep on."""
+    """Poses at 50 Hz of a sensor that moves along x at 1 m/s, from 0.2 s before the first sweep."""
     stamps = [BEGAN_S + k / 50 - 0.21 for k in range(40)]
     made = [messages.odometry(s, [10.0 + s - BEGAN_S, 0.0, 0.0], UP, child) for s in stamps]
     return [(topic, ODOMETRY, s + 0.001, messages.encode(m)) for s, m in zip(stamps, made, strict=True)]

@@ -1,4 +1,4 @@
-"""Odometry that lies: single datagrams cost nothing that lasts, a sequence that goes on is followed."""
+"""Odometry with wrong poses: single ones cost no frame its pose, a new sequence of poses is followed."""
 
 import json
 import socket
@@ -28,7 +28,7 @@ KINDS = {  # lies, and the reason that they are refused for
 
 
 class Robot:
-    """A robot on a straight way, whose sender and sensor stamp by clocks of their own; time is the test's."""
+    """A robot that drives straight on. Its sender and its sensor have clocks of their own; the test sets the time."""
 
     def __init__(self, rate_hz=50.0):
         self.there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)

@@ -16,7 +16,7 @@ STEP_S = st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2)
 
 
 def believed(stamps, arrivals):
-    """Numbers of the messages believed, their corrected stamps, and the check."""
+    """Indices of the accepted messages, their corrected stamps, and the check."""
     check, kept = StampCheck(), []
     for k, (stamp_s, arrived_s) in enumerate(zip(stamps, arrivals, strict=True)):
         if not check.doubt(stamp_s, arrived_s):

@@ -42,7 +42,7 @@ def sweep(stamp_s: float, *, complete: bool = True, x: float = 5.0) -> Sweep:
 
 
 class Driven:
-    """A stream without its thread, on a clock of the test's; sweeps arrive when it says so."""
+    """A stream without its thread. The test moves its clock and hands over the sweeps."""
 
     def __init__(self):
         self.now_s = 0.0

@@ -34,7 +34,7 @@ class Written:
     unit_m: float = 0.004
 
     def packet(self, at_s: float, mode: int = 0x37, cells: bytes = b"") -> bytes:
-        """Packet of a head that looked ahead at a whole turn and was sent at a time of the day."""
+        """Packet sent at a time of the day [s] by a head that looks ahead at the end of each turn."""
         returns = {0x39: 2, 0x3D: 3}.get(mode, 1)
         firings = self.blocks // returns
         body = b""
