@@ -21,7 +21,7 @@ def test_valid_bytes_are_read(target: Target, tmp_path: Path) -> None:
 
 
 @READERS
-@pytest.mark.parametrize(("n", "seed"), [(100, 1), pytest.param(500, 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("n", "seed"), [(50, 1), pytest.param(500, 2, marks=pytest.mark.slow)])
 def test_broken_bytes_are_refused(target: Target, n: int, seed: int, tmp_path: Path) -> None:
     seeds, call = target.prepare(tmp_path)
     with limits():
