@@ -45,10 +45,7 @@ FOUND = {
     "a quaternion beyond the square root": ("odometry", odometry()),
     "a value of aliases": ("profiles", SENSOR_BOMB),
     "a profile of a megabyte": ("profiles", "# " + "x" * 2**20),
-    "a name in a model that is no text": (
-        "models",
-        network().SerializeToString().replace(b"points", b"p\xff\xfents"),
-    ),
+    "a name in a model that is no text": ("models", MODEL.replace(b"points", b"p\xff\xfents")),
     "a nested description of a run": ("run_description", "[" * 5000),
     "a run without its mode": ("run_description", "schema: modt.run/1\nprofile: {}\n"),
     "a run with a profile of text": ("run_description", "schema: modt.run/1\nprofile: {classification: {batch: x}}"),
