@@ -1,6 +1,4 @@
-"""Recordings made by a grammar to take time and memory: every one is a small file of some parts that lie."""
-
-from __future__ import annotations
+"""Small recordings that are made to take time and memory, at random from parts with wrong sizes and contents."""
 
 import random
 import sqlite3
@@ -10,6 +8,8 @@ from contextlib import closing, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+import zstandard
 
 from tests.ros2 import messages
 
@@ -27,8 +27,6 @@ def sweep() -> bytes:
 @cache
 def bombs() -> list[bytes]:
     """Messages of few bytes that stand for many: with their size, without it, and in several layers."""
-    import zstandard
-
     sized = zstandard.compress(bytes(2**29))
     unsized = zstandard.ZstdCompressor(write_content_size=False).compress(bytes(2**26))
     return [sized, unsized, zstandard.compress(sized), zstandard.compress(sweep()), b"\x28\xb5\x2f\xfd" + bytes(20)]
@@ -36,32 +34,28 @@ def bombs() -> list[bytes]:
 
 TOPICS = "CREATE TABLE topics(id INTEGER{key}, name, type, serialization_format, offered_qos_profiles)"
 MESSAGES = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp{stamp}, data{data})"
+PLAIN_TOPICS, PLAIN_MESSAGES = TOPICS.format(key=""), MESSAGES.format(stamp="", data="")
+VIEWED = "CREATE VIEW messages AS " + ENDLESS
 SCHEMAS: list[list[str]] = [
-    *([TOPICS.format(key=key), MESSAGES.format(stamp="", data="")] for key in ("", " PRIMARY KEY")),
+    [PLAIN_TOPICS, PLAIN_MESSAGES],
+    [TOPICS.format(key=" PRIMARY KEY"), PLAIN_MESSAGES],
+    [PLAIN_TOPICS, VIEWED.format(columns="n id, 1 topic_id, n timestamp, n data")],
+    [PLAIN_TOPICS, VIEWED.format(columns="n id, 1 topic_id, n timestamp, zeroblob(1000000000) data")],
     [
-        TOPICS.format(key=""),
-        f"CREATE VIEW messages AS {ENDLESS.format(columns='n id, 1 topic_id, n timestamp, n data')}",
-    ],
-    [
-        TOPICS.format(key=""),
-        "CREATE VIEW messages AS "
-        + ENDLESS.format(columns="n id, 1 topic_id, n timestamp, zeroblob(1000000000) data"),
-    ],
-    [
-        MESSAGES.format(stamp="", data=""),
+        PLAIN_MESSAGES,
         "CREATE VIEW topics AS "
         + ENDLESS.format(columns=f"n id, 'a' || n name, '{CLOUD}' type, 'cdr' serialization_format"),
     ],
-    [TOPICS.format(key=""), MESSAGES.format(stamp="", data=" AS (zeroblob(1000000000))")],
-    [TOPICS.format(key=""), MESSAGES.format(stamp="", data=" AS (randomblob(60000))")],
-    [TOPICS.format(key=""), MESSAGES.format(stamp=" AS (length(hex(hex(zeroblob(500000000)))))", data="")],
-    [TOPICS.format(key=""), "CREATE VIRTUAL TABLE messages USING fts5(id, topic_id, timestamp, data)"],
+    [PLAIN_TOPICS, MESSAGES.format(stamp="", data=" AS (zeroblob(1000000000))")],
+    [PLAIN_TOPICS, MESSAGES.format(stamp="", data=" AS (randomblob(60000))")],
+    [PLAIN_TOPICS, MESSAGES.format(stamp=" AS (length(hex(hex(zeroblob(500000000)))))", data="")],
+    [PLAIN_TOPICS, "CREATE VIRTUAL TABLE messages USING fts5(id, topic_id, timestamp, data)"],
     [
-        TOPICS.format(key=""),
-        MESSAGES.format(stamp="", data=""),
+        PLAIN_TOPICS,
+        PLAIN_MESSAGES,
         "CREATE TRIGGER t AFTER INSERT ON topics BEGIN INSERT INTO topics VALUES (1, 2, 3, 4, 5); END",
     ],
-    [TOPICS.format(key="")],
+    [PLAIN_TOPICS],
     [],
 ]
 
@@ -108,9 +102,8 @@ def message(at_ns: int, data: bytes, channel: int = 1) -> bytes:
 
 
 def chunk(chance: Chance, records: bytes, *, honest: bool) -> bytes:
-    """A chunk, of which sizes and compression may lie."""
+    """A chunk whose sizes and compression may be wrong."""
     import lz4.frame
-    import zstandard
 
     packers: dict[bytes, Callable[[bytes], bytes]] = {
         b"zstd": zstandard.compress,
@@ -175,8 +168,6 @@ def packed(path: Path, chance: Chance) -> None:
 @cache
 def packed_zeros() -> list[bytes]:
     """Zeros behind the first bytes of each kind of file."""
-    import zstandard
-
     return [zstandard.compress(begin + bytes(2**27)) for begin in (b"", b"SQLite format 3\0", MAGIC)]
 
 

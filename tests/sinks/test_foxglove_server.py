@@ -6,15 +6,12 @@ import os
 import select
 import socket
 import struct
-from pathlib import Path
 
+import psutil
 import pytest
-
-pytest.importorskip("foxglove")
 
 from modt.errors import MisuseError
 from modt.schemes import open_sink
-from modt.sinks import foxglove_server
 from modt.sinks.foxglove_server import FoxgloveServer
 from modt.sinks.messages import topics
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
@@ -103,20 +100,17 @@ def test_a_client_sees_objects_points_and_energy(server, client):
     assert seen["/modt/cpu_ms/tracking"][4:] == struct.pack("<d", 2.0)
 
 
-def test_only_this_machine_is_served_unless_another_host_is_given(monkeypatch):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    monkeypatch.setattr(foxglove_server, "PORT", port)
-    background = open_sink("foxglove://")
-    listening = [line.split()[1:4] for line in Path("/proc/self/net/tcp").read_text().splitlines()[1:]]
-    hosts = {
-        local.partition(":")[0] for local, _, state in listening if state == "0A" and local.endswith(f"{port:04X}")
-    }
+def listening():
+    """Hosts and ports at which this process listens."""
+    process = psutil.Process()
+    opened = getattr(process, "net_connections", None) or process.connections  # the name before psutil 6
+    return {tuple(found.laddr) for found in opened("inet") if found.status == "LISTEN"}
+
+
+def test_only_this_machine_is_served_unless_another_host_is_given(server):
+    before = listening()
+    background = open_sink("foxglove://:0")
+    assert {host for host, _ in listening() - before} == {"127.0.0.1"}
     background.close()
-    assert hosts == {"0100007F"}
-
-
-def test_a_port_that_is_taken_is_misuse(server):
     with pytest.raises(MisuseError, match="cannot be bound"):
         open_sink(f"foxglove://127.0.0.1:{server.port}")

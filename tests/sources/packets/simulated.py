@@ -1,7 +1,5 @@
 """Packets of simulated sensors."""
 
-from __future__ import annotations
-
 import sqlite3
 import struct
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,7 +11,7 @@ import numpy as np
 
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import PacketDecoder
-from modt.types import Float32
+from modt.types import Float32, Frame
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.send.faults import Timed
 from tools.send.ideal_packets import packets_of
@@ -22,10 +20,15 @@ BEGAN_S = 1.6e9
 
 
 @cache
+def scene(model: str, sweeps: int) -> list[Frame]:
+    """Sweeps in the synthetic street."""
+    return list(SyntheticStream("street", model, 0.1 * sweeps, seed=1))
+
+
+@cache
 def packets(model: str = "vlp-16", sweeps: int = 5) -> tuple[Timed, ...]:
-    """Of an ideal sensor in the synthetic street: a turn that had begun, whole ones, and one cut short."""
-    frames = list(SyntheticStream("street", model, 0.1 * sweeps, seed=1))
-    return tuple((BEGAN_S + at_s, payload) for at_s, payload in packets_of(frames, model, 0.1))
+    """Packets of an ideal sensor in the scene: a turn that had begun, whole ones, and one cut short."""
+    return tuple((BEGAN_S + at_s, payload) for at_s, payload in packets_of(scene(model, sweeps), model, 0.1))
 
 
 def decoded(decoder: PacketDecoder, timed: Iterable[Timed]) -> tuple[list[Sweep], Reception]:
