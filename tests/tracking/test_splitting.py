@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt.config import TrackingConfig
 from modt.geometry import inverse, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
 from modt.placement import Placement
@@ -52,7 +51,7 @@ def tracks_of_person_and_wall(object_class=PEDESTRIAN, person=PERSON, **columns)
     return tracks
 
 
-def test_the_points_of_a_person_are_split_off_a_wall():
+def test_the_points_of_a_person_are_split_off_a_wall_and_measure_nothing():
     tracks = tracks_of_person_and_wall()
     after = split(tracks, wall_with(PERSON), rows=[1])
     assert after.proposals.count.tolist() == [WALL_POINTS, PERSON_POINTS]
@@ -60,11 +59,6 @@ def test_the_points_of_a_person_are_split_off_a_wall():
     assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 1, 1: 0}
     np.testing.assert_allclose(after.proposals.box[1], PERSON, atol=0.05)
     np.testing.assert_allclose(after.proposals.box[0, :6], WALL[:6], atol=0.05)
-
-
-def test_neither_the_piece_nor_the_rest_measures_anything():
-    tracks = tracks_of_person_and_wall()
-    after = split(tracks, wall_with(PERSON), rows=[1])
     order = after.matches.rows.argsort()
     np.testing.assert_allclose(after.matches.position[order], tracks.x[:, :2])
     assert (after.matches.covariance[:, 0, 0] >= 100).all()
@@ -91,30 +85,20 @@ def test_other_matches_stay_as_they_are():
 
 
 @pytest.mark.parametrize(
-    ("object_class", "columns", "why"),
+    ("object_class", "columns", "person", "points", "wall"),
     [
-        (BACKGROUND, {}, "it is a post"),
-        (PEDESTRIAN, {"hits": 3}, "it was seen too few times"),
-        (PEDESTRIAN, {"missed": 1}, "it was lost before"),
+        (BACKGROUND, {}, PERSON, 80, WALL),  # a post
+        (PEDESTRIAN, {"hits": 3}, PERSON, 80, WALL),  # seen too few times
+        (PEDESTRIAN, {"missed": 1}, PERSON, 80, WALL),  # lost before
+        (PEDESTRIAN, {}, PERSON, 12, WALL),  # too few points where it is expected
+        (PEDESTRIAN, {}, box(10, 2.5, 0.6, 0.6, 0.9, z=-1.25), 80, box(12, 3, 16.0, 0.3, 0.9, z=-1.2)),  # lower
+        (PEDESTRIAN, {}, box(10, -4, 0.6, 0.6, 1.7, z=-0.85), 80, WALL),  # in another place
+        (PEDESTRIAN, {}, PERSON, 80, box(10, 2.6, 0.6, 0.6, 1.7, z=-0.85)),  # no longer than the track
     ],
 )
-def test_only_established_objects_seen_a_frame_ago_split(object_class, columns, why):
-    after = split(tracks_of_person_and_wall(object_class, **columns), wall_with(PERSON), rows=[1])
-    assert len(after.proposals) == 1, why
-
-
-@pytest.mark.parametrize(
-    ("person", "points", "wall", "why"),
-    [
-        (PERSON, 12, WALL, "too few points lie where it is expected"),
-        (box(10, 2.5, 0.6, 0.6, 0.9, z=-1.25), 80, box(12, 3, 16.0, 0.3, 0.9, z=-1.2), "what lies there is lower"),
-        (box(10, -4, 0.6, 0.6, 1.7, z=-0.85), 80, WALL, "what lies there is elsewhere"),
-        (PERSON, 80, box(10, 2.6, 0.6, 0.6, 1.7, z=-0.85), "what lies there is no longer than the track"),
-    ],
-)
-def test_what_is_not_where_it_is_expected_is_not_split_off(person, points, wall, why):
-    after = split(tracks_of_person_and_wall(), wall_with(person, points=points, wall=wall), rows=[1])
-    assert len(after.proposals) == 1, why
+def test_only_what_an_established_track_expects_is_split_off(object_class, columns, person, points, wall):
+    tracks = tracks_of_person_and_wall(object_class, **columns)
+    assert len(split(tracks, wall_with(person, points=points, wall=wall), rows=[1]).proposals) == 1
 
 
 def test_a_matched_track_splits_nothing():
@@ -218,13 +202,6 @@ def test_two_pedestrians_who_meet_keep_their_tracks():
         ids, shares = follow(follower, bodies, i, together=[(0, 1), (2,)] if i in {14, 15} else ())
         assert ids == [0, 1, 2]
         assert min(shares) > 0.95
-
-
-def test_without_extensions_the_tracker_takes_proposals_as_they_are():
-    follower = Follower(TrackingConfig(extensions="none"))
-    for i in range(TOUCH + 1):
-        follow(follower, [walker(i), WALL], i, together=[(0, 1)] if i == TOUCH else ())
-    assert len(follower.proposals) == 1
 
 
 def test_a_piece_is_expected_where_the_head_saw_it_not_at_the_middle_of_the_wall():
