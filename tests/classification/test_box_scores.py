@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from modt.classification import prior
 from modt.classification.box_classifier import (
     N_BOUND_FEATURES,
     N_FEATURES,
@@ -19,31 +17,22 @@ from modt.classification.box_classifier import (
 from modt.classification.prior import BoxScores
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import SensorConfig
-from modt.types import Cut, Float64, Proposals
+from modt.types import Cut
 from tests.classification.scenes import blobs
 
 SENSOR = SensorConfig()
 
 
-def test_scores_of_a_frame_are_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    rng, calls = np.random.default_rng(2), []
-
-    def counted(proposals: Proposals, sensor: SensorConfig) -> Float64:
-        calls.append(len(proposals))
-        return proposal_features(proposals, sensor)
-
-    monkeypatch.setattr(prior, "proposal_features", counted)
+def test_scores_are_of_the_frame_that_is_given() -> None:
+    rng = np.random.default_rng(2)
     boxes = MlpBoxClassifier([(rng.normal(size=(N_FEATURES, 4)), rng.normal(size=4))], 0.4)
     scores = BoxScores(boxes, NoReflectanceClassifier(), SENSOR)
-    _, first = blobs([10, 30], rng)
-    _, second = blobs([20, 5, 7], rng)
+    first, second = (blobs(counts, rng)[1] for counts in ([10, 30], [20, 5, 7]))
     for proposals in (first, first, second, first):
         log_box, log_reflectance = scores.of(proposals)
-        np.testing.assert_array_equal(
-            log_box, boxes.log_probability(proposal_features(proposals, SENSOR), proposals.cut)
-        )
+        expected = boxes.log_probability(proposal_features(proposals, SENSOR), proposals.cut)
+        np.testing.assert_array_equal(log_box, expected)
         assert not log_reflectance.any()
-    assert calls == [2, 3, 2]
 
 
 def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds() -> None:
