@@ -41,8 +41,3 @@ def test_what_stands_for_seconds_is_hardly_a_cyclist() -> None:
 
 def test_a_young_track_says_little() -> None:
     assert np.abs(said(0.0, 0.1, 0.7)).max() < np.abs(said(0.0, 3.0, 0.7)).max()
-
-
-def test_no_tracks() -> None:
-    none = np.zeros(0)
-    assert log_likelihood(none, none, none).shape == (0, 4)
