@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.scheduler import START_MARGIN, LinearCost, Scheduler, warm_up
-from modt.types import NONE, UNLIMITED, Budget, Float32, Float64, Int, Proposals
+from modt.classification.scheduler import LinearCost, Scheduler, padded_size
+from modt.config import ClassificationConfig
+from modt.types import NONE, UNLIMITED, Budget, Float64, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
 
 COUNTS = st.lists(st.integers(1, 400), min_size=1, max_size=20)
@@ -100,12 +101,6 @@ def test_waiting_counts_deferred_frames() -> None:
     assert tracks.waiting.tolist() == [6, 0, 5]
 
 
-def test_no_tracks() -> None:
-    proposals = Proposals.empty()
-    chosen = Scheduler(cost_model()).select(new_tracks(proposals), proposals, np.zeros(0, np.bool_), Budget(1, 1.0))
-    assert len(chosen.rows) == chosen.deferred == 0
-
-
 @cache
 def dozen(number: int) -> Proposals:
     """A dozen proposals of some sizes."""
@@ -147,7 +142,7 @@ def test_cost_model_converges(call: float, point: float, frame: float, seed: int
     assert max(excess) < 3.0
 
 
-@pytest.mark.parametrize("budget_ms", [0.3, 0.65, 0.8, 1.0, 2.0])
+@pytest.mark.parametrize("budget_ms", [0.3, 0.8, 2.0])
 def test_a_budget_is_kept_in_99_of_100_frames_and_starves_nobody(budget_ms: float) -> None:
     times, calls = frames(cost_model(), budget_ms, 2000)
     assert (times > budget_ms).mean() <= 0.01
@@ -171,8 +166,10 @@ def paid_ms(mean_ms: float, n: int, period_s: float = 0.1, ask: float = 1.0, cpu
     return times
 
 
-@pytest.mark.parametrize("period_s", [0.05, 0.1, 0.5])
-@pytest.mark.parametrize("mean_ms", [0.01, 0.05, 0.3, 0.65, 2.0])
+@pytest.mark.parametrize(
+    ("mean_ms", "period_s"),
+    [(0.01, 0.1), (0.05, 0.05), (0.05, 0.5), (0.3, 0.1), (0.65, 0.5), (2.0, 0.05), (2.0, 0.5)],
+)
 def test_a_mean_budget_is_kept_in_the_mean_and_spent(mean_ms: float, period_s: float) -> None:
     times = paid_ms(mean_ms, 3000, period_s)
     assert times.mean() <= mean_ms + 1.0 / 3000  # at most one call on credit
@@ -246,21 +243,8 @@ def test_cost_model_survives_any_measurement(frames: list[tuple[int, float]]) ->
     assert (price >= 0).all()
 
 
-class Constant:
-    def __init__(self) -> None:
-        self.sizes: list[int] = []
-
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        self.sizes.append(len(which))
-        return np.full((len(which), 4), 0.25)
-
-    def facts(self) -> dict[str, str]:
-        return {}
-
-
-def test_the_warm_up_classifies_small_and_large_frames_and_prices_them() -> None:
-    network, clock = Constant(), iter(range(0, 10**12, 2_000_000))
-    cost = LinearCost(128, lambda points: int(points.sum()))
-    warm_up(network.classify, cost, 128, 8, lambda: next(clock))
-    assert set(network.sizes) == {1, 8, 16}
-    assert cost.cost_ms(np.array([60])) == pytest.approx(START_MARGIN * 2.0, rel=0.01)
+@pytest.mark.parametrize(("likelihood", "points"), [("network", 6 * 400), ("pooled", 4 * 290 + 2 * 400)])
+def test_points_are_counted_with_padding(likelihood: str, points: int) -> None:
+    size = padded_size(ClassificationConfig(likelihood=likelihood, max_points=400))
+    assert size(np.array([10, 700, 290, 10, 20, 400])) == points
+    assert size(np.zeros(0, np.int64)) == 0
