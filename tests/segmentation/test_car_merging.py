@@ -84,28 +84,21 @@ def test_bounds_are_in_metres(bearing, range_m, width_m):
     assert bounds.max[1:, 0] == pytest.approx([range_m, 1.2, -0.3 / range_m], rel=1e-4)
 
 
-def owners(boxes, seed=0, merge=True):
-    """Points of each proposal of a scene by the box that they lie on."""
-    points, on = scans.scan(boxes, step_deg=0.17, azimuth_deg=(-40, 40), seed=seed)
+def unmerged():
+    """A segmenter that merges no strips."""
     stage = Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView())
-    if not merge:
-        stage.clusterer.merger.candidates = lambda sizes: np.zeros(len(sizes), np.bool_)
-    found = stage.segment(points)
-    ends = zip(found.offsets, found.offsets[1:], strict=False)
-    return [np.bincount(on[found.members[a:b]], minlength=len(boxes) + 1)[1:] for a, b in ends]
-
-
-def rear_and_roof(x, y):
-    return [(x, y, 0.4, 1.7, 0.3, 0.9), (x + 2.2, y, 1.6, 1.5, 0.8, 1.5)]
+    stage.clusterer.merger.candidates = lambda sizes: np.zeros(len(sizes), np.bool_)
+    return stage
 
 
 @pytest.mark.parametrize(("x", "y"), [(28.0, 0.0), (34.0, -9.0), (40.0, 6.0)])
 def test_rear_and_roof_are_one_car(x, y):
     apart = 0
     for seed in range(6):
-        car = rear_and_roof(x + 0.3 * seed, y)
-        apart += all(min(own) == 0 for own in owners(car, seed, merge=False))
-        found = owners(car, seed)
+        rear_m = x + 0.3 * seed
+        car = [(rear_m, y, 0.4, 1.7, 0.3, 0.9), (rear_m + 2.2, y, 1.6, 1.5, 0.8, 1.5)]
+        apart += all(min(own) == 0 for own in scans.owners(car, seed, stage=unmerged()))
+        found = scans.owners(car, seed)
         largest = max(found, key=sum)
         assert min(largest) > 0
         assert sum(largest) > 0.9 * sum(map(sum, found))
@@ -126,7 +119,7 @@ def test_rear_and_roof_are_one_car(x, y):
 def test_two_objects_stay_two(pair):
     for seed in range(4):
         moved = [(x, y + 0.05 * seed, *rest) for x, y, *rest in pair]
-        assert all(min(own) == 0 for own in owners(moved, seed))
+        assert all(min(own) == 0 for own in scans.owners(moved, seed))
 
 
 def test_near_clusters_are_not_merged():
@@ -144,8 +137,9 @@ def test_merged_cars_stay_within_the_size_of_an_object():
         bounds = strips(np.random.default_rng(seed), 24)
         for limit_m in (2.0, 6.0):
             target = merger(limit_m).targets(bounds)
-            merged = [np.flatnonzero(target == first) for first in np.unique(target) if np.sum(target == first) > 1]
-            for own in merged:
+            for own in (np.flatnonzero(target == first) for first in np.unique(target)):
+                if len(own) == 1:
+                    continue
                 car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))
                 diagonal_m = float(np.sqrt(car.diagonal_m2[0]))
                 assert diagonal_m < limit_m
