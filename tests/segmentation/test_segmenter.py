@@ -81,22 +81,12 @@ def test_points_without_a_return_belong_to_no_proposal():
     assert (label != NONE).any()
 
 
-def test_two_people_walking_together_are_two():
-    points, on = scans.scan([(8.0, 0.0, *PERSON), (8.0, 0.95, *PERSON)], step_deg=0.17, azimuth_deg=(-20, 20))
-    one, other = seen(points, on)
-    assert one[0] != other[0]
-    assert min(one[1:] + other[1:]) > 0.9
-
-
 def test_a_person_beside_a_car_and_one_beside_a_wall_are_proposals_of_their_own():
     boxes = [(10.0, -2.0, *CAR), (10.0, -0.5, *PERSON), (13.2, 6.0, *PERSON), (14.0, 6.0, 0.3, 16.0, 0.0, 2.5)]
     points, on = scans.scan(boxes, step_deg=0.17, azimuth_deg=(-50, 60))
     table = seen(points, on)
-    assert len({table[i][0] for i in range(3)}) == 3
-    for proposal, share, purity in table[:3]:
-        assert proposal != NONE
-        assert share > 0.9
-        assert purity > 0.9
+    assert len({table[i][0] for i in range(3)} - {NONE}) == 3
+    assert min(min(shares) for _, *shares in table[:3]) > 0.9
 
 
 @pytest.mark.parametrize("range_m", [20.0, 30.0, 40.0])
@@ -119,8 +109,7 @@ def test_an_overhanging_object_is_not_part_of_the_car_below():
 
 def test_cars_across_the_seams_of_directions_are_one_proposal_each():
     points, _ = scans.scan([(0.5, -12.0, *CAR), (-12.0, 0.5, *CAR)], step_deg=0.17)
-    proposals = segmenter().segment(points)
-    assert len(proposals) == 2
+    assert len(segmenter().segment(points)) == 2
 
 
 def test_objects_that_reach_into_the_field_of_view_are_whole():
@@ -138,16 +127,7 @@ def test_objects_that_reach_into_the_field_of_view_are_whole():
 
 def test_an_object_cut_by_the_margin_is_truncated():
     points, _ = scans.scan([(16.0, 20.0, 3.0, 7.0, 0.0, 1.0)], step_deg=0.25)
-    proposals = segmenter(AHEAD).segment(points)
-    assert proposals.cut.tolist() == [Cut.SIDE]
-
-
-def test_the_same_sweep_gives_the_same_bytes():
-    points, _ = scans.scan([(12.0, 3.0, *CAR), (8.0, -4.0, *PERSON)])
-    stage = segmenter()
-    one, other = stage.segment(points), stage.segment(points.copy())
-    for name in ("members", "offsets", "centroid", "box", "cut"):
-        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
+    assert segmenter(AHEAD).segment(points).cut.tolist() == [Cut.SIDE]
 
 
 def test_the_order_of_the_points_does_not_change_the_proposals():
