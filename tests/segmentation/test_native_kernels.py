@@ -108,8 +108,7 @@ def test_hostile_sweeps(kernels, seed, share):
         both(kernels, np.where(rng.random(points.shape) < share, values, points))
 
 
-@pytest.mark.parametrize("name", ["vlp-16", "hdl-64e", "mid-360"])
-@pytest.mark.parametrize("front", [False, True])
+@pytest.mark.parametrize(("name", "front"), [("vlp-16", False), ("hdl-64e", True), ("mid-360", False)])
 def test_simulated_sweeps(kernels, name, front):
     config = profile.load(name)
     for frame in SyntheticStream("street", name, 0.3, 4):
@@ -126,7 +125,7 @@ def test_real_sweeps(kernels, kitti_root):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [0, 1, 2, 3_000_000])
+@pytest.mark.parametrize("n", [0, 1, 2, 1_000_000])
 def test_any_number_of_points(kernels, n):
     both(kernels, street(1, n))
 
