@@ -51,11 +51,6 @@ def test_pairs_do_not_depend_on_the_origin_of_the_world():
     np.testing.assert_array_equal(far, near)
 
 
-def test_groups_far_apart_do_not_overlap():
-    a = kdop(*random_ends(90, 1, 9)) + (np.array([2_000.0, 0.0]) @ DIRECTIONS)[:, None]
-    assert not len(overlapping_pairs(a, kdop(*random_ends(70, 2, 9)))[0])
-
-
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_widths_and_centres(n, seed):
     low, high = random_ends(n, seed, 9)
