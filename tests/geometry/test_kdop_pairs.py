@@ -45,32 +45,13 @@ def test_costs_equal_those_of_pairs_one_by_one(seed, n):
         assert overlap - 1e-9 <= coverage <= 1
 
 
-def cost_of(kdop, variance_m2):
-    """Cost without shape, and coverage, of a square at the origin and another k-DOP, by variance of the expected."""
-    rng, pair = np.random.default_rng(0), np.zeros(1, np.int64)
-    covariance = np.array([[variance_m2], [0.0], [variance_m2]])
-    given = shapes(rng, square((0, 0), 1.0)), shapes(rng, kdop), covariance, 0.3, (pair, pair)
-    return pair_costs(*given, PairWeights(0.0, 0.0, 0.0, 0.0))
-
-
-def test_growth_at_one_end_is_no_displacement():
-    grown = square((0, 0), 1.0)
-    grown[:2] += 1.5
-    cost, coverage = cost_of(grown, 0.0)
-    np.testing.assert_allclose(cost, 0, atol=1e-12)
-    np.testing.assert_allclose(coverage, 1)
-
-
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1))
 def test_the_displacement_of_a_displaced_shape_is_that_of_its_centre(dx, dy, variance_m2):
-    S = variance_m2 + 0.3
-    cost, _ = cost_of(square((dx, dy), 1.0), variance_m2)
+    rng, pair, S = np.random.default_rng(0), np.zeros(1, np.int64), variance_m2 + 0.3
+    covariance = np.array([[variance_m2], [0.0], [variance_m2]])
+    given = shapes(rng, square((0, 0), 1.0)), shapes(rng, square((dx, dy), 1.0)), covariance, 0.3, (pair, pair)
+    cost, _ = pair_costs(*given, PairWeights(0.0, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(cost, (dx**2 + dy**2) / S / 2 + np.log(S / 0.3), atol=1e-9)
-
-
-def test_what_is_where_it_is_expected_costs_less_the_more_precisely_it_is_expected():
-    precise, vague = (cost_of(square((0.3, 0), 1.0), variance_m2)[0] for variance_m2 in (0.1, 10.0))
-    assert precise < vague
 
 
 def test_pairs_without_a_rival_are_certain():
