@@ -60,13 +60,6 @@ def test_a_blank_track_knows_nothing():
     assert not blank.final.any()
 
 
-def test_a_copy_is_independent():
-    first = Tracks.blank(1)
-    second = first.copy()
-    second.id[0] = 7
-    assert first.id[0] == NONE
-
-
 def test_rows_by_proposal():
     tracks = Tracks.blank(3)
     tracks.proposal[:] = [2, NONE, 0]
