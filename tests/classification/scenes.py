@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from modt.types import Float32, Proposals, Tracks
+
+ROW, YES = np.array([0]), np.array([True])
+"""The first track, and that it asks for a class."""
 
 
 def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposals]:
@@ -31,3 +36,16 @@ def new_tracks(proposals: Proposals) -> Tracks:
     tracks.points, tracks.box = proposals.count.copy(), proposals.box.copy()
     tracks.age[:], tracks.hits[:] = 1, 1
     return tracks
+
+
+def scene(*counts: int, frames: int = 1) -> tuple[Proposals, Tracks]:
+    """Blobs and their tracks, seen in so many frames."""
+    _, proposals = blobs(list(counts), np.random.default_rng(3))
+    tracks = new_tracks(proposals)
+    tracks.hits[:] = tracks.age[:] = frames
+    return proposals, tracks
+
+
+def with_points(proposals: Proposals, *counts: int) -> Proposals:
+    """The proposals with other numbers of points."""
+    return dataclasses.replace(proposals, offsets=np.append(0, np.cumsum(counts)))

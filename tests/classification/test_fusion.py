@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,13 +16,12 @@ from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
 from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
-from tests.classification.scenes import blobs, new_tracks
+from tests.classification.scenes import ROW, YES, new_tracks, scene, with_points
 
 CONFIG = FusionConfig()
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 ALIKE = FrequencyPrior(FREQUENCY)
 ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in (FirstViews, FurtherViews, AnyView, KeyViews)))
-ROW, YES = np.array([0]), np.array([True])
 WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
 DOUBTFUL = np.array([[0.4, 0.2, 0.2, 0.2]])
 LIKE_ANY = [0.8, 0.1, 0.05, 0.05]
@@ -48,17 +45,6 @@ class FixedPrior:
         return object_probability_reaches(probability, threshold)
 
 
-def scene(counts: tuple[int, ...] = (50, 50)) -> tuple[Proposals, Tracks]:
-    _, proposals = blobs(list(counts), np.random.default_rng(3))
-    tracks = new_tracks(proposals)
-    tracks.hits[:] = tracks.age[:] = 3
-    return proposals, tracks
-
-
-def with_points(proposals: Proposals, *counts: int) -> Proposals:
-    return dataclasses.replace(proposals, offsets=np.append(0, np.cumsum(counts)))
-
-
 def fuse(fusion: Fusion, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
     """Fuse, and make final what is certain, as the state machine does."""
     certain = fusion.fuse(tracks, proposals, rows, likelihood)
@@ -74,7 +60,7 @@ def fuse(fusion: Fusion, tracks: Tracks, proposals: Proposals, rows: Int, likeli
 )
 @settings(max_examples=40)
 def test_posterior_stays_a_distribution_for_any_likelihood(fusion: Fusion, views: list[Float64]) -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50, 50, frames=3)
     for view in views:
         fusion.asks(tracks, proposals, np.ones(2, np.bool_))
         fusion.fuse(tracks, proposals, np.arange(2), view)
@@ -93,7 +79,7 @@ def test_no_tracks(fusion: Fusion) -> None:
 
 
 def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50, 50, frames=3)
     tracks.final[:] = True
     tracks.proposal[1] = NONE
     assert EveryFrame().asks(tracks, proposals, np.zeros(2, np.bool_)).tolist() == [True, False]
@@ -111,7 +97,7 @@ def test_posterior_is_that_of_the_plain_formula(
 ) -> None:
     """The slow reference: all views and boxes kept, and weighed anew in every frame."""
     views, boxes = (p / p.sum(axis=1, keepdims=True) for p in (views, boxes))
-    proposals, tracks = scene((50,))
+    proposals, tracks = scene(50, frames=3)
     prior = FixedPrior(boxes[0].tolist(), pool_weight=pool_weight)
     fusion = FusedTracks(CONFIG, prior)
     tracks.moved_m[:], tracks.observed_s[:], tracks.length_m[:] = moved_m, 3.0, 1.0
@@ -141,7 +127,7 @@ def test_posterior_is_that_of_the_plain_formula(
 
 @pytest.mark.parametrize("make", [FurtherViews, FirstViews])
 def test_what_is_hardly_an_object_is_not_classified(make: type[FusedTracks]) -> None:
-    proposals, tracks = scene((50, 50, 50))
+    proposals, tracks = scene(50, 50, 50, frames=3)
     fusion = make(CONFIG, FixedPrior(WALL, UNCERTAIN, CAR))
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == [False, False, True]
     assert not tracks.viewed.any()
@@ -149,7 +135,7 @@ def test_what_is_hardly_an_object_is_not_classified(make: type[FusedTracks]) -> 
 
 
 def test_efficient_requests_one_certain_view() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50, 50, frames=3)
     fusion, both = FirstViews(CONFIG, FixedPrior(CAR, CAR)), np.array([True, True])
     assert fusion.asks(tracks, proposals, both).all()
     assert fuse(fusion, tracks, proposals, ROW, CLEARLY_A_CAR).all()
@@ -160,7 +146,7 @@ def test_efficient_requests_one_certain_view() -> None:
 
 @pytest.mark.parametrize("make", [FirstViews, FurtherViews])
 def test_an_uncertain_track_is_classified_again_with_clearly_more_points(make: type[FusedTracks]) -> None:
-    proposals, tracks = scene((40,))
+    proposals, tracks = scene(40, frames=3)
     fusion = make(CONFIG, FixedPrior(CAR))
     fusion.asks(tracks, proposals, YES)
     assert not fuse(fusion, tracks, proposals, ROW, DOUBTFUL).any()
@@ -177,7 +163,7 @@ def test_an_uncertain_track_is_classified_again_with_clearly_more_points(make: t
 def test_certain_background_is_classified_again_near_by_or_where_its_box_comes_to_look_like_an_object(
     points: int, box: list[float], asked: bool
 ) -> None:
-    proposals, tracks = scene((50,))
+    proposals, tracks = scene(50, frames=3)
     prior = FixedPrior(LIKE_ANY)
     fusion = FurtherViews(CONFIG, prior)
     fusion.asks(tracks, proposals, YES)
@@ -195,7 +181,7 @@ def test_an_object_is_classified_again_at_growing_intervals_and_background_is_no
     box: list[float], view: Float64, least: int, most: int
 ) -> None:
     """An uncertain object is classified more often, with as many points all the while."""
-    proposals, tracks = scene((50,))
+    proposals, tracks = scene(50, frames=3)
     fusion = FurtherViews(CONFIG, FixedPrior(box))
     tracks.age[:], asked = 0, []
     for frame in range(1, 80):
@@ -208,7 +194,7 @@ def test_an_object_is_classified_again_at_growing_intervals_and_background_is_no
 
 
 def test_a_remembered_place_is_background_until_its_box_may_be_an_object() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50, 50, frames=3)
     tracks.final[:] = True
     nobody = np.zeros(2, np.bool_)
     assert FurtherViews(CONFIG, FixedPrior(WALL, CAR)).asks(tracks, proposals, nobody).tolist() == [False, True]
@@ -217,7 +203,7 @@ def test_a_remembered_place_is_background_until_its_box_may_be_an_object() -> No
 
 
 def test_lost_tracks_keep_their_posterior_and_ask_for_nothing() -> None:
-    proposals, tracks = scene((50,))
+    proposals, tracks = scene(50, frames=3)
     fusion = FurtherViews(CONFIG, FixedPrior(CAR))
     fusion.asks(tracks, proposals, YES)
     fuse(fusion, tracks, proposals, ROW, CLEARLY_A_CAR)
@@ -230,7 +216,7 @@ def test_lost_tracks_keep_their_posterior_and_ask_for_nothing() -> None:
 def test_background_is_as_certain_as_an_object_where_nobody_looks_again() -> None:
     certain = []
     for make in (FirstViews, FurtherViews):
-        proposals, tracks = scene((50,))
+        proposals, tracks = scene(50, frames=3)
         fusion = make(CONFIG, FixedPrior(FREQUENCY.tolist()))
         fusion.asks(tracks, proposals, YES)
         certain.append(bool(fusion.fuse(tracks, proposals, ROW, np.array([[0.97, 0.02, 0.005, 0.005]]))[0]))

@@ -27,11 +27,3 @@ def test_evidence_multiplies_the_class_frequency_once(weight: float) -> None:
     weights = PoolWeights(weight, weight, weight)
     pool = softmax(log_pool(frequency, np.log(frequency), none, np.log(FREQUENCY), weights), axis=1)
     np.testing.assert_allclose(pool, frequency)
-
-
-def test_weights_are_powers() -> None:
-    network, reflectance = np.array([[0.5, 0.3, 0.1, 0.1]]), np.array([[0.0, 1.0, 2.0, -1.0]])
-    pool = softmax(log_pool(network, BOX[1:2], reflectance, np.log(FREQUENCY), PoolWeights(0.8, 0.4, 0.3)), axis=1)
-    expected = FREQUENCY * (network / FREQUENCY) ** 0.8 * np.exp(0.3 * reflectance)
-    expected[:, 1:] *= 4.0**0.4
-    np.testing.assert_allclose(pool, expected / expected.sum())

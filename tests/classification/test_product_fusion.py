@@ -13,21 +13,11 @@ from hypothesis.extra.numpy import arrays
 from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
-from modt.types import Float64, Proposals, Tracks
-from tests.classification.scenes import blobs, new_tracks
+from modt.types import Float64
+from tests.classification.scenes import ROW, YES, scene, with_points
 
 PAPER = FusionConfig(rule="product", start_frame=1)
 ALIKE = FrequencyPrior(np.full(4, 0.25))
-ROW, YES = np.array([0]), np.array([True])
-
-
-def scene() -> tuple[Proposals, Tracks]:
-    _, proposals = blobs([50], np.random.default_rng(3))
-    return proposals, new_tracks(proposals)
-
-
-def with_points(proposals: Proposals, count: int) -> Proposals:
-    return dataclasses.replace(proposals, offsets=np.array([0, count]))
 
 
 @given(
@@ -36,7 +26,7 @@ def with_points(proposals: Proposals, count: int) -> Proposals:
 )
 def test_key_views_are_fused_by_equation_6(views: Float64, prior: Float64) -> None:
     views = views / views.sum(axis=1, keepdims=True)
-    proposals, tracks, full = *scene(), np.append(1 - prior.sum(), prior)
+    proposals, tracks, full = *scene(50), np.append(1 - prior.sum(), prior)
     fusion = KeyViews(dataclasses.replace(PAPER, object_threshold=1.0), FrequencyPrior(full))
     expected = full.copy()
     for view in views:
@@ -50,7 +40,7 @@ def test_key_views_are_fused_by_equation_6(views: Float64, prior: Float64) -> No
 
 
 def test_the_first_view_of_the_efficient_mode_is_final_whatever_it_says() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50)
     fusion = AnyView(PAPER, ALIKE)
     assert fusion.asks(tracks, proposals, YES).all()
     assert fusion.fuse(tracks, proposals, ROW, np.array([[0.4, 0.2, 0.2, 0.2]])).all()
@@ -59,14 +49,14 @@ def test_the_first_view_of_the_efficient_mode_is_final_whatever_it_says() -> Non
 
 @pytest.mark.parametrize(("points", "independent"), [(50, False), (59, False), (62, True), (38, True)])
 def test_independence_by_change_of_points(points: int, independent: bool) -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50)
     fusion = KeyViews(PAPER, ALIKE)
     fusion.fuse(tracks, proposals, ROW, np.array([[0.2, 0.6, 0.1, 0.1]]))
     assert fusion.asks(tracks, with_points(proposals, points), YES)[0] == independent
 
 
 def test_point_change_is_that_of_the_most_probable_class() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50)
     fusion = KeyViews(dataclasses.replace(PAPER, point_change=(0.5, 0.9, 0.1, 0.9)), ALIKE)
     fusion.fuse(tracks, proposals, ROW, np.array([[0.2, 0.6, 0.1, 0.1]]))
     more = with_points(proposals, 60)
@@ -76,7 +66,7 @@ def test_point_change_is_that_of_the_most_probable_class() -> None:
 
 
 def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50)
     fusion = KeyViews(dataclasses.replace(PAPER, start_frame=3), ALIKE)
     misled, clear = np.array([[0.1, 0.1, 0.7, 0.1]]), np.array([[0.2, 0.6, 0.1, 0.1]])
     fusion.fuse(tracks, proposals, ROW, misled)
@@ -90,7 +80,7 @@ def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
 
 
 def test_no_class_is_final_before_the_start_frame_however_distinct_a_view() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50)
     fusion = KeyViews(dataclasses.replace(PAPER, start_frame=4), ALIKE)
     distinct = np.array([[0.98, 0.01, 0.005, 0.005]])
     assert not fusion.fuse(tracks, proposals, ROW, distinct).any()
@@ -101,7 +91,7 @@ def test_no_class_is_final_before_the_start_frame_however_distinct_a_view() -> N
 
 
 def test_no_class_is_excluded_for_good() -> None:
-    proposals, tracks = scene()
+    proposals, tracks = scene(50)
     fusion = KeyViews(PAPER, ALIKE)
     for _ in range(50):
         fusion.fuse(tracks, proposals, ROW, np.array([[1.0, 0.0, 0.0, 0.0]]))
