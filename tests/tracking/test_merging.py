@@ -118,9 +118,8 @@ def test_of_two_cars_the_older_takes_parts_and_proposals_of_the_younger(ahead_m,
 
 
 def test_the_reflectance_is_that_of_the_matched_proposal():
-    tracks = tracks_at([WHOLE], CAR)
+    tracks, reflectance = tracks_at([WHOLE], CAR), np.arange(10.0).reshape(2, 5)
     frame = frame_at_rest(tracks, [FRONT, REAR], 0)
-    reflectance = np.arange(10.0).reshape(2, 5)
     after = merging(tracks, replace(frame, proposals=replace(frame.proposals, reflectance=reflectance)))
     np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
 
@@ -163,11 +162,7 @@ def test_without_extensions_the_tracker_takes_proposals_as_they_are():
 
 @pytest.mark.parametrize(
     ("object_class", "length_m", "known_m"),
-    [
-        (CAR, 5.8, 5.8),
-        (CAR, 6.4, 5.0),  # longer than any car
-        (BACKGROUND, 6.4, 6.4),
-    ],
+    [(CAR, 5.8, 5.8), (CAR, 6.4, 5.0), (BACKGROUND, 6.4, 6.4)],  # no car is longer than 6 m
 )
 def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length_m, known_m):
     follower = Follower()
