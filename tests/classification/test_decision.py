@@ -85,36 +85,16 @@ def test_the_frequency_of_the_stream_is_learnt(frequency):
     assert np.abs(decision.frequency - frequency).max() <= max(0.05, np.abs(ASSUMED - frequency).max() / 2)
 
 
-@pytest.fixture
-def soon(monkeypatch):
-    """The frequency at the start counts for a single proposal."""
-    monkeypatch.setattr(constants, "START_PROPOSALS", 1)
-
-
-@pytest.mark.usefixtures("soon")
-def test_no_object_becomes_rarer_than_the_model_assumes():
-    rng = np.random.default_rng(1)
-    decision = Decision(DecisionConfig(), ASSUMED)
-    for _ in range(100):
-        decision.decide(tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60)))
-    assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)
-
-
-@pytest.mark.usefixtures("soon")
-def test_what_is_not_seen_teaches_nothing():
-    decision = Decision(DecisionConfig(), ASSUMED)
+def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_teaches_nothing(monkeypatch):
+    monkeypatch.setattr(constants, "START_PROPOSALS", 1)  # what is seen counts soon
+    rng, decision = np.random.default_rng(1), Decision(DecisionConfig(), ASSUMED)
     lost = tracks([0.0, 0.0, 1.0, 0.0])
     lost.proposal[:] = NONE
     decision.decide(lost)
     assert decision.frequency == pytest.approx(ASSUMED)
-
-
-def test_the_profile_sets_the_frequency_at_the_start():
-    decision = Decision(DecisionConfig(frequency=(0.2, 0.1, 0.1)), ASSUMED)
-    assert decision.frequency == pytest.approx([0.6, 0.2, 0.1, 0.1])
-    table = tracks([0.4, 0.1, 0.45, 0.05])
-    decision.decide(table)
-    assert table.object_class.tolist() == [PEDESTRIAN]
+    for _ in range(100):
+        decision.decide(tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60)))
+    assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)
 
 
 @given(arrays(np.float64, (20, 4), elements=st.floats(1e-4, 1.0)))
