@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
+from scipy.special import softmax
 
 from modt import assets
 from modt.classification.box_classifier import NoBoxClassifier
@@ -28,13 +29,8 @@ Layers = list[tuple[Float32, Float32]]
 
 def random_layers(seed: int) -> Layers:
     rng = np.random.default_rng(seed)
-    return [
-        (
-            (rng.normal(size=(a, b)) * np.sqrt(2 / a)).astype(np.float32),
-            rng.normal(0, 0.3, b).astype(np.float32),
-        )
-        for a, b in pairwise(SIZES)
-    ]
+    layers = [(rng.normal(size=(a, b)) * np.sqrt(2 / a), rng.normal(0, 0.3, b)) for a, b in pairwise(SIZES)]
+    return [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers]
 
 
 def textbook(layers: Layers, xyz: Float32) -> Float64:
@@ -46,10 +42,8 @@ def textbook(layers: Layers, xyz: Float32) -> Float64:
     for weight, bias in layers[3:-1]:
         h = np.maximum(h @ weight + bias, 0)
     weight, bias = layers[-1]
-    z = h @ weight + bias
-    e = np.exp(z - z.max())
-    softmax: Float64 = e / e.sum()
-    return softmax
+    probability: Float64 = softmax(h @ weight + bias)
+    return probability
 
 
 def write(folder: Path, model: onnx.ModelProto) -> Path:
