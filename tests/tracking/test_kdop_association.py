@@ -77,10 +77,3 @@ def test_a_lost_track_is_matched_along_its_prediction():
     tracks = follow(Follower(), moving, CAR)
     assert tracks.id.tolist() == [0]
     assert tracks.missed[0] == 0
-
-
-@pytest.mark.parametrize("n", [0, 3])
-def test_an_empty_frame_or_table_has_no_matches(n):
-    boxes = [box(10 * k, 0) for k in range(1, n + 1)]
-    assert matched(tracks_at(boxes), observed([]))[0] == []
-    assert matched(tracks_at([]), observed(boxes))[0] == []
