@@ -26,7 +26,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.strips import CarLimits
 from modt.types import NONE, UNRECORDED
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.geometry.test_kdop_pairs import WEIGHTS, random_pairs
+from tests.geometry.test_kdop import WEIGHTS, random_pairs
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_clusters import cloud
 
