@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,11 +8,10 @@ from hypothesis import strategies as st
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.clustering import StripMerger
-from modt.segmentation.clusters import ClusterSizes
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.strips import CarLimits, ViewBounds, pairs
+from modt.segmentation.strips import CarLimits, ViewBounds
 from tests.segmentation import reference, scans
 
 BEAM = np.tan(np.deg2rad(SensorConfig().elevation_step_deg))
@@ -51,22 +52,6 @@ def strips(rng, n):
 def test_targets_equal_those_of_pairs_one_by_one(seed, n):
     bounds = strips(np.random.default_rng(seed), n)
     np.testing.assert_array_equal(merger().targets(bounds), reference.car_targets(bounds, BEAM, CarLimits()))
-
-
-def test_random_strips_are_merged():
-    """The comparison above covers pairs, chains and refusals."""
-    merged = chained = refused = 0
-    for seed in range(60):
-        bounds = strips(np.random.default_rng(seed), 24)
-        stage = merger()
-        target = stage.targets(bounds)
-        merged += np.count_nonzero(target != np.arange(24))
-        chained += np.count_nonzero(np.bincount(target, minlength=24) > 2)
-        front, back = pairs(bounds, np.full(24, BEAM, np.float32), stage.limits)
-        refused += np.count_nonzero(target[front] != target[back])
-    assert merged > 40
-    assert chained > 5
-    assert refused > 0
 
 
 @given(bearing=st.floats(-1.4, 4.5), range_m=st.floats(20.0, 70.0), width_m=st.floats(0.3, 5.0))
@@ -122,26 +107,18 @@ def test_two_objects_stay_two(pair):
         assert all(min(own) == 0 for own in scans.owners(moved, seed))
 
 
-def test_near_clusters_are_not_merged():
-    stage = merger()
-    size, points = np.ones(3, np.float32), np.full(3, 50.0)
-    range_m = np.array([10.0, 24.0, 27.0], np.float32)
-    beam_m = range_m * np.float32(BEAM)
-    sizes = ClusterSizes(points, size, 0 * size, size, np.sqrt(range_m), np.arange(3), beam_m, np.zeros(3, np.bool_))
-    assert stage.candidates(sizes).tolist() == [False, False, True]
-
-
 def test_merged_cars_stay_within_the_size_of_an_object():
-    larger = 0
-    for seed in range(20):
+    """The random strips make pairs and chains, some of them longer than the lower limit."""
+    larger = chained = 0
+    for seed, limit_m in itertools.product(range(20), (2.0, 6.0)):
         bounds = strips(np.random.default_rng(seed), 24)
-        for limit_m in (2.0, 6.0):
-            target = merger(limit_m).targets(bounds)
-            for own in (np.flatnonzero(target == first) for first in np.unique(target)):
-                if len(own) == 1:
-                    continue
-                car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))
-                diagonal_m = float(np.sqrt(car.diagonal_m2[0]))
-                assert diagonal_m < limit_m
-                larger += diagonal_m > 2.0
+        target = merger(limit_m).targets(bounds)
+        for first in np.flatnonzero(np.bincount(target) > 1):
+            own = np.flatnonzero(target == first)
+            car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))
+            diagonal_m = float(np.sqrt(car.diagonal_m2[0]))
+            assert diagonal_m < limit_m
+            larger += diagonal_m > 2.0
+            chained += len(own) > 2
     assert larger > 5
+    assert chained > 2

@@ -75,21 +75,6 @@ def test_points_of_one_index_share_a_cell(seed, n):
     assert (grid.occupied(place)[1] == cell).all(), "the grid is empty again"
 
 
-def test_the_clustering_distance_grows_with_range():
-    stage = clusterer(min_points=1, min_height_m=0.0)
-
-    def parts(range_m, gap_m):
-        y = np.repeat([-gap_m / 2, gap_m / 2], 10)
-        points = np.stack([np.full(20, range_m), y, np.tile(np.linspace(-1.4, 0.0, 10), 2)], axis=1)
-        return stage.cluster(
-            PointColumns.from_array(points.astype(np.float32)), np.tile(np.linspace(0.3, 1.7, 10), 2)
-        ).n
-
-    assert parts(5.0, 0.35) == 2
-    assert parts(50.0, 0.2) == 1
-    assert parts(50.0, 1.2) == 2
-
-
 @pytest.mark.parametrize("n", [1, 2, 7])
 def test_points_of_no_height_are_no_cluster(n):
     points = np.tile(np.float32([[5.0, 1.0, -0.5]]), (n, 1))
