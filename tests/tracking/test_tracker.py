@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kdop import DIRECTIONS
-from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, UndefinedTransitionError
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
 from modt.types import NONE, Cut
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
@@ -53,14 +53,6 @@ def test_conclude_returns_a_copy(tracker):
     tracks = tracker.conclude([0], [True])
     tracks.id[:] = 99
     assert tracker.tracks.id.tolist() == [0]
-
-
-@pytest.mark.parametrize(("machine", "certain"), [(EFFICIENT, False), (EFFICIENT, True), (CONVENTIONAL, False)])
-def test_a_classification_that_the_machine_has_no_row_for_is_an_error(machine, certain):
-    tracker = Follower(machine=machine)
-    run(tracker, [frame_of([box(10, 0)], i, EYE) for i in range(2)])
-    with pytest.raises(UndefinedTransitionError):
-        tracker.conclude([0], [certain])
 
 
 @settings(max_examples=40)
