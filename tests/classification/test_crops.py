@@ -49,13 +49,6 @@ def test_canonical_crops_are_independent_of_azimuth(angle: float, seed: int) -> 
     )
 
 
-def test_gather_keeps_the_order_of_its_argument() -> None:
-    points, proposals = blobs([3, 4, 5], np.random.default_rng(0))
-    crops = gather(points, proposals, np.array([2, 0]), 100)
-    assert crops.count.tolist() == [5, 3]
-    np.testing.assert_array_equal(crops.xyz[:5], points[proposals.members[7:], :3])
-
-
 @given(own=st.integers(1, 500), most=st.integers(1, 100))
 def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
     points, proposals = blobs([own], np.random.default_rng(own))

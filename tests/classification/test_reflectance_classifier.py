@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import softmax
 
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
@@ -53,14 +54,16 @@ def measured() -> Proposals:
     return dataclasses.replace(proposals, reflectance=REFLECTANCE)
 
 
+def prior_with_reflectance() -> BoxPrior:
+    """The prior with the reflectance of the sensor's scale."""
+    return BoxPrior(BoxScores(BOXES, from_metadata(METADATA, SENSOR), SENSOR), FREQUENCY)
+
+
 def test_prior_is_box_probability_times_reflectance_likelihood() -> None:
     proposals = measured()
     boxes = proposal_features(proposals, SENSOR)
-    score = logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE])
-    expected = np.exp(score) / np.exp(score).sum(axis=1, keepdims=True)
-    reflectance = from_metadata(METADATA, SENSOR)
-    prior = make_prior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY)
-    np.testing.assert_allclose(prior.probability(proposals), expected)
+    expected = softmax(logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE]), axis=1)
+    np.testing.assert_allclose(prior_with_reflectance().probability(proposals), expected)
 
 
 def test_a_sensor_has_the_classifier_of_its_scale() -> None:
@@ -81,8 +84,7 @@ def test_another_sensor_or_a_model_without_classifier_adds_nothing() -> None:
 
 
 def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.LogCaptureFixture) -> None:
-    reflectance = from_metadata(METADATA, SENSOR)
-    prior, bare = BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY), blobs([10, 30], RNG)[1]
+    prior, bare = prior_with_reflectance(), blobs([10, 30], RNG)[1]
     with caplog.at_level(logging.WARNING):
         assert prior.probability(Proposals.empty()).shape == (0, 4)
         assert not caplog.records  # a frame without proposals does not say whether the sensor measures it
@@ -94,8 +96,7 @@ def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.
 
 
 def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
-    reflectance = from_metadata(METADATA, SENSOR)
-    prior, whole = BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY), measured()
+    prior, whole = prior_with_reflectance(), measured()
     statistics = REFLECTANCE.copy()
     statistics[1] = np.nan
     probability = prior.probability(dataclasses.replace(whole, reflectance=statistics))
