@@ -100,14 +100,6 @@ def test_a_wheel_is_the_same_wherever_and_whenever_it_is_built():
     assert deps.wheel() == 0
 
 
-@pytest.mark.install
-def test_from_an_editable_install(expected, environment, tmp_path):
-    install(environment, "--editable", str(CHECKOUT))
-    package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path)
-    assert package == str(CHECKOUT / "runtime" / "modt")
-    assert files == expected
-
-
 def test_what_is_not_there_lists_what_is(tmp_path):
     with pytest.raises(MisuseError, match="hdl-64e"):
         assets.find("profiles", "nothing", ".yaml")
