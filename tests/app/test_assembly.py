@@ -1,4 +1,4 @@
-"""The pipeline that is put together: warmed up, and with a budget that buys something."""
+"""Assembly of the pipeline: it is warmed up, and its budget buys something."""
 
 import dataclasses
 import itertools
@@ -49,10 +49,8 @@ def test_a_budget_below_the_price_of_a_call_is_warned_of(mode, scheduler, warned
     monkeypatch.setattr(assembly, "time", clock)
     with caplog.at_level(logging.WARNING):
         pipeline(mode, **scheduler)
-    assert (
-        "the budget is" in caplog.text and "one is made every" in caplog.text and "raise" in caplog.text
-    ) is warned
     assert len(caplog.records) == warned
+    assert ("raise" in caplog.text) is warned
 
 
 @pytest.mark.parametrize(("budget", "learns"), [(Budget(cpu_ms=100.0), True), (Budget(calls=4), False)])

@@ -1,4 +1,4 @@
-"""Word to systemd, by real sockets."""
+"""Notifications to systemd, by real sockets."""
 
 import logging
 import os
@@ -45,24 +45,24 @@ def listeners():
 def test_ready_is_said_first_and_the_watchdog_served(tmp_path, listen, abstract):
     name = f"modt-test-{os.getpid()}"
     systemd = listen(f"\0{name}" if abstract else str(tmp_path / "notify"))
-    told = supervisor_of({"NOTIFY_SOCKET": f"@{name}" if abstract else str(tmp_path / "notify")})
+    supervisor = supervisor_of({"NOTIFY_SOCKET": f"@{name}" if abstract else str(tmp_path / "notify")})
     assert systemd.heard() == []
-    told.alive()
+    supervisor.alive()
     assert systemd.heard() == ["READY=1\nWATCHDOG=1"]
-    told.alive()
-    told.alive()
+    supervisor.alive()
+    supervisor.alive()
     assert systemd.heard() == ["WATCHDOG=1"] * 2
-    told.close()
+    supervisor.close()
     assert systemd.heard() == ["STOPPING=1"]
 
 
 @pytest.mark.parametrize("environment", [{}, {"NOTIFY_SOCKET": ""}])
 def test_without_a_socket_there_is_no_supervisor(environment):
     opened = os.listdir("/proc/self/fd")
-    told = supervisor_of(environment)
-    told.alive()
+    supervisor = supervisor_of(environment)
+    supervisor.alive()
     assert os.listdir("/proc/self/fd") == opened
-    told.close()
+    supervisor.close()
 
 
 @pytest.mark.parametrize("place", ["notify", "/", "@", "vsock:2:1234"])
@@ -72,25 +72,25 @@ def test_invalid_address_is_named(place):
 
 
 def test_unreachable_supervisor_is_logged_once_and_retried(tmp_path, listen, caplog):
-    told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
+    supervisor = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     with caplog.at_level(logging.WARNING):
-        told.alive()
-        told.alive()
+        supervisor.alive()
+        supervisor.alive()
     assert [r.levelname for r in caplog.records] == ["WARNING"]
     systemd = listen(str(tmp_path / "notify"))
-    told.alive()
+    supervisor.alive()
     assert systemd.heard() == ["READY=1\nWATCHDOG=1"]
-    told.close()
+    supervisor.close()
 
 
 def test_slow_supervisor_does_not_block(tmp_path, listen):
     systemd = listen(str(tmp_path / "notify"))
-    told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
+    supervisor = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     for _ in range(10_000):  # far more than a socket holds
-        told.alive()
+        supervisor.alive()
     heard = systemd.heard()
     assert heard[0] == "READY=1\nWATCHDOG=1"
     assert 1 < len(heard) < 10_000
-    told.alive()
+    supervisor.alive()
     assert systemd.heard() == ["WATCHDOG=1"]
-    told.close()
+    supervisor.close()

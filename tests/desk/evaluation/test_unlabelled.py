@@ -39,7 +39,7 @@ WALKER = boxes(1.3 * STAMPS_S)
         ("what is scattered", boxes(0 * STAMPS_S, scatter_m=1.0), False),
     ],
 )
-def test_what_moves_like_a_road_user(name, world, moves):
+def test_tracks_that_move_like_road_users(name, world, moves):
     assert moving(STAMPS_S, world).all() == moves == moving(STAMPS_S, world).any(), name
 
 

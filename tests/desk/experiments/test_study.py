@@ -13,12 +13,10 @@ def rows(jobs: int) -> list[Row]:
 
 
 def test_a_replay_that_experiments_share_is_made_once():
-    apart = [
-        Study([EXPERIMENTS[name]], simulated_drives(1, 0.4), [()]).tasks() for name in ("table5", "fig14", "table6")
-    ]
-    together = Study(chosen(["table5", "fig14", "table6"]), simulated_drives(1, 0.4), [()]).tasks()
+    names, drives = ["table5", "fig14", "table6"], simulated_drives(1, 0.4)
+    apart = [Study([EXPERIMENTS[name]], drives, [()]).tasks() for name in names]
     assert [len(tasks) for tasks in apart] == [2, 2, 2]
-    assert len(together) == 3, "conventional, accurate and efficient"
+    assert len(Study(chosen(names), drives, [()]).tasks()) == 3, "conventional, accurate and efficient"
 
 
 def test_drives_and_profiles_have_tasks_of_their_own():
