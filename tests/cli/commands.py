@@ -10,6 +10,7 @@ from pathlib import Path
 from modt.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
+PINNED = ("replay", "run", "check", "calibrate", "compare", "predict")
 PACKAGES = os.pathsep.join([str(ROOT / "runtime"), str(ROOT / "tools")])
 
 
@@ -35,7 +36,7 @@ def begin(*arguments: object, cwd: Path) -> subprocess.Popen[str]:
 
 def here(command: str, *words: object, program=main) -> int:
     """Run a command in this process, on any core; returns its exit status."""
-    free = ["--core", "none"] if command in ("replay", "run", "compare") else []
+    free = ["--core", "none"] if command in PINNED else []
     try:
         return program([command, *free, *map(str, words)])
     except SystemExit as ended:

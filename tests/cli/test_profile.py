@@ -12,12 +12,6 @@ from .commands import here, modt, refusal
 pytestmark = pytest.mark.command
 
 
-def modt_profile(*arguments, cwd):
-    done = modt(*arguments, cwd=cwd, module="modt.cli.profile")
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 def test_meters_are_listed_with_reasons(capsys):
     assert here("meters", "--json", program=profile.main) == 0
     meters = json.loads(capsys.readouterr().out)["meters"]
@@ -33,7 +27,9 @@ def compared(tmp_path_factory):
     """Folder in which the modes were compared: other.json and page.html."""
     folder = tmp_path_factory.mktemp("compared")
     options = ("--frames", "0:8", "--repeat", 1, "--json", "--html", "page.html")
-    (folder / "other.json").write_text(modt_profile("compare", *options, cwd=folder))
+    done = modt("compare", *options, cwd=folder, module="modt.cli.profile")
+    assert done.returncode == 0, done.stderr
+    (folder / "other.json").write_text(done.stdout)
     return folder
 
 
@@ -54,18 +50,21 @@ def test_a_prediction_is_compared_with_what_is_measured(compared, tmp_path, monk
     assert "other.json" in refusal(capsys, "predict", "--calibration", "other.json", program=profile.main)
     (tmp_path / "other.json").write_text(json.dumps(json.loads(other) | {"stream": "elsewhere"}))
     arguments = ("--frames", "6:12", "--calibration", "other.json", "--observe", "all", "--out", "blind.json")
-    assert "efficient: gamma predicted" in modt_profile("predict", *arguments, cwd=tmp_path)
+    assert here("predict", *arguments, program=profile.main) == 0
+    assert "efficient: gamma predicted" in capsys.readouterr().out
     blind = json.loads((tmp_path / "blind.json").read_text())
     assert (blind["seen"], blind["calibration"]) == (6, ["elsewhere"])
-    done = modt_profile("compare", "--frames", "6:12", "--repeat", 1, "--against", "blind.json", cwd=tmp_path)
-    assert "gamma, accurate: predicted" in done
+    arguments = ("--frames", "6:12", "--repeat", 1, "--against", "blind.json")
+    assert here("compare", *arguments, program=profile.main) == 0
+    assert "gamma, accurate: predicted" in capsys.readouterr().out
     assert "asked" in refusal(capsys, "compare", "--frames", "0:6", "--against", "blind.json", program=profile.main)
 
 
-def test_calibration_writes_a_profile_that_loads(tmp_path):
+def test_calibration_writes_a_profile_that_loads(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     short = ("--frames", "0:3", "--windows", 12, "--window-s", 0.12, "--burst-s", 0.02)
-    said = modt_profile("calibrate", "--board", "bench", "--meter", "model", *short, cwd=tmp_path)
-    assert "says nothing of the board" in said
+    assert here("calibrate", "--board", "bench", "--meter", "model", *short, program=profile.main) == 0
+    assert "says nothing of the board" in capsys.readouterr().out
     energy = profiles.load(str(tmp_path / "board.yaml")).energy
     assert energy.board == "bench"
     assert energy.seg_J is not None

@@ -4,7 +4,7 @@ import csv
 
 import pytest
 
-from modt.cli.main import main
+from tests.cli.commands import here, refusal
 
 pytestmark = pytest.mark.command
 
@@ -16,7 +16,7 @@ def results(tmp_path_factory):
     other = out / "other.yaml"
     other.write_text("fusion:\n  start_frame: 1\n")
     words = ["evaluate", "--experiment", "table4", "fig12", "--simulated", "2", "--seconds", "0.2"]
-    assert main([*words, "--beside", str(other), "--out", str(out)]) == 0
+    assert here(*words, "--beside", other, "--out", out) == 0
     return out
 
 
@@ -45,7 +45,7 @@ def test_another_profile_stands_beside_the_first(results):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "named"),
     [
         (["--experiment", "table9", "--simulated", "1"], "table3"),
         (["--experiment", "table4"], "no drives"),
@@ -54,6 +54,5 @@ def test_another_profile_stands_beside_the_first(results):
         (["--experiment", "table4", "--simulated", "1", "--further", "table.csv"], "--further"),
     ],
 )
-def test_misuse_is_told(words, said, capsys, tmp_path):
-    assert main(["evaluate", *words, "--out", str(tmp_path)]) == 2
-    assert said in capsys.readouterr().err
+def test_misuse_is_one_line(words, named, capsys, tmp_path):
+    assert named in refusal(capsys, "evaluate", *words, "--out", tmp_path)

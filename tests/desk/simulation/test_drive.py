@@ -12,16 +12,19 @@ from modt_desk.simulation.kitti_raw import DATE, DriveWriter
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("drive")
-    stream = SyntheticStream("street", "vlp-16", 1.5, seed=4)
-    writer = DriveWriter(folder, CAMERA)
+def write(folder, seconds, **options):
+    """A street in KITTI's layout: its writer, its stream, its sweeps."""
+    stream, writer = SyntheticStream("street", "vlp-16", seconds, seed=4, **options), DriveWriter(folder, CAMERA)
     sweeps = list(stream.sweeps())
     for frame, truth in sweeps:
         writer.write(frame, truth)
     writer.close()
     return writer, stream, sweeps
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("drive"), 1.5)
 
 
 @pytest.mark.parametrize("layout", ["drive", "sequence"])
@@ -45,14 +48,9 @@ def test_points_times_poses_and_camera_are_read_back(written, layout):
 
 @pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
 def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, turn_s):
-    stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
-    writer = DriveWriter(tmp_path, CAMERA)
-    for frame, truth in stream.sweeps():
-        assert frame.turn_s == turn_s
-        writer.write(frame, truth)
-    writer.close()
+    writer, _, sweeps = write(tmp_path, 0.3, distort=distort)
+    assert [frame.turn_s for frame, _ in sweeps] == [turn_s] * 3
     read = open_stream(writer.drive)
-    assert read.info.notes == ()
     np.testing.assert_allclose([f.turn_s for f in read], turn_s, atol=1e-9)
     starts, stamps = ((writer.drive / "velodyne_points" / f"timestamps{k}.txt").read_text() for k in ("_start", ""))
     assert (starts == stamps) is not distort

@@ -46,10 +46,6 @@ def test_batches_and_single_windows_hit_the_same_solids(seed):
 @settings(max_examples=25)
 @given(st.integers(0, 1000))
 def test_windows_contain_every_ray_that_hits(seed):
-    solids = scene(seed, n=6)
-    caster = RayCaster(sensor("vlp-16"))
-    found = caster.cast(solids, NO_GROUND, np.ones_like(NO_GROUND)).distance
-
     class Everywhere(RayCaster):
         def windows(self, solids):
             near = super().windows(solids)
@@ -57,7 +53,10 @@ def test_windows_contain_every_ray_that_hits(seed):
             whole = np.tile([0, 16], (n, 1)), np.tile([0, 1808], (n, 1))
             return type(near)(np.arange(n), *whole, np.zeros(n, np.float32), 1808)
 
-    whole = Everywhere(sensor("vlp-16")).cast(solids, NO_GROUND, np.ones_like(NO_GROUND)).distance
+    solids, depth = scene(seed, n=6), np.ones_like(NO_GROUND)
+    found, whole = (
+        make(sensor("vlp-16")).cast(solids, NO_GROUND, depth).distance for make in (RayCaster, Everywhere)
+    )
     assert np.isfinite(found).sum() == np.isfinite(whole).sum()
 
 

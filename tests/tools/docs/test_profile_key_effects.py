@@ -149,7 +149,7 @@ def other_values(key: Key) -> Iterator[Any]:
 @cache
 def unchanged(path: str, folder: Path) -> str:
     """Digest of the scenario of a path with the unchanged profile, which is the same each time."""
-    one, two = (SCENARIOS[path](BASE, folder / name) for name in ("one", "two"))
+    one, two = (SCENARIOS[path](BASE, folder / f"unchanged-{path}{name}") for name in ("one", "two"))
     assert one == two
     return one
 
@@ -161,7 +161,7 @@ def test_a_key_has_an_effect(key, tmp_path, tmp_path_factory):
         assert key.path.rpartition(".")[2] in (Path(__file__).parents[2] / beside[0]).read_text(encoding="utf-8")
         return
     path = max(filter(key.path.startswith, SCENARIOS), key=len)
-    before = unchanged(path, tmp_path_factory.getbasetemp() / f"unchanged-{path}")
+    before = unchanged(path, tmp_path_factory.getbasetemp())
     values = [value for value in other_values(key) if value != attrgetter(key.path)(BASE)]
     assert any(SCENARIOS[path](changed(BASE, key.path, v), tmp_path / str(n)) != before for n, v in enumerate(values))
 
