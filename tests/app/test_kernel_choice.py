@@ -1,7 +1,5 @@
 """Choice of `segmentation.kernels`."""
 
-from __future__ import annotations
-
 import logging
 
 import pytest

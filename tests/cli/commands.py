@@ -1,12 +1,12 @@
 """Running the commands as a user would."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+from modt.app.inputs import Request
+from modt.app.session import Session, replay
 from modt.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,11 +27,11 @@ def modt(*arguments: object, cwd: Path, module: str = "modt.cli.main", **options
     return subprocess.run(command, check=False, **options)
 
 
-def begin(*arguments: object, cwd: Path) -> subprocess.Popen[str]:
+def begin(*arguments: object, cwd: Path, env: dict[str, str] | None = None) -> subprocess.Popen[str]:
     """Start a command and leave it running."""
     command = [sys.executable, "-m", "modt.cli.main", *map(str, arguments)]
     pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment(), cwd=cwd)
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=env or environment(), cwd=cwd)
 
 
 def here(command: str, *words: object, program=main) -> int:
@@ -49,3 +49,8 @@ def refusal(capsys, *arguments: object, program=main) -> str:
     said = capsys.readouterr()
     assert said.out == ""
     return said.err.splitlines()[-1]
+
+
+def session(out: Path, frames: int | None, **options) -> Session:
+    """A replay in this process."""
+    return replay(Request(mode="efficient", frames=(0, frames), **options), {}, out, None, ["modt"])

@@ -1,7 +1,5 @@
 """The help of the commands, by itself or with --help."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

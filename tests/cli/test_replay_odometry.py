@@ -1,4 +1,4 @@
-"""`modt replay` with poses from elsewhere: a file, nobody, another process."""
+"""`modt replay` with poses of a file, of another process, or without poses."""
 
 import json
 import socket
@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 import yaml
 
-from modt.app.inputs import Request
-from modt.app.session import replay
 from modt.app.supervisor import Supervisor
 from modt.geometry import inverse, rotation_zyx, se3
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
-from .commands import refusal
+from .commands import refusal, session
 
 pytestmark = pytest.mark.command
 
@@ -29,13 +27,9 @@ def the_embedded_street():
     return [(i * period_s, simulator.world.ego_pose(i * period_s)) for i in range(FRAMES)]
 
 
-def session(out, **options):
-    return replay(Request(mode="efficient", frames=(0, FRAMES), **options), {}, out, None, ["modt"])
-
-
 def run(out, **options):
     """Summary of a run and the bytes of its tracks."""
-    summary = session(out, **options).run(Supervisor())
+    summary = session(out, FRAMES, **options).run(Supervisor())
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
@@ -54,7 +48,7 @@ def test_poses_from_a_socket_equal_recorded_poses_and_a_restart_of_the_sender_mo
     restarted, tmp_path, street, recorded
 ):
     T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
-    played = session(tmp_path / "run", odometry=f"unix://{tmp_path / 's'}")
+    played = session(tmp_path / "run", FRAMES, odometry=f"unix://{tmp_path / 's'}")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
         for i, (stamp_s, T) in enumerate(street):
             pose = T_elsewhere @ T if restarted and i >= FRAMES // 2 else T
@@ -79,7 +73,7 @@ def test_without_poses_they_are_estimated(tmp_path, recorded):
 
 
 def test_poses_of_a_file_equal_recorded_poses(tmp_path, street, recorded):
-    """As `modt simulate` writes them: the camera's, from where it started."""
+    """`modt simulate` writes those of the camera, from its start on."""
     camera = SyntheticStream("street", "hdl-64e", 1.0).info.camera.T_camera_sensor
     rows = [(camera @ inverse(street[0][1]) @ T @ inverse(camera))[:3].ravel() for _, T in street]
     np.savetxt(tmp_path / "poses.txt", rows, fmt="%.12e")
@@ -102,14 +96,13 @@ GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
 
 
 @pytest.mark.parametrize(
-    ("options", "noted"),
-    [({}, True), ({"odometry": "none"}, False), ({"poses": "poses.txt"}, False), ({"odometry": "unix"}, False)],
+    ("options", "noted"), [({}, True), ({"poses": "poses.txt"}, False), ({"odometry": "unix"}, False)]
 )
 def test_missing_poses_are_noted_unless_they_come_from_elsewhere(tmp_path, options, noted):
     places = {"poses.txt": tmp_path / "poses.txt", "unix": f"unix://{tmp_path / 's'}"}
     (tmp_path / "poses.txt").write_text(3 * GOOD)
-    request = Request(path=layouts.bare(tmp_path), **{key: places.get(name, name) for key, name in options.items()})
-    made = replay(request, {}, tmp_path / "run", None, ["modt"])
+    options = {key: places.get(name, name) for key, name in options.items()}
+    made = session(tmp_path / "run", None, path=layouts.bare(tmp_path), **options)
     made.run(Supervisor())
     notes = [*made.stages.info.notes, *made.stages.info.pose_notes]
     assert any("no calibration" in note for note in notes)

@@ -1,12 +1,8 @@
 """`modt replay` of a recording of ROS 2, and with the poses of a topic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from modt.app.inputs import Request
-from modt.app.session import replay
 from modt.app.supervisor import Supervisor
 from modt.ros2 import odometry
 from modt.ros2.odometry import write_odometry
@@ -17,7 +13,7 @@ from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.ros2.network import FAR, NEAR, until
 from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 
-from .commands import modt
+from .commands import here, refusal, session
 
 pytestmark = pytest.mark.command
 
@@ -27,15 +23,6 @@ FRAMES = 5
 @pytest.fixture(scope="module", name="street")
 def the_embedded_street():
     return list(SyntheticStream("street", "hdl-64e", 10.0, seed=0).between(0, FRAMES))
-
-
-def session(out, **options):
-    return replay(Request(mode="efficient", frames=(0, FRAMES), **options), {}, out, None, ["modt"])
-
-
-def run(out, **options):
-    made = session(out, **options)
-    return made, made.run(Supervisor())
 
 
 def tracks(out):
@@ -50,9 +37,10 @@ def test_a_recording_gives_the_tracks_of_what_was_recorded(street, tmp_path):
         s = BEGAN_S + frame.stamp_s
         recorded.append(("/odom", ODOMETRY, s, write_odometry(s, "odom", "lidar", frame.T_world_sensor)))
         recorded.append(("/points", CLOUD, s, write_cloud(s, "lidar", frame.points)))
-    made, _ = run(tmp_path / "bag", path=write_mcap(tmp_path / "drive", recorded), profile="hdl-64e")
-    assert made.stages.info.layout == "rosbag2"
-    run(tmp_path / "street", profile="hdl-64e")
+    bag = session(tmp_path / "bag", FRAMES, path=write_mcap(tmp_path / "drive", recorded), profile="hdl-64e")
+    for made in (bag, session(tmp_path / "street", FRAMES, profile="hdl-64e")):
+        made.run(Supervisor())
+    assert bag.stages.info.layout == "rosbag2"
     for a, b in zip(tracks(tmp_path / "bag"), tracks(tmp_path / "street"), strict=True):
         assert [row[0] for row in a] == [row[0] for row in b]
         np.testing.assert_allclose(sum((row[1:] for row in a), ()), sum((row[1:] for row in b), ()), atol=0.002)
@@ -61,7 +49,7 @@ def test_a_recording_gives_the_tracks_of_what_was_recorded(street, tmp_path):
 def test_the_poses_of_a_topic_place_the_sweeps(street, tmp_path, loopback):
     from modt.ros2 import dds
 
-    made = session(tmp_path / "run", odometry=f"ros2:///odom?domain={NEAR}")
+    made = session(tmp_path / "run", FRAMES, odometry=f"ros2:///odom?domain={NEAR}")
     sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
     until(lambda: sent.receivers and made.stages.odometry._subscription.senders)
     for frame in street:
@@ -73,9 +61,8 @@ def test_the_poses_of_a_topic_place_the_sweeps(street, tmp_path, loopback):
     assert summary["odometry"]["used"] == FRAMES
 
 
-def test_topics_are_named_on_the_command_line(tmp_path):
+def test_topics_are_named_on_the_command_line(tmp_path, capsys):
     recorded = [(f"/{k}", CLOUD, BEGAN_S, write_cloud(BEGAN_S, "lidar", np.ones((9, 4), np.float32))) for k in "ab"]
     path = write_mcap(tmp_path / "drive", recorded)
-    refused = modt("replay", path, "--quiet", cwd=tmp_path)
-    assert (refused.returncode, "choose by --capture topic=NAME: /a, /b" in refused.stderr) == (2, True)
-    assert modt("replay", path, "--capture", "topic=/b", "--quiet", "--out", "run", cwd=tmp_path).returncode == 0
+    assert "choose by --capture topic=NAME: /a, /b" in refusal(capsys, "replay", path, "--quiet")
+    assert here("replay", path, "--capture", "topic=/b", "--quiet", "--out", tmp_path / "run") == 0

@@ -4,8 +4,6 @@ import json
 import re
 import signal
 import socket
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
-from .commands import environment, here, modt, refusal
+from .commands import begin, environment, here, modt, refusal
 
 pytestmark = pytest.mark.command
 
@@ -36,50 +34,46 @@ def scans(tmp_path_factory):
 
 
 class Service:
-    """A running `modt run`, and where it notifies."""
+    """A running `modt run`, and the socket that it notifies."""
 
-    def __init__(self, folder, *arguments, watchdog_s=2.0):
+    def __init__(self, folder, *arguments):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.socket.bind(str(folder / "notify"))
         self.socket.settimeout(DEADLINE_S)
-        told = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": str(int(1e6 * watchdog_s))}
-        command = [sys.executable, "-m", "modt.cli.main", "run", *map(str, arguments), "--out", str(folder / "run")]
         self.out = folder / "run"
-        self.process = subprocess.Popen(
-            command, stderr=subprocess.PIPE, text=True, env={**environment(), **told}, cwd=folder
-        )
+        notified = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": "2000000"}
+        self.process = begin("run", *arguments, "--out", self.out, cwd=folder, env={**environment(), **notified})
 
     def hear(self, beginning):
         """The next message that begins with some word; the test fails if none comes."""
-        while True:
-            message = self.socket.recv(4096).decode()
-            if message.startswith(beginning):
-                return message
+        while not (message := self.socket.recv(4096).decode()).startswith(beginning):
+            pass
+        return message
 
-    def end(self, number=signal.SIGTERM):
+    def end(self):
         """Status and messages; the test fails if it goes on."""
-        self.process.send_signal(number)
+        self.process.terminate()
         _, said = self.process.communicate(timeout=DEADLINE_S)
         return self.process.returncode, said
 
-    def close(self):
-        self.socket.close()
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.communicate()
 
-
-@pytest.fixture(name="start")
-def services(tmp_path):
+@pytest.fixture
+def start(scans, tmp_path):
+    """Start a service on the scans in a loop, and wait until it is ready."""
     made = []
 
-    def start(*arguments, **options):
-        made.append(Service(tmp_path, *arguments, **options))
-        return made[-1]
+    def started(*options, ready=True):
+        options = options or ("--profile", "vlp-16")
+        made.append(Service(tmp_path, f"{scans}?loop=yes", *options))
+        if ready:
+            made[0].hear("READY=1")
+        return made[0]
 
-    yield start
+    yield started
     for service in made:
-        service.close()
+        service.socket.close()
+        service.process.kill()
+        service.process.communicate()
 
 
 def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
@@ -105,8 +99,8 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert (tmp_path / "run.mcap").stat().st_size > 15 * 100_000  # with the points
 
 
-def test_a_reload_before_it_is_ready_does_not_end_it(scans, start):
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
+def test_a_reload_before_it_is_ready_does_not_end_it(start):
+    service = start(ready=False)
     status = Path(f"/proc/{service.process.pid}/status")
     hup, ignored = 1 << (signal.SIGHUP - 1), False
     while not ignored:
@@ -119,11 +113,10 @@ def test_a_reload_before_it_is_ready_does_not_end_it(scans, start):
     assert service.end()[0] == 0
 
 
-def test_systemd_is_notified_of_each_state_and_of_a_reload(scans, start, tmp_path):
+def test_systemd_is_notified_of_each_state_and_of_a_reload(start, tmp_path):
     own = tmp_path / "robot.yaml"
     own.write_text(profile.to_yaml(profile.dump(profile.load("vlp-16"))))
-    service = start(f"{scans}?loop=yes", "--profile", own)
-    service.hear("READY=1")
+    service = start("--profile", own)
     service.hear("WATCHDOG=1")
     assert "tracks" in service.hear("STATUS=")
     for before, after in (("all", "everything"), ("everything", "all")):
@@ -141,9 +134,8 @@ def test_systemd_is_notified_of_each_state_and_of_a_reload(scans, start, tmp_pat
 
 
 @pytest.mark.parametrize(("options", "hosts"), [([], []), (["--view", ":0"], ["127.0.0.1"])])
-def test_nothing_listens_but_the_page_that_is_asked_for_and_none_beyond_this_machine(scans, start, options, hosts):
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16", *options)
-    service.hear("READY=1")
+def test_nothing_listens_but_the_page_that_is_asked_for_and_none_beyond_this_machine(start, options, hosts):
+    service = start("--profile", "vlp-16", *options)
     process = psutil.Process(service.process.pid)
     assert process.children() == []
     opened = getattr(process, "net_connections", None) or process.connections  # the name before psutil 6
@@ -152,12 +144,11 @@ def test_nothing_listens_but_the_page_that_is_asked_for_and_none_beyond_this_mac
     assert service.end()[0] == 0
 
 
-def test_the_run_is_seen_in_a_browser_while_it_goes_on(scans, start, chromium):
+def test_the_run_is_seen_in_a_browser_while_it_goes_on(start, chromium):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16", "--view", f"127.0.0.1:{port}")
-    service.hear("READY=1")
+    service = start("--profile", "vlp-16", "--view", f"127.0.0.1:{port}")
     with chromium.tab(f"http://127.0.0.1:{port}/", width=390) as tab:
         tab.until("state.at > 3 && state.at === last && drawn.length > 10")
         assert tab.value("new Int32Array(image.data.buffer).some((value) => value !== colours.paperPixel)")
@@ -173,8 +164,7 @@ def test_the_run_is_seen_in_a_browser_while_it_goes_on(scans, start, chromium):
 
 
 def test_a_killed_service_has_lost_no_more_than_a_second_and_starts_again(scans, start, tmp_path):
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
-    service.hear("READY=1")
+    service = start()
     while not (service.out / "tracks.jsonl").exists() or len((service.out / "tracks.jsonl").read_bytes()) < 100_000:
         service.hear("STATUS=")
     service.process.kill()
@@ -193,8 +183,7 @@ def test_a_source_that_cannot_be_is_a_misuse(source, capsys):
 
 def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path, capsys):
     assert refusal(capsys, "status", tmp_path / "run")
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
-    service.hear("READY=1")
+    service = start()
     while not (service.out / "status.json").exists():
         service.hear("STATUS=")
     second = modt("run", scans, "--out", service.out, cwd=tmp_path)

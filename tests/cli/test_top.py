@@ -32,7 +32,7 @@ def test_in_a_terminal_the_page_follows_the_status_until_ctrl_c(tmp_path):
     write(tmp_path, status())
     side, far = pty.openpty()
     fcntl.ioctl(far, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
-    # A session's first terminal that it opens is its own: Ctrl-C in it reaches the command.
+    # The first terminal that a session opens is its own: Ctrl-C in it reaches the command.
     opened = ["sh", "-c", 'exec "$@" <"$0" >"$0" 2>&1', os.ttyname(far)]
     command = [*opened, sys.executable, "-m", "modt.cli.main", "top", str(tmp_path)]
     process = subprocess.Popen(command, env=environment(), start_new_session=True)

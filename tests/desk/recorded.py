@@ -1,7 +1,5 @@
 """Synthetic drives on disk, and runs on them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from modt.cli.main import main

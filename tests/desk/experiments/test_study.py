@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from modt_desk.experiments.catalogue import EXPERIMENTS, chosen

@@ -1,14 +1,12 @@
 """Benchmark of the classifier."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from tests.classification.scenes import blobs
 
 
-def test_the_textbook_graph_equals_the_exported_one() -> None:
+def test_the_textbook_graph_equals_the_exported_one():
     pytest.importorskip("onnx", reason="extra [train] is not installed")
     from modt.classification.pointnet import PointNet
     from modt.config import ClassificationConfig, SensorConfig

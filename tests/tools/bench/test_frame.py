@@ -1,7 +1,5 @@
 """Benchmark of a frame."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from modt.types import Frame

@@ -4,8 +4,6 @@ A scenario digests the results of a profile: those of a second of a synthetic st
 key has an effect if another value of it, half and double the default first, gives another digest.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import itertools

@@ -1,7 +1,5 @@
 """Cross-validation over drives: folds, weights of the pool, calibration, scores by sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -23,7 +21,7 @@ def single_points(label: Int, **columns: Any) -> Dataset:
     return data_of(Crops(np.zeros((len(label), 3), np.float32), np.arange(len(label) + 1)), label, **columns)
 
 
-def test_folds_split_real_scans_by_drive_and_leave_out_the_rest() -> None:
+def test_folds_split_real_scans_by_drive_and_leave_out_the_rest():
     drive = np.array([0, 0, 1, 2, 3, 4, 4, 5])  # the last two drives are synthetic
     truth = truth_of(np.array([1, 2, 1]), np.array([0, 1, 2]))
     label, variant = np.array([1, 0, 2, 1, 0, 1, 0, 3]), np.where(drive < 4, SHIPPED, SYNTHETIC)
@@ -33,13 +31,13 @@ def test_folds_split_real_scans_by_drive_and_leave_out_the_rest() -> None:
     assert len(set(fold[:3].tolist())) == 3  # the objects are spread
 
 
-def test_unknown_and_partial_crops_are_not_trainable() -> None:
+def test_unknown_and_partial_crops_are_not_trainable():
     partial, unknown = np.array([False, False, False, True]), np.array([True, False, True, False])
     data = single_points(np.array([0, 0, 1, 0]), partial=partial, unknown=unknown)
     assert data.trainable.tolist() == [False, True, True, False]
 
 
-def test_out_of_fold_models_predict_drives_unseen_in_training() -> None:
+def test_out_of_fold_models_predict_drives_unseen_in_training():
     drive = np.repeat(np.arange(6), 5)
     label = np.tile(np.arange(5) % 4, 6)
     data = single_points(label, drive=drive, truth=truth_of(label, drive))
@@ -58,7 +56,7 @@ def test_out_of_fold_models_predict_drives_unseen_in_training() -> None:
     assert (held.logits.argmax(axis=1) == held.validation.label).all()
 
 
-def test_every_sensor_counts_as_much_as_the_others() -> None:
+def test_every_sensor_counts_as_much_as_the_others():
     label, sensor = np.array([0, 0, 0, 1, 0, 1, 2, 0]), np.array([0, 0, 0, 0, 1, 1, 1, 1])
     partial, variant = np.arange(8) == 4, np.where(np.arange(8) == 7, CLUSTERED, SHIPPED)
     truth = truth_of(label[4:], np.array([0, 0, 0, 9]), row=np.array([5, NONE, 7, 4]))
@@ -82,14 +80,14 @@ def validation() -> Validation:
     return Validation.of(single_points(LABEL, truth=truth_of(LABEL, 0 * LABEL, row=np.arange(400))))
 
 
-def test_what_contradicts_a_network_that_is_right_has_no_weight() -> None:
+def test_what_contradicts_a_network_that_is_right_has_no_weight():
     valid = validation()
     weights, _ = fit_pool(softmax(SURE, axis=1), softmax(-SURE, axis=1), -SURE, valid, valid.weight)
     assert weights.network > 0.95
     assert max(weights.box, weights.reflectance) < 0.05
 
 
-def test_the_box_tells_objects_from_background_alone() -> None:
+def test_the_box_tells_objects_from_background_alone():
     valid = validation()
     weights, log_posterior = fit_pool(softmax(NOTHING, axis=1), softmax(SURE, axis=1), NOTHING, valid, valid.weight)
     assert weights.box > 0.95
@@ -99,7 +97,7 @@ def test_the_box_tells_objects_from_background_alone() -> None:
     np.testing.assert_allclose(posterior[:, 1], posterior[:, 3])
 
 
-def test_calibration_recovers_temperature_and_class_offsets() -> None:
+def test_calibration_recovers_temperature_and_class_offsets():
     rng = np.random.default_rng(0)
     true = rng.normal([2.0, 0, 0, 0], 2.0, (6000, 4))
     share = Calibration.identity().apply(true)
@@ -112,7 +110,7 @@ def test_calibration_recovers_temperature_and_class_offsets() -> None:
     assert top_calibration_error(Calibration.identity().apply(distorted), label) > 0.1
 
 
-def test_calibration_folds_into_the_last_layer() -> None:
+def test_calibration_folds_into_the_last_layer():
     rng = np.random.default_rng(0)
     calibration = Calibration(1.7, np.array([0.0, -1.0, 0.5, 2.0]))
     x, weight, bias = rng.normal(size=(5, 8)), rng.normal(size=(8, 4)), rng.normal(size=4)
@@ -123,7 +121,7 @@ def test_calibration_folds_into_the_last_layer() -> None:
     )
 
 
-def test_recall_counts_the_objects_called_right_at_the_precision() -> None:
+def test_recall_counts_the_objects_called_right_at_the_precision():
     score = np.array([9.0, 8, 7, 6, 5, 4])
     right = np.array([True, True, False, True, True, False])
     row, every = np.array([0, 3, 4, NONE, 5]), np.ones(6, np.bool_)
@@ -139,7 +137,7 @@ def test_recall_counts_the_objects_called_right_at_the_precision() -> None:
     assert recall_at(0.8, score, ~right, every, wanted, row)["of_all"] == 0.0
 
 
-def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor() -> None:
+def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor():
     rng = np.random.default_rng(0)
     n = 4000
     frequency = np.array([[0.9, 0.05, 0.03, 0.02], [0.4, 0.2, 0.2, 0.2]])
@@ -161,7 +159,7 @@ def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor() -
     assert sharper["rare"]["calibration_error"] > 0.05
 
 
-def test_a_class_that_is_absent_keeps_the_assumed_frequency() -> None:
+def test_a_class_that_is_absent_keeps_the_assumed_frequency():
     assumed = np.array([0.7, 0.1, 0.1, 0.1])
     found = shift(np.array([0.5, 0.5, 0.0, 0.0]), assumed)
     np.testing.assert_allclose(found, np.log([0.5 / 0.7, 5.0, 1.0, 1.0]))

@@ -1,9 +1,5 @@
 """Readers of labelled scans."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -24,7 +20,7 @@ from tools.train.labelled_scans import (
 from tools.train.synthetic_scans import simulated_scans
 
 
-def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path: Path) -> None:
+def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path):
     car = np.array([11.35, 0.0, 0.5, 0.2], np.float32) + np.linspace(0, 1, 30)[:, None] * np.float32([0, 1, 0, 0])
     carrier = np.array([[1.4, 0.1, 1.0, 0.2]], np.float32)
     np.savez(tmp_path / "log_1.npz", points=np.concatenate([carrier, car]))
@@ -42,13 +38,13 @@ def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path: Path) -> None:
     assert len(scan.objects[0]) == 30
 
 
-def test_points_in_a_rotated_box_are_above_the_ground() -> None:
+def test_points_in_a_rotated_box_are_above_the_ground():
     box = np.array([10.0, 0.0, -1.7, 4.0, 2.0, 1.5, np.pi / 2])
     points = np.array([[10, 1.9, -1, 0], [11.9, 0, -1, 0], [10, 0, -1.6, 0], [10, 0, 0.5, 0]], np.float32)
     assert points_in_box(points, box).tolist() == [True, False, False, False]
 
 
-def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_unlabelled(tmp_path: Path) -> None:
+def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_unlabelled(tmp_path):
     (tmp_path / "scans").mkdir()
     feet = np.array([[10.79, 0.0], [20.79, 0.0], [30.79, 0.0], [40.79, 0.0]])
     points = np.c_[np.repeat(feet, 25, axis=0), np.tile(np.linspace(0.3, 1.1, 25), 4), np.full(100, 9)]
@@ -68,7 +64,7 @@ def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_un
     assert np.flatnonzero(scan.unlabelled).tolist() == list(range(25, 50))
 
 
-def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_unknown(tmp_path: Path) -> None:
+def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_unknown(tmp_path):
     (tmp_path / "scans").mkdir()
     side = np.linspace(-2.0, 2.0, 41)
     height = np.full(41, 1.6)
@@ -88,7 +84,7 @@ def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_
     assert np.flatnonzero(scan.unlabelled).tolist() == [82, 83]
 
 
-def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole() -> None:
+def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole():
     azimuth = np.arange(0.1, 2 * np.pi, 0.1)
     rho = np.repeat([20.0, 15.0, 10.0, 5.0], len(azimuth))  # beam by beam, from the top
     a = np.tile(azimuth, 4)
@@ -103,7 +99,7 @@ def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole() -> 
     assert scan.sensor == "hdl-64e, 32 beams"
 
 
-def test_scans_in_a_folder_are_those_that_were_written(tmp_path: Path) -> None:
+def test_scans_in_a_folder_are_those_that_were_written(tmp_path):
     made = list(simulated_scans(["street"], [3], [0.0, 0.5], camera=False, sensors=["vlp-16"]))
     write_folder(tmp_path, made)
     found = list(folder_scans(tmp_path, "mine", made[0].profile))
@@ -124,7 +120,7 @@ def test_scans_in_a_folder_are_those_that_were_written(tmp_path: Path) -> None:
         list(folder_scans(tmp_path, "mine", made[0].profile))
 
 
-def test_the_calibration_of_a_folder_states_where_labels_are_complete(tmp_path: Path) -> None:
+def test_the_calibration_of_a_folder_states_where_labels_are_complete(tmp_path):
     (scan,) = simulated_scans(["street"], [3], [0.0], camera=True, sensors=["vlp-16"])
     write_folder(tmp_path, [scan])
     (tmp_path / "calib").mkdir()

@@ -1,12 +1,10 @@
 """The network in PyTorch, and its export to ONNX."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 
-def test_max_pooled_linear_has_the_gradients_of_its_definition() -> None:
+def test_max_pooled_linear_has_the_gradients_of_its_definition():
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
     from tools.train.network import MaxPooledLinear
 
@@ -25,7 +23,7 @@ def test_max_pooled_linear_has_the_gradients_of_its_definition() -> None:
         assert torch.allclose(one, other, atol=1e-6)
 
 
-def test_the_exported_network_equals_the_trained_one(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_the_exported_network_equals_the_trained_one(tmp_path_factory):
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.pointnet import PointNet
     from modt.config import ClassificationConfig, SensorConfig
