@@ -16,6 +16,7 @@ from modt.cli.profile import main as modt_profile
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.desk import recorded
 
 from .commands import begin, environment, here, modt, refusal
 
@@ -27,10 +28,7 @@ DEADLINE_S = 60.0
 @pytest.fixture(scope="module")
 def scans(tmp_path_factory):
     """Fifteen scans of a small sensor."""
-    folder = tmp_path_factory.mktemp("scans")
-    for frame in SyntheticStream("street", "vlp-16", 1.5, 0):
-        frame.points.tofile(folder / f"{frame.index:06d}.bin")
-    return folder
+    return recorded.scans(tmp_path_factory.mktemp("scans"), SyntheticStream("street", "vlp-16", 1.5, 0))
 
 
 class Service:

@@ -1,20 +1,9 @@
 import numpy as np
-import pytest
 
-from modt.viewer.packed import packed_cells, packed_table
-from modt.viewer.point_cells import SIDE, Cells
+from modt.viewer.packed import packed_table
+from modt.viewer.point_cells import Cells
 
 from . import pages
-
-
-@pytest.mark.parametrize("n", [0, 500])
-def test_cells_come_back(n):
-    random = np.random.default_rng(3)
-    cell = np.unique(np.append(random.integers(0, SIDE**2, n), [0, SIDE**2 - 1][:n]))
-    cells = Cells(cell, random.integers(0, 64, len(cell)))
-    number, level = pages.cells(packed_cells(cells))
-    np.testing.assert_array_equal(number, cells.cell)
-    np.testing.assert_array_equal(level, cells.level)
 
 
 def test_a_table_comes_back_with_numbers_of_either_sign():

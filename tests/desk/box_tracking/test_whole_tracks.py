@@ -9,7 +9,6 @@ from modt_desk.box_tracking.sequences import (
     TrackedBoxes,
     birds_eye_intersection,
     bridged,
-    confident,
     iou_3d,
     of_one_class,
 )
@@ -21,13 +20,6 @@ def tracked(rows):
     box = np.tile([0, 0, -1, 4.0, 1.8, 1.5, 0], (len(rows), 1))
     box[:, 0], box[:, 6] = x, yaw
     return TrackedBoxes(frame, ids, np.repeat(x[:, None], 4, axis=1), box, confidence.astype(float))
-
-
-def test_a_track_is_kept_by_its_mean_confidence():
-    found = tracked([(0, 3, 0, 0, 2), (0, 5, 9, 0, 6), (1, 3, 0, 0, 8), (1, 5, 9, 0, 3)])
-    assert set(confident(found, 5.0).id) == {3}
-    assert set(confident(found, 4.5).id) == {3, 5}
-    assert len(confident(found.take(found.id == 7), 4.5).id) == 0
 
 
 def test_gaps_up_to_the_greatest_are_filled_on_the_line_between_their_ends():

@@ -6,17 +6,14 @@ import yaml
 from modt import profile
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import here, refusal
+from tests.desk import recorded
 
 pytestmark = pytest.mark.command
 
 
 @pytest.fixture(scope="module", name="scans")
 def scans_of_a_puck(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("puck") / "scans"
-    folder.mkdir()
-    for frame in SyntheticStream("street", "vlp-16", 1.0, seed=3):
-        frame.points.tofile(folder / f"{frame.index:06d}.bin")
-    return folder
+    return recorded.scans(tmp_path_factory.mktemp("puck"), SyntheticStream("street", "vlp-16", 1.0, seed=3))
 
 
 def test_a_fitted_profile_is_that_of_the_sensor_and_is_not_overwritten(scans, tmp_path, monkeypatch, capsys):

@@ -5,8 +5,8 @@ from modt_desk.evaluation.truth import Role
 from modt_desk.experiments.catalogue import chosen
 from modt_desk.experiments.drives import completed, kitti_drives
 from modt_desk.experiments.study import Study
-from modt_desk.simulation.kitti_raw import DriveWriter
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.desk.recorded import written
 
 
 def test_a_folder_without_labels_is_refused(tmp_path):
@@ -15,10 +15,7 @@ def test_a_folder_without_labels_is_refused(tmp_path):
 
 
 def test_further_objects_make_another_drive_of_the_one_that_has_its_sweeps(tmp_path):
-    writer = DriveWriter(tmp_path, CAMERA)
-    for frame, truth in SyntheticStream("street", "vlp-16", 0.2, seed=2).sweeps():
-        writer.write(frame, truth)
-    writer.close()
+    written(tmp_path, SyntheticStream("street", "vlp-16", 0.2, seed=2))
     table = tmp_path / "further.csv"
     head = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
     table.write_text(f"{head}\n0,0,Pedestrian,9,0,-1.7,0.6,0.6,1.7,0\n")

@@ -71,13 +71,6 @@ def test_an_ellipsoid_is_hit_on_its_surface():
     np.testing.assert_allclose(np.linalg.norm(met - [10.0, 3.0, 0.5], axis=1), 2.0, atol=1e-4)
 
 
-def test_the_nearer_of_two_walls_hides_the_other():
-    walls = Solids.join(box((x, 0.0, 0.0), (0.2, 4.0, 4.0), Material.WALL) for x in (12.0, 8.0))
-    image = RayCaster(sensor("vlp-16")).cast(walls, NO_GROUND, np.ones_like(NO_GROUND))
-    ahead = image.solid[8, [0, -1]]
-    assert ahead.tolist() == [1, 1]
-
-
 def test_foliage_transmits_by_its_density():
     rng = np.random.default_rng(0)
     hedge = box((20.0, 0.0, 0.0), (1.0, 12.0, 12.0), Material.FOLIAGE, density=1.5)

@@ -56,8 +56,7 @@ def test_the_truth_covers_every_point(street):
     assert len(truth.instance) == len(truth.semantic) == len(truth.object_class) == len(frame.points)
     assert {40, 50, 70} <= set(truth.semantic.tolist())
     assert (truth.object_class[truth.instance == NONE] == ObjectClass.BACKGROUND).all()
-    counted = [(truth.instance == b).sum() for b in truth.bodies]
-    assert truth.points.tolist() == counted
+    assert truth.points.tolist() == [(truth.instance == b).sum() for b in truth.bodies]
 
 
 def test_bodies_at_rest_stay_where_they_are_in_the_world(street):

@@ -6,8 +6,8 @@ import pytest
 
 from modt_desk.experiments.drives import kitti_drives
 from modt_desk.experiments.study import DEFAULT, Row
-from modt_desk.simulation.kitti_raw import DriveWriter
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.desk.recorded import written
 from tools.docs import figures
 from tools.docs.paper_page import section
 
@@ -38,10 +38,7 @@ def test_the_page_shows_what_tracking_adds_and_what_is_behind_the_paper():
 
 @pytest.mark.slow
 def test_the_table_has_a_row_for_each_sensor_and_the_text_the_cpu_time_of_the_modes(tmp_path, monkeypatch):
-    writer = DriveWriter(tmp_path, CAMERA)
-    for frame, truth in SyntheticStream("street", "hdl-64e", 0.4, seed=2).sweeps():
-        writer.write(frame, truth)
-    writer.close()
+    written(tmp_path, SyntheticStream("street", "hdl-64e", 0.4, seed=2))
     monkeypatch.setattr(figures, "FIRST", 0)
     monkeypatch.setattr(figures, "SENSORS", {"vlp-16": "VLP-16"})
     monkeypatch.setattr(figures, "SEEDS", [2])
