@@ -44,19 +44,21 @@ def test_points_in_a_rotated_box_are_above_the_ground():
     assert points_in_box(points, box).tolist() == [True, False, False, False]
 
 
+def pandaset(folder, name, points, rows):
+    """The scan of points [m, world] and rows of a table of labels."""
+    (folder / "scans").mkdir()
+    np.c_[points, np.full(len(points), 9)].astype(np.float32).tofile(folder / "scans" / f"{name}.bin")
+    (folder / f"{name}.csv").write_text(f"class,x,y,z,length,width,height,yaw,points\n{rows}")
+    (scan,) = pandaset_scans(folder)
+    return scan
+
+
 def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_unlabelled(tmp_path):
-    (tmp_path / "scans").mkdir()
     feet = np.array([[10.79, 0.0], [20.79, 0.0], [30.79, 0.0], [40.79, 0.0]])
-    points = np.c_[np.repeat(feet, 25, axis=0), np.tile(np.linspace(0.3, 1.1, 25), 4), np.full(100, 9)]
-    points.astype(np.float32).tofile(tmp_path / "scans" / "000001.bin")
-    (tmp_path / "000001.csv").write_text(
-        "class,x,y,z,length,width,height,yaw,points\n"
-        "Pedestrian_with_Object,10.79,0,0.6,0.8,0.8,1.9,0,25\n"
-        "Medium-sized_Truck,20.79,0,0.6,7,2.5,1.9,0,25\n"
-        "Bicycle,30.79,0,0.6,1.8,0.6,1.8,0,25\n"
-        "Bicycle,40.79,0,0.6,1.8,0.6,1.2,0,25\n"
-    )
-    (scan,) = pandaset_scans(tmp_path)
+    points = np.c_[np.repeat(feet, 25, axis=0), np.tile(np.linspace(0.3, 1.1, 25), 4)]
+    rows = "Pedestrian_with_Object,10.79,0,0.6,0.8,0.8,1.9,0,25\nMedium-sized_Truck,20.79,0,0.6,7,2.5,1.9,0,25\n"
+    rows += "Bicycle,30.79,0,0.6,1.8,0.6,1.8,0,25\nBicycle,40.79,0,0.6,1.8,0.6,1.2,0,25\n"
+    scan = pandaset(tmp_path, "000001", points, rows)
     assert scan.sensor == "pandar64"
     assert scan.kinds == (ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST, ObjectClass.BACKGROUND)
     np.testing.assert_allclose(scan.boxes[:, :3], [[10, 0, -2.2], [30, 0, -2.15], [40, 0, -1.85]], atol=1e-6)
@@ -65,20 +67,12 @@ def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_un
 
 
 def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_unknown(tmp_path):
-    (tmp_path / "scans").mkdir()
-    side = np.linspace(-2.0, 2.0, 41)
-    height = np.full(41, 1.6)
+    side, height = np.linspace(-2.0, 2.0, 41), np.full(41, 1.6)
     across = np.c_[np.full(41, -20.0), 30.0 + side, height]  # sensor at (-30, 34.1, 1.79)
     along = np.c_[-10.0 + side, np.full(41, 30.0), height]
     people = np.array([[-20.0, 51.6, 1.6], [-21.3, 51.4, 1.6], [-20.0, 55.0, 1.6]])
-    points = np.concatenate([across, along, people])
-    np.c_[points, np.zeros(len(points))].astype(np.float32).tofile(tmp_path / "scans" / "world-000040.bin")
-    (tmp_path / "world-000040.csv").write_text(
-        "class,x,y,z,length,width,height,yaw,points\n"
-        "Car,-20,30,1.2,4.4,1.8,1.5,0,41\n"
-        "Car,-10,30,1.2,4.4,1.8,1.5,0,41\n"
-    )
-    (scan,) = pandaset_scans(tmp_path)
+    rows = "".join(f"Car,{x},30,1.2,4.4,1.8,1.5,0,41\n" for x in (-20, -10))
+    scan = pandaset(tmp_path, "world-000040", np.concatenate([across, along, people]), rows)
     np.testing.assert_allclose(scan.boxes[:, 6], [np.pi / 2, 0.0])
     assert [len(own) for own in scan.objects] == [41, 41]
     assert np.flatnonzero(scan.unlabelled).tolist() == [82, 83]
