@@ -4,15 +4,12 @@ import dataclasses
 import itertools
 import logging
 
-import numpy as np
 import pytest
 
 from modt import profile
 from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.geometry import FieldOfView
-from modt.types import Budget
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 BASE = profile.load("vlp-16")
 
@@ -53,12 +50,3 @@ def test_a_budget_below_the_price_of_a_call_is_warned_of(mode, scheduler, warned
         pipeline(mode, **scheduler)
     assert len(caplog.records) == warned
     assert ("raise" in caplog.text) is warned
-
-
-@pytest.mark.parametrize(("budget", "learns"), [(Budget(cpu_ms=100.0), True), (Budget(calls=4), False)])
-def test_the_cost_of_calls_is_learnt_where_cpu_time_binds(budget, learns):
-    stages, points = pipeline("accurate"), np.array([100])
-    before_ms = stages.scheduler.cost.cost_ms(points)
-    for frame, _ in SyntheticStream("street", "vlp-16", 0.3, 0).sweeps():
-        assert len(stages.step(frame, budget).classified)
-    assert (stages.scheduler.cost.cost_ms(points) != before_ms) is learns

@@ -1,7 +1,7 @@
 """The loop over a live source, on a clock that only working and waiting move."""
 
 import logging
-import signal
+from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
@@ -51,10 +51,10 @@ class Stages:
     budget = Budget(16, None)
 
     def __init__(self, time, work_s):
-        self.time, self.work_s, self.ledger = time, work_s, self
-        self.recognised, self.watched = [], []
-        self.steps, self.recovered, self.loads = [], [], 0
-        self.invalid, self.fails = None, {}
+        self.time, self.work_s, self.fails, self.steps = time, work_s, {}, []
+        self.recognise, self.watch, self.recover = Mock(), Mock(), Mock()
+        stages = {"stages": {"segmentation": {"wall_ns": 20_000_000}}}
+        self.ledger = Mock(run=lambda stage, write, r: write(r), close_frame=lambda index: {"frame": index, **stages})
 
     def step(self, frame, budget, *, reduced):
         if frame.index in self.fails:
@@ -63,47 +63,12 @@ class Stages:
         self.time.now += self.work_s(self.time.now - 100.0)
         return result(frame.index, [3], {0: 1})
 
-    def recognise(self, frame, named):
-        self.recognised.append((frame.index, named))
-
-    def watch(self, frame):
-        self.watched.append(frame.index)
-
-    def run(self, stage, write, r):
-        write(r)
-
-    def close_frame(self, index):
-        return {"frame": index, "stages": {"segmentation": {"wall_ns": 20_000_000}}}
-
-    def recover(self, *, anew):
-        self.recovered.append(anew)
-
-    def reload(self):
-        if self.invalid:
-            raise self.invalid
-        self.loads += 1
-
-
-class Told:
-    """A supervisor that notes its notifications, and when they come."""
-
-    def __init__(self, time):
-        self.time, self.said, self.pings = time, [], []
-
-    def ready(self):
-        self.said.append("ready")
-
-    def reloading(self):
-        self.said.append("reloading")
-
-    def alive(self):
-        self.pings.append(self.time.now)
-
 
 def loop_of(seconds, work=lambda t: 0.02, sinks=(), silent=(0.0, 0.0), stop=None, **calls):
     time = Time()
     sensor, stages = Sensor(time, seconds, silent), Stages(time, work)
-    told, reports, seen = Told(time), [], []
+    pings, reports, seen = [], [], []
+    supervisor = Mock(pings=pings, alive=lambda: pings.append(time.now))
     loop = Loop(
         sensor,
         stages,
@@ -116,30 +81,31 @@ def loop_of(seconds, work=lambda t: 0.02, sinks=(), silent=(0.0, 0.0), stop=None
         time,
     )
     run = loop.run
-    loop.run, loop.deadlines, loop.failures = lambda: run(told), loop._deadlines, loop._failures
-    return loop, sensor, stages, told, reports, seen
+    loop.run, loop.deadlines, loop.failures = lambda: run(supervisor), loop._deadlines, loop._failures
+    return loop, sensor, stages, supervisor, reports, seen
 
 
 def test_every_sweep_in_time_goes_through():
     sink = Kept()
-    loop, sensor, stages, told, reports, seen = loop_of(10.0, sinks=[sink])
+    loop, sensor, stages, supervisor, reports, seen = loop_of(10.0, sinks=[sink])
     loop.run()
     assert len(seen) == 100
     assert sink.indices == seen
     assert loop.deadlines.timing.missed == sensor.dropped == loop.deadlines.shed == 0
     assert loop.deadlines.report()["lateness_ms"]["max"] == 0.0
-    assert stages.recognised == [(1, "vlp-16")]
-    assert stages.watched == seen
+    ((first, named),) = (made.args for made in stages.recognise.call_args_list)
+    assert (first.index, named) == (1, "vlp-16")
+    assert [made.args[0].index for made in stages.watch.call_args_list] == seen
     assert loop.deadlines.timing.report()["latency_ms"]["max"] == pytest.approx(20.0)
-    assert told.said == ["ready"]
+    supervisor.ready.assert_called_once_with()
     assert len(reports) in (10, 11)
     assert stages.steps[-1][1] == Budget(16, pytest.approx(80.0)), "of the time that is left to the deadline"
 
 
 def test_the_watchdog_is_served_while_the_sensor_is_silent():
-    loop, _, _, told, _, seen = loop_of(12.0, silent=(1.0, 11.0))
+    loop, _, _, supervisor, _, seen = loop_of(12.0, silent=(1.0, 11.0))
     loop.run()
-    gaps = np.diff(told.pings)
+    gaps = np.diff(supervisor.pings)
     assert max(gaps) <= WAIT_S + 0.11
     assert 15 < len(seen) < 25
 
@@ -181,7 +147,7 @@ def test_a_failure_costs_its_frame_and_is_logged_once(caplog):
     loop.run()
     assert sorted({*range(1, 21)} - {*seen}) == [5, 6]
     assert loop.failures.counts == {"frame: IndexError": 2}
-    assert stages.recovered == [False, False]
+    assert stages.recover.call_args_list == [call(anew=False)] * 2
     assert [r.exc_info is not None for r in caplog.records] == [True]
 
 
@@ -192,7 +158,7 @@ def test_failures_that_repeat_renew_the_stages_and_then_end_the_run():
         loop.run()
     assert caught.value.exit_status == 1
     assert len(seen) == 4
-    assert stages.recovered == [k == RENEW_AFTER for k in range(1, MAX_IN_A_ROW)]
+    assert stages.recover.call_args_list == [call(anew=k == RENEW_AFTER) for k in range(1, MAX_IN_A_ROW)]
     loop, _, stages, *_ = loop_of(1.0)
     stages.fails = {1: MisuseError("poses", "too few", "give more")}
     with pytest.raises(MisuseError):
@@ -250,21 +216,6 @@ def test_a_log_has_one_line_a_second_of_each_kind():
                 lines.append(record.getMessage())
     assert len(lines) == 30
     assert lines[:4] == ["0: stepped", "0: silent", "0: stepped", "100: stepped (and 99 lines like it)"]
-
-
-def test_a_reload_is_between_two_frames_and_an_invalid_one_is_refused(caplog):
-    stop = Stop()
-    loop, _, stages, told, _, seen = loop_of(2.0, stop=stop)
-    stages.invalid = MisuseError("robot.yaml:3", "unknown key 'x'", "did you mean 'y'?")
-    stop._on_reload(signal.SIGHUP, None)
-    loop.run()
-    assert (loop.reloads, loop.refused_reloads, stages.loads) == (0, 1, 0)
-    assert "unknown key 'x'" in caplog.text
-    assert len(seen) == 20
-    assert told.said == ["ready", "reloading", "ready"]
-    stages.invalid = None
-    loop._reload(told)
-    assert (loop.reloads, stages.loads) == (1, 1)
 
 
 def test_a_signal_ends_the_loop_though_the_sensor_is_silent():

@@ -2,12 +2,15 @@
 
 import json
 
+import numpy as np
 import pytest
 
+from modt.ros2.point_cloud2 import write_cloud
+from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-from .commands import modt, refusal
+from .commands import here, modt, refusal
 
 pytestmark = pytest.mark.command
 
@@ -43,3 +46,10 @@ def test_invalid_options_are_misuse(capsys, capture, arguments, named):
     if "metadata" in arguments[1]:
         pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
     assert named in refusal(capsys, "replay", capture, *arguments)
+
+
+def test_topics_are_named_on_the_command_line(tmp_path, capsys):
+    recorded = [(f"/{k}", CLOUD, BEGAN_S, write_cloud(BEGAN_S, "lidar", np.ones((9, 4), np.float32))) for k in "ab"]
+    path = write_mcap(tmp_path / "drive", recorded)
+    assert "choose by --capture topic=NAME: /a, /b" in refusal(capsys, "replay", path, "--quiet")
+    assert here("replay", path, "--capture", "topic=/b", "--quiet", "--out", tmp_path / "run") == 0

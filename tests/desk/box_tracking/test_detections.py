@@ -2,13 +2,10 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
-from modt_desk.box_tracking.detections import boxes_from_kitti, boxes_to_kitti, files, read
+from modt_desk.box_tracking.detections import files, read
 
 AB3DMOT = "0,2,298.3,165.2,458.2,293.4,8.3,1.96,1.81,4.75,-4.57,1.84,13.53,-2.11,-1.79\n"
 LABEL = "0 7 Car 0 0 -1.79 298.3 165.2 458.2 293.4 1.96 1.81 4.75 -4.57 1.84 13.53 -2.11 8.3\n"
@@ -59,11 +56,6 @@ def test_files_of_a_folder_are_regular_ones_and_missing_ones_refused(tmp_path):
     assert [file.name for file in files(tmp_path)] == ["0000.txt"]
     with pytest.raises(MisuseError, match="cannot be read"):
         one(tmp_path / "none.txt")
-
-
-@given(arrays(np.float64, (3, 7), elements=st.floats(-3, 3)))
-def test_box_conversions_are_inverse(boxes):
-    np.testing.assert_allclose(boxes_from_kitti(boxes_to_kitti(boxes)), boxes, atol=1e-9)
 
 
 def scored(path, *scores):

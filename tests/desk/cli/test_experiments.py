@@ -18,28 +18,16 @@ def results(tmp_path_factory):
     return out
 
 
-def table(folder):
-    with (folder / "results.csv").open() as file:
-        return list(csv.DictReader(file))
-
-
 def test_results_are_written_as_a_table_and_a_document(results):
-    swept = {row["at"] for row in table(results) if row["experiment"] == "fig12" and row["quantity"] == "beta"}
+    with (results / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    swept = {row["at"] for row in rows if row["experiment"] == "fig12" and row["quantity"] == "beta"}
     assert swept == {f"{metres}.0" for metres in range(10, 80, 10)}
+    assert {(row["kind"], row["paper"]) for row in rows} == {("simulated", "")}, "beside no figure of the paper"
+    assert [row["profile"] for row in rows].count("default") == len(rows) / 2
     page = (results / "results.md").read_text()
     assert "## Table IV" in page
     assert "## Fig. 12" in page
-
-
-def test_simulated_drives_stand_apart_and_beside_no_figure_of_the_paper(results):
-    found = table(results)
-    assert {row["kind"] for row in found} == {"simulated"}
-    assert {row["paper"] for row in found} == {""}
-
-
-def test_another_profile_stands_beside_the_first(results):
-    rows = table(results)
-    assert [row["profile"] for row in rows].count("default") == len(rows) / 2
 
 
 @pytest.mark.parametrize(

@@ -44,13 +44,6 @@ def test_unit_costs_are_found_from_varied_load() -> None:
         assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
 
 
-def test_reconciliation_equals_measurement_at_constant_unit_costs() -> None:
-    found = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
-    assert found.reconciled.value == pytest.approx(found.measured.value)
-    assert found.deviation.value == pytest.approx(0.0, abs=1e-9)
-    assert found.reconciliation.explain(found.measured.value)[-1].change == pytest.approx(0.0, abs=1e-6)
-
-
 def test_intervals_cover_the_truth_with_noise() -> None:
     truth = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured.value
     found = estimate_gamma(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))

@@ -116,14 +116,10 @@ def test_it_is_nearer_than_simple_guesses() -> None:
         assert all(error < 0.5 * abs(np.log(rival / truth[k])) for rival in rivals)
 
 
-def test_it_misses_where_the_life_of_tracks_is_wrong() -> None:
-    """The same proposals in tracks of a tenth of the life."""
+def test_it_misses_where_tracks_are_ten_times_as_many_or_cost_twice_as_much():
     broken = Stream(TEST.runs, TEST.observed.copy())
     broken.observed[:, [OBSERVED.index("tracks"), -2, -1]] *= 10
     assert not covers(predicted(seen=broken), measured(TEST))[GAMMA].any()
-
-
-def test_it_misses_where_tracking_costs_twice_as_much() -> None:
     dear = Stream({name: RunCosts(each.counts, each.cost.copy()) for name, each in TEST.runs.items()}, TEST.observed)
     for each in dear.runs.values():
         each.cost[:, STAGES.index("tracking")] *= 2
