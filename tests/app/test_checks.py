@@ -1,5 +1,7 @@
 """Checks before the first frame: each outcome has its line and, where something is wrong, a remedy."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -46,26 +48,12 @@ def near(height_m, **sensor):
     return checks.near(SensorConfig(height_m=height_m, **sensor))
 
 
-class Reader:
-    """A receiver of sweeps and other messages."""
-
-    profile = None
-
-    def __init__(self, sweeps, messages=0, refused=None):
-        self.reception = Reception(messages, 0, refused or {})
-        self.sweeps = sweeps
-
-    def read(self, timeout_s):
-        sweeps, self.sweeps = self.sweeps, []
-        return sweeps
-
-    def close(self):
-        pass
-
-
 def sensor(sweeps, messages, **refused):
+    waiting = [sweeps]
+    reader = SimpleNamespace(profile=None, reception=Reception(messages, 0, refused), close=lambda: None)
+    reader.read = lambda timeout_s: waiting.pop() if waiting else []
     info = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
-    (found,) = checks.sensor(lambda: LiveStream(info, Reader(sweeps, messages, refused)), 0.3)
+    (found,) = checks.sensor(lambda: LiveStream(info, reader), 0.3)
     return found
 
 

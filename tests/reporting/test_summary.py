@@ -5,7 +5,7 @@ from array import array
 
 import pytest
 
-from modt.reporting.summary import Summary, TrackLives, around, summary_text
+from modt.reporting.summary import Summary, around, summary_text
 from tests.results import CAR, result
 
 
@@ -51,14 +51,6 @@ def test_empty_run_has_no_ratio():
     assert figures["beta"] is None
     assert figures["tracks"] == {"count": 0, "N_go": None}
     assert "0 frames" in summary_text(figures)
-
-
-def test_only_tracks_alive_are_held():
-    lives = TrackLives()
-    for i in range(50):
-        lives.add([(i, True, False)])
-    assert len(lives) == 1
-    assert lives.totals(foreground_only=False) == (50, 50)
 
 
 def test_memory_is_bounded_in_a_long_run():

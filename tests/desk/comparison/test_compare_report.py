@@ -23,54 +23,49 @@ EVERY = {"conventional": 1, "efficient": 20, "accurate": 5, "varied": 2}
 BUSY_W = 5.0
 
 
-class Board:
-    """Clocks and a counter that advance with the work."""
+FACTS = Facts(name="board", unit="J", resolution=1e-6, max_W=100.0, scope=Scope.CPU, kind=Kind.MEASURED)
 
-    def __init__(self):
-        self.now_ns = self.cpu_ns = 0
-        self.energy_J = 0.0
-        facts = {"name": "board", "unit": "J", "resolution": 1e-6, "max_W": 100.0, "scope": Scope.CPU}
-        self.facts = Facts(kind=Kind.MEASURED, **facts)
+
+class Board:
+    """A pipeline whose work moves the clocks and the counter of a board.
+
+    It segments in 10 ms or a little more, tracks in 2, and classifies in 1 and 1 for each proposal.
+    """
+
+    facts = FACTS
+
+    def __init__(self, every):
+        self.every, self.now_ns = every, 0
+        self.ledger = Ledger(self.clock, self.clock)
+
+    def clock(self):
+        return self.now_ns
 
     def read(self):
-        return self.energy_J
+        return BUSY_W * self.now_ns / 1e9
 
     def work(self, ms, value=None):
         self.now_ns += round(ms * 1e6)
-        self.cpu_ns += round(ms * 1e6)
-        self.energy_J += BUSY_W * ms / 1e3
         return value
-
-    def clocks(self):
-        return Clocks(lambda: self.now_ns, lambda: self.now_ns, lambda: self.cpu_ns)
-
-
-class Steps:
-    """Segments in 10 ms, tracks in 2, classifies in 1 and 1 a proposal."""
-
-    def __init__(self, board, ledger, every):
-        self.board, self.ledger, self.every = board, ledger, every
 
     def step(self, frame, budget=UNLIMITED):
         run, asked = self.ledger.run, frame.index % self.every == 0
         found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR})
-        found = replace(found, classified=np.array([7, 8] * asked, np.int64))
-        run("segmentation", self.board.work, 10.0 + frame.index % 3)
-        run("tracking", self.board.work, 2.0)
+        run("segmentation", self.work, 10.0 + frame.index % 3)
+        run("tracking", self.work, 2.0)
         if asked:
-            run("classification", self.board.work, 3.0, np.tile(CAR, (2, 1)))
-        return found
+            run("classification", self.work, 3.0, np.tile(CAR, (2, 1)))
+        return replace(found, classified=np.array([7, 8] * asked, np.int64))
 
 
 def mode_run(name, metered):
-    board = Board()
-    ledger = Ledger(lambda: board.now_ns, lambda: board.cpu_ns)
-    windows = Windows([board], board.clocks(), Conditions(), min_s=0.1) if metered else None
-    for _ in range(2 if windows else 0):  # its power is known
-        board.work(100)
-        windows.close()
-    steps = Steps(board, ledger, EVERY[name])
-    return ModeRun(steps, ledger, lambda index: UNLIMITED, windows)
+    board, windows = Board(EVERY[name]), None
+    if metered:
+        windows = Windows([board], Clocks(board.clock, board.clock, board.clock), Conditions(), min_s=0.1)
+        for _ in range(2):  # its power is known
+            board.work(100)
+            windows.close()
+    return ModeRun(board, board.ledger, lambda index: UNLIMITED, windows)
 
 
 def tree_of(metered, coefficients=None):
@@ -79,7 +74,7 @@ def tree_of(metered, coefficients=None):
     kind = Kind.MEASURED if metered else Kind.ESTIMATED
     seg_J, class_J, point_J = coefficients or (None, None, None)
     config = EnergyConfig(idle_W=1.0, busy_W=4.0, seg_J=seg_J, class_J=class_J, point_J=point_J)
-    basis = Basis(config, replace(Board().facts, kind=kind), period_s=0.1)
+    basis = Basis(config, replace(FACTS, kind=kind), period_s=0.1)
     about = {
         "stream": "street", "frames": len(FRAMES), "fov": "full", "repeat": 1, "turn": 1, "basis": "at 10 Hz",
         "board": "test", "conditions": {"governor": None, "frequency_MHz": None, "core": 0},

@@ -1,4 +1,4 @@
-"""Pictures and films of figures, and where the labels of a picture find room."""
+"""Films, and the places of the labels of a picture."""
 
 import os
 
@@ -52,22 +52,11 @@ def test_a_gif_shows_every_drawing_as_long_as_it_stays(tmp_path):
     assert np.all(np.diff(edges) > 0.08 * WIDTH)
 
 
-@pytest.fixture
-def ffmpeg(tmp_path, monkeypatch):
-    """Installs a script in its place."""
-
-    def install(script):
-        encoder = tmp_path / "bin" / "ffmpeg"
-        encoder.parent.mkdir()
-        encoder.write_text(f"#!/bin/sh\n{script}\n")
-        encoder.chmod(0o755)
-        monkeypatch.setenv("PATH", str(encoder.parent), prepend=os.pathsep)
-
-    return install
-
-
-def test_what_ffmpeg_says_is_the_error(tmp_path, ffmpeg):
-    ffmpeg("echo no room >&2; exit 1")
+def test_the_message_of_ffmpeg_is_the_error(tmp_path, monkeypatch):
+    encoder = tmp_path / "ffmpeg"
+    encoder.write_text("#!/bin/sh\necho no room >&2; exit 1\n")
+    encoder.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     with pytest.raises(ModtError, match=r"cannot be written by ffmpeg \(no room\)"):
         film_of(tmp_path / "film.mp4")
 
