@@ -55,3 +55,4 @@ def test_objects_of_a_scan_are_counted_by_class():
     assert tally.objects[ObjectClass.CAR] > 3
     assert tally.detected[ObjectClass.CAR] > 0.5 * tally.objects[ObjectClass.CAR]
     assert (tally.detected <= tally.objects).all()
+    assert "x" in tally.row("x")
