@@ -54,13 +54,6 @@ def test_overruns_step_up_one_at_a_time_and_slack_steps_back(parts, steps):
     assert all(b - a >= CALM_S - 0.01 for a, b in itertools.pairwise(times))
 
 
-@pytest.mark.parametrize("limit_W", [10.0, None])
-def test_power_below_the_limit_changes_nothing(limit_W):
-    frames = Frames(limit_W)
-    assert frames.ladder.power(0.0, 5.0) is None
-    assert frames.ladder.step is Step.ALL
-
-
 def test_trials_that_fail_become_rare():
     frames = Frames().run(120.0, lambda step: 1.1 if step < Step.REDUCED else 0.7)
     trials = [at for at, step in frames.changes if step is Step.DEFERRED and at > 1]

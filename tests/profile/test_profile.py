@@ -9,8 +9,6 @@ from modt.config import (
     EnergyConfig,
     ProfileConfig,
     SchedulerConfig,
-    SegmentationConfig,
-    ValueRangeError,
 )
 from modt.errors import MisuseError
 from modt.segmentation.clustering import Clusterer
@@ -20,15 +18,6 @@ from modt.segmentation.clustering import Clusterer
 def test_every_profile_that_comes_along_loads(path):
     assert isinstance(profile.load(path.stem), ProfileConfig)
     assert profile.load(str(path)) == profile.load(path.stem)
-
-
-def test_dump_and_parse_are_inverse():
-    config = profile.parse(
-        "fusion: {object_threshold: 0.9, point_change: [0.1, 0.2, 0.3, 0.4]}\nsensor: {height_m: null}\n"
-    )
-    assert config.fusion.point_change == (0.1, 0.2, 0.3, 0.4)
-    assert config.sensor.height_m is None
-    assert profile.parse(profile.to_yaml(profile.dump(config))) == config
 
 
 @pytest.mark.parametrize(
@@ -74,11 +63,6 @@ def test_a_profile_that_cannot_be_read_is_one_clear_error(tmp_path):
     for name, named in (*absent, (str(tmp_path / "binary.yaml"), "cannot be read")):
         with pytest.raises(MisuseError, match=named):
             profile.load(name)
-
-
-def test_configuration_made_in_code_is_checked_too():
-    with pytest.raises(ValueRangeError, match="cell_m"):
-        SegmentationConfig(cell_m=-1.0)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,9 @@
 import numpy as np
 import pytest
 
-from modt.energy.meters.meter import Kind
 from modt.pipeline import STAGES
-from modt_desk.comparison.gamma import RunCosts, estimate_gamma, unit_costs
+from modt_desk.comparison.gamma import RunCosts, estimate_gamma
 from modt_desk.energy.savings import UnitCosts
-from modt_desk.reporting.quantity import quantity
 
 from .test_prediction import run_costs
 
@@ -36,12 +34,6 @@ def varied(noise: float = 0.0) -> RunCosts:
 
 EVERY = np.full(FRAMES, N)
 FEW = np.full(FRAMES, 2)
-
-
-def test_unit_costs_are_found_from_varied_load() -> None:
-    found = unit_costs(varied())
-    for name in ("seg", "track", "class_call", "class_item", "class_point"):
-        assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
 
 
 def test_intervals_cover_the_truth_with_noise() -> None:
@@ -83,9 +75,3 @@ def test_counts_and_costs_are_of_the_same_repetition() -> None:
     np.testing.assert_array_equal(middle.cost, passes[2].cpu_s())
     disturbed = RunCosts.median([Repeated(3), Repeated(3, slower=9.0), Repeated(3, slower=1.1)])
     np.testing.assert_allclose(disturbed.cost, 1.1 * passes[1].cpu_s())
-
-
-def test_quantity_without_a_value_is_unavailable() -> None:
-    assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
-    assert quantity(float("nan")).value is None
-    assert quantity(float("inf")).text() == "unavailable"

@@ -126,16 +126,6 @@ def test_it_misses_where_tracks_are_ten_times_as_many_or_cost_twice_as_much():
     assert not covers(predicted(), measured(dear)).any()
 
 
-@pytest.mark.slow
-def test_the_first_third_stands_for_the_whole() -> None:
-    """All tracks of the first frame are new: the rate of the others is what goes on."""
-    third, whole = predicted(share=1 / 3), predicted(share=1.0)
-    np.testing.assert_allclose(third.expected.values, whole.expected.values, rtol=0.1)
-    counts = TEST.runs["conventional"].counts
-    n_go = counts[:, COUNTS.index("proposals")].sum() / counts[:, COUNTS.index("tracks")].sum()
-    assert whole.expected.equation.n_go == pytest.approx(n_go)
-
-
 def test_a_stream_without_proposals_saves_nothing() -> None:
     found = expect(Rates.fit(CALIBRATION), np.zeros((3, 7), np.int64), 10)
     assert found.cost["conventional"] == pytest.approx(found.cost["efficient"], rel=0.05)

@@ -70,16 +70,8 @@ def test_empty_runs_save_nothing() -> None:
     assert math.isinf(EnergyModel(0, 0, 0, 1).a)
 
 
-PAPER = EnergyModel(e_seg=31.0, e_class=6.5, n=40.0, n_go=34.9)
-
 positive = st.floats(1e-3, 1e3)
 models = st.builds(EnergyModel, e_seg=positive, e_class=positive, n=positive, n_go=st.floats(1.0, 1e3))
-
-
-def test_energies_of_a_worked_example() -> None:
-    assert PAPER.e1 == pytest.approx(31 + 40 * 6.5)
-    assert PAPER.e2 == pytest.approx(31 + 40 * 6.5 / 34.9)
-    assert PAPER.gamma == pytest.approx(291 / (31 + 260 / 34.9))
 
 
 @given(models)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, transform, transform_boxes
 from modt.types import NONE
@@ -49,14 +48,6 @@ def test_points_of_a_body_lie_in_its_box(scene):
             total += len(p)
     assert total > 1000
     assert inside > 0.98 * total
-
-
-def test_the_truth_covers_every_point(street):
-    frame, truth = next(street.sweeps())
-    assert len(truth.instance) == len(truth.semantic) == len(truth.object_class) == len(frame.points)
-    assert {40, 50, 70} <= set(truth.semantic.tolist())
-    assert (truth.object_class[truth.instance == NONE] == ObjectClass.BACKGROUND).all()
-    assert truth.points.tolist() == [(truth.instance == b).sum() for b in truth.bodies]
 
 
 def test_bodies_at_rest_stay_where_they_are_in_the_world(street):

@@ -14,7 +14,6 @@ from tools.train.labelled_scans import (
     beams,
     folder_scans,
     pandaset_scans,
-    points_in_box,
     thinned,
 )
 from tools.train.synthetic_scans import simulated_scans
@@ -36,12 +35,6 @@ def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path):
     np.testing.assert_allclose(scan.points[1, :3], [10.0, 0.0, -1.07], atol=1e-5)
     np.testing.assert_allclose(scan.boxes[0, :3], [10.15, 0.5, -1.92], atol=1e-5)
     assert len(scan.objects[0]) == 30
-
-
-def test_points_in_a_rotated_box_are_above_the_ground():
-    box = np.array([10.0, 0.0, -1.7, 4.0, 2.0, 1.5, np.pi / 2])
-    points = np.array([[10, 1.9, -1, 0], [11.9, 0, -1, 0], [10, 0, -1.6, 0], [10, 0, 0.5, 0]], np.float32)
-    assert points_in_box(points, box).tolist() == [True, False, False, False]
 
 
 def pandaset(folder, name, points, rows):
