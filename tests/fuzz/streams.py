@@ -13,10 +13,9 @@ from modt.ros2.odometry import read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
 from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.live.sweep_reader import Reception
-from modt.sources.packets.capture import Capture
+from modt.sources.packets.capture import Capture, open_capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
-from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream

@@ -1,7 +1,6 @@
 import numpy as np
 
-from modt.viewer.packed import packed_cells, packed_table
-from modt.viewer.point_cells import SIDE, Cells
+from modt.viewer.packed import SIDE, Cells, packed_cells, packed_table
 
 from . import pages
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import logging
 import os
 
-from modt.config.segmentation import KERNELS, NATIVE
-from modt.config.segmentation import NUMPY as NUMPY_NAME
+from modt.config.stages import KERNELS, NATIVE
+from modt.config.stages import NUMPY as NUMPY_NAME
 from modt.errors import MisuseError
 from modt.native.library import NotAvailableError, load
 from modt.segmentation.kernels import NUMPY, Kernels

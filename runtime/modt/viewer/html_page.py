@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from modt.viewer import theme
-from modt.viewer.point_cells import SIDE
+from modt.viewer.packed import SIDE
 from modt.viewer.theme import REACH_M, THEME
 from modt.viewer.track_rows import COLUMNS, SCALE
 

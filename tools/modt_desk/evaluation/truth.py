@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, inverse, transform_boxes
-from modt.sources.scan_stream import ScanStream
+from modt.sources.scan_file import ScanStream
 from modt.types import NONE, Bool, Float32, Float64, Int
 from modt_desk.evaluation.kitti_labels import Label
 from modt_desk.evaluation.rules import Rules

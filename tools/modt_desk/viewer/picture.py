@@ -21,7 +21,7 @@ from modt.geometry import corners
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64
 from modt.viewer import theme
-from modt.viewer.point_cells import SIDE, Cells
+from modt.viewer.packed import SIDE, Cells
 from modt.viewer.theme import LIGHT, REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.recorded_run import RecordedRun

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from modt.energy.meters.meter import (
     Candidate,
@@ -24,9 +24,6 @@ from modt.energy.meters.meter import (
     text_or_none,
 )
 from modt.errors import MisuseError
-
-if TYPE_CHECKING:
-    from modt.energy.meters.boards import Board
 
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
 _SAME_J = 1e-3
@@ -96,6 +93,36 @@ def _scmi(zone: Path, name: str) -> Meter:
     return file_meter(Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED), zone / "power_uw")
 
 
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A board whose power rails are known, recognised by the model in its device tree and the labels of its rails.
+
+    Sources: NVIDIA's Jetson Linux developer guides and product design guides, and the device trees of the kernel.
+    """
+
+    name: str
+    model: str  # pattern in the model of the device tree
+    whole: tuple[str, ...]  # rails whose sum is the module's power
+    cpu: str  # narrowest rail with the CPU
+    parts: tuple[str, ...] = ()  # rails side by side that one of the whole feeds
+
+
+BOARDS = (
+    Board("Jetson Nano", r"Jetson Nano", ("POM_5V_IN",), "POM_5V_CPU", ("POM_5V_CPU", "POM_5V_GPU")),
+    Board("Jetson NX", r"Xavier NX|Orin (NX|Nano)", ("VDD_IN",), "VDD_CPU_GPU_CV", ("VDD_CPU_GPU_CV", "VDD_SOC")),
+    Board("Jetson AGX Xavier", r"AGX Xavier|Jetson-AGX", ("GPU", "CPU", "SOC", "CV", "VDDRQ", "SYS5V"), "CPU"),
+    Board("Jetson AGX Orin", r"AGX Orin", ("VDD_GPU_SOC", "VDD_CPU_CV", "VIN_SYS_5V0"), "VDD_CPU_CV"),
+)
+
+
+def board_of(model: str, labels: Collection[str]) -> Board | None:
+    """The board of a model in the device tree with these rails; by the rails alone where the model is empty."""
+    for board in BOARDS:
+        if {board.cpu, *board.whole}.issubset(labels) and (not model or re.search(board.model, model)):
+            return board
+    return None
+
+
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
 _PART_SHARE = 1.1
 """A module is refused if the rails that it feeds draw more than this factor of its own power."""
@@ -118,8 +145,6 @@ def find_hwmon(sys: Path) -> list[Candidate]:
 
 def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
     """A candidate for each rail, after one for the module of a known board: the feeding rail or a sum."""
-    from modt.energy.meters.boards import board_of  # only machines with rails load it
-
     remedy, board = "make the chip's inputs readable", board_of(model, rails)
     found = [] if board is None else [_module(board, rails, remedy)]
     for label, meter in rails.items():
