@@ -53,41 +53,30 @@ class Power:
     """Power by the windows of the meters. It is unknown before the first reading and while the meters fail.
 
     Attributes:
-        watts: power in the last window.
-        kind: measured, integrated, estimated or unavailable.
-        frame_J: energy a frame in it.
-        stages_J: the same of each stage, of idling and of the rest of the process (`attribute`).
-        windows, unread: counts, of all and of those without energy.
+        windows, unread: number of all windows, and of those without energy.
     """
 
     def __init__(self) -> None:
-        self.watts: float | None = None
-        self.frame_J: float | None = None
-        self.stages_J: dict[str, float] = {}
-        self.kind = "unavailable"
         self.windows = self.unread = 0
+        self._last: dict[str, Any] = {"watts": None, "kind": "unavailable", "frame_J": None, "stages_J": {}}
 
     def add(self, window: dict[str, Any], board: EnergyConfig) -> float | None:
         """Add a line modt.energy/1; the window's power [W]."""
         energy_J, frames = window["energy_J"], window["frames"][2]
-        self.windows, self.kind = self.windows + 1, window["kind"]
-        self.unread += energy_J is None
-        self.watts = None if energy_J is None else energy_J / (1e-9 * window["wall_ns"])
-        self.frame_J = None if energy_J is None or not frames else energy_J / frames
+        self.windows, self.unread = self.windows + 1, self.unread + (energy_J is None)
+        watts = None if energy_J is None else energy_J / (1e-9 * window["wall_ns"])
         split = attribute(window, board) if frames else {}
-        self.stages_J = {stage: joules / frames for stage, joules in split.items()}
-        return self.watts
+        self._last = {
+            "watts": watts,
+            "kind": window["kind"],
+            "frame_J": None if energy_J is None or not frames else energy_J / frames,
+            "stages_J": {stage: round(joules / frames, 6) for stage, joules in split.items()},
+        }
+        return watts
 
     def report(self) -> dict[str, Any]:
-        """Figures for the status."""
-        return {
-            "watts": self.watts,
-            "kind": self.kind,
-            "frame_J": self.frame_J,
-            "stages_J": {stage: round(joules, 6) for stage, joules in self.stages_J.items()},
-            "windows": self.windows,
-            "unread_windows": self.unread,
-        }
+        """Figures of the last window for the status, with the energy of each part of a frame (`attribute`)."""
+        return {**self._last, "windows": self.windows, "unread_windows": self.unread}
 
 
 def one_line(status: dict[str, Any]) -> str:

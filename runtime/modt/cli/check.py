@@ -15,8 +15,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("check", help="check this machine, and a sensor, for modt run; print remedies")
     source = "address of the sensor to listen to, or a recording (default: none)"
     p.add_argument("source", nargs="?", metavar="SOURCE", help=source)
-    options.add_profile_option(p)
-    options.add_core_option(p)
+    options.add(p, "profile", "core")
     p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
     options.add_examples(
         p,

@@ -13,7 +13,7 @@ COMMANDS = {
     "replay": "modt.cli.replay",
     "run": "modt.cli.run",
     "status": "modt.cli.status",
-    "top": "modt.cli.top",
+    "top": "modt.cli.status",
     "check": "modt.cli.check",
     "view": "modt_desk.cli.view",
     "evaluate": "modt_desk.cli.evaluate",

@@ -7,8 +7,9 @@ import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from io import FileIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import foxglove
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
@@ -27,31 +28,24 @@ PARTS = 8
 """Number of parts that share the size limit; the oldest is deleted for a new one."""
 
 
-class _Output:
+class _Output(FileIO):
     """The file of a part. It keeps the write error, which the SDK swallows."""
 
     def __init__(self, path: Path) -> None:
         with writing(path):
-            self.file: BinaryIO = path.open("xb", buffering=0)
+            super().__init__(path, "xb")
         self.path, self.size, self.frames = path, 0, 0
         self.error: OSError | None = None
 
-    def write(self, data: bytes | bytearray) -> int:
+    def write(self, data: Any) -> int:
         """Write, and return how much was written."""
         try:
-            written = self.file.write(data)
+            written = super().write(data)
         except OSError as error:
             self.error = error
             raise
         self.size += written
         return written
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        """Move the position."""
-        return self.file.seek(offset, whence)
-
-    def flush(self) -> None:
-        """No effect: the file has no buffer."""
 
 
 class McapFile:
@@ -104,7 +98,7 @@ class McapFile:
         """Write the index and close the part. A part that failed before its first frame is removed."""
         with suppress(RuntimeError):
             self._writer.close()
-        self._output.file.close()
+        self._output.close()
         if self._output.error is not None and not self._output.frames:
             self._output.path.unlink(missing_ok=True)
 

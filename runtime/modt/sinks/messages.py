@@ -33,12 +33,16 @@ COLOURS = tuple((*(int(c.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.6) 
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """Pose and scale of the marker that deletes all others."""
 NO_TEXT, NO_HEADER = text_fields(""), header_fields(0.0, "")
-UNUSED: Fields = (
-    ("B", "2I", *NO_TEXT[0], *NO_HEADER[0], *NO_TEXT[0], "2I"),
-    (0, 0, 0, *NO_TEXT[1], *NO_HEADER[1], *NO_TEXT[1], 0, 0),
-)
+
+
+def _joined(*parts: Fields) -> Fields:
+    """Fields of several parts as those of one."""
+    return tuple(chain.from_iterable(f for f, _ in parts)), tuple(chain.from_iterable(v for _, v in parts))
+
+
+UNUSED = _joined((("B", "2I"), (0, 0, 0)), NO_TEXT, NO_HEADER, NO_TEXT, (("2I",), (0, 0)))
 """frame_locked, points, colors, texture_resource, texture (header, format, data), uv_coordinates."""
-NO_MESH: Fields = ((*NO_TEXT[0], *NO_TEXT[0], "I", "B"), (*NO_TEXT[1], *NO_TEXT[1], 0, 0))
+NO_MESH = _joined(NO_TEXT, NO_TEXT, (("I", "B"), (0, 0)))
 """mesh_resource, mesh_file (filename, data), mesh_use_embedded_materials."""
 
 
@@ -150,10 +154,9 @@ def _marker(
     colour: tuple[float, ...] = WHITE,
     text: str = "",
 ) -> None:
-    name, label = text_fields(namespace), text_fields(text)
-    fields = (*header[0], *name[0], "3i", "10d", "4f", "2i", *UNUSED[0], *label[0], *NO_MESH[0])
-    first = (*header[1], *name[1], *number_kind_action, *pose_scale, *colour, LIFETIME_S, 0)
-    cdr.record(fields, *first, *UNUSED[1], *label[1], *NO_MESH[1])
+    own: Fields = ("3i", "10d", "4f", "2i"), (*number_kind_action, *pose_scale, *colour, LIFETIME_S, 0)
+    fields, values = _joined(header, text_fields(namespace), own, UNUSED, text_fields(text), NO_MESH)
+    cdr.record(fields, *values)
 
 
 def pose(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:

@@ -20,7 +20,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     seconds = options.real(0.01, 600, "seconds")
     p = commands.add_parser("calibrate", help="fit the energy of this board's units of work, and write its profile")
     options.add_stream_options(p, (0, 40))
-    options.add_meter_option(p)
+    options.add(p, "meter")
     p.add_argument("--board", default="this board", metavar="NAME", help="name of the board in the profile")
     p.add_argument(
         "--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="profile (default: %(default)s)"
