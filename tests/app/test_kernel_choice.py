@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from modt.app import checks, kernel_choice
+from modt.app import assembly, checks
 from modt.errors import MisuseError
 from modt.native.library import NotAvailableError
 from modt.segmentation.kernels import NUMPY
@@ -14,40 +14,40 @@ from modt.segmentation.kernels import NUMPY
 
 @pytest.fixture
 def none_compiled(monkeypatch):
-    monkeypatch.delenv(kernel_choice.VARIABLE, raising=False)
+    monkeypatch.delenv(assembly.VARIABLE, raising=False)
 
     def load():
         raise NotAvailableError("not compiled for riscv64; install modt again")
 
-    monkeypatch.setattr(kernel_choice, "load", load)
+    monkeypatch.setattr(assembly, "load", load)
 
 
 def test_numpy_takes_their_place_with_a_warning(none_compiled, caplog):
     with caplog.at_level(logging.WARNING):
-        assert kernel_choice.choose("auto") is NUMPY
+        assert assembly.chosen_kernels("auto") is NUMPY
     assert "run on NumPy" in caplog.text
     assert "not compiled for riscv64" in caplog.text
 
 
 def test_numpy_where_it_is_asked_for_is_no_reason_to_warn(none_compiled, caplog):
-    assert kernel_choice.choose("numpy") is NUMPY
+    assert assembly.chosen_kernels("numpy") is NUMPY
     assert not caplog.text
 
 
 def test_compiled_ones_that_are_asked_for_and_missing_are_an_error(none_compiled):
     with pytest.raises(MisuseError, match="native: not compiled for riscv64"):
-        kernel_choice.choose("native")
+        assembly.chosen_kernels("native")
 
 
 def test_the_environment_wins(none_compiled, monkeypatch, caplog):
-    monkeypatch.setenv(kernel_choice.VARIABLE, "numpy")
-    assert kernel_choice.choose("native") is NUMPY
-    monkeypatch.setenv(kernel_choice.VARIABLE, "fast")
+    monkeypatch.setenv(assembly.VARIABLE, "numpy")
+    assert assembly.chosen_kernels("native") is NUMPY
+    monkeypatch.setenv(assembly.VARIABLE, "fast")
     with pytest.raises(MisuseError, match="MODT_KERNELS: no kernels 'fast'; use one of: auto, native, numpy"):
-        kernel_choice.choose("numpy")
+        assembly.chosen_kernels("numpy")
 
 
 def test_the_check_fails_where_they_cannot_be_chosen(none_compiled):
-    finding = checks.kernels(lambda: kernel_choice.choose("native").name)
+    finding = checks.kernels(lambda: assembly.chosen_kernels("native").name)
     assert finding.level == checks.FAIL
     assert "segmentation.kernels" in str(finding)

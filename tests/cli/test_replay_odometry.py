@@ -11,8 +11,8 @@ from modt.app.inputs import Request
 from modt.app.session import replay
 from modt.app.supervisor import Supervisor
 from modt.geometry import inverse, rotation_zyx, se3
-from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 

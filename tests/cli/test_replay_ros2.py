@@ -11,8 +11,8 @@ from modt.app.supervisor import Supervisor
 from modt.ros2 import odometry
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
-from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.ros2.network import FAR, NEAR, until
 from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap

@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 from .commands import environment, modt

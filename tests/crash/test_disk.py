@@ -15,9 +15,9 @@ from modt.app.status import SCHEMA as STATUS_SCHEMA
 from modt.cli.status import read
 from modt.config import RecordingConfig
 from modt.sinks.recording import RETRY_S, AtOnce, Recording
-from modt.sinks.records import read_records
 from modt.sinks.run_directory import RunDirectory, status_paths
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from tests.crash.test_power_cut import OURS
 from tests.results import CAR, result
 from tests.sinks.test_recording import Time

@@ -6,9 +6,9 @@ import pytest
 
 from modt.config import RecordingConfig
 from modt.sinks.recording import AtOnce, Recording
-from modt.sinks.records import read_records
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from tests.crash.power_cut import PowerCuts
 from tests.results import CAR, result
 from tests.sinks.test_recording import Time

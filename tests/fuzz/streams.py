@@ -12,13 +12,13 @@ from modt.ros2.cdr import MessageError
 from modt.ros2.odometry import read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
 from modt.ros2.static_transforms import StaticTransforms
-from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture, open_capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
+from modt.sources.stream import Reception
 from tests.fuzz.target import Feed, of_file, target
 from tests.ros2 import messages
 from tests.sources import bags, layouts

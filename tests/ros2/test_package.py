@@ -37,7 +37,7 @@ PUBLISHED = {topic.name: topic.type for topic in topics(PREFIX, world_frame_id="
 def figures():
     """Topics of energy and CPU time."""
     pytest.importorskip("foxglove")
-    from modt.sinks.foxglove_server import FIGURES
+    from modt.sinks.foxglove_sinks import FIGURES
 
     return {f"/{PREFIX}/{name}" for name in FIGURES}
 

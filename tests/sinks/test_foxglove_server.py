@@ -14,8 +14,8 @@ pytest.importorskip("foxglove")
 
 from modt.errors import MisuseError
 from modt.schemes import open_sink
-from modt.sinks import foxglove_server
-from modt.sinks.foxglove_server import FoxgloveServer
+from modt.sinks import foxglove_sinks
+from modt.sinks.foxglove_sinks import FoxgloveServer
 from modt.sinks.messages import topics
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
 
@@ -107,7 +107,7 @@ def test_only_this_machine_is_served_unless_another_host_is_given(monkeypatch):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    monkeypatch.setattr(foxglove_server, "PORT", port)
+    monkeypatch.setattr(foxglove_sinks, "PORT", port)
     background = open_sink("foxglove://")
     listening = [line.split()[1:4] for line in Path("/proc/self/net/tcp").read_text().splitlines()[1:]]
     hosts = {

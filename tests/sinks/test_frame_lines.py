@@ -10,8 +10,8 @@ import pytest
 from modt.schemes import open_sink
 from modt.sinks.background import Background
 from modt.sinks.frame_lines import Descriptor
-from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA, frame_line
+from modt_desk.reporting.records import read_records
 from tests.cli.commands import environment
 from tests.results import CAR, result
 from tests.sinks.test_background import settled

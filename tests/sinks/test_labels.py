@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from modt.sinks.labels import PointLabels, encode
+from modt.sinks.kitti import PointLabels, encode
 from tests.results import CAR, PEDESTRIAN, result
 
 

@@ -10,9 +10,9 @@ import pytest
 from modt.config import RecordingConfig
 from modt.sinks import output
 from modt.sinks.recording import KEPT, RETRY_S, AtOnce, Recording, WholeRecording
-from modt.sinks.records import read_records
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from tests.results import CAR, result
 
 OURS = f"schema: modt.run/1\n{MARK}\n"

@@ -21,7 +21,7 @@ from modt.energy.ledger import Line
 from modt.errors import ModtError
 from modt.pipeline import SINK
 from modt.sinks.output import Writer
-from modt.sources.live.sweep_reader import Received, StreamEndedError
+from modt.sources.stream import Received, StreamEndedError
 from modt.types import FrameResult
 
 if TYPE_CHECKING:

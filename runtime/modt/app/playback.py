@@ -8,8 +8,7 @@ from typing import Any
 
 from modt.energy.ledger import Ledger
 from modt.pipeline import SOURCE
-from modt.sources.live.sweep_reader import Received, StreamEndedError
-from modt.sources.stream import Stream
+from modt.sources.stream import Received, Stream, StreamEndedError
 
 
 class Pace:

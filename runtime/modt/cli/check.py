@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt import profile
-    from modt.app import checks, kernel_choice, metering
+    from modt.app import assembly, checks, metering
     from modt.app.inputs import live_source
     from modt.classification.pointnet import PointNet
 
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         checks.governor(pinned),
         *checks.permissions(),
         checks.meters(metering.discovery(config.energy)),
-        checks.kernels(lambda: kernel_choice.choose(config.segmentation.kernels).name),
+        checks.kernels(lambda: assembly.chosen_kernels(config.segmentation.kernels).name),
         checks.model(limits, lambda: PointNet(limits, config.sensor).facts()),
         checks.near(config.sensor),
         checks.disk(arguments.out, config),

@@ -21,7 +21,7 @@ COMMANDS = {
     "simulate": "modt_desk.cli.simulate",
     "track": "modt_desk.cli.track",
     "profile": "modt.cli.profile_group",
-    "profiles": "modt.cli.profile_list",
+    "profiles": "modt.cli.profile_group",
     "completion": "modt_desk.cli.completion",
     "service": "modt_desk.cli.service",
 }

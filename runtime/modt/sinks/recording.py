@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from modt.config import RecordingConfig
 from modt.errors import ModtError
 from modt.geometry import Camera
-from modt.sinks.kitti import KittiResults
+from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import Health, LineFile, Writer
 from modt.sinks.records import line
 from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
@@ -260,8 +260,6 @@ class WholeRecording(Recording):
         path = self.directory.path
         self._more.append(KittiResults(path / "kitti" / f"{self._sequence:04d}.txt", self._camera))
         if self._labels:
-            from modt.sinks.labels import PointLabels
-
             self._more.append(PointLabels(path / "labels"))
 
     def write(self, result: FrameResult) -> None:

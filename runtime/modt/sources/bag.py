@@ -19,10 +19,9 @@ from modt.ros2.odometry import read_odometry
 from modt.ros2.point_cloud2 import PointCloud, read_cloud
 from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.bag_files import BagFile, BagMessage, BagTopic, bag_files, messages_of
-from modt.sources.live.sweep_reader import Sweep
 from modt.sources.received_poses import PoseBuffer
 from modt.sources.stamp_check import STEP_S, StampCheck
-from modt.sources.stream import Faults, StreamInfo
+from modt.sources.stream import Faults, StreamInfo, Sweep
 from modt.types import Float64, Frame, Self
 
 Poses = tuple[str, Float64]

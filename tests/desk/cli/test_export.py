@@ -11,8 +11,8 @@ import yaml
 
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.cli.main import main
-from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from tests.desk.recorded import drive_and_run
 
 

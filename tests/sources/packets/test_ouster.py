@@ -8,10 +8,10 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
-from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets import ouster
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.ouster import OusterDecoder
+from modt.sources.stream import Reception
 from tests.sources.packets.simulated import bearing_deg, decoded, equal
 
 sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")

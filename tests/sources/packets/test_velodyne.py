@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from modt.errors import MisuseError
-from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.velodyne import VelodyneDecoder, model_named
+from modt.sources.stream import Reception
 from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 

@@ -14,8 +14,7 @@ from typing import Any, TypeVar
 
 from modt.classes import CLASS_NAMES
 from modt.errors import MisuseError, install
-from modt.sinks.kitti import KittiResults
-from modt.sinks.labels import PointLabels
+from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import LineFile, writing
 from modt.sinks.records import BROKEN
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
@@ -130,7 +129,7 @@ class Export:
 def _mcap(export: Export, target: Path) -> None:
     """Write an MCAP file as the sink mcap:///FILE does."""
     try:
-        from modt.sinks.mcap_file import McapFile
+        from modt.sinks.foxglove_sinks import McapFile
     except ModuleNotFoundError as error:
         raise MisuseError("--mcap", f"needs {error.name}", install("foxglove")) from None
     results = _with_points(export) if export.points else export.results()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from modt.classes import CLASS_NAMES
 from modt.geometry import transform_boxes
-from modt.sinks.labels import MAX_INSTANCE, SEMANTIC
+from modt.sinks.kitti import MAX_INSTANCE, SEMANTIC
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import NONE, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
 

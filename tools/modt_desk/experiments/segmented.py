@@ -14,7 +14,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from modt.app import assembly, kernel_choice
+from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig, TrackingConfig
 from modt.geometry import FieldOfView
@@ -72,7 +72,7 @@ def _network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
 
 
 def _frames(drive: Drive, config: ProfileConfig, network: PointNet) -> Iterator[SegmentedFrame]:
-    segmenter = assembly.segmenter(config, drive.fov(), kernel_choice.choose(config.segmentation.kernels))
+    segmenter = assembly.segmenter(config, drive.fov(), assembly.chosen_kernels(config.segmentation.kernels))
     for frame, truth in drive.sweeps():
         whole = segmenter.segment(frame.points)
         kept = _of_objects(frame.points, truth)

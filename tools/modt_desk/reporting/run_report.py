@@ -22,7 +22,6 @@ from modt.energy.meters.meter import Kind
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE, STAGES
-from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
 from modt.types import Float64
@@ -33,6 +32,7 @@ from modt_desk.reporting import energy_plots, svg
 from modt_desk.reporting.document import Cell, Document, Plot, Table
 from modt_desk.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
+from modt_desk.reporting.records import read_records
 from modt_desk.reporting.run_sums import COLUMNS, FrameSums, run_facts
 
 SCHEMA = "modt.report/2"

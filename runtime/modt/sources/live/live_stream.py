@@ -10,11 +10,19 @@ from typing import Any
 
 from modt import host
 from modt.errors import ModtError, ScanError
-from modt.sources.live.sweep_reader import Received, StreamEndedError, Sweep, SweepReader
 from modt.sources.packets.packet_decoder import DeviceClock
 from modt.sources.scan_file import sanitised
 from modt.sources.stamp_check import StampCheck
-from modt.sources.stream import Faults, StreamInfo, no_seconds, unit_of
+from modt.sources.stream import (
+    Faults,
+    Received,
+    StreamEndedError,
+    StreamInfo,
+    Sweep,
+    SweepReader,
+    no_seconds,
+    unit_of,
+)
 from modt.types import Frame
 
 log = logging.getLogger(__name__)

@@ -6,8 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 
-from modt.sources.live.sweep_reader import Reception, StreamEndedError, Sweep
-from modt.sources.stream import Stream
+from modt.sources.stream import Reception, Stream, StreamEndedError, Sweep
 from modt.types import Frame
 
 

@@ -13,8 +13,7 @@ from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.point_cloud2 import TYPE, read_cloud
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.stream import StreamInfo
+from modt.sources.stream import Reception, StreamInfo, Sweep
 
 REMEMBERED = 32
 NEEDED = 8

@@ -15,11 +15,10 @@ from pathlib import Path
 from typing import BinaryIO
 
 from modt.errors import MisuseError
-from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets import hesai, livox, velodyne
 from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for
 from modt.sources.stamp_check import StampCheck
-from modt.sources.stream import Faults, StreamInfo
+from modt.sources.stream import Faults, Reception, StreamInfo, Sweep
 from modt.types import Frame, Self
 
 MAX_PENDING = 64
