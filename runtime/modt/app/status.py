@@ -14,9 +14,9 @@ from modt.types import NONE, Tracks
 
 SCHEMA = "modt.status/1"
 MIN_RATE_S = 0.5
-"""Shortest time over which a rate is formed."""
+"""Shortest time over which a rate is computed [s]."""
 STALE_S = 5.0
-"""Age from which a status is no longer that of a running service."""
+"""Greatest age of the status of a running service [s]."""
 
 
 class Counts:
@@ -29,10 +29,10 @@ class Counts:
 
     def __init__(self, totals: Summary, now_s: float) -> None:
         self._totals, self._rate_hz = totals, 0.0
-        self._frames, self._since_s = 0, now_s  # where the rate was formed last
+        self._frames, self._since_s = 0, now_s  # when the rate was last computed
 
     def report(self, now_s: float, tracks: Tracks | None) -> dict[str, Any]:
-        """Figures for the status, by the tracks of the last frame; the rate is that of the time between reports."""
+        """Figures for the status, with the tracks of the last frame. The rate is the one since the last report."""
         totals, seconds = self._totals, now_s - self._since_s
         if seconds >= MIN_RATE_S:
             self._rate_hz = (totals.frames - self._frames) / seconds
@@ -91,7 +91,7 @@ def one_line(status: dict[str, Any]) -> str:
 
 
 def status_text(status: dict[str, Any], now_s: float) -> str:
-    """Some lines for a terminal, without characters that would steer it."""
+    """Lines for a terminal, without control characters."""
     loop, sensor, recording = status["loop"], status["sensor"], status["recording"]
     age_s = now_s - status["time_s"]
     state = (

@@ -44,7 +44,7 @@ class Supervisor:
         self._ready = self._send("READY=1")
 
     def alive(self) -> None:
-        """Report that the loop goes round, when half the period of the watchdog has passed."""
+        """Report that the loop is alive, once in half the period of the watchdog."""
         if self._clock() - self._alive_s >= self._interval_s:
             self._alive_s = self._clock()
             self._ready |= self._send("WATCHDOG=1" if self._ready else "READY=1\nWATCHDOG=1")
@@ -78,7 +78,7 @@ class Supervisor:
 
 
 def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
-    """Systemd where the environment names its socket: /PATH, or @NAME if abstract."""
+    """Supervisor of the socket that the environment names: /PATH, or @NAME if abstract. Without one it has no effect."""
     name = environment.get(_VARIABLE)
     if not name:
         return Supervisor()

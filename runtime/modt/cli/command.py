@@ -18,8 +18,9 @@ INTERRUPTED = 130
 def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Sequence[str] | None) -> int:
     """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted.
 
-    `commands` holds the module of each. Only that of the command given is imported; its add_parser sets `run` to a
-    function of the parsed arguments that returns the status. Without a command the help is printed, which is misuse.
+    `commands` maps each command to its module. Only the module of the given command is imported. Its add_parser sets
+    `run` to a function of the parsed arguments that returns the status. Without a command the help is printed and the
+    status is 2.
     """
     words = sys.argv[1:] if argv is None else argv
     top = argparse.ArgumentParser(prog=name, description=description)

@@ -46,7 +46,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Follow; SIGTERM ends it with exit status 0, SIGINT with 130, both with complete records."""
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # a reload before there is anything to reload; the loop handles it
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # there is nothing to reload yet; the loop handles later ones
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.

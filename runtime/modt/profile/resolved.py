@@ -38,7 +38,7 @@ class Resolved:
 
     Attributes:
         layers: the profiles that are asked for, each after those that it extends; later ones win.
-        assumed: the DEFAULT profile below them, if none of them sets a key of the sensor.
+        assumed: the DEFAULT profile, on which they are based if none of them sets a key of the sensor.
         config: the resulting configuration.
     """
 

@@ -138,7 +138,7 @@ class Publication:
 
 
 def _count(entity: Any, matched: str) -> int:
-    """Number of matched entities; 1 where the binding cannot tell: 0.10, for the Cyclone DDS of Humble and Jazzy."""
+    """Number of matched entities; 1 with version 0.10 of the binding (Humble, Jazzy), which does not count them."""
     return len(getattr(entity, matched)()) if hasattr(entity, matched) else 1
 
 

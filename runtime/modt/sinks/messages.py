@@ -27,7 +27,7 @@ LIFETIME_S = 1
 TEXT_M, ABOVE_M = 0.6, 0.5
 """Height of a label, and of its middle above the box [m]."""
 MIN_ARROW_MPS, ARROW_WIDTH_M = 0.3, 0.2
-"""Slower objects have no arrow. An arrow is as long as the way of one second."""
+"""Slower objects have no arrow. An arrow is as long as the distance of one second."""
 WHITE = (1.0, 1.0, 1.0, 1.0)
 COLOURS = tuple((*(int(c.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.6) for c in CLASSES.values())
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
@@ -89,13 +89,13 @@ def topics(
 
 
 def seen(result: FrameResult, background: bool = False) -> Int:
-    """Rows of the tracks with a proposal that are objects, or with `background` of all."""
+    """Rows of the tracks with a proposal; tracks of the background only if `background`."""
     tracks = result.tracks
     return np.flatnonzero((tracks.proposal != NONE) & (background | (tracks.object_class != ObjectClass.BACKGROUND)))
 
 
 def detections(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
-    """vision_msgs/Detection3DArray (version 4): boxes and posteriors of what is in view, the reported class first."""
+    """vision_msgs/Detection3DArray (version 4): boxes and posteriors of tracks in view, the reported class first."""
     tracks, rows = result.tracks, seen(result, background)
     boxes = result.proposals.box[tracks.proposal[rows]]
     poses = in_sensor_frame(box_poses(boxes), result.frame.R_level_sensor)

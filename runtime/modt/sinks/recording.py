@@ -184,7 +184,7 @@ class Recording:
         self._bytes, self.parts = RESERVED_BYTES, self.parts + self._begun
 
     def _look(self) -> None:
-        """Leave a part whose files were moved or removed. The lines of removed files count as lost."""
+        """Close a part whose files were moved or removed. The lines of removed files count as lost."""
         if self._begun and not (self.directory.present() and all(file.present() for file in self._files.values())):
             removed = sum(int(file.health()["written"]) for file in self._files.values() if file.removed())
             self.lost, self._unsynced = self.lost + removed, 0
@@ -236,7 +236,7 @@ class WholeRecording(Recording):
     """The records of a replay: all of them, in one part, written at once. A failure ends the run.
 
     Args:
-        directory, describe: as of Recording.
+        directory, describe: as in Recording.
         sequence, camera: sequence and camera of the KITTI results.
         labels: whether point labels are written.
     """

@@ -17,7 +17,7 @@ SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 UNKNOWN_NEAR = "unknown, near"
-"""May be a person, too near for the sensor to show enough of it."""
+"""Value of `uncertain` for a track that may be a person too near to be seen whole."""
 BOOLEANS = ("false", "true")
 UNCERTAIN = (None, *(f"{name}?" for name in CLASS_NAMES[1:]), UNKNOWN_NEAR)
 NUMBER_BYTES = 32
@@ -50,9 +50,10 @@ def frame_line(result: FrameResult) -> str:
 
 
 def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
-    """The line of a frame; where it is longer than that, lines of some of the tracks each.
+    """The line of a frame, or lines of parts of its tracks if it is longer than `max_bytes`.
 
-    Parts have all fields of a frame, `part`, from 0, and `parts`, their number. A single track may be longer.
+    Each part has all fields of a frame, `part`, which counts from 0, and `parts`, the number of parts. A part with a
+    single track may be longer than `max_bytes`.
 
     Raises:
         ValueError: a number is not finite.
@@ -141,7 +142,7 @@ def _in_tables(result: FrameResult) -> bool:
 
 
 def _by_columns(result: FrameResult) -> str:
-    """The rows joined by commas, made column by column."""
+    """JSON of all tracks, joined by commas and made column by column."""
     tracks = result.tracks
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
     id_, proposal, points, age, missed = text.integers(np.stack(counts))

@@ -39,7 +39,7 @@ Poses = dict[int, Float64]
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """Missing files and their consequences; `of_poses` does not matter with another pose source."""
+    """Missing files and their consequences; `of_poses` are irrelevant with another source of poses."""
 
     of_stream: list[str] = field(default_factory=list)
     of_poses: list[str] = field(default_factory=list)

@@ -37,7 +37,7 @@ class Fault:
 
     frame: int  # index of the frame
     subject: str  # file or device
-    cause: str  # what is wrong with it
+    cause: str  # the fault
     skipped: bool  # the whole scan is skipped
 
 

@@ -54,8 +54,8 @@ class LiveServer(ThreadingTCPServer):
 
     Attributes:
         page: HTML.
-        names: hosts that a request may name, None for all: a page of another site could reach the loopback by a name
-            of its own.
+        names: host names that a request may use; None for all. On the loopback they are limited, because a page of
+            another site could reach it by a name of its own.
 
     Raises:
         OSError: the address cannot be bound.
@@ -120,7 +120,7 @@ class LiveServer(ThreadingTCPServer):
             self._free.release()
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """A client that has gone is no error."""
+        """Ignore the error: the client has gone."""
 
 
 class _Handler(BaseHTTPRequestHandler):

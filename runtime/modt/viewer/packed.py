@@ -17,7 +17,7 @@ NUMBER_BYTES = 4
 
 
 def packed(data: bytes, level: int = LEVEL) -> str:
-    """Text of bytes; the page undoes it by `atob` and `DecompressionStream("deflate")`."""
+    """Text of bytes. The page reads it by `atob` and `DecompressionStream("deflate")`."""
     return base64.b64encode(zlib.compress(data, level)).decode("ascii")
 
 
@@ -28,7 +28,7 @@ def planes(numbers: Int, n_bytes: int) -> bytes:
 
 
 def differences(numbers: Int) -> Int:
-    """(n,) the first number, then what is added to each to get the next."""
+    """(n,) the first number, then the difference of each number from the one before."""
     return np.diff(numbers, prepend=0)
 
 
@@ -51,7 +51,7 @@ LEVELS = 64
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """The occupied cells of a sweep, by their number."""
+    """The occupied cells of a sweep, ordered by their numbers."""
 
     cell: Int  # (n,) SIDE * row + column, ascending; column and row count from -x and -y, the sensor at SIDE / 2
     level: Int  # (n,) height above ground [LEVEL_M], 0 for ground
@@ -60,7 +60,7 @@ class Cells:
         return len(self.cell)
 
     def thinned(self, most: int) -> Cells:
-        """At most so many of them, of the ground as few as need be."""
+        """At most `most` cells. Cells of the ground are left out first."""
         kept = [np.flatnonzero(self.level > 0), np.flatnonzero(self.level == 0)]
         for group, rows in enumerate(kept):
             room = max(most - (len(kept[0]) if group else 0), 0)

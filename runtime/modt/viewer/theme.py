@@ -52,7 +52,7 @@ def classes() -> list[Entry]:
 
 
 def states(names: Iterable[str]) -> list[Entry]:
-    """Legend of states: waiting ones grey, final ones green, those in doubt ochre, lost ones violet or plum."""
+    """Legend of states: grey while waiting, green if tracked, ochre if unclassified, violet or plum if lost."""
     return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
 
 
@@ -67,7 +67,7 @@ LIVE = _PAGE / "live.js"
 
 
 def content(states: list[Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
-    """Content of each page: columns, legends, budget of a frame, width of a cell (None without points)."""
+    """Content of a page: columns, legends, budget of a frame, width of a cell (None without points)."""
     return {
         "schema": "modt.player/2",
         "columns": [(name, SCALE.get(name, 1)) for name in COLUMNS],
@@ -82,7 +82,7 @@ def content(states: list[Entry], budget: str | None, step_cm: int | None) -> dic
 
 
 def page(name: str, about: str, known: dict[str, Any], script: Path) -> tuple[str, str]:
-    """The page before and after its data; the script says where frames come from, and what Play does."""
+    """HTML before and after the data of a page. The script fetches the frames and handles Play."""
     css, body = ((_PAGE / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "html"))
     scripts = "".join(part.read_text(encoding="utf-8") for part in (*_SCRIPTS, script))
     text = json.dumps(known, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

@@ -51,7 +51,7 @@ class GammaEstimate:
     """Gamma of one mode over tracking-by-detection, with intervals at 95 % over frames resampled in blocks."""
 
     reconciliation: Reconciliation
-    reconciled: Quantity  # by the full model
+    reconciled: Quantity  # gamma by the full model
     measured: Quantity  # ratio of the costs of the two runs
     deviation: Quantity  # reconciled / measured - 1
 

@@ -27,7 +27,7 @@ Frames = tuple[int, int | None]
 Capture = Sequence[tuple[str, str]]
 PLAIN = ("id", "state", "class", "viewed", "final", "proposal", "points", "age", "missed")
 """Columns that have their name from tracks.jsonl."""
-UNITS = {"yaw": "rad", "heading": "rad", "speed_mps": ""}  # of the others: m
+UNITS = {"yaw": "rad", "heading": "rad", "speed_mps": ""}  # other columns: m
 NO_BOX = dict.fromkeys(BOX_KEYS)
 
 

@@ -1,6 +1,6 @@
 """Proposals and tracks of a frame against its labelled objects, by the points that they share.
 
-What is compared and what is ignored is written down in docs/evaluation.md.
+docs/evaluation.md states the rules.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def judge(
 ) -> tuple[Rows, Rows, tuple[Association, ...]]:
     """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class.
 
-    points: of the labelled objects, where they are known.
+    `points` are the points of the labelled objects, where they are known.
     """
     overlap = Overlap.of(frame, points)
     row = np.full(len(overlap.size), NONE, np.int64)

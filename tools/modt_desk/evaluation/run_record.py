@@ -148,10 +148,10 @@ class RunRecord:
         """Every recorded frame beside its truth.
 
         Args:
-            truth: of the run's recording.
+            truth: labels of the recording of the run.
             proposed: assigns points to proposals; None: the labels that replay --labels has written.
             stream: the recording; None: the scans of the truth.
-            records: those of frames that are labelled; None: all.
+            records: records of labelled frames; None for all records.
 
         Raises:
             MisuseError: the run is of another recording, empty or without labels, or a record is broken.

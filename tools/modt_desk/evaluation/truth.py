@@ -109,7 +109,7 @@ def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Fl
     """Map each frame to (k, 7) boxes of parked cars without a label in it, as they stood at their nearest label.
 
     Args:
-        labels: of a recording.
+        labels: labels of a recording.
         types: classes of their types.
         poses: T_world_sensor by frame.
     """
@@ -134,8 +134,8 @@ def by_stamp(truth: Truth, stamps_s: Mapping[int, float]) -> Truth:
     Where no stamps agree, those of the run have another origin: then both count from the first one.
 
     Args:
-        truth: of a recording with scans; without them it is returned as it is.
-        stamps_s: by number of the run's frames, of which there is one.
+        truth: truth of a recording; without scans it is returned unchanged.
+        stamps_s: stamp of each frame of the run by its number; at least one.
     """
     if truth.scans is None or not truth.scans.scans:
         return truth

@@ -57,7 +57,7 @@ class Mover:
     frame: Int  # (n,)
     box: Float64  # (n, 7) sensor frame, along the motion, all of one size
     gone_m: float  # from its first place to its last
-    straightness: float  # that distance over the length of its path
+    straightness: float  # gone_m over the length of its path
     speed_mps: float  # length of its path over time
 
 

@@ -183,7 +183,7 @@ class IdealTracking(PlayedBack):
         return Located(origin, observe(proposals, origin.T_world_sensor))
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """Never asked for.
+        """Raise an error: no caller needs it.
 
         Raises:
             NotImplementedError: always.

@@ -245,7 +245,8 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
     frames = np.cumsum(each) - each
     parts_mJ, basis = energy_plots.stage_energy_mJ(series), energy_plots.basis(tree["gross_J"])
     baseline, run_mJ = "E1, tracking-by-detection (computed)", np.sum([*parts_mJ.values()], axis=0)
-    further_ms = np.array(series["e1_cpu_ms"]) - np.sum([*series["cpu_ms"].values()], axis=0)  # of classification
+    run_ms = np.sum([*series["cpu_ms"].values()], axis=0)
+    further_ms = np.array(series["e1_cpu_ms"]) - run_ms  # CPU time of the classifications that E1 adds
     energy_mJ = {baseline: run_mJ + series["stage_W"][CLASSIFICATION] * further_ms, "E2, this run": run_mJ}
     budget = [svg.Trace(key, frames, np.array(series[key], float)) for key in ("classified", "deferred")]
     if series["budget"] is not None:

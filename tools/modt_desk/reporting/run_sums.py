@@ -99,8 +99,9 @@ class FrameSums:
         self.marks: set[str] = set()
         self.lengths = Histogram()  # frames with a proposal, of the tracks that ended
         self.foreground = self.tracks = self.classified_tracks = 0
-        self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)  # of calls, items, points and CPU s
-        self._length: dict[int, int] = {}  # of the tracks alive
+        # products of calls, items and points with one another, and with CPU time [s]
+        self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)
+        self._length: dict[int, int] = {}  # frames with a proposal by track alive
         self._viewed: set[int] = set()
 
     def add(self, line: dict[str, Any], record: dict[str, Any]) -> None:

@@ -28,7 +28,7 @@ class Response:
     far_loss: float = 0.0  # subtracted per metre farther [1/m]
     least: float = 0.0  # lower intensities are reported as 0
     most: float = 1.0  # greatest reported intensity
-    steps: int = 255  # of the scale from 0 to 1
+    steps: int = 255  # steps of the scale from 0 to 1
 
     def report(self, intensity: Float32, range_m: Float32) -> Float32:
         """(n,) reported intensities [0, most] of returns by their intensities in focus and their ranges."""
@@ -42,26 +42,26 @@ class Response:
 class SensorModel:
     """A LiDAR that samples a grid of beams and azimuths, by default one that rotates at 10 Hz."""
 
-    name: str  # of the sensor, and of the profile it is run with
-    elevation_rad: Float64  # (B,) of each beam, descending
-    azimuth_rad: Float64  # (A,) of each column, ascending, counter-clockwise from straight ahead
+    name: str  # name of the sensor and of its profile
+    elevation_rad: Float64  # (B,) elevations of the beams, descending
+    azimuth_rad: Float64  # (A,) azimuths of the columns, ascending, counter-clockwise from straight ahead
     origin_m: Float64 | float = 0.0  # (B,) height of each beam's origin above the sensor's, or one for all
     rotating: bool = True  # a sweep is one turn of the columns
-    sweeps_a_ray: int = 1  # of sweeps, one in which a ray is fired; more than 1 for a non-repetitive sensor
+    sweeps_a_ray: int = 1  # sweeps in which each ray is fired once; more than 1 if non-repetitive
     height_m: float  # usual mounting height above the ground
-    min_range_m: float  # of a return
-    max_range_m: float  # of a return
+    min_range_m: float  # least range of a return
+    max_range_m: float  # greatest range of a return
     range_sigma_m: float = 0.015  # noise of a range
     beam_sigma_m: float = 0.0075  # standard deviation of the constant range errors of the beams
     azimuth_sigma_rad: float = 0.0003  # jitter of a firing
-    elevation_sigma_rad: float = 0.0  # the same in elevation
+    elevation_sigma_rad: float = 0.0  # jitter of a firing in elevation
     detect_m: float = 70.0  # distance at which half the returns of a reflectivity of 0.1 at normal incidence are lost
     dropout: float = 0.01  # share of firings lost on any surface
     beam_radius_m: float = 0.02  # radius of a beam at its origin
     divergence_rad: float = 0.0015  # growth of the radius with range
     mixed_share: float = 0.12  # share of the returns at a depth edge that lie between the surfaces
     edge_delay_m: float = 0.06  # mean range error of a return from an edge that splits the beam
-    period_s: float = 0.1  # of a sweep
+    period_s: float = 0.1  # time of a sweep
     response: Response = Response()  # reported intensity
 
     @property

@@ -54,11 +54,11 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
     """Draw points, tracks, truth, and the cost of the frame, in place of the former content of the figure.
 
     Args:
-        figure: drawn on.
-        run: what is recorded.
+        figure: figure to draw on.
+        run: recorded run.
         at: index of the frame.
         step_cm: width of a cell.
-        cells: of the sweep, None without points.
+        cells: cells of the sweep, None without points.
     """
     figure.clear()
     axes, reach = figure.add_axes((0, 0, 1, 1)), reach_m(run.tracks)

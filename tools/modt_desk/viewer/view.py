@@ -82,7 +82,7 @@ def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: 
 
     Args:
         path: the file.
-        run: what is recorded.
+        run: recorded run.
         start: index of the frame.
         step_cm: width of a cell.
         sweeps: cells of each frame, None without points.

@@ -144,7 +144,7 @@ def find_hwmon(sys: Path) -> list[Candidate]:
 
 
 def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
-    """A candidate for each rail, after one for the module of a known board: the feeding rail or a sum."""
+    """Candidates for the module of a known board (its supply rail or a sum of rails), then for each rail."""
     remedy, board = "make the chip's inputs readable", board_of(model, rails)
     found = [] if board is None else [_module(board, rails, remedy)]
     for label, meter in rails.items():
@@ -221,7 +221,7 @@ def _battery(folder: Path) -> Meter:
 
 
 _RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=(\S*)[AV](?!\S)")
-_STEP_W = 0.02  # by the width of the converter
+_STEP_W = 0.02  # one step of the converter
 _FACTS = Facts("Raspberry Pi 5 PMIC", "V x A", _STEP_W, 50.0, Scope.MODULE, Kind.INTEGRATED, privilege="group video")
 
 
@@ -274,7 +274,7 @@ FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Functions that search sysfs, mounted at a path, for candidates of one type of meter."""
 _KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
 _SCOPES = (Scope.CPU, Scope.CPU_RAIL, Scope.SOC, Scope.MODULE, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
-"""Order of preference. Of a narrower scope this program has a larger share."""
+"""Order of preference: this program has a larger share of a narrower scope."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -113,5 +113,5 @@ def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
     with host.threads_on(cores):
         joined = participant(domain_of(address))
     subscription = Subscription(joined, topic, TYPE, depth=DEPTH, reliable=reliable)
-    info = StreamInfo(f"/{topic}", "ros2")  # of nominal period, until the profile of the sensor is known
+    info = StreamInfo(f"/{topic}", "ros2")  # with the nominal period until the profile is known
     return LiveStream(info, PointCloudReader(subscription, info.name), cores=cores)

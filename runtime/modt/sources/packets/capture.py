@@ -41,7 +41,7 @@ class Fragments:
         self._pending: dict[bytes, dict[int, tuple[bytes, bool]]] = {}
 
     def whole(self, raw: bytes) -> Packet | None:
-        """Packet that these bytes of an IP packet complete, None while a part is missing or if they are none."""
+        """Packet that these bytes complete; None while a part is missing, or if they are no IP packet."""
         version = raw[0] >> 4 if raw else 0
         if version == 6 and len(raw) >= IPV6_BYTES:
             return self._whole_of_ipv6(raw)

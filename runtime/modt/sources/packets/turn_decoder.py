@@ -228,7 +228,7 @@ class TurnDecoder(PacketDecoder):
                 refuse(reception, self.name, self.unknown)
             return []
         self._signature, self._first = signature, None
-        self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # of two returns
+        self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # packets with two returns a firing
         return [s for r, p in first for s in self._packet(r, p, self.signature(p), reception)]
 
     def _packet(self, received_s: float, payload: bytes, signature: object, reception: Reception) -> Sequence[Sweep]:

@@ -117,8 +117,8 @@ def azimuths(payload: bytes) -> tuple[int, int]:
 def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> tuple[Model | None, Signature | None]:
     """Model that sent most of some packets, or the declared one, and the signature of those packets.
 
-    The model is None where it is unknown. Where identity and pace of the packets disagree, the pace of the lasers is
-    right. A contradiction is logged as a warning.
+    The model is None where it is unknown. Where the identity of the packets contradicts their pace, the pace decides.
+    A contradiction is logged as a warning.
     """
     signatures = [signature_of(payload) for payload in payloads]
     signature, _ = Counter(signatures).most_common(1)[0]
