@@ -31,7 +31,7 @@ Poses = tuple[str, Float64]
 def find_poses(
     files: list[BagFile], topics: dict[str, BagTopic], sensor: str
 ) -> tuple[Poses | None, tuple[str, ...]]:
-    """Poses that apply to the frame of a sensor, and notes. None without poses, or without a transform to the sensor."""
+    """Poses that apply to the frame of a sensor (None without poses or without a transform to it), and notes."""
     names = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE and topic.count)
     if not names:
         return None, ("no nav_msgs/Odometry: no poses",)
