@@ -78,7 +78,7 @@ class Supervisor:
 
 
 def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
-    """Supervisor of the socket that the environment names (/PATH, or @NAME if abstract); without one it does nothing."""
+    """Supervisor of the socket that the environment names (/PATH, or @NAME if abstract). Without one: no effect."""
     name = environment.get(_VARIABLE)
     if not name:
         return Supervisor()
