@@ -68,17 +68,7 @@ class Session:
         self.deadlines, self.failures, self.stop = deadlines, failures, stop
         self._totals, self._core, self._refusals, self._metrics = totals, core, list(refusals), metrics
         outputs = {**sinks, "recording": recording}
-        self.loop = Loop(
-            source,
-            stages,
-            outputs,
-            self._observe,
-            self._report,
-            deadlines,
-            failures,
-            stop,
-            clock,
-        )
+        self.loop = Loop(source, stages, outputs, self._observe, self._report, deadlines, failures, stop, clock)
         self._ledgers = [sink for sink in outputs.values() if isinstance(sink, LedgerSink)]
         self._followed = stages.chosen
         self.power, self.summary = Power(), dict[str, Any]()

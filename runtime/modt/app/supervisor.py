@@ -26,10 +26,7 @@ class Supervisor:
     """
 
     def __init__(
-        self,
-        address: str | None = None,
-        watchdog_s: float | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        self, address: str | None = None, watchdog_s: float | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._address, self._clock = address, clock
         self._interval_s = 0.0 if watchdog_s is None else watchdog_s / 2

@@ -37,9 +37,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "modt status /var/lib/modt --json   all fields of another one",
     )
     options.add_examples(
-        q,
-        "modt top                 the service that records into runs/live",
-        "modt top /var/lib/modt   another one",
+        q, "modt top                 the service that records into runs/live", "modt top /var/lib/modt   another one"
     )
 
 

@@ -68,8 +68,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare the command."""
     p = commands.add_parser("schema", help="print the JSON Schema of a profile, for editors")
     options.add_examples(
-        p,
-        "modt profile schema > profile.schema.json   for the line `# yaml-language-server: $schema=`",
+        p, "modt profile schema > profile.schema.json   for the line `# yaml-language-server: $schema=`"
     )
     p.set_defaults(run=run)
 

@@ -171,10 +171,7 @@ _ALL = (
         note="Proposals beyond the range are left out before tracking.",
     ),
     Experiment(
-        "table5",
-        "Table V: average precision, real detector, real tracker",
-        partial(_pair, ideal=False),
-        precisions,
+        "table5", "Table V: average precision, real detector, real tracker", partial(_pair, ideal=False), precisions
     ),
     Experiment(
         "fig14",
