@@ -35,8 +35,7 @@ def delays(proposals: Proposals, turn_s: float) -> Float64:
     half_angle = np.arctan2(np.hypot(length, width) / 2, np.hypot(x, y))
     beyond_seam = np.maximum(np.abs(bearing) + half_angle - np.pi, 0.0)
     bearing -= np.copysign(np.pi * beyond_seam / np.maximum(half_angle, 1e-9), bearing)
-    delay_s: Float64 = bearing * (-turn_s / (2 * np.pi))
-    return delay_s
+    return np.asarray(bearing * (-turn_s / (2 * np.pi)))
 
 
 FAR_M = 1e5

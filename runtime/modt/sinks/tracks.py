@@ -95,8 +95,7 @@ def _tracks(rows: str) -> str:
 
 def _doubts(result: FrameResult) -> Int:
     """(M,) index into UNCERTAIN of each track."""
-    doubt: Int = np.where(unknown_near(result), len(CLASS_NAMES), result.tracks.object_class * doubtful(result))
-    return doubt
+    return np.asarray(np.where(unknown_near(result), len(CLASS_NAMES), result.tracks.object_class * doubtful(result)))
 
 
 def _rows(result: FrameResult) -> list[str]:

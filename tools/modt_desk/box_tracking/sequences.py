@@ -51,8 +51,7 @@ def iou_3d(a: Float64, b: Float64) -> Float64:
     foot = np.maximum(a[:, 2] - a[:, 5] / 2, b[:, 2] - b[:, 5] / 2)
     shared = birds_eye_intersection(a, b) * np.maximum(top - foot, 0.0)
     union = np.prod(a[:, 3:6], axis=1) + np.prod(b[:, 3:6], axis=1) - shared
-    iou: Float64 = shared / np.maximum(union, TINY)
-    return iou
+    return np.asarray(shared / np.maximum(union, TINY))
 
 
 MIN_IOU = 0.25
@@ -109,8 +108,7 @@ def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
 def _mean(ids: Int, values: Float64) -> Float64:
     """(n,) mean of the values (n,) of each one's track."""
     _, track = np.unique(ids, return_inverse=True)
-    mean: Float64 = (np.bincount(track, values) / np.bincount(track))[track]
-    return mean
+    return np.asarray((np.bincount(track, values) / np.bincount(track))[track])
 
 
 def bridged(found: TrackedBoxes, max_gap: int) -> TrackedBoxes:

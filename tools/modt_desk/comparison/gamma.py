@@ -111,8 +111,7 @@ def other_costs(run: RunCosts) -> OtherCosts:
 def blocks(n: int, random: np.random.Generator) -> Int:
     """(n,) frames drawn in circular blocks."""
     starts = random.integers(0, n, size=-(-n // _BLOCK))
-    frames: Int = ((starts[:, None] + np.arange(_BLOCK)) % n).ravel()[:n]
-    return frames
+    return np.asarray(((starts[:, None] + np.arange(_BLOCK)) % n).ravel()[:n])
 
 
 def _interval(values: Float64) -> Interval:

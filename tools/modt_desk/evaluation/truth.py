@@ -71,8 +71,7 @@ class Regions:
         uvw = points[:, :3] @ P[:, :3].T + P[:, 3]
         uv = uvw[:, :2] / np.maximum(uvw[:, 2:], 1e-6)
         low, high = self.edges[:, None, :2], self.edges[:, None, 2:]
-        within: Bool = ((uv > low) & (uv < high)).all(axis=2).any(axis=0) & (uvw[:, 2] > 1)
-        return within
+        return np.asarray(((uv > low) & (uv < high)).all(axis=2).any(axis=0) & (uvw[:, 2] > 1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,8 +95,7 @@ def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
 
 def within(proposals: Proposals, range_m: float) -> Bool:
     """(P,) proposals within a range."""
-    near: Bool = np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m
-    return near
+    return np.asarray(np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m)
 
 
 @lru_cache(maxsize=2)

@@ -139,8 +139,7 @@ def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
     rows = run.tracks[(run.tracks[:, 0] == id_) & (now <= at) & (now >= at - TRAIL)]
     x, y, yaw = run.poses[at]
     c, s = np.cos(yaw), np.sin(yaw)
-    trail: Float64 = (rows[:, world : world + 2] / SCALE["world_x"] - [x, y]) @ np.array([[c, -s], [s, c]])
-    return trail
+    return np.asarray((rows[:, world : world + 2] / SCALE["world_x"] - [x, y]) @ np.array([[c, -s], [s, c]]))
 
 
 def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:

@@ -205,5 +205,4 @@ class VelodyneDecoder(TurnDecoder):
         """(N, 8) table of the library."""
         if not entries:  # the library would crash
             return np.zeros((0, 8), np.float32)
-        table: Float32 = self._decoder.decode(self._library.PacketVector([e.packet for e in entries]))[1]
-        return table
+        return np.asarray(self._decoder.decode(self._library.PacketVector([e.packet for e in entries]))[1])
