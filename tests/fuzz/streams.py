@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from modt.ros2.cdr import MessageError
-from modt.ros2.odometry import read_odometry, write_odometry
+from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
-from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.packets.capture import Capture, open_capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder

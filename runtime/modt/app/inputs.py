@@ -86,8 +86,7 @@ def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Pa
     """
     if "://" in text:
         return open_sensor(text, cores), None
-    from modt.sources.live.live_stream import LiveStream
-    from modt.sources.live.played_reader import PlayedReader
+    from modt.sources.live.live_stream import LiveStream, PlayedReader
 
     place, _, query = text.partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))

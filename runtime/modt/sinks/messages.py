@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.geometry import quaternion_of, se3, yaw_of
-from modt.ros2 import odometry, point_cloud2, static_transforms
+from modt.ros2 import odometry, point_cloud2
 from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
 from modt.types import NONE, Float64, FrameResult, Int
 
 PREFIX, FRAME_ID, WORLD_FRAME_ID = "modt", "lidar", "world"
 """Names used if neither the address nor the input gives one."""
-DETECTIONS, MARKERS, TF = "vision_msgs/Detection3DArray", "visualization_msgs/MarkerArray", static_transforms.TYPE
+DETECTIONS, MARKERS, TF = "vision_msgs/Detection3DArray", "visualization_msgs/MarkerArray", odometry.TF
 UNKNOWN_COVARIANCE = f"{8 * 36}x"
 
 ARROW, CUBE, TEXT = 0, 1, 9

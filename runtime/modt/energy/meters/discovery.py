@@ -206,10 +206,8 @@ def _battery(folder: Path) -> Meter:
     computed = power.exists()
     unit = "uW" if computed else "uV x uA"
     facts = Facts(f"battery {folder.name}", unit, 0.01, 2000.0, Scope.ROBOT, Kind.INTEGRATED)
-    if computed:
-        drawn = file_meter(facts, power)
-    else:
-        drawn = file_meter(facts, folder / "voltage_now", folder / "current_now", scale=1e-12)
+    product = file_meter(facts, folder / "voltage_now", folder / "current_now", scale=1e-12)
+    drawn = file_meter(facts, power) if computed else product
 
     def read() -> float:
         status = read_text(folder / "status")
