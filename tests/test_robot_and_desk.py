@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modt.app.kernel_choice import choose
+from modt.app.assembly import chosen_kernels
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import environment
 
@@ -63,7 +63,7 @@ def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, until, sc
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(choose("auto").name == "numpy", reason="the kernels in NumPy use SciPy")
+@pytest.mark.skipif(chosen_kernels("auto").name == "numpy", reason="the kernels in NumPy use SciPy")
 @pytest.mark.parametrize("command", ["run", "replay"])
 def test_no_frame_loads_scipy(command, tmp_path):
     drive = SyntheticStream("street", "vlp-16", 1.5, 0)

@@ -39,7 +39,7 @@ def test_a_dash_is_standard_output(monkeypatch):
 
 def test_an_extra_that_is_missing_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "foxglove", None)
-    monkeypatch.delitem(sys.modules, "modt.sinks.foxglove_server", raising=False)
+    monkeypatch.delitem(sys.modules, "modt.sinks.foxglove_sinks", raising=False)
     with pytest.raises(MisuseError, match=r"needs foxglove; pip install '\.\[foxglove\]'"):
         open_sink("foxglove://")
 

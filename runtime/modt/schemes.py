@@ -107,9 +107,11 @@ SINKS = {
     "file": Scheme("file:///PATH", _opener("sinks.frame_lines", "open_file")),
     "unix": Scheme("unix:///PATH", _opener("sinks.datagrams", "open_unix")),
     "udp": Scheme("udp://HOST:PORT", _opener("sinks.datagrams", "open_udp")),
-    "mcap": Scheme("mcap:///PATH", _background("sinks.mcap_file", "open_mcap", 4), _POINTS | {"max_mb"}, "foxglove"),
+    "mcap": Scheme(
+        "mcap:///PATH", _background("sinks.foxglove_sinks", "open_mcap", 4), _POINTS | {"max_mb"}, "foxglove"
+    ),
     "foxglove": Scheme(
-        "foxglove://[HOST][:PORT]", _background("sinks.foxglove_server", "open_foxglove", 4), _POINTS, "foxglove"
+        "foxglove://[HOST][:PORT]", _background("sinks.foxglove_sinks", "open_foxglove", 4), _POINTS, "foxglove"
     ),
     "view": Scheme("view://[HOST][:PORT]", _background("viewer.live_page", "open_view", 6)),
     "ros2": Scheme("ros2:///PREFIX", _background("sinks.ros2", "open_ros2", 4), _DETECTIONS, "ros2"),

@@ -11,8 +11,7 @@ from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, Scope
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.stream import StreamInfo
+from modt.sources.stream import Reception, StreamInfo, Sweep
 
 
 def core(sys, isolated, number):

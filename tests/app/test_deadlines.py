@@ -11,7 +11,7 @@ from modt.app.deadlines import Deadlines, Timing
 from modt.app.ladder import Step
 from modt.app.loop import WAIT_S, Loop, Stop
 from modt.errors import MisuseError, ModtError
-from modt.sources.live.sweep_reader import Received, StreamEndedError
+from modt.sources.stream import Received, StreamEndedError
 from modt.types import Budget, Frame
 from tests.results import Kept, result
 

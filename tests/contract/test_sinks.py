@@ -7,8 +7,7 @@ import pytest
 
 from modt.errors import ModtError
 from modt.schemes import SINKS, open_sink
-from modt.sinks.kitti import KittiResults
-from modt.sinks.labels import PointLabels
+from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import LedgerSink, LineFile
 from modt.sinks.tracks import frame_line
 from tests.results import CAR, result

@@ -38,7 +38,6 @@ from modt.sinks.background import Background
 from modt.sinks.datagrams import Datagrams
 from modt.sinks.output import LineFile
 from modt.sinks.recording import AtOnce, Recording
-from modt.sinks.records import read_records
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.tracks import SCHEMA, frame_line
 from modt.sources.live import live_stream
@@ -48,6 +47,7 @@ from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Frame
+from modt_desk.reporting.records import read_records
 from tests.crash.failing_calls import Faults
 from tests.results import CAR, result
 from tests.sequences.makers import MAKERS

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from modt.ros2.cdr import MessageError
-from modt.ros2.odometry import read_odometry, write_odometry
+from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
-from modt.ros2.static_transforms import StaticTransforms
-from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
@@ -18,6 +16,7 @@ from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
+from modt.sources.stream import Reception
 from tests.fuzz.target import Feed, of_file, target
 from tests.ros2 import messages
 from tests.sources import bags, layouts

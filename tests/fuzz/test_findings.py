@@ -12,11 +12,11 @@ from modt.classification.pointnet import read_model
 from modt.cli.status import read as read_status
 from modt.errors import ModtError
 from modt.ros2.cdr import CdrWriter
-from modt.sinks.records import read_records
 from modt.sources.packets.hesai import read_angles
 from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_source import read_poses
+from modt_desk.reporting.records import read_records
 from tests.desk.reporting.test_run_report import ledger_line
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import SENSOR_BOMB, network

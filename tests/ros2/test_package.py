@@ -22,7 +22,7 @@ from modt.errors import MisuseError
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.schemes import POSES, SENSORS, SINKS, open_poses, open_sensor, open_sink
-from modt.sinks.foxglove_server import FIGURES
+from modt.sinks.foxglove_sinks import FIGURES
 from modt.sinks.messages import PREFIX, topics
 from tests.results import CAR, result
 from tests.ros2 import fake_rclpy

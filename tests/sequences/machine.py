@@ -11,10 +11,11 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from modt.app.assembly import MODES
 from modt.errors import ScanError
-from modt.sinks.records import line, read_records
+from modt.sinks.records import line
 from modt.sinks.tracks import SCHEMA
 from modt.sources.scan_file import sanitised
 from modt.types import Budget, Float32, Frame
+from modt_desk.reporting.records import read_records
 from tests.sequences.promises import Run, config
 from tests.sequences.world import SENSORS, World, broken
 

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 
 from modt.config import RecordingConfig
 from modt.sinks.recording import AtOnce, Recording
-from modt.sinks.records import read_records
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from tests.results import CAR, result
 
 OURS = f"schema: modt.run/1\n{MARK}\n"

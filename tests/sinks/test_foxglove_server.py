@@ -12,7 +12,7 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sink
-from modt.sinks.foxglove_server import FoxgloveServer
+from modt.sinks.foxglove_sinks import FoxgloveServer
 from modt.sinks.messages import topics
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
 

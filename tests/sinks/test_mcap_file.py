@@ -11,7 +11,7 @@ from rosbags.highlevel import AnyReader
 from modt.errors import ModtError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import open_sink
-from modt.sinks.mcap_file import McapFile
+from modt.sinks.foxglove_sinks import McapFile
 from modt.sinks.messages import topics
 from modt.sources.recognise import open_stream
 from tests.results import CAR, PEDESTRIAN, result

@@ -9,9 +9,8 @@ from rosbags.typesys import get_types_from_msg
 from modt.geometry import rotation_zyx, se3, transform
 from modt.placement import Mount
 from modt.ros2.definitions import DEFINITIONS, schema
-from modt.ros2.odometry import read_odometry
+from modt.ros2.odometry import StaticTransforms, read_odometry
 from modt.ros2.point_cloud2 import read_cloud
-from modt.ros2.static_transforms import StaticTransforms
 from modt.sinks import messages as encoded
 from tests.results import CAR, PEDESTRIAN, result
 from tests.ros2 import messages

@@ -1,7 +1,6 @@
 import numpy as np
 
-from modt.viewer.packed import packed_table
-from modt.viewer.point_cells import Cells
+from modt.viewer.packed import Cells, packed_table
 
 from . import pages
 

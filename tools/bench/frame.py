@@ -25,8 +25,8 @@ import numpy as np
 
 from modt import host, profile
 from modt.app import assembly
-from modt.config.segmentation import NATIVE
-from modt.config.segmentation import NUMPY as NUMPY_KERNELS
+from modt.config.stages import NATIVE
+from modt.config.stages import NUMPY as NUMPY_KERNELS
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
 from modt.pipeline import SEGMENTATION

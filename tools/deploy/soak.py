@@ -35,7 +35,7 @@ from modt.app.session import Session, service
 from modt.app.supervisor import Supervisor
 from modt.schemes import open_sensor
 from modt.sinks.output import Health
-from modt.sources.live.sweep_reader import StreamEndedError, Sweep, SweepReader
+from modt.sources.stream import StreamEndedError, Sweep, SweepReader
 from modt.types import FrameResult
 from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT, Fault, World
 from tools.options import parser

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from modt.cli.options import frames, real
 from modt.errors import ModtError
-from modt.sources.packets.open_capture import open_capture
+from modt.sources.packets.capture import open_capture
 from modt.sources.recognise import CAPTURES, open_stream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser

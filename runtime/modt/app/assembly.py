@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,22 +12,26 @@ from importlib import import_module
 import numpy as np
 
 from modt import host
-from modt.app import kernel_choice
 from modt.classification.decision import Decision, LikeliestClass
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
 from modt.config import FusionConfig, ProfileConfig
+from modt.config.stages import KERNELS, NATIVE
+from modt.config.stages import NUMPY as NUMPY_NAME
 from modt.energy.ledger import Ledger
+from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
 from modt.geometry.kernels import GeometryKernels
+from modt.native.library import NotAvailableError, load
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Classifier, Fusion, Pipeline
 from modt.pipeline import Segmenter as SegmenterStage
 from modt.placement import Mount
-from modt.segmentation.kernels import Kernels
+from modt.segmentation.kernels import NUMPY, Kernels
+from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
 from modt.tracking.tracker import Tracker
@@ -95,6 +100,29 @@ class BlindSectorFilter:
         return self.segmenter.segment(kept)
 
 
+VARIABLE = "MODT_KERNELS"
+
+
+def chosen_kernels(wanted: str) -> Kernels:
+    """The kernels of a name in KERNELS, or of the name in the environment variable MODT_KERNELS.
+
+    Raises:
+        MisuseError: the name is unknown, or the compiled ones are asked for and cannot be used.
+    """
+    name = os.environ.get(VARIABLE) or wanted
+    if name not in KERNELS:
+        raise MisuseError(VARIABLE, f"no kernels {name!r}", f"use one of: {', '.join(KERNELS)}")
+    if name == NUMPY_NAME:
+        return NUMPY
+    try:
+        return NativeKernels(*load())
+    except NotAvailableError as error:
+        if name == NATIVE:
+            raise MisuseError("segmentation.kernels", f"native: {error}", f"or use {NUMPY_NAME}") from None
+        log.warning("the passes over points run on NumPy: a frame takes about half as long again: %s", error)
+        return NUMPY
+
+
 def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> SegmenterStage:
     """The first stage, the same in every mode."""
     sensor, stage = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
@@ -121,7 +149,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledge
         MisuseError: the model cannot be used.
     """
     host.keep_freed_pages()
-    kernels = kernel_choice.choose(profile.segmentation.kernels)
+    kernels = chosen_kernels(profile.segmentation.kernels)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
     cost = LinearCost(limits.max_points, padded_size(limits))

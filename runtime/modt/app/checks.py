@@ -61,7 +61,7 @@ def governor(number: int | None, sys: Path = Path("/sys")) -> Finding:
 
 
 def permissions() -> list[Finding]:
-    """Check real-time priority and locked memory, and take what is permitted."""
+    """Check real-time priority and locked memory, and use what is permitted."""
     refusals = host.take_real_time_priority()
     with ThreadPoolExecutor(1) as receiving:
         refusals.append(receiving.submit(host.serve_loop, None).result())
@@ -93,7 +93,7 @@ def kernels(choose: Callable[[], str]) -> Finding:
 
 
 def model(config: ClassificationConfig, load: Callable[[], dict[str, str]]) -> Finding:
-    """Check that the network is the one of its card."""
+    """Check that the network is the one that its card describes."""
     try:
         facts = load()
     except ModtError as error:
@@ -124,7 +124,7 @@ def disk(out: Path, config: ProfileConfig, free_bytes: Callable[[Path], int] | N
 
 
 def clock(state: int | None = None, now_s: float | None = None) -> Finding:
-    """Check that the calendar clock is set, which poses and sweeps are matched by."""
+    """Check that the calendar clock is set. Poses and sweeps are matched by it."""
     year = time.gmtime(time.time() if now_s is None else now_s).tm_year
     if year < _SANE_YEAR:
         return Finding(FAIL, "clock", f"the year is {year}", "set it, or fit a battery to the clock")

@@ -42,11 +42,11 @@ class ChosenProfile:
 
 
 def choose(asked_for: profile.Names | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:
-    """The profile of a stream by its first frame; what differs is warned of.
+    """Choose the profile of a stream by its first frame, and log the differences as warnings.
 
-    What is found takes the place of the default profile, and of that which the source has named, never of one of a
-    sensor that was asked for, but for a tilt of the mount that it leaves open; beams that the source knows are better
-    than found ones.
+    The findings of the first frame replace the default profile, or the profile that the source names. They never
+    replace the profile of a requested sensor, except for a tilt that this profile leaves open. Beams that the source
+    states take precedence over beams that are found.
 
     Raises:
         MisuseError: a profile that cannot be used.
@@ -66,7 +66,7 @@ def choose(asked_for: profile.Names | ProfileConfig, first: Frame | None, info: 
 
 
 def _compared(first: Frame | None, config: ProfileConfig, name: str, *, replaced: bool) -> Recognition:
-    """Differences between a sweep and the profile of a name, which is replaced or not."""
+    """Compare a sweep with the profile of a name; `replaced` says whether the findings take its place."""
     recognition = Recognition((), None, config) if first is None else recognise(first.points, config)
     for line in recognition.warnings(name, replaced=replaced):
         log.warning("%s", line)

@@ -1,4 +1,4 @@
-"""Containment of failures: each kind is counted and logged once, and only a row of failures ends the run."""
+"""Containment of failures: each kind is counted and logged once. Only MAX_IN_A_ROW failures in a row end the run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Containment:
         self.in_a_row = 0
 
     def succeed(self) -> None:
-        """A frame went well."""
+        """Note a frame without a failure."""
         self.in_a_row = 0
 
     def fail(self, error: Exception, where: str) -> None:
@@ -49,7 +49,7 @@ class Containment:
             raise ModtError(where, cause, "report it, with the traceback above") from error
 
     def spare(self, where: str, call: Callable[P, R], /, *arguments: P.args, **options: P.kwargs) -> R | None:
-        """Result of a dispensable call. A failure is counted and gives None."""
+        """Result of a call that is not essential. A failure is counted, and the result is None."""
         try:
             return call(*arguments, **options)
         except Exception as error:

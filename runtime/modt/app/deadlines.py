@@ -81,7 +81,7 @@ class Deadlines:
         self.shed = 0
         self.budget_ms = 0.0
         self._period_s, self._clock = period_s, clock
-        self._start_s = 0.0  # of the present frame
+        self._start_s = 0.0  # start of the present frame
         self._fresh_s: float | None = None  # end of the first frame
         self._shed_last = False
 

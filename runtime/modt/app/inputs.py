@@ -47,13 +47,13 @@ class Request:
 
     @classmethod
     def of(cls, arguments: argparse.Namespace) -> Request:
-        """The options that a command has; the defaults of the others."""
+        """Request by the options of a command, and defaults for the options that it lacks."""
         names = {field.name for field in fields(cls)}
         return cls(**{name: value for name, value in vars(arguments).items() if name in names})
 
 
 def stream(request: Request) -> Stream:
-    """The stream asked for, the embedded one where no path is given.
+    """The requested stream, or the embedded one without a path.
 
     Raises:
         MisuseError: the path is no stream.
@@ -74,20 +74,19 @@ def stream(request: Request) -> Stream:
 
 
 def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Path | None]:
-    """A sensor by its address, or a recording by its path, played as if it were live; "" is the embedded stream.
+    """A sensor by its address, or a recording by its path, played as if it were live. "" is the embedded stream.
 
     `PATH?loop=yes` plays a recording for ever.
 
     Returns:
-        the source, and the path where its frames can be read again by their numbers, None where they cannot.
+        the source, and the path from which its frames can be read again by number; None if they cannot.
 
     Raises:
         MisuseError: no such sensor or recording.
     """
     if "://" in text:
         return open_sensor(text, cores), None
-    from modt.sources.live.live_stream import LiveStream
-    from modt.sources.live.played_reader import PlayedReader
+    from modt.sources.live.live_stream import LiveStream, PlayedReader
 
     place, _, query = text.partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
@@ -104,7 +103,7 @@ def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> Pose
     """Source of the poses of a stream's frames.
 
     Raises:
-        MisuseError: a file of poses that cannot be used, an address that cannot be bound or is none.
+        MisuseError: a file of poses cannot be used, or an address is invalid or cannot be bound.
     """
     if request.poses is not None:
         return PoseFile(request.poses, info.camera, info.end)
@@ -119,10 +118,10 @@ def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> Pose
 
 
 def field_of_view(request: Request, info: StreamInfo, mount: Mount = LEVEL) -> FieldOfView:
-    """The part of space to look at, for the level points of a mount.
+    """Field of view for the level points of a mounted sensor.
 
     Raises:
-        MisuseError: the camera's is asked for and the stream has none.
+        MisuseError: the view of the camera is requested, and the stream has no camera.
     """
     if request.fov == "full":
         return FieldOfView()

@@ -24,10 +24,10 @@ DEFERRED_EVERY = 5
 class Step(IntEnum):
     """Measures against load. Each step includes those before it."""
 
-    ALL = 0  # nothing
-    DEFERRED = 1  # classification, but for a call now and then
-    REDUCED = 2  # what is far
-    DROPPED = 3  # every second sweep
+    ALL = 0  # no measure
+    DEFERRED = 1  # classification is deferred, except one call every DEFERRED_EVERY frames
+    REDUCED = 2  # distant points are left out
+    DROPPED = 3  # every second sweep is left out
 
 
 GIVEN_UP = {
@@ -67,8 +67,9 @@ class Ladder:
         self.step = Step.ALL
         self.power_W = power_W
         self.patience_s = CALM_S
-        self._cause = Event.OVERRUN  # of the last step up
-        self._calm_s = self._ample_s = self._down_s = float("-inf")  # since when; last step down
+        self._cause = Event.OVERRUN  # cause of the last step up
+        # start of slack, start of ample slack, time of the last step down
+        self._calm_s = self._ample_s = self._down_s = float("-inf")
 
     def frame(self, now_s: float, share: float) -> Event | None:
         """A frame whose result came `share` of a period after its sweep."""

@@ -21,7 +21,7 @@ from modt.energy.ledger import Line
 from modt.errors import ModtError
 from modt.pipeline import SINK
 from modt.sinks.output import Writer
-from modt.sources.live.sweep_reader import Received, StreamEndedError
+from modt.sources.stream import Received, StreamEndedError
 from modt.types import FrameResult
 
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ log = logging.getLogger(__name__)
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 NAP_S = 0.05
-"""Longest sleep without a look at the signals [s]."""
+"""Longest sleep without a check of the signals [s]."""
 WAIT_S = 0.2
-"""Longest wait for a sweep without a look at the signals and the watchdog [s]."""
+"""Longest wait for a sweep without a check of the signals and the watchdog [s]."""
 REPORT_S = 1.0
 """Time between two reports of the status [s]."""
 
@@ -56,7 +56,7 @@ class Stop:
             self._handlers[signal.SIGHUP] = self._on_reload
 
     def sleep(self, seconds: float) -> None:
-        """Sleep, in naps: a signal does not end one, and is seen after it."""
+        """Sleep in short naps. A signal does not interrupt a nap, and is noticed after it."""
         end_s = self._clock() + seconds
         while self.signal is None and (left_s := end_s - self._clock()) > 0:
             self._sleep(min(left_s, NAP_S))
@@ -121,7 +121,7 @@ class Loop:
         self.reloads = self.refused_reloads = 0
 
     def run(self, supervisor: Supervisor) -> None:
-        """Process frames until a signal, or the end of the source. The first one shows what the sensor is.
+        """Process frames until a signal, or the end of the source. The first one identifies the sensor.
 
         Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
 

@@ -8,15 +8,14 @@ from typing import Any
 
 from modt.energy.ledger import Ledger
 from modt.pipeline import SOURCE
-from modt.sources.live.sweep_reader import Received, StreamEndedError
-from modt.sources.stream import Stream
+from modt.sources.stream import Received, Stream, StreamEndedError
 
 
 class Pace:
     """Frames at absolute deadlines, which restart after an overrun so that no burst follows.
 
     Args:
-        rate_hz: frames a second; None for as many as there is time for.
+        rate_hz: frames a second; None for no limit.
     """
 
     def __init__(
@@ -27,11 +26,11 @@ class Pace:
     ) -> None:
         self._rate_hz, self._clock, self._sleep = rate_hz, clock, sleep
         self._period_s = 0.0 if rate_hz is None else 1.0 / rate_hz
-        self._max_lateness_s = self._lost_s = 0.0  # by which the deadlines were put off
+        self._max_lateness_s = self._lost_s = 0.0  # largest delay, and time by which deadlines were put off
         self._deadline_s: float | None = None
 
     def wait(self) -> None:
-        """Sleep until the deadline; when late by more than a period, begin a new row of deadlines."""
+        """Sleep until the deadline. After a delay of more than a period the deadlines start anew."""
         if self._rate_hz is None:
             return
         now_s = self._clock()
@@ -59,7 +58,7 @@ class Pace:
 
 
 class Playback:
-    """The frames of a stream, taken at a pace; reading them is a span of the ledger."""
+    """The frames of a stream at a pace. Reading a frame is a span of the ledger."""
 
     def __init__(self, stream: Stream, pace: Pace, ledger: Ledger) -> None:
         self.info, self.faults, self.profile, self.pace = stream.info, stream.faults, stream.info.profile, pace
@@ -69,7 +68,7 @@ class Playback:
         """No effect."""
 
     def take(self, timeout_s: float) -> Received:
-        """The next frame, however long it takes.
+        """The next frame, without a time limit.
 
         Raises:
             StreamEndedError: there is none.

@@ -15,7 +15,7 @@ COUNTERS = re.compile(
     r"(frames|proposals|classifications|deferred|missed_deadlines|shed_sweeps|reloads|refused_reloads|steps_entered"
     r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|(?:un)?sent|dropped)"
 )
-"""Names of what only grows."""
+"""Names of counters, which never decrease."""
 LABELS = {
     "visible": "class",
     "steps_entered": "step",
@@ -23,12 +23,12 @@ LABELS = {
     "refused_messages": "reason",
     "stages_J": "stage",
 }
-"""Tables, and what their keys are."""
+"""Label of the keys of each table."""
 STEPS = ("all", "deferred", "reduced", "dropped")
 
 
 def metrics_text(status: Mapping[str, Any]) -> str:
-    """Every number of a status, as modt_PART_NAME; names ending in _total only grow."""
+    """Every number of a status, as modt_PART_NAME; names of counters end in _total."""
     lines: list[str] = []
     typed: set[str] = set()
     for name, labels, value in _samples(status):

@@ -68,17 +68,7 @@ class Session:
         self.deadlines, self.failures, self.stop = deadlines, failures, stop
         self._totals, self._core, self._refusals, self._metrics = totals, core, list(refusals), metrics
         outputs = {**sinks, "recording": recording}
-        self.loop = Loop(
-            source,
-            stages,
-            outputs,
-            self._observe,
-            self._report,
-            deadlines,
-            failures,
-            stop,
-            clock,
-        )
+        self.loop = Loop(source, stages, outputs, self._observe, self._report, deadlines, failures, stop, clock)
         self._ledgers = [sink for sink in outputs.values() if isinstance(sink, LedgerSink)]
         self._followed = stages.chosen
         self.power, self.summary = Power(), dict[str, Any]()
@@ -86,11 +76,11 @@ class Session:
         self._began_s = clock()
         self._counts = Counts(totals, self._began_s)
         self._without_reflectance = 0
-        self._tracks: Tracks | None = None  # of the last frame
+        self._tracks: Tracks | None = None  # tracks of the last frame
         self._tick: Tick = lambda result: None
 
     def run(self, supervisor: Supervisor, tick: Tick | None = None) -> dict[str, Any]:
-        """Until a signal or the end of the source; returns the summary, as written.
+        """Run until a signal or the end of the source; return the summary as written.
 
         Raises:
             ModtError: a failure that is not contained, or another run that records into the same directory.
@@ -179,7 +169,7 @@ class Session:
         return {address: sink.health() for address, sink in self.sinks.items()}
 
     def _finish(self) -> None:
-        """Write the summary after everything that waits."""
+        """Write the summary after the queued records."""
         elapsed_s, frames, stages = self._clock() - self._began_s, self._totals.frames, self.stages
         faults = self.source.faults
         self.summary = self._totals.result() | {
@@ -220,7 +210,7 @@ class Session:
 def replay(
     request: inputs.Request, sinks: Mapping[str, Sink], out: Path | None, core: int | None, command: Sequence[str]
 ) -> Session:
-    """A replay of a recording, by default into a directory named after stream and mode; arguments as of `service`.
+    """A replay of a recording, by default into a directory named after stream and mode; arguments as in `service`.
 
     Raises:
         MisuseError: an invalid request.
@@ -252,7 +242,7 @@ def service(
     command: Sequence[str],
     refusals: Sequence[str] = (),
 ) -> Session:
-    """A service over a live source; the threads that write begin on the cores that this one is allowed.
+    """A service over a live source. Threads that write start on the cores that the calling thread may use.
 
     Args:
         request: the options of the user.

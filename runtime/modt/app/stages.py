@@ -68,7 +68,7 @@ class Stages:
         chosen: the present profile.
         pipeline: its stages.
         odometry: source of the poses.
-        looking: thread that compares a sweep with the profile; None before the first one.
+        looking: thread that compares a sweep with the profile. None before it is started once.
         misfits: number of times that sweeps were found to be of another sensor than before.
 
     Raises:
@@ -80,11 +80,11 @@ class Stages:
     ) -> None:
         self.request, self.ledger, self._info, self._watch = request, ledger, info, watch
         self._mode = assembly.MODES[request.mode]
-        self._first: Frame | None = None  # shows what the sensor is
+        self._first: Frame | None = None  # identifies the sensor
         self.misfits = 0
-        self._unlike = False  # sweeps of another size wait to be looked at
+        self._unlike = False  # sweeps of another size wait for a comparison
         self.looking: Thread | None = None
-        self._found: list[ChosenProfile] = []  # by the thread that looks again
+        self._found: list[ChosenProfile] = []  # profile chosen by the thread `looking`
         self.chosen = self._choose()
         self.pipeline = self._made(self.chosen.config)
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
@@ -106,7 +106,7 @@ class Stages:
         return self._mode.budget(self.config)
 
     def recognise(self, first: Frame, named: str | None = None) -> None:
-        """Take the profile that the first sweep shows, or `named`, which the messages of the sensor name."""
+        """Use the profile that fits the first sweep; `named` is the profile that the messages of the sensor name."""
         self._first, self._info = first, replace(self._info, profile=named or self._info.profile)
         chosen = self._choose()
         if chosen.config == self.config:
@@ -126,7 +126,7 @@ class Stages:
         return result
 
     def watch(self, frame: Frame) -> None:
-        """Follow a sensor that has changed, between two frames. A thread compares its sweep, which is slow."""
+        """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it."""
         self._unlike |= self._watch is not None and self._watch.unlike(frame.points)
         if self._found:
             self.misfits += 1
@@ -145,7 +145,7 @@ class Stages:
             self.pipeline.tracker.restore(tracks, next_id)
 
     def reload(self) -> None:
-        """Take the profile as it is on disk now; tracks go on.
+        """Use the profile as it is on disk now; the tracks are kept.
 
         Raises:
             ModtError: it is not valid; nothing has changed.

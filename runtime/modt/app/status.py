@@ -14,9 +14,9 @@ from modt.types import NONE, Tracks
 
 SCHEMA = "modt.status/1"
 MIN_RATE_S = 0.5
-"""Shortest time over which a rate is formed."""
+"""Shortest time over which a rate is computed [s]."""
 STALE_S = 5.0
-"""Age from which a status is no longer that of a running service."""
+"""Greatest age of the status of a running service [s]."""
 
 
 class Counts:
@@ -29,10 +29,10 @@ class Counts:
 
     def __init__(self, totals: Summary, now_s: float) -> None:
         self._totals, self._rate_hz = totals, 0.0
-        self._frames, self._since_s = 0, now_s  # where the rate was formed last
+        self._frames, self._since_s = 0, now_s  # when the rate was last computed
 
     def report(self, now_s: float, tracks: Tracks | None) -> dict[str, Any]:
-        """Figures for the status, by the tracks of the last frame; the rate is that of the time between reports."""
+        """Figures for the status, with the tracks of the last frame. The rate is the one since the last report."""
         totals, seconds = self._totals, now_s - self._since_s
         if seconds >= MIN_RATE_S:
             self._rate_hz = (totals.frames - self._frames) / seconds
@@ -53,41 +53,30 @@ class Power:
     """Power by the windows of the meters. It is unknown before the first reading and while the meters fail.
 
     Attributes:
-        watts: power in the last window.
-        kind: measured, integrated, estimated or unavailable.
-        frame_J: energy a frame in it.
-        stages_J: the same of each stage, of idling and of the rest of the process (`attribute`).
-        windows, unread: counts, of all and of those without energy.
+        windows, unread: number of all windows, and of those without energy.
     """
 
     def __init__(self) -> None:
-        self.watts: float | None = None
-        self.frame_J: float | None = None
-        self.stages_J: dict[str, float] = {}
-        self.kind = "unavailable"
         self.windows = self.unread = 0
+        self._last: dict[str, Any] = {"watts": None, "kind": "unavailable", "frame_J": None, "stages_J": {}}
 
     def add(self, window: dict[str, Any], board: EnergyConfig) -> float | None:
         """Add a line modt.energy/1; the window's power [W]."""
         energy_J, frames = window["energy_J"], window["frames"][2]
-        self.windows, self.kind = self.windows + 1, window["kind"]
-        self.unread += energy_J is None
-        self.watts = None if energy_J is None else energy_J / (1e-9 * window["wall_ns"])
-        self.frame_J = None if energy_J is None or not frames else energy_J / frames
+        self.windows, self.unread = self.windows + 1, self.unread + (energy_J is None)
+        watts = None if energy_J is None else energy_J / (1e-9 * window["wall_ns"])
         split = attribute(window, board) if frames else {}
-        self.stages_J = {stage: joules / frames for stage, joules in split.items()}
-        return self.watts
+        self._last = {
+            "watts": watts,
+            "kind": window["kind"],
+            "frame_J": None if energy_J is None or not frames else energy_J / frames,
+            "stages_J": {stage: round(joules / frames, 6) for stage, joules in split.items()},
+        }
+        return watts
 
     def report(self) -> dict[str, Any]:
-        """Figures for the status."""
-        return {
-            "watts": self.watts,
-            "kind": self.kind,
-            "frame_J": self.frame_J,
-            "stages_J": {stage: round(joules, 6) for stage, joules in self.stages_J.items()},
-            "windows": self.windows,
-            "unread_windows": self.unread,
-        }
+        """Figures of the last window for the status, with the energy of each part of a frame (`attribute`)."""
+        return {**self._last, "windows": self.windows, "unread_windows": self.unread}
 
 
 def one_line(status: dict[str, Any]) -> str:
@@ -102,7 +91,7 @@ def one_line(status: dict[str, Any]) -> str:
 
 
 def status_text(status: dict[str, Any], now_s: float) -> str:
-    """Some lines for a terminal, without characters that would steer it."""
+    """Lines for a terminal, without control characters."""
     loop, sensor, recording = status["loop"], status["sensor"], status["recording"]
     age_s = now_s - status["time_s"]
     state = (

@@ -26,10 +26,7 @@ class Supervisor:
     """
 
     def __init__(
-        self,
-        address: str | None = None,
-        watchdog_s: float | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        self, address: str | None = None, watchdog_s: float | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._address, self._clock = address, clock
         self._interval_s = 0.0 if watchdog_s is None else watchdog_s / 2
@@ -44,7 +41,7 @@ class Supervisor:
         self._ready = self._send("READY=1")
 
     def alive(self) -> None:
-        """Report that the loop goes round, when half the period of the watchdog has passed."""
+        """Report that the loop is alive, once in half the period of the watchdog."""
         if self._clock() - self._alive_s >= self._interval_s:
             self._alive_s = self._clock()
             self._ready |= self._send("WATCHDOG=1" if self._ready else "READY=1\nWATCHDOG=1")
@@ -78,7 +75,7 @@ class Supervisor:
 
 
 def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
-    """Systemd where the environment names its socket: /PATH, or @NAME if abstract."""
+    """Supervisor of the socket that the environment names (/PATH, or @NAME if abstract). Without one: no effect."""
     name = environment.get(_VARIABLE)
     if not name:
         return Supervisor()

@@ -15,8 +15,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("check", help="check this machine, and a sensor, for modt run; print remedies")
     source = "address of the sensor to listen to, or a recording (default: none)"
     p.add_argument("source", nargs="?", metavar="SOURCE", help=source)
-    options.add_profile_option(p)
-    options.add_core_option(p)
+    options.add(p, "profile", "core")
     p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
     options.add_examples(
         p,
@@ -32,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt import profile
-    from modt.app import checks, kernel_choice, metering
+    from modt.app import assembly, checks, metering
     from modt.app.inputs import live_source
     from modt.classification.pointnet import PointNet
 
@@ -43,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         checks.governor(pinned),
         *checks.permissions(),
         checks.meters(metering.discovery(config.energy)),
-        checks.kernels(lambda: kernel_choice.choose(config.segmentation.kernels).name),
+        checks.kernels(lambda: assembly.chosen_kernels(config.segmentation.kernels).name),
         checks.model(limits, lambda: PointNet(limits, config.sensor).facts()),
         checks.near(config.sensor),
         checks.disk(arguments.out, config),

@@ -18,15 +18,16 @@ INTERRUPTED = 130
 def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Sequence[str] | None) -> int:
     """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted.
 
-    `commands` holds the module of each. Only that of the command given is imported; its add_parser sets `run` to a
-    function of the parsed arguments that returns the status. Without a command the help is printed, which is misuse.
+    `commands` maps each command to its module. Only the module of the given command is imported. Its add_parser sets
+    `run` to a function of the parsed arguments that returns the status. Without a command the help is printed and the
+    status is 2.
     """
     words = sys.argv[1:] if argv is None else argv
     top = argparse.ArgumentParser(prog=name, description=description)
     top.add_argument("--version", action="version", version=f"modt {__version__}")
     choice = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     given = next(iter(words), "")
-    for module in [commands[given]] if given in commands else commands.values():
+    for module in [commands[given]] if given in commands else dict.fromkeys(commands.values()):
         import_module(module).add_parser(choice)
     if not words:
         return show_help(top)

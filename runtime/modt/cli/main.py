@@ -13,7 +13,7 @@ COMMANDS = {
     "replay": "modt.cli.replay",
     "run": "modt.cli.run",
     "status": "modt.cli.status",
-    "top": "modt.cli.top",
+    "top": "modt.cli.status",
     "check": "modt.cli.check",
     "view": "modt_desk.cli.view",
     "evaluate": "modt_desk.cli.evaluate",
@@ -21,7 +21,7 @@ COMMANDS = {
     "simulate": "modt_desk.cli.simulate",
     "track": "modt_desk.cli.track",
     "profile": "modt.cli.profile_group",
-    "profiles": "modt.cli.profile_list",
+    "profiles": "modt.cli.profile_group",
     "completion": "modt_desk.cli.completion",
     "service": "modt_desk.cli.service",
 }

@@ -5,88 +5,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from modt import host
 from modt.profile import DEFAULT
 from modt.schemes import SINKS
 
 Parser = argparse.ArgumentParser
-PROFILES = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
 MODES = ("conventional", "efficient", "accurate")
 CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
-
-
-def add_examples(p: Parser, *examples: str) -> None:
-    """Add example lines to the end of the help."""
-    p.formatter_class = argparse.RawDescriptionHelpFormatter
-    p.epilog = "\n  ".join(["examples:", *examples])
-
-
-def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
-    """Add the options of a stream: path, capture, frames, profile and core."""
-    stream = (
-        "KITTI drive, folder of .bin, .pcd or .ply scans, PCAP file, ROS 2 recording (default: a synthetic stream)"
-    )
-    p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
-    add_capture_option(p)
-    add_frames_option(p, first_frames)
-    add_profile_option(p)
-    add_core_option(p)
-
-
-def add_frames_option(p: Parser, default: tuple[int, int | None] = (0, None)) -> None:
-    """Add the range of frames."""
-    a, b = default
-    which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
-    p.add_argument("--frames", type=frames, default=default, metavar="A:B", help=which)
-
-
-def add_mode_option(p: Parser) -> None:
-    """Add the mode."""
-    p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
-
-
-def add_core_option(p: Parser) -> None:
-    """Add the core."""
-    p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
-
-
-def add_profile_option(p: argparse._ActionsContainer, meaning: str = PROFILES) -> None:
-    """Add the profiles."""
-    p.add_argument("--profile", action="append", default=[], metavar="NAME|FILE", help=meaning)
-
-
-def add_sink_option(p: Parser) -> None:
-    """Add the sinks."""
-    forms = ", ".join(scheme.form for scheme in SINKS.values())
-    p.add_argument(
-        "--sink", action="append", default=[], metavar="ADDRESS", help=f"send tracks to {forms}; repeatable"
-    )
-
-
-def add_capture_option(p: Parser) -> None:
-    """Add the facts that a recording does not hold."""
-    what = (
-        "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai, metadata=FILE of "
-        "an Ouster; of a ROS 2 recording with several topics of point clouds: topic=NAME; repeatable"
-    )
-    p.add_argument("--capture", type=capture, action="append", default=[], metavar="KEY=VALUE", help=what)
-
-
-def add_fov_option(p: Parser) -> None:
-    """Add the field of view."""
-    p.add_argument("--fov", choices=("camera", "full"), default="full", help="field of view (default: %(default)s)")
-
-
-def add_meter_option(p: Parser) -> None:
-    """Add the meter."""
-    p.add_argument("--meter", metavar="NAME", help="meter to read (default: the best)")
-
-
-def add_report_options(p: Parser) -> None:
-    """Add the formats of a report."""
-    p.add_argument("--json", action="store_true", help="print JSON")
-    p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots")
 
 
 def capture(text: str) -> tuple[str, str]:
@@ -140,3 +67,54 @@ def real(low: float, high: float, what: str) -> Callable[[str], float]:
         return value
 
     return parse
+
+
+_REPEATABLE: dict[str, Any] = {"action": "append", "default": []}
+_PROFILES = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
+_CAPTURE = (
+    "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai, metadata=FILE of "
+    "an Ouster; of a ROS 2 recording with several topics of point clouds: topic=NAME; repeatable"
+)
+_SINKS = f"send tracks to {', '.join(scheme.form for scheme in SINKS.values())}; repeatable"
+SHARED: dict[str, dict[str, Any]] = {
+    "capture": {"type": capture, **_REPEATABLE, "metavar": "KEY=VALUE", "help": _CAPTURE},
+    "core": {"type": core, "default": "last", "metavar": "N|none", "help": "pin to core N (default: the last)"},
+    "fov": {"choices": ("camera", "full"), "default": "full", "help": "field of view (default: %(default)s)"},
+    "html": {"type": Path, "metavar": "FILE", "help": "write an HTML page with plots"},
+    "json": {"action": "store_true", "help": "print JSON"},
+    "meter": {"metavar": "NAME", "help": "meter to read (default: the best)"},
+    "mode": {"choices": MODES, "default": "accurate", "help": "default: %(default)s"},
+    "profile": {**_REPEATABLE, "metavar": "NAME|FILE", "help": _PROFILES},
+    "sink": {**_REPEATABLE, "metavar": "ADDRESS", "help": _SINKS},
+}
+"""Arguments of `add_argument` by the name of an option."""
+
+
+def add(p: argparse._ActionsContainer, *names: str, **changes: Any) -> None:
+    """Add SHARED options, with changes to their arguments."""
+    for name in names:
+        p.add_argument(f"--{name}", **{**SHARED[name], **changes})
+
+
+def add_examples(p: Parser, *examples: str) -> None:
+    """Add example lines to the end of the help."""
+    p.formatter_class = argparse.RawDescriptionHelpFormatter
+    p.epilog = "\n  ".join(["examples:", *examples])
+
+
+def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
+    """Add the options of a stream: path, capture, frames, profile and core."""
+    stream = (
+        "KITTI drive, folder of .bin, .pcd or .ply scans, PCAP file, ROS 2 recording (default: a synthetic stream)"
+    )
+    p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
+    add(p, "capture")
+    add_frames_option(p, first_frames)
+    add(p, "profile", "core")
+
+
+def add_frames_option(p: Parser, default: tuple[int, int | None] = (0, None)) -> None:
+    """Add the range of frames."""
+    a, b = default
+    which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
+    p.add_argument("--frames", type=frames, default=default, metavar="A:B", help=which)

@@ -18,8 +18,8 @@ SCHEMA = "modt.meters/1"
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("meters", help="list the energy meters of this machine")
-    options.add_profile_option(p, f"board (default: {profile.DEFAULT})")
-    p.add_argument("--json", action="store_true", help="print JSON")
+    options.add(p, "profile", help=f"board (default: {profile.DEFAULT})")
+    options.add(p, "json")
     options.add_examples(
         p,
         "modt-profile meters                            meters, and why others cannot be read",

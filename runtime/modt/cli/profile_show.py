@@ -22,6 +22,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print it."""
+    """Print the configuration."""
     print(profile.resolve(arguments.names).shown(), end="")
     return 0

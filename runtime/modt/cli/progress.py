@@ -11,7 +11,7 @@ from modt.errors import install
 
 @contextmanager
 def bar(total: int | None, unit: str, *, shown: bool) -> Iterator[Callable[[str], None]]:
-    """Function to call with a few words after every unit; without effect unless shown."""
+    """Yield a function that is called with a few words after every unit. It has no effect unless `shown`."""
     if not shown:
         yield lambda words: None
         return

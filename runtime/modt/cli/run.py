@@ -24,12 +24,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("run", help="follow a live source: the service of a robot")
     source = "address of a sensor, or a recording to play: PATH, PATH?loop=yes (default: a synthetic stream)"
     p.add_argument("source", nargs="?", default="", metavar="SOURCE", help=source)
-    options.add_sink_option(p)
+    options.add(p, "sink")
     view = "show the run to browsers at http://HOST:PORT/ (default: 127.0.0.1:8766, which no other machine reaches)"
     p.add_argument("--view", nargs="?", const="", metavar="HOST:PORT", help=view)
-    options.add_profile_option(p)
-    options.add_core_option(p)
-    options.add_mode_option(p)
+    options.add(p, "profile", "core", "mode")
     odometry = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
     p.add_argument("--odometry", default="recording", metavar="SOURCE", help=odometry)
     p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
@@ -48,7 +46,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Follow; SIGTERM ends it with exit status 0, SIGINT with 130, both with complete records."""
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # a reload before there is anything to reload; the loop handles it
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # there is nothing to reload yet; the loop handles later ones
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.

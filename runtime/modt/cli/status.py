@@ -1,11 +1,14 @@
-"""`modt status`: print the status of a service."""
+"""`modt status` and `modt top`: the status of a service, once or kept up to date."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import os
+import shutil
+import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,25 +17,28 @@ from modt.cli.run import OUT
 from modt.errors import MisuseError, refuse_pipe
 
 REMEDY = "give the run directory of a modt run"
+PERIOD_S = 1.0
+"""Interval between two status files [s]."""
+CLEAR = "\x1b[H\x1b[2J"
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Declare the command and its options."""
+    """Declare both commands and their options."""
     p = commands.add_parser("status", help="say what a running modt run is doing")
-    add_directory(p)
-    p.add_argument("--json", action="store_true", help="print JSON")
+    q = commands.add_parser("top", help="show what a running modt run is doing, until Ctrl-C is pressed")
+    for command, function in ((p, run), (q, run_top)):
+        run_directory = "its run directory (default: %(default)s)"
+        command.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
+        command.set_defaults(run=function)
+    options.add(p, "json")
     options.add_examples(
         p,
         "modt status                        the service that records into runs/live",
         "modt status /var/lib/modt --json   all fields of another one",
     )
-    p.set_defaults(run=run)
-
-
-def add_directory(p: argparse.ArgumentParser) -> None:
-    """Add the run directory of the service."""
-    run_directory = "its run directory (default: %(default)s)"
-    p.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
+    options.add_examples(
+        q, "modt top                 the service that records into runs/live", "modt top /var/lib/modt   another one"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -70,3 +76,27 @@ def read(directory: Path) -> dict[str, Any]:
     if not isinstance(status, dict) or status.get("schema") != SCHEMA:
         raise MisuseError(path, "another schema", f"this version reads {SCHEMA}")
     return status
+
+
+def run_top(arguments: argparse.Namespace) -> int:
+    """Show the status until Ctrl-C; without a terminal print it once.
+
+    Raises:
+        MisuseError: there is no status at the start.
+    """
+    from modt.app.status import status_text
+
+    text = status_text(read(arguments.directory), time.time())
+    if not sys.stdout.isatty():
+        print(text)
+        return 0
+    with suppress(KeyboardInterrupt):
+        while True:
+            rows = text.splitlines()[: shutil.get_terminal_size().lines - 1]
+            print(CLEAR + "\n".join(rows), flush=True)
+            time.sleep(PERIOD_S)
+            try:
+                text = status_text(read(arguments.directory), time.time())
+            except MisuseError as error:  # another part of the records begins, or the service ends
+                text = str(error)
+    return 0

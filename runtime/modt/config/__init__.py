@@ -1,17 +1,15 @@
 """Configuration: one frozen dataclass a stage, whose values are checked as it is made."""
 
 from modt.config.base import StageConfig, ValueRangeError
-from modt.config.classification import (
+from modt.config.profile import EnergyConfig, LoopConfig, ProfileConfig, RecordingConfig, SensorConfig
+from modt.config.stages import (
     ClassificationConfig,
     DecisionConfig,
     FusionConfig,
-    SchedulerConfig,
-)
-from modt.config.odometry import OdometryConfig
-from modt.config.profile import EnergyConfig, LoopConfig, ProfileConfig, RecordingConfig, SensorConfig
-from modt.config.segmentation import SegmentationConfig
-from modt.config.tracking import (
+    OdometryConfig,
     PaperAssociationConfig,
+    SchedulerConfig,
+    SegmentationConfig,
     TrackingConfig,
 )
 

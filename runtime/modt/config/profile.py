@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING
 
 from modt.classes import PERSON_M
 from modt.config.base import StageConfig, ValueRangeError, choice, number, numbers
-from modt.config.classification import ClassificationConfig, DecisionConfig, FusionConfig, SchedulerConfig
-from modt.config.odometry import OdometryConfig
-from modt.config.segmentation import SegmentationConfig
-from modt.config.tracking import TrackingConfig
+from modt.config.stages import (
+    ClassificationConfig,
+    DecisionConfig,
+    FusionConfig,
+    OdometryConfig,
+    SchedulerConfig,
+    SegmentationConfig,
+    TrackingConfig,
+)
 
 if TYPE_CHECKING:
     from modt.geometry.beams import Beams

@@ -17,7 +17,7 @@ _MAX_W = 10_000.0
 
 
 def usable(line: Line) -> bool:
-    """Whether a window has a reading that can be true, and no mark that forbids its use."""
+    """Whether a window has a plausible reading and no mark that forbids its use."""
     energy_J = line["energy_J"]
     known = energy_J is not None and _HARMLESS_MARKS.issuperset(line.get("marks", ()))
     return known and 0.0 <= energy_J <= _MAX_W * 1e-9 * line["wall_ns"]

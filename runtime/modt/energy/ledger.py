@@ -38,7 +38,7 @@ class Ledger:
         return self.timed(stage, function, *args, **kwargs)[0]
 
     def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
-        """Result as of `run`, and the CPU time of the span [ns]."""
+        """Result as in `run`, and the CPU time of the span [ns]."""
         wall0, cpu0 = self._wall_ns(), self._cpu_ns()
         try:
             result = function(*args, **kwargs)

@@ -35,8 +35,7 @@ def delays(proposals: Proposals, turn_s: float) -> Float64:
     half_angle = np.arctan2(np.hypot(length, width) / 2, np.hypot(x, y))
     beyond_seam = np.maximum(np.abs(bearing) + half_angle - np.pi, 0.0)
     bearing -= np.copysign(np.pi * beyond_seam / np.maximum(half_angle, 1e-9), bearing)
-    delay_s: Float64 = bearing * (-turn_s / (2 * np.pi))
-    return delay_s
+    return np.asarray(bearing * (-turn_s / (2 * np.pi)))
 
 
 FAR_M = 1e5
@@ -72,9 +71,10 @@ class Odometry:
         """Placement of a frame, and its proposals in the world.
 
         Args:
-            frame: its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
-            proposals: of the frame.
-            static_tracks: the tracks that a frame at a time may continue; called where there is no pose.
+            frame: sweep; its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
+            proposals: proposals of the frame.
+            static_tracks: function of a time that returns the tracks that a frame may continue. It is called if the
+                frame has no pose.
         """
         given, first = frame.T_world_sensor, self._time_s is None
         if frame.restarts != self._restarts:
@@ -104,7 +104,7 @@ class Odometry:
             placement = placed(self._T_world_odometry @ given)
         else:
             landmarks = self._landmarks.update(static_tracks(frame.time_s))
-            share = 1.0 if delay_s is None else 1.0 + delay_s / dt_s  # of a correction, at the time of view
+            share = 1.0 if delay_s is None else 1.0 + delay_s / dt_s  # share of a correction at the time of view
 
             def registered(placement: Placement) -> Placement:
                 correction = self._registration.correct(landmarks, observed(placement), share)

@@ -1,6 +1,7 @@
 """Ego-motion from the proposals, where the robot has no odometry.
 
-Most proposals are static background: the planar motion that brings most of them onto their landmarks is the sensor's.
+Most proposals are static background. The planar motion that maps most of them onto their landmarks is the motion of
+the sensor.
 """
 
 from __future__ import annotations
@@ -266,7 +267,7 @@ def _fit(
 
     Args:
         outward_shift: (8, K) displacement of each end outward, from landmark to observation [m].
-        jacobian: (3, 8, K), as of _jacobian.
+        jacobian: (3, 8, K), as in _jacobian.
         variance: (K,) square of the scale of each pair's errors [m2].
         motion: (3,) first guess.
         scales: factors to these scales, an iteration each.

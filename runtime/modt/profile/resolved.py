@@ -11,7 +11,7 @@ from typing import Any
 from modt import assets
 from modt.config import ProfileConfig, StageConfig, ValueRangeError
 from modt.errors import MisuseError
-from modt.profile.yaml_text import MAX_CHARACTERS, Written, nested, read, value_text
+from modt.profile.yaml_text import MAX_CHARACTERS, Written, read, value_text
 
 DEFAULT = "hdl-64e"
 """Profile of the sensor if none is asked for."""
@@ -38,7 +38,7 @@ class Resolved:
 
     Attributes:
         layers: the profiles that are asked for, each after those that it extends; later ones win.
-        assumed: the DEFAULT profile below them, if none of them sets a key of the sensor.
+        assumed: the DEFAULT profile, on which they are based if none of them sets a key of the sensor.
         config: the resulting configuration.
     """
 
@@ -67,8 +67,7 @@ class Resolved:
     def shown(self) -> str:
         """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
         set_by = {path: layer.name for layer in (*self.assumed, *self.layers) for path in layer.settings}
-        rows = _by_path(dump(self.config))
-        text = nested((path, f"{value_text(value)} # {set_by.get(path, 'default')}") for path, value in rows)
+        text = "".join(_shown(dump(self.config), set_by))
         near_m = self.config.sensor.person_seen_from_m
         return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
 
@@ -105,13 +104,14 @@ def _listed(items: list[tuple[str, Any]]) -> dict[str, Any]:
     return {key: list(value) if isinstance(value, tuple) else value for key, value in items}
 
 
-def _by_path(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Values of a profile by the paths of their keys."""
+def _shown(data: Mapping[str, Any], set_by: Mapping[str, str], group: str = "", indent: str = "") -> Iterator[str]:
+    """Lines of YAML, each value with the profile that has set it."""
     for key, value in data.items():
         if isinstance(value, dict):
-            yield from _by_path(value, f"{prefix}{key}.")
+            yield f"{indent}{key}:\n"
+            yield from _shown(value, set_by, f"{group}{key}.", f"{indent}  ")
         else:
-            yield prefix + key, value
+            yield f"{indent}{key}: {value_text(value)} # {set_by.get(group + key, 'default')}\n"
 
 
 def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:

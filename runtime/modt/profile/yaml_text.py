@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -91,20 +91,6 @@ def value_text(value: Any) -> str:
     plain = list(value) if isinstance(value, tuple) else value
     text: str = yaml.safe_dump(plain, default_flow_style=True, allow_unicode=True, width=float("inf"))
     return text.removesuffix("\n").removesuffix("\n...")
-
-
-def nested(rows: Iterable[tuple[str, str]]) -> str:
-    """YAML text of keys by their paths and the texts behind their colons; keys of one mapping are neighbours."""
-    lines: list[str] = []
-    opened: list[str] = []
-    for path, text in rows:
-        *groups, name = path.split(".")
-        shared = next((n for n, pair in enumerate(zip(groups, opened, strict=False)) if pair[0] != pair[1]), None)
-        for depth in range(min(len(groups), len(opened)) if shared is None else shared, len(groups)):
-            lines.append(f"{'  ' * depth}{groups[depth]}:")
-        opened = groups
-        lines.append(f"{'  ' * len(groups)}{name}: {text}")
-    return "".join(f"{line}\n" for line in lines)
 
 
 def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int, prefix: str) -> dict[str, Any]:

@@ -115,7 +115,7 @@ def _ratio(a: float, b: float) -> float | None:
 
 
 def around(tracks: Tracks, proposals: Proposals) -> dict[str, dict[str, Any]]:
-    """Tracks with a proposal in a frame: by class their number, and the distance of their nearest return [m]."""
+    """Number of tracks with a proposal in a frame, and distance of their nearest return [m], by class."""
     distance_m, found = np.hypot(*proposals.coordinates[:2]), defaultdict[str, list[float]](list)
     for kind, p in zip(tracks.object_class, tracks.proposal, strict=True):
         if p != NONE:

@@ -7,13 +7,16 @@ import os
 import threading
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
 from modt.errors import MisuseError, ModtError, install
+from modt.ros2.definitions import DEFINITIONS
 
 try:
+    from cyclonedds import idl
     from cyclonedds.core import DDSException, ReadCondition, WaitSet
     from cyclonedds.core import InstanceState as Instance
     from cyclonedds.core import SampleState as Sample
@@ -24,7 +27,6 @@ try:
     from cyclonedds.sub import DataReader
     from cyclonedds.topic import Topic
 
-    from modt.ros2.message_types import message_type
 except ImportError:
     raise MisuseError("ROS 2", "needs Cyclone DDS", f"{install('ros2')}, or build cyclonedds") from None
 
@@ -136,7 +138,7 @@ class Publication:
 
 
 def _count(entity: Any, matched: str) -> int:
-    """Number of matched entities; 1 where the binding cannot tell: 0.10, for the Cyclone DDS of Humble and Jazzy."""
+    """Number of matched entities; 1 with version 0.10 of the binding (Humble, Jazzy), which does not count them."""
     return len(getattr(entity, matched)()) if hasattr(entity, matched) else 1
 
 
@@ -158,3 +160,42 @@ def _warn_of_buffer() -> None:
     if granted < ENOUGH_BYTES:
         cause = f"{granted} bytes are too few for a sweep that arrives at once"
         log.warning("net.core.rmem_max: %s; sysctl -w net.core.rmem_max=%d", cause, ENOUGH_BYTES)
+
+
+TYPES: Any = idl.types
+PRIMITIVES: dict[str, Any] = {"string": str, "bool": bool}
+
+
+@cache
+def message_type(name: str) -> type[Any]:
+    """DDS type whose objects are made of the bytes of a message, and keep them as `message`.
+
+    Cyclone DDS checks a message against its type in C, so the types are whole. Its deserialiser makes a Python object
+    of every number; these types keep the bytes instead, which the other modules of this package read and write.
+    """
+    kind: type[Any] = _struct(name)
+
+    def make(self: Any, message: bytes) -> None:
+        self.message = message
+
+    kind.__init__ = make
+    kind.serialize = lambda self, *_, **__: self.message
+    kind.deserialize = classmethod(lambda cls, message, *_, **__: cls(message))
+    kind.deserialize_key = classmethod(lambda _cls, *_, **__: None)  # for the notice that a sender has left
+    return kind
+
+
+@cache
+def _struct(name: str) -> Any:
+    package, _, short = name.partition("/")
+    fields = (field.split() for field in DEFINITIONS[name].split(", "))
+    made = {field: _type(kind) for kind, field in fields}
+    return idl.make_idl_struct(short, f"{package}::msg::dds_::{short}_", made)
+
+
+def _type(kind: str) -> Any:
+    element, bracket, size = kind.rstrip("]").partition("[")
+    single = _struct(element) if "/" in element else PRIMITIVES.get(element) or getattr(TYPES, element)
+    if not bracket:
+        return single
+    return TYPES.array[single, int(size)] if size else TYPES.sequence[single]

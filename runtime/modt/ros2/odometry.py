@@ -1,4 +1,4 @@
-"""nav_msgs/Odometry."""
+"""nav_msgs/Odometry, and tf2_msgs/TFMessage of /tf_static."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.geometry import quaternion_of, rotation_of, se3
+from modt.geometry import inverse, quaternion_of, rotation_of, se3
 from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
 from modt.types import Float64
 
@@ -63,3 +63,48 @@ def write_odometry(stamp_s: float, frame_id: str, child_frame_id: str, T_odom_ch
     cdr.text(child_frame_id)
     cdr.record(("7d", UNKNOWN), *T_odom_child[:3, 3].tolist(), *quaternion_of(T_odom_child).tolist())
     return cdr.message()
+
+
+TF, TF_STATIC = "tf2_msgs/TFMessage", "/tf_static"
+"""Type of messages of transforms, and the topic of the robot's fixed ones."""
+MAX_TRANSFORMS = 10_000
+
+
+class StaticTransforms:
+    """The tree of the robot's fixed frames."""
+
+    def __init__(self) -> None:
+        self._parents: dict[str, tuple[str, Float64]] = {}
+
+    def add(self, message: bytes) -> None:
+        """Add the transforms of a message.
+
+        Raises:
+            MessageError: it is not a TFMessage.
+        """
+        cdr = CdrReader(message)
+        n = cdr.count()
+        if n > MAX_TRANSFORMS:
+            raise MessageError("malformed", f"{n} transforms")
+        for _ in range(n):
+            _, parent, child = cdr.stamp_s(), cdr.text(), cdr.text()
+            self._parents[_plain(child)] = _plain(parent), read_pose(cdr)
+
+    def between(self, base: str, sensor: str) -> Float64 | None:
+        """(4, 4) pose of `sensor` in `base`; None if they are not connected."""
+        (root, T_root_base), (other, T_other_sensor) = self._root(_plain(base)), self._root(_plain(sensor))
+        return inverse(T_root_base) @ T_other_sensor if root == other else None
+
+    def _root(self, frame: str) -> tuple[str, Float64]:
+        """The root of a frame, and the pose of the frame in it."""
+        T: Float64 = np.eye(4)
+        for _ in range(len(self._parents)):  # ends if the transforms form a loop
+            if frame not in self._parents:
+                break
+            frame, T_parent_frame = self._parents[frame]
+            T = T_parent_frame @ T
+        return frame, T
+
+
+def _plain(frame: str) -> str:
+    return frame.lstrip("/")

@@ -39,8 +39,7 @@ def running_mean(values: Float64, width: int) -> Float64:
     """Mean of windows of a width; windows of even width begin one value earlier."""
     padded = np.pad(values, (width // 2, (width - 1) // 2), "symmetric")
     first = padded[:width].cumsum()[-1:]
-    mean: Float64 = np.concatenate([first, padded[width:] - padded[:-width]]).cumsum() / width
-    return mean
+    return np.asarray(np.concatenate([first, padded[width:] - padded[:-width]]).cumsum() / width)
 
 
 def running_median(values: Int, width: int) -> Int:

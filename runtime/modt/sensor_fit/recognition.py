@@ -1,4 +1,4 @@
-"""Comparison of the first sweep with a profile: is it the profile of this sensor?"""
+"""Comparison of the first sweep with a profile, to tell whether it is the profile of this sensor."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Recognition:
         return replace(config, sensor=replace(sensor, roll_deg=roll_deg, pitch_deg=pitch_deg))
 
     def warnings(self, name: str, *, replaced: bool) -> Iterator[str]:
-        """A line on the differences from the profile of a name with the remedy, and a line on the tilt."""
+        """Yield a warning of the differences from the named profile, with the remedy, and a warning of the tilt."""
         if self.differences:
             done = "used instead: what the first sweep shows" if replaced else "used all the same"
             known = f"--profile {self.nearest}, or " if self.nearest else ""

@@ -33,7 +33,7 @@ class Background(Generic[T]):
         name: subject of log messages.
         writer: used by the thread alone.
         depth: length of the queue.
-        encode: makes of an item, before it is queued, what the writer takes.
+        encode: converts an item, before it is queued, to what the writer takes.
         retry_s: pause after a failure.
         close_s: time limit of `close`.
         clock: [s].

@@ -15,7 +15,7 @@ from modt.sinks.tracks import frame_line
 DEPTH = 100
 """Number of lines that may wait for a stalled disk, 10 s at 10 Hz. No points wait: frames are encoded at once."""
 LONGEST_LINE = 1 << 22
-"""Longest line that is looked for at the end of a continued file [bytes]."""
+"""Longest incomplete line that is searched for at the end of a continued file [bytes]."""
 
 
 class Descriptor:
@@ -25,7 +25,7 @@ class Descriptor:
         self._number = number
 
     def write(self, text: str, /) -> None:
-        """Write all of it; waits for the reader.
+        """Write the whole text; waits for the reader.
 
         Raises:
             OSError: the reader has left.

@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.geometry import quaternion_of, se3, yaw_of
-from modt.ros2 import odometry, point_cloud2, static_transforms
+from modt.ros2 import odometry, point_cloud2
 from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
 from modt.types import NONE, Float64, FrameResult, Int
 
 PREFIX, FRAME_ID, WORLD_FRAME_ID = "modt", "lidar", "world"
 """Names used if neither the address nor the input gives one."""
-DETECTIONS, MARKERS, TF = "vision_msgs/Detection3DArray", "visualization_msgs/MarkerArray", static_transforms.TYPE
+DETECTIONS, MARKERS, TF = "vision_msgs/Detection3DArray", "visualization_msgs/MarkerArray", odometry.TF
 UNKNOWN_COVARIANCE = f"{8 * 36}x"
 
 ARROW, CUBE, TEXT = 0, 1, 9
@@ -27,18 +27,22 @@ LIFETIME_S = 1
 TEXT_M, ABOVE_M = 0.6, 0.5
 """Height of a label, and of its middle above the box [m]."""
 MIN_ARROW_MPS, ARROW_WIDTH_M = 0.3, 0.2
-"""Slower objects have no arrow. An arrow is as long as the way of one second."""
+"""Slower objects have no arrow. An arrow is as long as the distance of one second."""
 WHITE = (1.0, 1.0, 1.0, 1.0)
 COLOURS = tuple((*(int(c.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.6) for c in CLASSES.values())
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """Pose and scale of the marker that deletes all others."""
 NO_TEXT, NO_HEADER = text_fields(""), header_fields(0.0, "")
-UNUSED: Fields = (
-    ("B", "2I", *NO_TEXT[0], *NO_HEADER[0], *NO_TEXT[0], "2I"),
-    (0, 0, 0, *NO_TEXT[1], *NO_HEADER[1], *NO_TEXT[1], 0, 0),
-)
+
+
+def _joined(*parts: Fields) -> Fields:
+    """Fields of several parts as those of one."""
+    return tuple(chain.from_iterable(f for f, _ in parts)), tuple(chain.from_iterable(v for _, v in parts))
+
+
+UNUSED = _joined((("B", "2I"), (0, 0, 0)), NO_TEXT, NO_HEADER, NO_TEXT, (("2I",), (0, 0)))
 """frame_locked, points, colors, texture_resource, texture (header, format, data), uv_coordinates."""
-NO_MESH: Fields = ((*NO_TEXT[0], *NO_TEXT[0], "I", "B"), (*NO_TEXT[1], *NO_TEXT[1], 0, 0))
+NO_MESH = _joined(NO_TEXT, NO_TEXT, (("I", "B"), (0, 0)))
 """mesh_resource, mesh_file (filename, data), mesh_use_embedded_materials."""
 
 
@@ -85,13 +89,13 @@ def topics(
 
 
 def seen(result: FrameResult, background: bool = False) -> Int:
-    """Rows of the tracks with a proposal that are objects, or with `background` of all."""
+    """Rows of the tracks with a proposal; tracks of the background only if `background`."""
     tracks = result.tracks
     return np.flatnonzero((tracks.proposal != NONE) & (background | (tracks.object_class != ObjectClass.BACKGROUND)))
 
 
 def detections(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
-    """vision_msgs/Detection3DArray (version 4): boxes and posteriors of what is in view, the reported class first."""
+    """vision_msgs/Detection3DArray (version 4): boxes and posteriors of tracks in view, the reported class first."""
     tracks, rows = result.tracks, seen(result, background)
     boxes = result.proposals.box[tracks.proposal[rows]]
     poses = in_sensor_frame(box_poses(boxes), result.frame.R_level_sensor)
@@ -150,10 +154,9 @@ def _marker(
     colour: tuple[float, ...] = WHITE,
     text: str = "",
 ) -> None:
-    name, label = text_fields(namespace), text_fields(text)
-    fields = (*header[0], *name[0], "3i", "10d", "4f", "2i", *UNUSED[0], *label[0], *NO_MESH[0])
-    first = (*header[1], *name[1], *number_kind_action, *pose_scale, *colour, LIFETIME_S, 0)
-    cdr.record(fields, *first, *UNUSED[1], *label[1], *NO_MESH[1])
+    own: Fields = ("3i", "10d", "4f", "2i"), (*number_kind_action, *pose_scale, *colour, LIFETIME_S, 0)
+    fields, values = _joined(header, text_fields(namespace), own, UNUSED, text_fields(text), NO_MESH)
+    cdr.record(fields, *values)
 
 
 def pose(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:

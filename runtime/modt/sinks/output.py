@@ -33,7 +33,7 @@ class Sink(Writer[FrameResult], Protocol):
     """Takes the results of frames."""
 
     def health(self) -> Health:
-        """Counts of what has become of the frames so far."""
+        """Counts of the frames so far by their fate."""
 
 
 @runtime_checkable
@@ -121,7 +121,7 @@ class LineFile(Generic[T]):
         self._written += 1
 
     def sync(self) -> None:
-        """Make everything written survive a power cut; waits for the disk.
+        """Make all written lines survive a power cut; waits for the disk.
 
         Raises:
             ModtError: the disk reports a failure.

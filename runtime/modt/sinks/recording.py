@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from modt.config import RecordingConfig
 from modt.errors import ModtError
 from modt.geometry import Camera
-from modt.sinks.kitti import KittiResults
+from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import Health, LineFile, Writer
 from modt.sinks.records import line
 from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
@@ -184,7 +184,7 @@ class Recording:
         self._bytes, self.parts = RESERVED_BYTES, self.parts + self._begun
 
     def _look(self) -> None:
-        """Leave a part whose files were moved or removed. The lines of removed files count as lost."""
+        """Close a part whose files were moved or removed. The lines of removed files count as lost."""
         if self._begun and not (self.directory.present() and all(file.present() for file in self._files.values())):
             removed = sum(int(file.health()["written"]) for file in self._files.values() if file.removed())
             self.lost, self._unsynced = self.lost + removed, 0
@@ -236,7 +236,7 @@ class WholeRecording(Recording):
     """The records of a replay: all of them, in one part, written at once. A failure ends the run.
 
     Args:
-        directory, describe: as of Recording.
+        directory, describe: as in Recording.
         sequence, camera: sequence and camera of the KITTI results.
         labels: whether point labels are written.
     """
@@ -260,8 +260,6 @@ class WholeRecording(Recording):
         path = self.directory.path
         self._more.append(KittiResults(path / "kitti" / f"{self._sequence:04d}.txt", self._camera))
         if self._labels:
-            from modt.sinks.labels import PointLabels
-
             self._more.append(PointLabels(path / "labels"))
 
     def write(self, result: FrameResult) -> None:

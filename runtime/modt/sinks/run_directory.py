@@ -32,7 +32,7 @@ class RunDirectory:
 
     Attributes:
         path: the directory.
-        before: new path of the part before, None if there was none.
+        before: new path of the previous part, None if there was none.
 
     Raises:
         MisuseError: the path is a file, or a directory that holds other files.
@@ -53,10 +53,10 @@ class RunDirectory:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other runs out within the context; where no lock can be written, none is kept out.
+        """Lock out other runs within the context. If no lock can be written, no run is locked out.
 
         Raises:
-            ModtError: another run is in.
+            ModtError: another run holds the lock.
         """
         with ExitStack() as self._lock:
             self._locked = True
@@ -67,7 +67,7 @@ class RunDirectory:
                 self.in_memory(None)
 
     def begin(self, description: str, limit_bytes: float) -> None:
-        """Keep the part before under the next name, delete the oldest ones beyond a limit, and begin a new part.
+        """Rename the previous part, delete the oldest parts beyond a limit, and begin a new part.
 
         Raises:
             ModtError: the disk is full, or cannot be written.

@@ -17,16 +17,9 @@ SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 UNKNOWN_NEAR = "unknown, near"
-"""May be a person, too near for the sensor to show enough of it."""
-BOX, WORLD = ("{" + ",".join(f'"{key}":%r' for key in keys) + "}" for keys in (BOX_KEYS, WORLD_KEYS))
-PER_CLASS = "[" + ",".join(["%r"] * len(CLASS_NAMES)) + "]"
-TRACK = (
-    f'{{"id":%d,"state":%s,"class":%s,"posterior":{PER_CLASS},"witness":{PER_CLASS},"viewed":%s,"final":%s,'
-    f'"uncertain":%s,"proposal":%s,"points":%d,"age":%d,"missed":%d,"box":%s,"world":{WORLD}}}'
-)
-"""Format of a track. Columns of text, `_by_columns`, give the same characters in a third of the CPU time."""
-BOOLEANS, CLASSES = ("false", "true"), tuple(map(json.dumps, CLASS_NAMES))
-UNCERTAIN = ("null", *(json.dumps(f"{name}?") for name in CLASS_NAMES[1:]), json.dumps(UNKNOWN_NEAR))
+"""Value of `uncertain` for a track that may be a person too near to be seen whole."""
+BOOLEANS = ("false", "true")
+UNCERTAIN = (None, *(f"{name}?" for name in CLASS_NAMES[1:]), UNKNOWN_NEAR)
 NUMBER_BYTES = 32
 """Room for the numbers in `part` and `parts` [bytes]."""
 
@@ -57,9 +50,10 @@ def frame_line(result: FrameResult) -> str:
 
 
 def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
-    """The line of a frame; where it is longer than that, lines of some of the tracks each.
+    """The line of a frame, or lines of parts of its tracks if it is longer than `max_bytes`.
 
-    Parts have all fields of a frame, `part`, from 0, and `parts`, their number. A single track may be longer.
+    Each part has all fields of a frame, `part`, which counts from 0, and `parts`, the number of parts. A part with a
+    single track may be longer than `max_bytes`.
 
     Raises:
         ValueError: a number is not finite.
@@ -101,56 +95,40 @@ def _tracks(rows: str) -> str:
 
 def _doubts(result: FrameResult) -> Int:
     """(M,) index into UNCERTAIN of each track."""
-    doubt: Int = np.where(unknown_near(result), len(CLASS_NAMES), result.tracks.object_class * doubtful(result))
-    return doubt
+    return np.asarray(np.where(unknown_near(result), len(CLASS_NAMES), result.tracks.object_class * doubtful(result)))
 
 
 def _rows(result: FrameResult) -> list[str]:
-    """JSON of each track."""
+    """JSON of each track, at three times the CPU time of `_by_columns`.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
     tracks = result.tracks
-    if not all(
-        np.isfinite(values).all() for values in (tracks.posterior, tracks.witness, tracks.x, result.proposals.box)
-    ):
-        raise ValueError("JSON has no number that is not finite")
-    states = tuple(map(json.dumps, result.state_names))
-    boxes = [BOX % tuple(box) for box in np.round(result.proposals.box, 3).tolist()]
-    boxes.append("null")  # index NONE is the last element
-    columns = (
-        tracks.id,
-        tracks.state,
-        tracks.object_class,
-        np.round(tracks.posterior, 6),
-        np.round(tracks.witness, 3),
-        tracks.viewed,
-        tracks.final,
-        _doubts(result),
-        tracks.proposal,
-        tracks.points,
-        tracks.age,
-        tracks.missed,
-        np.round(tracks.x, 3),
-    )
-    return [
-        TRACK
-        % (
-            *(id_, states[state], CLASSES[class_], *posterior, *witness, BOOLEANS[viewed], BOOLEANS[final]),
-            *(
-                UNCERTAIN[doubt],
-                "null" if proposal == NONE else proposal,
-                points,
-                age,
-                missed,
-                boxes[proposal],
-                *world,
-            ),
-        )
-        for id_, state, class_, posterior, witness, viewed, final, doubt, proposal, points, age, missed, world in zip(
-            *(column.tolist() for column in columns), strict=True
-        )
-    ]
+    boxes = [dict(zip(BOX_KEYS, box, strict=True)) for box in np.round(result.proposals.box, 3).tolist()]
+    columns = {
+        "id": tracks.id.tolist(),
+        "state": [result.state_names[state] for state in tracks.state],
+        "class": [CLASS_NAMES[class_] for class_ in tracks.object_class],
+        "posterior": np.round(tracks.posterior, 6).tolist(),
+        "witness": np.round(tracks.witness, 3).tolist(),
+        "viewed": tracks.viewed.tolist(),
+        "final": tracks.final.tolist(),
+        "uncertain": [UNCERTAIN[doubt] for doubt in _doubts(result)],
+        "proposal": [None if proposal == NONE else proposal for proposal in tracks.proposal.tolist()],
+        "points": tracks.points.tolist(),
+        "age": tracks.age.tolist(),
+        "missed": tracks.missed.tolist(),
+        "box": [None if proposal == NONE else boxes[proposal] for proposal in tracks.proposal],
+        "world": [dict(zip(WORLD_KEYS, x, strict=True)) for x in np.round(tracks.x, 3).tolist()],
+    }
+    return [line(dict(zip(columns, row, strict=True)))[:-1] for row in zip(*columns.values(), strict=True)]
 
 
-TEXT_OF_CLASS, TEXT_OF_DOUBT, TEXT_OF_BOOLEAN = map(text.encode_table, (CLASSES, UNCERTAIN, BOOLEANS))
+TEXT_OF_CLASS, TEXT_OF_DOUBT = (
+    text.encode_table([json.dumps(name) for name in names]) for names in (CLASS_NAMES, UNCERTAIN)
+)
+TEXT_OF_BOOLEAN = text.encode_table(BOOLEANS)
 NULL = text.encode("null")[0]
 
 
@@ -163,7 +141,7 @@ def _in_tables(result: FrameResult) -> bool:
 
 
 def _by_columns(result: FrameResult) -> str:
-    """The rows joined by commas, made column by column."""
+    """JSON of all tracks, joined by commas and made column by column."""
     tracks = result.tracks
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
     id_, proposal, points, age, missed = text.integers(np.stack(counts))

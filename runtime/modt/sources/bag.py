@@ -13,16 +13,14 @@ import numpy as np
 
 from modt.config import OdometryConfig
 from modt.errors import MisuseError, ModtError
-from modt.ros2 import odometry, point_cloud2, static_transforms
+from modt.ros2 import odometry, point_cloud2
 from modt.ros2.cdr import CdrReader, MessageError
-from modt.ros2.odometry import read_odometry
+from modt.ros2.odometry import StaticTransforms, read_odometry
 from modt.ros2.point_cloud2 import PointCloud, read_cloud
-from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.bag_files import BagFile, BagMessage, BagTopic, bag_files, messages_of
-from modt.sources.live.sweep_reader import Sweep
 from modt.sources.received_poses import PoseBuffer
 from modt.sources.stamp_check import STEP_S, StampCheck
-from modt.sources.stream import Faults, StreamInfo
+from modt.sources.stream import Faults, StreamInfo, Sweep
 from modt.types import Float64, Frame, Self
 
 Poses = tuple[str, Float64]
@@ -32,7 +30,7 @@ Poses = tuple[str, Float64]
 def find_poses(
     files: list[BagFile], topics: dict[str, BagTopic], sensor: str
 ) -> tuple[Poses | None, tuple[str, ...]]:
-    """Poses for the frame of a sensor, and notes; None without poses, or where their frame is not connected to it."""
+    """Poses that apply to the frame of a sensor (None without poses or without a transform to it), and notes."""
     names = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE and topic.count)
     if not names:
         return None, ("no nav_msgs/Odometry: no poses",)
@@ -45,13 +43,13 @@ def find_poses(
     if base.lstrip("/") == sensor.lstrip("/") or not base or not sensor:
         return (topic, np.eye(4)), ()
     transforms = StaticTransforms()
-    if topics.get(static_transforms.TOPIC, BagTopic("", 0)).type == static_transforms.TYPE:
-        for message in messages_of(files, {static_transforms.TOPIC}):
+    if topics.get(odometry.TF_STATIC, BagTopic("", 0)).type == odometry.TF:
+        for message in messages_of(files, {odometry.TF_STATIC}):
             with suppress(MessageError):
                 transforms.add(message.data)
     T_base_sensor = transforms.between(base, sensor)
     if T_base_sensor is None:
-        where = f"{static_transforms.TOPIC} does not lead from {base}, of which they are, to {sensor}"
+        where = f"{odometry.TF_STATIC} does not lead from {base}, of which they are, to {sensor}"
         return None, (f"poses of {topic} are not used: {where}",)
     return (topic, T_base_sensor), ()
 

@@ -101,7 +101,7 @@ class BagFile(ABC):
         """Topic, time of the recording [ns] and bytes of each message."""
 
     def _less(self, left: int, size: int) -> int:
-        """Number of bytes that may be unpacked after `size` more.
+        """Number of bytes that may still be unpacked after `size` bytes.
 
         Raises:
             ModtError: the limit is exceeded.
@@ -283,7 +283,7 @@ def _summary(file: BinaryIO) -> Any:
 
 
 def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iterator[tuple[int, Any]]:
-    """Begin [ns] and chunk, for chunks with messages of these topics; without an index, 0 and each record."""
+    """Start [ns] and content of each chunk with messages of these topics; without an index, 0 and each record."""
     chunks = () if summary is None else summary.chunk_indexes
     for index in sorted(chunks, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
         held = {summary.channels[number].topic for number in index.message_index_offsets}

@@ -20,7 +20,7 @@ from modt.errors import MisuseError
 from modt.sources import kitti_calibration, oxts
 from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
 from modt.sources.pose_source import read_poses, sensor_poses
-from modt.sources.scan_stream import PERIOD_S, ScanReference, ScanStream
+from modt.sources.scan_file import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt.types import Float64
 
@@ -39,7 +39,7 @@ Poses = dict[int, Float64]
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """Missing files and their consequences; `of_poses` does not matter with another pose source."""
+    """Missing files and their consequences; `of_poses` are irrelevant with another source of poses."""
 
     of_stream: list[str] = field(default_factory=list)
     of_poses: list[str] = field(default_factory=list)

@@ -24,11 +24,10 @@ MAX_COUNT = 1024
 MAX_HEADER_BYTES = 65_536
 BYTE_MAX, WORD_MAX = 255, 65_535
 SKIPPED = "the frame is skipped; convert it to x, y, z [m] and reflectance"
-PCD_TYPES = {"F4": "<f4", "F8": "<f8", "U1": "u1", "U2": "<u2", "U4": "<u4", "U8": "<u8"}
-PCD_TYPES |= {"I1": "i1", "I2": "<i2", "I4": "<i4", "I8": "<i8"}
+PCD_TYPES = {kind: f"<{kind.lower()}" for kind in ("F4", "F8", *(sign + size for sign in "UI" for size in "1248"))}
 PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
-PLY_TYPES |= {"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2"}
-PLY_TYPES |= {"int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
+PLY_TYPES |= {"float": "f4", "double": "f8"}
+PLY_TYPES |= {np.dtype(kind).name: kind for kind in PLY_TYPES.values()}
 BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 
 

@@ -54,24 +54,21 @@ def read_datagram(raw: bytes) -> tuple[float, Float64]:
         raise MessageError("malformed", "no JSON object")
     if ("pose" in message) == any(key in message for key in PLANAR):
         raise MessageError("malformed", "neither x, y, yaw nor pose, or both")
-    stamp = _number(message, "stamp")
+    missing = [key for key in ("stamp", *(() if "pose" in message else PLANAR)) if key not in message]
+    if missing:
+        raise MessageError("malformed", f"no {missing[0]}")
+    stamp = _number(message["stamp"], "stamp")
     if "pose" in message:
         T = _matrix(message["pose"])
     else:
-        x, y, yaw = (_number(message, key) for key in PLANAR)
+        x, y, yaw = (_number(message[key], key) for key in PLANAR)
         T = se3(rotation_zyx(0.0, 0.0, math.remainder(yaw, 2 * math.pi)), np.array([x, y, 0.0]))
     if defect := pose_defect(T):
         raise MessageError("malformed", f"pose is {defect}")
     return stamp, T
 
 
-def _number(message: dict[str, Any], key: str) -> float:
-    if key not in message:
-        raise MessageError("malformed", f"no {key}")
-    return _finite(message[key], key)
-
-
-def _finite(value: object, key: str) -> float:
+def _number(value: object, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise MessageError("malformed", f"{key} is no number")
     try:
@@ -86,7 +83,7 @@ def _finite(value: object, key: str) -> float:
 def _matrix(values: object) -> Float64:
     if not isinstance(values, list) or len(values) not in (12, 16):
         raise MessageError("malformed", "pose is no list of 12 or 16 numbers")
-    numbers = np.array([_finite(value, "pose") for value in values])
+    numbers = np.array([_number(value, "pose") for value in values])
     if len(numbers) == 16 and np.abs(numbers[12:] - [0, 0, 0, 1]).max() > 1e-6:
         raise MessageError("malformed", "the last row of pose is not 0 0 0 1")
     T = np.eye(4)

@@ -7,8 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from modt.errors import MisuseError
-from modt.sources.scan_file import SUFFIXES
-from modt.sources.scan_stream import PERIOD_S, ScanStream
+from modt.sources.scan_file import PERIOD_S, SUFFIXES, ScanStream
 from modt.sources.stream import Stream
 
 CAPTURES = frozenset({".pcap", ".cap", ".pcapng"})
@@ -46,7 +45,7 @@ def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, st
         ModtError: the recording cannot be read.
     """
     if path.is_file() and path.suffix in CAPTURES:
-        from modt.sources.packets.open_capture import open_capture
+        from modt.sources.packets.capture import open_capture
 
         _only(path, capture, {"model", "calibration", "metadata"})
         return open_capture(path, capture)

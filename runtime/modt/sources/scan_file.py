@@ -1,14 +1,17 @@
-"""Scan files: KITTI's float32 rows of x, y, z, reflectance, PCD and PLY."""
+"""Scan files (KITTI's float32 rows of x, y, z, reflectance; PCD and PLY), and streams of them."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from modt.errors import ScanError
-from modt.types import UNRECORDED, Float32
+from modt.errors import ModtError, ScanError
+from modt.sources.stream import Faults, StreamInfo
+from modt.types import UNRECORDED, Float32, Float64, Frame, Self
 
 SUFFIXES = (".bin", ".pcd", ".ply")
 """Suffixes of scan files; a folder that holds several kinds is read by the first one."""
@@ -99,3 +102,47 @@ def _flawless(points: Float32) -> bool:
     with np.errstate(invalid="ignore"):
         coordinates = points.min(initial=0.0) >= -MAX_COORDINATE_M and points.max(initial=0.0) <= MAX_COORDINATE_M
         return bool(coordinates and reflectance.min(initial=0.0) >= 0.0 and reflectance.max(initial=0.0) <= 1.0)
+
+
+PERIOD_S = 0.1
+"""Time between scans that have no stamps [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScanReference:
+    """A scan on disk."""
+
+    index: int  # frame number
+    path: Path  # the file
+    stamp_s: float  # its time [s]
+    T_world_sensor: Float64 | None  # (4, 4) pose, None where unknown
+    turn_s: float = 0.0  # duration of the sweep [s], as in Frame
+
+
+class ScanStream:
+    """Frames of scan files, ordered by time; unusable scans are counted and skipped, the first ones are logged."""
+
+    def __init__(self, info: StreamInfo, scans: list[ScanReference]) -> None:
+        self.info = replace(info, n_frames=len(scans), end=scans[-1].index + 1 if scans else 0)
+        self.scans = scans
+        self.faults = Faults()
+
+    def __iter__(self) -> Iterator[Frame]:
+        used = 0
+        for scan in self.scans:
+            try:
+                points, flaws = read_scan(scan.path)
+            except ScanError as error:
+                self.faults.report(scan.index, scan.path, error.cause, skipped=True)
+                continue
+            if flaws:
+                self.faults.report(scan.index, scan.path, "; ".join(flaws), skipped=False)
+            used += 1
+            yield Frame(scan.index, scan.stamp_s, points, scan.T_world_sensor, turn_s=scan.turn_s)
+        if self.scans and not used:
+            cause = f"none of its {len(self.scans)} scans can be used ({self.faults.first[0].cause})"
+            raise ModtError(self.info.name, cause, "give a stream of float32 x, y, z, reflectance scans")
+
+    def between(self, first: int, last: int | None) -> Self:
+        """Scans with first <= index < last; others are not read."""
+        return type(self)(self.info, [s for s in self.scans if s.index >= first and (last is None or s.index < last)])

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from modt.errors import ScanError
-from modt.sources.live.sweep_reader import Sweep
 from modt.sources.scan_file import sanitised
-from modt.sources.stream import Faults
+from modt.sources.stream import Faults, Sweep
 from modt.types import Frame
 
 STEP_S = 1.0

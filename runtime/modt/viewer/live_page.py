@@ -5,13 +5,18 @@ from __future__ import annotations
 import logging
 from typing import Any
 
+import numpy as np
+
 from modt.address import Address
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
+from modt.sinks.records import line
 from modt.types import FrameResult
-from modt.viewer.html_page import LIVE, content, page
-from modt.viewer.live_frame import STEP_CM, live_message
+from modt.viewer import theme
 from modt.viewer.live_server import LiveServer
+from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, occupied, packed_cells, packed_table
+from modt.viewer.theme import LIVE, content, page
+from modt.viewer.track_rows import planar, result_rows, scaled
 
 log = logging.getLogger(__name__)
 
@@ -64,3 +69,43 @@ def open_view(address: Address) -> LivePage:
         raise MisuseError(address.text, f"cannot be bound ({error.strerror or error})", remedy) from None
     log.warning("the run is shown at http://%s:%d/", f"[{host}]" if ":" in host else host, opened.port)
     return opened
+
+
+STEP_CM = 5
+MOST_CELLS = 50_000
+FASTEST = 1
+"""Level of the fastest compression."""
+
+
+def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
+    """Line of JSON for a frame."""
+    frame = {
+        "frame": result.frame.index,
+        "stamp_s": round(result.frame.stamp_s, 3),
+        "proposals": len(result.proposals),
+        "classifications": len(result.classified),
+        "deferred": result.n_deferred,
+        "pose": planar(result.T_world_sensor).round(4).tolist(),
+        **costs,
+    }
+    content = {
+        "frame": frame,
+        "states": theme.states(result.state_names),
+        "tracks": packed_table(scaled(result_rows(result)), FASTEST),
+        "points": packed_cells(live_cells(result).thinned(MOST_CELLS), FASTEST),
+    }
+    return line(content)
+
+
+def live_cells(result: FrameResult) -> Cells:
+    """Cells of the sweep; points without a proposal count as ground."""
+    x, y, z = (result.frame.points[:, k] for k in range(3))
+    reach_m = (SIDE // 2 - 1) * STEP_CM / 100
+    used = (np.abs(x) < reach_m) & (np.abs(y) < reach_m) & ((x != 0) | (y != 0))
+    level = np.zeros(len(x), np.int64)
+    members = result.proposals.members
+    ground = used.copy()
+    ground[members] = False
+    floor_m = float(np.median(z[ground])) if ground.any() else 0.0
+    level[members] = np.clip(np.rint((z[members] - floor_m) / LEVEL_M), 1, LEVELS - 1)
+    return occupied(x[used], y[used], level[used], STEP_CM)

@@ -7,6 +7,7 @@ import threading
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler
 from ipaddress import ip_address
+from queue import Empty, Queue
 from socketserver import ThreadingTCPServer
 
 _Request = socket.socket | tuple[bytes, socket.socket]
@@ -22,31 +23,22 @@ ALIVE_S = 10.0
 
 
 class Client:
-    """Mailbox of a client, which holds the newest event alone."""
+    """Mailbox of a client, which holds the newest event alone; None ends the events."""
 
     def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._event: bytes | None = None
-        self._ended = False
+        self._box: Queue[bytes | None] = Queue(1)
 
-    def put(self, event: bytes) -> None:
-        """Replace the event that has not been sent."""
-        with self._changed:
-            self._event = event
-            self._changed.notify()
-
-    def end(self) -> None:
-        """Send no more events."""
-        with self._changed:
-            self._ended = True
-            self._changed.notify()
+    def put(self, event: bytes | None) -> None:
+        """Replace the event that has not been sent; one thread at a time may do this."""
+        with suppress(Empty):
+            self._box.get_nowait()
+        self._box.put_nowait(event)
 
     def take(self) -> bytes | None:
-        """The next event, a comment after ALIVE_S without one, None at the end."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._event is not None or self._ended, ALIVE_S)
-            event, self._event = self._event, None
-            return None if self._ended else event or b": alive\n\n"
+        """The next event, or a comment after ALIVE_S without one."""
+        with suppress(Empty):
+            return self._box.get(timeout=ALIVE_S)
+        return b": alive\n\n"
 
 
 class LiveServer(ThreadingTCPServer):
@@ -54,8 +46,8 @@ class LiveServer(ThreadingTCPServer):
 
     Attributes:
         page: HTML.
-        names: hosts that a request may name, None for all: a page of another site could reach the loopback by a name
-            of its own.
+        names: host names that a request may use; None for all. On the loopback they are limited, because a page of
+            another site could reach it by a name of its own.
 
     Raises:
         OSError: the address cannot be bound.
@@ -105,7 +97,8 @@ class LiveServer(ThreadingTCPServer):
         self.shutdown()
         with self._lock:
             for client in self._clients:
-                client.end()
+                client.put(None)
+            self._clients.clear()
         self.server_close()
 
     def verify_request(self, request: object, client_address: object) -> bool:
@@ -120,7 +113,7 @@ class LiveServer(ThreadingTCPServer):
             self._free.release()
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """A client that has gone is no error."""
+        """Ignore the error: the client has gone."""
 
 
 class _Handler(BaseHTTPRequestHandler):

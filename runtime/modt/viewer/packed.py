@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import base64
 import zlib
+from dataclasses import dataclass
 
 import numpy as np
 
-from modt.types import Int
-from modt.viewer.point_cells import Cells
+from modt.types import Float32, Int
 
 LEVEL = 6
 """Level of the compression; higher ones take longer and gain little."""
@@ -17,7 +17,7 @@ NUMBER_BYTES = 4
 
 
 def packed(data: bytes, level: int = LEVEL) -> str:
-    """Text of bytes; the page undoes it by `atob` and `DecompressionStream("deflate")`."""
+    """Text of bytes. The page reads it by `atob` and `DecompressionStream("deflate")`."""
     return base64.b64encode(zlib.compress(data, level)).decode("ascii")
 
 
@@ -28,7 +28,7 @@ def planes(numbers: Int, n_bytes: int) -> bytes:
 
 
 def differences(numbers: Int) -> Int:
-    """(n,) the first number, then what is added to each to get the next."""
+    """(n,) the first number, then the difference of each number from the one before."""
     return np.diff(numbers, prepend=0)
 
 
@@ -40,3 +40,41 @@ def packed_cells(cells: Cells, level: int = LEVEL) -> str:
 def packed_table(table: Int, level: int = LEVEL) -> str:
     """(R, C) table, column by column: differences in NUMBER_BYTES planes."""
     return packed(b"".join(planes(differences(column), NUMBER_BYTES) for column in table.T), level)
+
+
+SIDE = 4096
+"""Cells of the grid along x and along y: three bytes count them all."""
+LEVEL_M = 0.1
+LEVELS = 64
+"""Heights above ground are whole multiples of LEVEL_M below LEVELS; level 0 is ground."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """The occupied cells of a sweep, ordered by their numbers."""
+
+    cell: Int  # (n,) SIDE * row + column, ascending; column and row count from -x and -y, the sensor at SIDE / 2
+    level: Int  # (n,) height above ground [LEVEL_M], 0 for ground
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+    def thinned(self, most: int) -> Cells:
+        """At most `most` cells. Cells of the ground are left out first."""
+        kept = [np.flatnonzero(self.level > 0), np.flatnonzero(self.level == 0)]
+        for group, rows in enumerate(kept):
+            room = max(most - (len(kept[0]) if group else 0), 0)
+            if len(rows) > room:
+                kept[group] = rows[np.linspace(0, len(rows), room, endpoint=False).astype(np.int64)]
+        rows = np.sort(np.concatenate(kept))
+        return Cells(self.cell[rows], self.level[rows])
+
+
+def occupied(x: Float32, y: Float32, level: Int, step_cm: int) -> Cells:
+    """The cells of points x, y [m] within the grid, each with the highest level of its points."""
+    column, row = (np.floor(v * (100 / step_cm)).astype(np.int64) + SIDE // 2 for v in (x, y))
+    # Sorted by cell, then by height: the last of each cell is its highest.
+    packed = np.sort((SIDE * row + column) * LEVELS + level)
+    cell, level = np.divmod(packed, LEVELS)
+    highest = np.append(np.diff(cell) > 0, True)[: len(cell)]
+    return Cells(cell[highest], level[highest])

@@ -17,7 +17,7 @@ SCALED = (*P, *WITNESS, *BOX_KEYS, *WORLD)
 COLUMNS = (*PLAIN, *SCALED)
 """`at` is the index of the frame in the run, `seen` whether it has a proposal. Probabilities are per mille, lengths
 [cm], angles [mrad], speeds [cm/s]; `motion_CLASS` the log-likelihood of the motion over that of background [1/100].
-The box of a lost track is its last one, moved to where the filter has it."""
+The box of a lost track is its last one, moved to the position that the filter predicts."""
 SCALE = {name: 1000 if name in (*P, "yaw", "world_heading") else 100 for name in SCALED}
 
 

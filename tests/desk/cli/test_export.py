@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
-from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
 from tests.cli.commands import here, refusal
 from tests.desk.recorded import drive_and_run
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modt.sources.scan_stream import ScanReference, ScanStream
+from modt.sources.scan_file import ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt_desk.evaluation.rules import KITTI_RULES
 from modt_desk.evaluation.run_record import FramesByNumber

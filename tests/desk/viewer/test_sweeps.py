@@ -1,7 +1,7 @@
 import numpy as np
 
 from modt.profile import load
-from modt.viewer.point_cells import SIDE
+from modt.viewer.packed import SIDE
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt_desk.viewer.view import Grid
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.sweep_reader import Reception, StreamEndedError, Sweep
-from modt.sources.stream import StreamInfo
+from modt.sources.stream import Reception, StreamEndedError, StreamInfo, Sweep
 
 INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
 

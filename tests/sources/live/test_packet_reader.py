@@ -10,10 +10,10 @@ import pytest
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
-from modt.sources.live.sweep_reader import Reception
+from modt.sources.packets.capture import open_capture
 from modt.sources.packets.hesai import HesaiDecoder
 from modt.sources.packets.livox import LivoxDecoder
-from modt.sources.packets.open_capture import open_capture
+from modt.sources.stream import Reception
 from tests.sources.packets.simulated import decoded, packets
 from tools.send.loops import endless
 from tools.send.packets import send

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from modt.sources.live.played_reader import PlayedReader
-from modt.sources.live.sweep_reader import StreamEndedError
-from modt.sources.stream import Faults, StreamInfo
+from modt.sources.live.live_stream import PlayedReader
+from modt.sources.stream import Faults, StreamEndedError, StreamInfo
 from modt.types import Frame
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.stream import Reception, Sweep
 from modt.types import Float32, Frame
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.send.faults import Timed

@@ -5,8 +5,8 @@ import struct
 import numpy as np
 import pytest
 
-from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.livox import MAX_PACKETS, LivoxDecoder
+from modt.sources.stream import Reception
 from tests.sources.packets.simulated import BEGAN_S, decoded
 
 STEP_S = 480e-6

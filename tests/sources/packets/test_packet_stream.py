@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from modt.sources.packets.open_capture import open_capture
+from modt.sources.packets.capture import open_capture
 from modt.sources.recognise import open_stream
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture

@@ -7,9 +7,9 @@ import struct
 import numpy as np
 import pytest
 
-from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.velodyne import VelodyneDecoder, model_named
+from modt.sources.stream import Reception
 from tests.sources.packets.simulated import bearing_deg, decoded, equal, packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import Capture
-from modt.sources.packets.open_capture import open_capture
+from modt.sources.packets.capture import Capture, open_capture
 from modt.sources.recognise import open_stream
 from tests.sources import layouts
 from tests.sources.packets.simulated import packets

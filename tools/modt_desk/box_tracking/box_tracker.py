@@ -33,7 +33,7 @@ def predict(x: Float64, P: Float64, acceleration_sigma_mps2: float, dt_s: float)
 
 def update(x: Float64, P: Float64, z: Float64, variance: Float64) -> tuple[Float64, Float64]:
     """States and covariances after measured positions z (M, 2) of variance (M,) [m2] along each axis."""
-    gain = P[:, :2] / (P[:, 0] + variance)[:, None]  # of position and velocity
+    gain = P[:, :2] / (P[:, 0] + variance)[:, None]  # gains of position and velocity
     nu = z - x[:, :2]
     updated = x + np.concatenate([gain[:, :1] * nu, gain[:, 1:] * nu], axis=1)
     return updated, P - np.stack([gain[:, 0] * P[:, 0], gain[:, 0] * P[:, 1], gain[:, 1] * P[:, 1]], axis=1)

@@ -41,7 +41,7 @@ T_LEVEL_CAMERA = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 
 class Detections:
     """The D detections of a sequence, ordered by frame."""
 
-    name: str  # of the sequence
+    name: str  # name of the sequence
     frame: Int  # (D,) index of the frame
     object_class: Int  # (D,) class
     image_box: Float64  # (D, 4) left, top, right, bottom [pixel]

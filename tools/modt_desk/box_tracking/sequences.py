@@ -25,27 +25,24 @@ TINY = 1e-9
 
 
 def birds_eye_intersection(a: Float64, b: Float64) -> Float64:
-    """(n,) bird's-eye area that boxes a (n, 7) share with boxes b (n, 7), row by row [m2].
-
-    The common polygon's vertices are the corners of one inside the other and the crossings of their edges; in the
-    order of their bearing from their mean they give its area.
-    """
+    """(n,) bird's-eye area that boxes a (n, 7) share with boxes b (n, 7), row by row [m2]."""
     origin = a[:, None, :2]  # near the boxes: far from it, cross products cancel
-    p, q = corners(a) - origin, corners(b) - origin
-    crossing, crosses = _crossings(p, q)
-    vertices = np.concatenate([p, q, crossing], axis=1)
-    valid = np.concatenate([_inside(p, q), _inside(q, p), crosses], axis=1)
-    n = np.maximum(valid.sum(axis=1), 1)
-    mean = (vertices * valid[..., None]).sum(axis=1) / n[:, None]
-    local = np.where(valid[..., None], vertices - mean[:, None], 0.0)
-    bearing = np.where(valid, np.arctan2(local[..., 1], local[..., 0]), np.inf)
-    order = np.argsort(bearing, axis=1)
-    ring = np.take_along_axis(local, order[..., None], axis=1)
-    placed = np.take_along_axis(valid, order, axis=1)
-    ring = np.where(placed[..., None], ring, ring[:, :1])  # the unused repeat the first vertex and add no area
-    after = np.roll(ring, -1, axis=1)
-    area: Float64 = 0.5 * np.abs((ring[..., 0] * after[..., 1] - ring[..., 1] * after[..., 0]).sum(axis=1))
-    return area
+    return np.array([_shared_m2(p, q) for p, q in zip(corners(a) - origin, corners(b) - origin, strict=True)])
+
+
+def _shared_m2(polygon: Float64, other: Float64) -> float:
+    """Area that two convex, counter-clockwise polygons share: each edge of the other one clips the first."""
+    for begin, end in zip(other, np.roll(other, -1, axis=0), strict=True):
+        (dx, dy), (x, y) = end - begin, (polygon - begin).T
+        side = dx * y - dy * x
+        change = side - np.roll(side, -1)
+        inside = side >= 0
+        leaves = inside != np.roll(inside, -1)
+        share = np.divide(side, change, out=np.zeros(len(side)), where=leaves)[:, None]
+        crossing = polygon + share * (np.roll(polygon, -1, axis=0) - polygon)
+        polygon = np.stack([polygon, crossing], axis=1)[np.stack([inside, leaves], axis=1)]
+    (x, y), (after_x, after_y) = polygon.T, np.roll(polygon, -1, axis=0).T
+    return float(x @ after_y - after_x @ y) / 2
 
 
 def iou_3d(a: Float64, b: Float64) -> Float64:
@@ -54,32 +51,7 @@ def iou_3d(a: Float64, b: Float64) -> Float64:
     foot = np.maximum(a[:, 2] - a[:, 5] / 2, b[:, 2] - b[:, 5] / 2)
     shared = birds_eye_intersection(a, b) * np.maximum(top - foot, 0.0)
     union = np.prod(a[:, 3:6], axis=1) + np.prod(b[:, 3:6], axis=1) - shared
-    iou: Float64 = shared / np.maximum(union, TINY)
-    return iou
-
-
-def _inside(points: Float64, polygon: Float64) -> Bool:
-    """(n, k) whether points (n, k, 2) lie in counter-clockwise rectangles (n, 4, 2), edges included."""
-    edge = np.roll(polygon, -1, axis=1) - polygon
-    offset = points[:, :, None] - polygon[:, None]
-    cross = edge[:, None, :, 0] * offset[..., 1] - edge[:, None, :, 1] * offset[..., 0]
-    inside: Bool = np.logical_and.reduce(cross >= -TINY, axis=2)
-    return inside
-
-
-def _crossings(p: Float64, q: Float64) -> tuple[Float64, Bool]:
-    """(n, 16, 2) where the edges of p meet those of q, and whether they do so within both."""
-    d, e = np.roll(p, -1, axis=1) - p, np.roll(q, -1, axis=1) - q
-    offset = q[:, None] - p[:, :, None]
-    d, e = d[:, :, None], e[:, None]
-    denominator = d[..., 0] * e[..., 1] - d[..., 1] * e[..., 0]
-    parallel = np.less(np.abs(denominator), TINY)
-    denominator = np.where(parallel, 1.0, denominator)
-    t = (offset[..., 0] * e[..., 1] - offset[..., 1] * e[..., 0]) / denominator
-    u = (offset[..., 0] * d[..., 1] - offset[..., 1] * d[..., 0]) / denominator
-    meets = ~parallel & (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
-    point = p[:, :, None] + t[..., None] * d
-    return point.reshape(len(p), 16, 2), meets.reshape(len(p), 16)
+    return np.asarray(shared / np.maximum(union, TINY))
 
 
 MIN_IOU = 0.25
@@ -136,8 +108,7 @@ def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
 def _mean(ids: Int, values: Float64) -> Float64:
     """(n,) mean of the values (n,) of each one's track."""
     _, track = np.unique(ids, return_inverse=True)
-    mean: Float64 = (np.bincount(track, values) / np.bincount(track))[track]
-    return mean
+    return np.asarray((np.bincount(track, values) / np.bincount(track))[track])
 
 
 def bridged(found: TrackedBoxes, max_gap: int) -> TrackedBoxes:

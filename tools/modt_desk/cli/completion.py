@@ -56,7 +56,7 @@ def commands() -> Iterator[Command]:
     for prog, modules in (("modt", modt.COMMANDS), ("modt-profile", modt_profile.COMMANDS)):
         top = argparse.ArgumentParser(prog=prog)
         choice = top.add_subparsers()
-        for module in modules.values():
+        for module in dict.fromkeys(modules.values()):
             import_module(module).add_parser(choice)
         yield from _below(prog, "", top)
 

@@ -29,7 +29,7 @@ def add_options(p: argparse.ArgumentParser) -> None:
     seconds = options.real(0.2, 3600, "seconds")
     each = "duration of each simulated drive [s] (default: %(default)g)"
     g.add_argument("--seconds", type=seconds, default=6.0, metavar="S", help=each)
-    options.add_profile_option(g, "profile on top of that of each drive's sensor; later ones win key by key")
+    options.add(g, "profile", help="profile on top of that of each drive's sensor; later ones win key by key")
     beside = "compare with the same experiments under this further profile; repeatable"
     g.add_argument("--beside", action="append", default=[], metavar="NAME|FILE", help=beside)
     out = "directory of the results (default: %(default)s)"

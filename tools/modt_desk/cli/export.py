@@ -22,7 +22,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     form.add_argument("--parquet", type=Path, metavar="FILE", help="write the same table as Parquet")
     options.add_frames_option(p)
     p.add_argument("--no-points", action="store_true", help="write MCAP without points, which needs no source")
-    options.add_capture_option(p)
+    options.add(p, "capture")
     options.add_examples(
         p,
         "modt export RUN --mcap run.mcap    for Foxglove, with the points of the source",

@@ -20,7 +20,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     seconds = options.real(0.01, 600, "seconds")
     p = commands.add_parser("calibrate", help="fit the energy of this board's units of work, and write its profile")
     options.add_stream_options(p, (0, 40))
-    options.add_meter_option(p)
+    options.add(p, "meter")
     p.add_argument("--board", default="this board", metavar="NAME", help="name of the board in the profile")
     p.add_argument(
         "--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="profile (default: %(default)s)"
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt import profile
-    from modt.app import assembly, inputs, kernel_choice, metering
+    from modt.app import assembly, inputs, metering
     from modt.app.chosen_profile import choose
     from modt.classification.pointnet import PointNet
     from modt.classification.scheduler import padded_size
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = PointNet(limits, loaded.sensor)
-    segmenter = assembly.segmenter(loaded, FieldOfView(), kernel_choice.choose(loaded.segmentation.kernels))
+    segmenter = assembly.segmenter(loaded, FieldOfView(), assembly.chosen_kernels(loaded.segmentation.kernels))
     windows = metering.windows(meters, pinned, min_s=math.inf)
     workload = Workload(scans, segmenter.segment, network.classify, padded_size(limits), ledger, windows)
     try:

@@ -18,9 +18,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     count = options.integer(1, 1000, "a count")
     p = commands.add_parser("compare", help="run all modes on the same stream, interleaved")
     options.add_stream_options(p)
-    options.add_fov_option(p)
-    options.add_meter_option(p)
-    options.add_report_options(p)
+    options.add(p, "fov", "meter", "json", "html")
     p.add_argument("--repeat", type=count, default=3, metavar="K", help="repetitions (default: %(default)s)")
     turn = "consecutive frames of one mode (default: 1, with a meter all frames)"
     p.add_argument("--turn", type=count, metavar="N", help=turn)

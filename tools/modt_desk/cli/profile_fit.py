@@ -26,7 +26,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("fit", help="fit a profile to a recording of an unknown sensor")
     stream = "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, or PCAP file; best of a drive that moves"
     p.add_argument("path", type=Path, metavar="RECORDING", help=stream)
-    options.add_capture_option(p)
+    options.add(p, "capture")
     p.add_argument("--name", metavar="NAME", help="name of the profile (default: that of the recording)")
     p.add_argument("--out", type=Path, metavar="FILE", help="profile to write (default: NAME.yaml)")
     count = options.integer(1, MOST_FRAMES, "a count")

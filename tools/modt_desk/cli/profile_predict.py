@@ -15,8 +15,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare the command and its options."""
     p = commands.add_parser("predict", help="predict energy and gamma of the modes from other streams")
     options.add_stream_options(p)
-    options.add_fov_option(p)
-    p.add_argument("--json", action="store_true", help="print JSON")
+    options.add(p, "fov", "json")
     calibration = "JSON of modt-profile compare of another stream; repeatable"
     p.add_argument("--calibration", type=Path, action="append", required=True, metavar="FILE", help=calibration)
     seen = "part of the frames to track without classifying (default: %(default)s)"

@@ -14,7 +14,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare the command and its options."""
     p = commands.add_parser("report", help="report energy and savings of a run, which may still be running")
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")
-    options.add_report_options(p)
+    options.add(p, "json", "html")
     options.add_examples(
         p,
         "modt-profile report RUN                      what a run has cost",

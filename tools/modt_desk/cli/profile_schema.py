@@ -18,8 +18,8 @@ class Key:
     """One key of a profile.
 
     Attributes:
-        path: of the key, with dots.
-        default: without a profile.
+        path: path of the key, with dots.
+        default: value without a profile.
         kind: type of its values.
         facts: low, high, unit, options, number of values and meaning.
     """
@@ -61,21 +61,20 @@ def keys(config: type[StageConfig] | type[ProfileConfig] = ProfileConfig, prefix
 
 
 FILE = "profile.schema.json"
-"""Its name in profiles/."""
+"""Name of the schema in profiles/."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command."""
     p = commands.add_parser("schema", help="print the JSON Schema of a profile, for editors")
     options.add_examples(
-        p,
-        "modt profile schema > profile.schema.json   for the line `# yaml-language-server: $schema=`",
+        p, "modt profile schema > profile.schema.json   for the line `# yaml-language-server: $schema=`"
     )
     p.set_defaults(run=run)
 
 
 def run(_arguments: argparse.Namespace) -> int:
-    """Print it."""
+    """Print the schema."""
     print(schema_text(), end="")
     return 0
 

@@ -23,7 +23,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "FILE.html, a page that plays the run (default: RUN/view.html); of one frame FILE.svg (with --frame: "
         "RUN/view-N.svg) or FILE.png; a film, FILE.gif or FILE.mp4"
     )
-    options.add_capture_option(p)
+    options.add(p, "capture")
     truth = "labels to compare with, as for modt evaluate (default: those that lie with its source)"
     p.add_argument("--truth", type=Path, metavar="TRUTH", help=truth)
     p.add_argument("--out", type=Path, metavar="FILE", help=out)

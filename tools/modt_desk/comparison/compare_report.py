@@ -40,8 +40,8 @@ def compare_tree(
 ) -> dict[str, Any]:
     """Results of a comparison over repetitions of the same stream.
 
-    The first of the modes is tracking-by-detection; the run named `varied` gives the unit costs. What the
-    comparison is about (stream, frames, conditions) is copied to the tree.
+    The first of the modes is tracking-by-detection. The run named `varied` gives the unit costs. `about` (stream,
+    frames, conditions) is copied to the tree.
     """
     random = np.random.default_rng(0)
     passes = {name: [repetition[name] for repetition in repetitions] for name in (*modes, varied)}
@@ -88,7 +88,7 @@ def _energy(
     basis: Basis,
     random: np.random.Generator,
 ) -> dict[str, Quantity]:
-    """Energy a frame with and without idling [J]: of the meter where it was read, else of the model."""
+    """Energy a frame with and without idling [J], by the meter if it was read, else by the model."""
     good = usable_windows(windows)
     frames = np.array([line["frames"][2] for line in good])
     if frames.sum():

@@ -36,7 +36,7 @@ class RecordingFusion:
         return asks
 
     def first_asked(self, alive: set[int]) -> int:
-        """Number of tracks that asked since the last call and never before; the others than alive are forgotten."""
+        """Number of tracks that asked for the first time since the last call; only tracks alive are remembered."""
         number = len(self._asked - self._known)
         self._known = (self._known | self._asked) & alive
         self._asked = set()
@@ -49,9 +49,9 @@ class ModeRun:
 
     pipeline: Pipeline
     ledger: Ledger
-    budget: Callable[[int], Budget]  # of the frame with that index
+    budget: Callable[[int], Budget]  # budget of a frame by its index
     windows: Windows | None = None  # None where no meter is read
-    lines: list[Line] = field(default_factory=list)  # of the ledger
+    lines: list[Line] = field(default_factory=list)  # lines of the ledger
     energy_lines: list[Line] = field(default_factory=list)
     lives: Histogram = field(default_factory=Histogram)  # frames with a proposal, of every track that ended
     _counts: list[tuple[int, ...]] = field(default_factory=list)

@@ -51,7 +51,7 @@ class GammaEstimate:
     """Gamma of one mode over tracking-by-detection, with intervals at 95 % over frames resampled in blocks."""
 
     reconciliation: Reconciliation
-    reconciled: Quantity  # by the full model
+    reconciled: Quantity  # gamma by the full model
     measured: Quantity  # ratio of the costs of the two runs
     deviation: Quantity  # reconciled / measured - 1
 
@@ -111,8 +111,7 @@ def other_costs(run: RunCosts) -> OtherCosts:
 def blocks(n: int, random: np.random.Generator) -> Int:
     """(n,) frames drawn in circular blocks."""
     starts = random.integers(0, n, size=-(-n // _BLOCK))
-    frames: Int = ((starts[:, None] + np.arange(_BLOCK)) % n).ravel()[:n]
-    return frames
+    return np.asarray(((starts[:, None] + np.arange(_BLOCK)) % n).ravel()[:n])
 
 
 def _interval(values: Float64) -> Interval:

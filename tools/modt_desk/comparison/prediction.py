@@ -1,7 +1,8 @@
 """Energy of the modes on a stream before any of them has run on it.
 
-What a unit of work costs, and how often a track is classified, comes from other streams; from the stream itself comes
-what tracking alone sees. Unlike the reconciliation (modt_desk.energy.savings) it can be wrong.
+The costs of units of work, and the number of classifications of a track, come from other streams. The stream itself
+contributes the counts of tracking without classification. Unlike the reconciliation (modt_desk.energy.savings) the
+prediction can be wrong.
 """
 
 from __future__ import annotations
@@ -58,9 +59,9 @@ class Views:
         """Selection seen in a run.
 
         Args:
-            run: of the mode.
-            asking: (F,) tracks that ask.
-            size: network's points of a proposal that is seen.
+            run: run of the mode.
+            asking: (F,) number of tracks that ask.
+            size: points of the network for a proposal that is seen.
         """
         each = _column(run, "classified").mean()
         if not each:
@@ -80,9 +81,9 @@ class Rates:
 
     segmentation: Float64  # (2,) a frame, a point of the sweep
     classification: Float64  # (3,) a call, a proposal, a point of the network
-    tracking: dict[str, Float64]  # of each mode: (3,) a frame, a proposal, a track
-    scheduling: dict[str, Float64]  # of each mode, with fusion: (2,) a frame, a track
-    views: dict[str, Views]  # of each mode; of tracking-by-detection, in which every proposal asks
+    tracking: dict[str, Float64]  # by mode: (3,) costs of a frame, a proposal, a track
+    scheduling: dict[str, Float64]  # by mode, with fusion: (2,) costs of a frame, a track
+    views: dict[str, Views]  # by mode; in tracking-by-detection every proposal asks
 
     @classmethod
     def fit(cls, streams: Sequence[Stream]) -> Self:
@@ -112,7 +113,7 @@ class Rates:
 class Expected:
     """Expectation for one stream."""
 
-    cost: dict[str, float]  # of each mode, a frame [CPU s]; tracking-by-detection first
+    cost: dict[str, float]  # cost of a frame by mode [CPU s]; tracking-by-detection first
     equation: EnergyModel  # Equation 3 bare, with N_go
 
     @property

@@ -23,9 +23,9 @@ class Calibration:
     """Result of a calibration."""
 
     fit: Fit
-    seg_burst_J: float | None  # of one segmentation, from bursts of segmentation
-    class_burst_J: float | None  # of one classification of mean points, from bursts of classification
-    class_fit_J: float  # the same by the fit
+    seg_burst_J: float | None  # energy of one segmentation, from bursts of segmentation
+    class_burst_J: float | None  # energy of one classification of mean size, from bursts
+    class_fit_J: float  # energy of one classification of mean size by the fit
     busy_W: float  # idle power plus energy above idling over CPU time
 
 

@@ -149,8 +149,7 @@ def _bootstrap(X: Float64, y: Float64, random: np.random.Generator, resamples: i
     weight = random.multinomial(n, np.full(n, 1 / n), size=resamples).astype(float)
     normal = np.einsum("bn,np,nq->bpq", weight, X, X, optimize=True) + 1e-12 * np.eye(p)
     moment = weight @ (X * y[:, None])
-    solved: Float64 = np.linalg.solve(normal, moment[..., None])[..., 0]
-    return solved
+    return np.asarray(np.linalg.solve(normal, moment[..., None])[..., 0])
 
 
 def unit_energy_J(lines: Sequence[Line], idle_W: float, work: Regressor) -> float | None:

@@ -33,9 +33,9 @@ class EnergySums:
         self.count = self.frames = self.wall_ns = self.dropped = 0
         self.gross_J = self.error2_J2 = 0.0
         self.parts_J: Counter[str] = Counter()
-        self._cpu_ns: Counter[str] = Counter()  # of the stages
+        self._cpu_ns: Counter[str] = Counter()  # CPU time of each stage
         self.kind, self.meter = Kind.ESTIMATED, ""
-        self.conditions: dict[str, Any] = {}  # of the last window
+        self.conditions: dict[str, Any] = {}  # conditions of the last window
         self.marks: set[str] = set()
 
     def add_window(self, window: Line) -> None:
@@ -75,7 +75,7 @@ class EnergySums:
 
 
 def run_energy(windows: Iterable[Line], frames: Iterable[Line], board: EnergyConfig) -> EnergySums:
-    """Energy of a run: of its windows where a meter was read, else of its frames by the power model."""
+    """Energy of a run: the energy of its windows if a meter was read, else that of its frames by the power model."""
     sums = EnergySums(board)
     for window in windows:
         sums.add_window(window)

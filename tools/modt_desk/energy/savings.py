@@ -24,12 +24,12 @@ class EnergyModel:
     e_class: float  # E(class), of one classification by tracking-by-detection
     n: float  # N_obj + N_bg, proposals a frame
     n_go: float  # N_go, mean length of a track in frames
-    classified_share: float = 1.0  # of the tracks, at least once
+    classified_share: float = 1.0  # share of the tracks that are classified at least once
     repeats: float = 0.0  # further classifications a track, without those after a loss
     reacquired: float = 0.0  # further classifications a track after it was lost
     view_cost_ratio: float = 1.0  # E(class) of the views selected over e_class
     track: float = 0.0  # common to both runs, a frame
-    extra_track1: float = 0.0  # beyond that
+    extra_track1: float = 0.0  # cost of tracking beyond the common part, by run
     extra_track2: float = 0.0
     schedule1: float = 0.0  # scheduling and fusion, a frame
     schedule2: float = 0.0
@@ -78,7 +78,7 @@ class Counts:
     classified: int  # proposals
     reacquired: int  # classifications of a track that was lost in the frame before and classified earlier
     points: int  # processed by the network
-    calls: int  # of the classifier
+    calls: int  # calls of the classifier
     sweep_points: int = 0
     alive: int = 0  # tracks, summed over the frames
 
@@ -110,7 +110,7 @@ class UnitCosts:
     seg: float  # E(seg), a frame
     track: float  # odometry and tracking of a frame, as in tracking-by-detection
     class_call: float
-    class_item: float  # of a proposal in a call
+    class_item: float  # cost of a proposal in a call
     class_point: float
 
     def classification(self, counts: Counts) -> float:

@@ -20,7 +20,7 @@ CURVE_RECALLS = np.arange(1, 21) / 20
 class ClassScore:
     """Proposals of one class."""
 
-    objects: int  # of the class, one count an object and frame
+    objects: int  # number of objects of the class, one count an object and frame
     average_precision: float | None  # area under the envelope of precision over recall
     curve: tuple[tuple[float, float, float], ...]  # threshold, precision, recall at each new twentieth
     called: int  # proposals reported as the class
@@ -29,7 +29,7 @@ class ClassScore:
     segmentable: int  # objects of the class that are judged for segmentation
     recall: float | None  # share of them that are detected and reported as the class
     recall_of_found: float | None  # share of the detected ones reported as the class
-    calibration_error: float | None  # of the class's posterior over all judged proposals
+    calibration_error: float | None  # calibration error of the posterior of the class over all judged proposals
 
 
 def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:

@@ -84,11 +84,11 @@ class Evaluation:
     frames: int
     proposals: int
     beta: float | None  # proposals classified over all
-    ranges: dict[str, RangeScore]  # by band of range
-    tracks: dict[str, TrackScore]  # of all objects, by class and by labelled type
-    metrics: dict[str, dict[str, float]] | None  # of all classes and each; None where trackeval is not installed
+    ranges: dict[str, RangeScore]  # scores by band of range
+    tracks: dict[str, TrackScore]  # scores of all objects, by class and by labelled type
+    metrics: dict[str, dict[str, float]] | None  # metrics of all classes and of each; None without trackeval
     calibration_error: float | None  # expected, of the most probable class, over all judged proposals
-    calibration_error_of_objects: float | None  # over those that stand for an object
+    calibration_error_of_objects: float | None  # the same over the proposals that stand for an object
 
 
 def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES) -> Evaluation:

@@ -14,8 +14,7 @@ from typing import Any, TypeVar
 
 from modt.classes import CLASS_NAMES
 from modt.errors import MisuseError, install
-from modt.sinks.kitti import KittiResults
-from modt.sinks.labels import PointLabels
+from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import LineFile, writing
 from modt.sinks.records import BROKEN
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
@@ -28,7 +27,7 @@ Frames = tuple[int, int | None]
 Capture = Sequence[tuple[str, str]]
 PLAIN = ("id", "state", "class", "viewed", "final", "proposal", "points", "age", "missed")
 """Columns that have their name from tracks.jsonl."""
-UNITS = {"yaw": "rad", "heading": "rad", "speed_mps": ""}  # of the others: m
+UNITS = {"yaw": "rad", "heading": "rad", "speed_mps": ""}  # other columns: m
 NO_BOX = dict.fromkeys(BOX_KEYS)
 
 
@@ -130,7 +129,7 @@ class Export:
 def _mcap(export: Export, target: Path) -> None:
     """Write an MCAP file as the sink mcap:///FILE does."""
     try:
-        from modt.sinks.mcap_file import McapFile
+        from modt.sinks.foxglove_sinks import McapFile
     except ModuleNotFoundError as error:
         raise MisuseError("--mcap", f"needs {error.name}", install("foxglove")) from None
     results = _with_points(export) if export.points else export.results()

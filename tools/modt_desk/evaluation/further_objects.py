@@ -36,7 +36,7 @@ def with_further(truth: Truth, path: Path, types: Types) -> Truth:
     """The truth with the objects of a table added; they are judged for their class alone.
 
     Args:
-        truth: of the drive that the table is of.
+        truth: truth of the drive that the table completes.
         path: the table (docs/evaluation.md).
         types: class and role of the types of its objects.
 

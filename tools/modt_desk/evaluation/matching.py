@@ -1,6 +1,6 @@
 """Proposals and tracks of a frame against its labelled objects, by the points that they share.
 
-What is compared and what is ignored is written down in docs/evaluation.md.
+docs/evaluation.md states the rules.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def judge(
 ) -> tuple[Rows, Rows, tuple[Association, ...]]:
     """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class.
 
-    points: of the labelled objects, where they are known.
+    `points` are the points of the labelled objects, where they are known.
     """
     overlap = Overlap.of(frame, points)
     row = np.full(len(overlap.size), NONE, np.int64)
@@ -59,8 +59,7 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
     def most(which: Bool) -> Bool:
         """(n,) whether most points of each object satisfy it; true for an object without points."""
         times = np.bincount(of[which], minlength=len(overlap.own))
-        found: Bool = (times > 0.5 * overlap.count) | (overlap.count == 0)
-        return found
+        return np.asarray((times > 0.5 * overlap.count) | (overlap.count == 0))
 
     in_view, in_sector = most(frame.fov.contains(shown)), most(_in_sector(shown, rules))
     near = range_m <= rules.max_range_m
@@ -83,8 +82,7 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
 def _has_points(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Bool:
     """(n,) whether each object has the points to be judged for its class."""
     further = frame.truth.role == Role.FURTHER
-    enough: Bool = overlap.count >= np.where(further, rules.min_points_further, rules.min_points_followed)
-    return enough
+    return np.asarray(overlap.count >= np.where(further, rules.min_points_further, rules.min_points_followed))
 
 
 def _outcome(overlap: Overlap) -> Int:
@@ -106,8 +104,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
 
     def most(which: Bool) -> Bool:
         """(P,) whether more than half of each proposal's points are so."""
-        found: Bool = np.bincount(of[which], minlength=len(size)) > 0.5 * size
-        return found
+        return np.asarray(np.bincount(of[which], minlength=len(size)) > 0.5 * size)
 
     # The object that a proposal stands for, and the one in whose box it lies.
     matched = objects["to_classify"] & pairs
@@ -153,8 +150,7 @@ def most_in_sector(frame: JudgedFrame, size: Int, rules: Rules) -> Bool:
     """(P,) whether more than half of the points of each proposal, (P,) in number, lie in the labelled sector."""
     members = frame.proposal >= 0
     inside_sector = frame.proposal[members][_in_sector(frame.points[members], rules)]
-    found: Bool = np.bincount(inside_sector, minlength=len(size)) > 0.5 * size
-    return found
+    return np.asarray(np.bincount(inside_sector, minlength=len(size)) > 0.5 * size)
 
 
 def _in_sector(points: Float32, rules: Rules) -> Bool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from modt.classes import CLASS_NAMES
 from modt.geometry import transform_boxes
-from modt.sinks.labels import MAX_INSTANCE, SEMANTIC
+from modt.sinks.kitti import MAX_INSTANCE, SEMANTIC
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import NONE, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
 
@@ -35,7 +35,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     tracks.state[:] = [names.index(row["state"]) for row in rows]
     tracks.object_class[:] = [CLASS_NAMES.index(row["class"]) for row in rows]
     tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
-    silent = [0.0] * len(CLASS_NAMES)  # of runs recorded before
+    silent = [0.0] * len(CLASS_NAMES)  # runs of earlier versions have no witness
     tracks.witness[:] = np.array([row.get("witness", silent) for row in rows]).reshape(tracks.witness.shape)
     tracks.key_points[:] = [row["viewed"] for row in rows]
     tracks.final[:] = [row["final"] for row in rows]

@@ -14,7 +14,7 @@ from modt.types import Bool, Float64, Int
 from modt_desk.evaluation.truth import Role
 
 Rows = NDArray[np.void]
-"""A structured array: of OBJECT, a row an object and frame, or of PROPOSAL, a row a tracked proposal and frame."""
+"""Structured array: OBJECT has a row for each object and frame, PROPOSAL for each tracked proposal and frame."""
 
 
 class Outcome(IntEnum):
@@ -35,7 +35,7 @@ OBJECT = np.dtype(
         ("type", object),  # as labelled
         ("class", int),
         ("role", int),
-        ("range_m", float),  # of the box's centre
+        ("range_m", float),  # range of the centre of the box
         ("in_view", bool),  # most of its points are
         ("to_segment", bool),  # judged for segmentation
         ("to_classify", bool),  # judged for average precision
@@ -51,7 +51,7 @@ PROPOSAL = np.dtype(
         ("drive", int),
         ("frame", int),
         ("track", int),
-        ("range_m", float),  # of the object that it stands for; of none, the mean of its points
+        ("range_m", float),  # range of the object that it stands for, else mean range of its points
         ("posterior", float, N_CLASSES),
         ("reported", int),  # reported class
         ("label", int),  # class of the object that it stands for, BACKGROUND for none

@@ -17,8 +17,8 @@ class Rules:
     """
 
     min_points: int = 20  # least points of an object that must be segmented
-    min_points_followed: int = 10  # the same of one that must be followed, or counts for average precision
-    min_points_further: int = 8  # the same of an object beside the labels
+    min_points_followed: int = 10  # least points of an object that must be followed, or counts for average precision
+    min_points_further: int = 8  # least points of an object beside the labels
     by_iou: bool = False
     sector_deg: float = 40.0  # half the sector about x in which proposals are judged: where everything is labelled
     max_range_m: float = float("inf")  # farthest judged object or proposal

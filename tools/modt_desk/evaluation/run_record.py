@@ -15,7 +15,7 @@ from modt.energy import ledger, windows
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.placement import Mount
-from modt.sinks.records import BROKEN, read_records
+from modt.sinks.records import BROKEN
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.sources.stream import Faults, Stream, StreamInfo
@@ -23,6 +23,7 @@ from modt.types import Float32, Frame, Int, Self
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.recorded_result import recorded_result
 from modt_desk.evaluation.truth import Truth
+from modt_desk.reporting.records import read_records
 from modt_desk.reporting.run_sums import GIVE, run_facts
 
 
@@ -147,10 +148,10 @@ class RunRecord:
         """Every recorded frame beside its truth.
 
         Args:
-            truth: of the run's recording.
+            truth: labels of the recording of the run.
             proposed: assigns points to proposals; None: the labels that replay --labels has written.
             stream: the recording; None: the scans of the truth.
-            records: those of frames that are labelled; None: all.
+            records: records of labelled frames; None for all records.
 
         Raises:
             MisuseError: the run is of another recording, empty or without labels, or a record is broken.

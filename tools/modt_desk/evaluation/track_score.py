@@ -49,8 +49,8 @@ class TrackScore:
     labelled: Length  # over all labelled frames, whatever points the object has there; Table III gives this ideal
     followed: float | None  # share of the frames in which an object is followed
     discontinuities: int  # times that another track than before follows an object
-    taken_over: int  # of these, by an existing track of something else
-    returned: int  # of these, by a track that had followed the object before
+    taken_over: int  # number of these by an existing track of something else
+    returned: int  # number of these by a track that had followed the object before
     mis_associations: int  # tracks that follow more than one object for MIN_FRAMES_OWNED frames or more each
 
 
@@ -93,7 +93,7 @@ def _score(all_rows: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
 
 
 def _count(rows: Rows) -> int:
-    """Objects of the rows."""
+    """Number of objects in the rows."""
     return len(set(rows[["drive", "id"]].tolist()))
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, inverse, transform_boxes
-from modt.sources.scan_stream import ScanStream
+from modt.sources.scan_file import ScanStream
 from modt.types import NONE, Bool, Float32, Float64, Int
 from modt_desk.evaluation.kitti_labels import Label
 from modt_desk.evaluation.rules import Rules
@@ -71,8 +71,7 @@ class Regions:
         uvw = points[:, :3] @ P[:, :3].T + P[:, 3]
         uv = uvw[:, :2] / np.maximum(uvw[:, 2:], 1e-6)
         low, high = self.edges[:, None, :2], self.edges[:, None, 2:]
-        within: Bool = ((uv > low) & (uv < high)).all(axis=2).any(axis=0) & (uvw[:, 2] > 1)
-        return within
+        return np.asarray(((uv > low) & (uv < high)).all(axis=2).any(axis=0) & (uvw[:, 2] > 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +108,7 @@ def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Fl
     """Map each frame to (k, 7) boxes of parked cars without a label in it, as they stood at their nearest label.
 
     Args:
-        labels: of a recording.
+        labels: labels of a recording.
         types: classes of their types.
         poses: T_world_sensor by frame.
     """
@@ -134,8 +133,8 @@ def by_stamp(truth: Truth, stamps_s: Mapping[int, float]) -> Truth:
     Where no stamps agree, those of the run have another origin: then both count from the first one.
 
     Args:
-        truth: of a recording with scans; without them it is returned as it is.
-        stamps_s: by number of the run's frames, of which there is one.
+        truth: truth of a recording; without scans it is returned unchanged.
+        stamps_s: stamp of each frame of the run by its number; at least one.
     """
     if truth.scans is None or not truth.scans.scans:
         return truth

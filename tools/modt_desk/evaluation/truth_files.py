@@ -17,7 +17,7 @@ from modt.sources.file_names import files_in
 from modt.sources.kitti_calibration import camera_of_sequence
 from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_scans
-from modt.sources.scan_stream import ScanStream
+from modt.sources.scan_file import ScanStream
 from modt.types import NONE
 from modt_desk.evaluation.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES

@@ -57,7 +57,7 @@ class Mover:
     frame: Int  # (n,)
     box: Float64  # (n, 7) sensor frame, along the motion, all of one size
     gone_m: float  # from its first place to its last
-    straightness: float  # that distance over the length of its path
+    straightness: float  # gone_m over the length of its path
     speed_mps: float  # length of its path over time
 
 
@@ -190,8 +190,7 @@ def _heading(stamp_s: Float64, world: Float64) -> Float64:
     first = np.searchsorted(stamp_s, stamp_s - WINDOW_S / 2)
     last = np.searchsorted(stamp_s, stamp_s + WINDOW_S / 2, side="right") - 1
     dx, dy = (world[last, :2] - world[first, :2]).T
-    heading: Float64 = np.arctan2(dy, dx)
-    return heading
+    return np.asarray(np.arctan2(dy, dx))
 
 
 def _type(length_m: float, width_m: float, speed_mps: float) -> str:

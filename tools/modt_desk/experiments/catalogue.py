@@ -39,13 +39,13 @@ class Experiment:
     """Replays of a drive, and the figures that follow from them.
 
     Attributes:
-        name: on the command line.
+        name: name on the command line.
         title: the table or figure of the paper, and what it shows.
-        replays: by label, given the profile of a drive.
-        figures: of the outcome of a replay, of one drive or several pooled, and its label.
+        replays: function of the profile of a drive that returns replays by label.
+        figures: function of the outcome of a replay (of one drive or several pooled) and its label.
         swept: name and unit of the value that is swept.
         scans: whether sweeps are needed, not labels alone.
-        note: what a reader has to know.
+        note: facts that a reader needs.
     """
 
     name: str
@@ -171,10 +171,7 @@ _ALL = (
         note="Proposals beyond the range are left out before tracking.",
     ),
     Experiment(
-        "table5",
-        "Table V: average precision, real detector, real tracker",
-        partial(_pair, ideal=False),
-        precisions,
+        "table5", "Table V: average precision, real detector, real tracker", partial(_pair, ideal=False), precisions
     ),
     Experiment(
         "fig14",

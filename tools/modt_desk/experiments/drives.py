@@ -46,8 +46,8 @@ class KittiDrive:
 
     Attributes:
         name: number of the raw drive, and the sequence if its labels are those.
-        number: of the raw drive, the sequence where it is not known.
-        path: of the drive, or the label file.
+        number: number of the raw drive, or the sequence if it is not known.
+        path: folder of the drive, or the label file.
         scans: whether sweeps of half of the labelled frames or more are there.
         further: table of objects that its labels leave out, None for the labels alone.
     """

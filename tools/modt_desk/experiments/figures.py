@@ -120,8 +120,7 @@ class Ranking:
 
 
 def _areas(precision: Float64, recall: Float64) -> Float64:
-    areas: Float64 = (np.diff(recall, prepend=0.0, axis=1) * precision).sum(axis=1)
-    return areas
+    return np.asarray((np.diff(recall, prepend=0.0, axis=1) * precision).sum(axis=1))
 
 
 def _weights(n: int) -> Float64:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from modt.app import assembly, kernel_choice
+from modt.app import assembly
 from modt.classification.scheduler import LinearCost, padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
@@ -98,7 +98,7 @@ class NetworkReplay:
     def _pipeline(self, known: SegmentedDrive) -> Pipeline:
         config, limits, mode = self.config, self.config.classification, assembly.MODES[self.mode]
         cost = LinearCost(limits.max_points, padded_size(limits))
-        kernels = kernel_choice.choose(config.segmentation.kernels)
+        kernels = assembly.chosen_kernels(config.segmentation.kernels)
         ideal = IdealTracking(known, config, self.range_m) if self.ideal else None
         played = ideal or PlayedBack(known, self.range_m)
         pipeline = assembly.stages(mode, config, known.network, played, played, cost, Ledger(), kernels)

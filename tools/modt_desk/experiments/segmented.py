@@ -14,7 +14,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from modt.app import assembly, kernel_choice
+from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig, TrackingConfig
 from modt.geometry import FieldOfView
@@ -72,7 +72,7 @@ def _network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
 
 
 def _frames(drive: Drive, config: ProfileConfig, network: PointNet) -> Iterator[SegmentedFrame]:
-    segmenter = assembly.segmenter(config, drive.fov(), kernel_choice.choose(config.segmentation.kernels))
+    segmenter = assembly.segmenter(config, drive.fov(), assembly.chosen_kernels(config.segmentation.kernels))
     for frame, truth in drive.sweeps():
         whole = segmenter.segment(frame.points)
         kept = _of_objects(frame.points, truth)
@@ -95,8 +95,7 @@ def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
 
 def within(proposals: Proposals, range_m: float) -> Bool:
     """(P,) proposals within a range."""
-    near: Bool = np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m
-    return near
+    return np.asarray(np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m)
 
 
 @lru_cache(maxsize=2)
@@ -183,7 +182,7 @@ class IdealTracking(PlayedBack):
         return Located(origin, observe(proposals, origin.T_world_sensor))
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """Never asked for.
+        """Raise an error: no caller needs it.
 
         Raises:
             NotImplementedError: always.

@@ -60,9 +60,9 @@ class Study:
     """Some experiments on some drives.
 
     Attributes:
-        experiments: to make.
-        drives: to make them on.
-        profiles: each on top of that of a drive's sensor, compared with one another; labels alone need the first.
+        experiments: experiments to make.
+        drives: drives to make them on.
+        profiles: profiles to compare, each on top of the profile of the sensor. Experiments on labels use the first.
     """
 
     experiments: Sequence[Experiment]

@@ -22,7 +22,6 @@ from modt.energy.meters.meter import Kind
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE, STAGES
-from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
 from modt.types import Float64
@@ -33,6 +32,7 @@ from modt_desk.reporting import energy_plots, svg
 from modt_desk.reporting.document import Cell, Document, Plot, Table
 from modt_desk.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
+from modt_desk.reporting.records import read_records
 from modt_desk.reporting.run_sums import COLUMNS, FrameSums, run_facts
 
 SCHEMA = "modt.report/2"
@@ -245,7 +245,8 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
     frames = np.cumsum(each) - each
     parts_mJ, basis = energy_plots.stage_energy_mJ(series), energy_plots.basis(tree["gross_J"])
     baseline, run_mJ = "E1, tracking-by-detection (computed)", np.sum([*parts_mJ.values()], axis=0)
-    further_ms = np.array(series["e1_cpu_ms"]) - np.sum([*series["cpu_ms"].values()], axis=0)  # of classification
+    run_ms = np.sum([*series["cpu_ms"].values()], axis=0)
+    further_ms = np.array(series["e1_cpu_ms"]) - run_ms  # CPU time of the classifications that E1 adds
     energy_mJ = {baseline: run_mJ + series["stage_W"][CLASSIFICATION] * further_ms, "E2, this run": run_mJ}
     budget = [svg.Trace(key, frames, np.array(series[key], float)) for key in ("classified", "deferred")]
     if series["budget"] is not None:

@@ -63,21 +63,18 @@ class FrameSeries:
     def frames(self) -> Int:
         """(points,) frames of each point; only the last may have fewer."""
         starts = np.arange(0, self.count, self.frames_a_point)
-        each: Int = np.diff(starts, append=self.count)
-        return each
+        return np.asarray(np.diff(starts, append=self.count))
 
     @property
     def means(self) -> Float64:
         """(points, columns) means over the frames of each point."""
         frames = self.frames
-        mean: Float64 = self._sums[: len(frames)] / frames[:, None]
-        return mean
+        return np.asarray(self._sums[: len(frames)] / frames[:, None])
 
     @property
     def total(self) -> Float64:
         """(columns,) sums over all frames."""
-        total: Float64 = self._sums.sum(axis=0)
-        return total
+        return np.asarray(self._sums.sum(axis=0))
 
 
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
@@ -99,8 +96,9 @@ class FrameSums:
         self.marks: set[str] = set()
         self.lengths = Histogram()  # frames with a proposal, of the tracks that ended
         self.foreground = self.tracks = self.classified_tracks = 0
-        self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)  # of calls, items, points and CPU s
-        self._length: dict[int, int] = {}  # of the tracks alive
+        # products of calls, items and points with one another, and with CPU time [s]
+        self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)
+        self._length: dict[int, int] = {}  # frames with a proposal by track alive
         self._viewed: set[int] = set()
 
     def add(self, line: dict[str, Any], record: dict[str, Any]) -> None:

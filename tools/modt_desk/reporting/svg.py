@@ -112,8 +112,7 @@ class _Scale:
 
     def _part(self, value: Float64, low: float, high: float) -> Float64:
         if self.log:
-            logarithmic: Float64 = np.log(np.maximum(value, low) / low) / math.log(high / low)
-            return logarithmic
+            return np.asarray(np.log(np.maximum(value, low) / low) / math.log(high / low))
         return np.asarray((value - low) / (high - low))
 
     def ticks(self, low: float, high: float) -> list[float]:
@@ -169,8 +168,7 @@ def _limits(values: Float64, low: float, high: float) -> tuple[float, float]:
 def _thin(values: Float64) -> Float64:
     if len(values) <= _MAX_POINTS:
         return values
-    kept: Float64 = values[np.linspace(0, len(values) - 1, _MAX_POINTS).astype(int)]
-    return kept
+    return np.asarray(values[np.linspace(0, len(values) - 1, _MAX_POINTS).astype(int)])
 
 
 def _points(x: Float64, y: Float64) -> str:

@@ -11,13 +11,13 @@ from modt.types import Bool, Float32, Float64, Int
 
 CELL_DEG = 2.0
 COLUMNS = int(360 / CELL_DEG)
-BODY_REACH_M = 3.0  # of the robot around its sensor
+BODY_REACH_M = 3.0  # greatest distance of a part of the robot from its sensor
 STEADY_M = 0.03  # range of a fixed cell changes by less, from the 10 % to the 90 % quantile
-MIN_SHARE = 0.8  # of the sweeps in which a fixed cell has a return
-MIN_CLEARANCE_M = 0.3  # above the ground
-MAX_ABOVE_M = 1.0  # above the sensor: a ceiling is higher
-MAX_FIXED_SHARE = 0.5  # of the cells out of reach, in a recording that moves
-MARGIN_DEG, MARGIN_M = 1.0, 0.2  # around what was seen
+MIN_SHARE = 0.8  # least share of the sweeps in which a fixed cell has a return
+MIN_CLEARANCE_M = 0.3  # least height above the ground
+MAX_ABOVE_M = 1.0  # greatest height above the sensor: a ceiling is higher
+MAX_FIXED_SHARE = 0.5  # greatest share of fixed cells out of reach, in a recording that moves
+MARGIN_DEG, MARGIN_M = 1.0, 0.2  # added around the visible parts
 JOIN_DEG = 6.0  # sectors nearer than this are one
 MIN_SWEEPS = 5
 
@@ -27,7 +27,7 @@ class Body:
     """Visible parts of the robot."""
 
     sectors_deg: Float64  # (S, 2) from, to, counter-clockwise
-    range_m: float  # of its farthest part
+    range_m: float  # range of the farthest part
 
 
 def find_body(sweeps: Sequence[Float32], height_m: float) -> Body | None:
@@ -35,7 +35,7 @@ def find_body(sweeps: Sequence[Float32], height_m: float) -> Body | None:
 
     Args:
         sweeps: (N, 4) points of each, some time apart.
-        height_m: of the sensor above the ground.
+        height_m: height of the sensor above the ground.
     """
     if len(sweeps) < MIN_SWEEPS:
         return None

@@ -37,10 +37,10 @@ class Recording:
 class Finding:
     """A value of a profile's key."""
 
-    stage: str  # of the profile
-    key: str  # of the stage
-    value: Any  # of the key
-    evidence: str  # what was measured, or why nothing could be
+    stage: str  # stage of the profile
+    key: str  # key of the stage
+    value: Any  # value of the key
+    evidence: str  # the measurement, or the reason why none was possible
     reliable: bool = True  # measured well; else to be checked by the user
 
 

@@ -21,7 +21,7 @@ STEP_S, MARGIN_M = 0.25, 0.1
 
 
 def without_collisions(paths: Sequence[Path], footprint: Float64, seconds: float) -> Bool:
-    """(n,) which bodies stay, by path and footprint (n, 2) [m]: of two that ever collide, the one listed first.
+    """(n,) which bodies stay, by path and footprint (n, 2) [m]. Of two that collide, the first one stays.
 
     Bodies of zero footprint do not collide. Pairs at rest are tested once.
     """

@@ -17,7 +17,7 @@ class Path:
     xy: Float64  # (n, 2) way points [m, world]; one for a body at rest
     time_s: Float64  # (k,) ascending times
     travelled_m: Float64  # (k,) distance along the line at these times; constant before and after
-    heading_rad: float = 0.0  # of a body at rest
+    heading_rad: float = 0.0  # heading of a body at rest
 
     @classmethod
     def standing(cls, x: float, y: float, heading_rad: float) -> Path:

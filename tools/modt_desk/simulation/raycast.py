@@ -39,7 +39,7 @@ class Windows:
     rows: Int  # (W, 2) first, and one past the last
     columns: Int  # (W, 2) first, and one past the last
     near: Float32  # (W,) least horizontal distance of the solid [m]
-    n_columns: int  # of the image
+    n_columns: int  # columns of the image
 
     @property
     def area(self) -> Int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Response:
     far_loss: float = 0.0  # subtracted per metre farther [1/m]
     least: float = 0.0  # lower intensities are reported as 0
     most: float = 1.0  # greatest reported intensity
-    steps: int = 255  # of the scale from 0 to 1
+    steps: int = 255  # steps of the scale from 0 to 1
 
     def report(self, intensity: Float32, range_m: Float32) -> Float32:
         """(n,) reported intensities [0, most] of returns by their intensities in focus and their ranges."""
@@ -41,26 +42,26 @@ class Response:
 class SensorModel:
     """A LiDAR that samples a grid of beams and azimuths, by default one that rotates at 10 Hz."""
 
-    name: str  # of the sensor, and of the profile it is run with
-    elevation_rad: Float64  # (B,) of each beam, descending
-    azimuth_rad: Float64  # (A,) of each column, ascending, counter-clockwise from straight ahead
+    name: str  # name of the sensor and of its profile
+    elevation_rad: Float64  # (B,) elevations of the beams, descending
+    azimuth_rad: Float64  # (A,) azimuths of the columns, ascending, counter-clockwise from straight ahead
     origin_m: Float64 | float = 0.0  # (B,) height of each beam's origin above the sensor's, or one for all
     rotating: bool = True  # a sweep is one turn of the columns
-    sweeps_a_ray: int = 1  # of sweeps, one in which a ray is fired; more than 1 for a non-repetitive sensor
+    sweeps_a_ray: int = 1  # sweeps in which each ray is fired once; more than 1 if non-repetitive
     height_m: float  # usual mounting height above the ground
-    min_range_m: float  # of a return
-    max_range_m: float  # of a return
+    min_range_m: float  # least range of a return
+    max_range_m: float  # greatest range of a return
     range_sigma_m: float = 0.015  # noise of a range
     beam_sigma_m: float = 0.0075  # standard deviation of the constant range errors of the beams
     azimuth_sigma_rad: float = 0.0003  # jitter of a firing
-    elevation_sigma_rad: float = 0.0  # the same in elevation
+    elevation_sigma_rad: float = 0.0  # jitter of a firing in elevation
     detect_m: float = 70.0  # distance at which half the returns of a reflectivity of 0.1 at normal incidence are lost
     dropout: float = 0.01  # share of firings lost on any surface
     beam_radius_m: float = 0.02  # radius of a beam at its origin
     divergence_rad: float = 0.0015  # growth of the radius with range
     mixed_share: float = 0.12  # share of the returns at a depth edge that lie between the surfaces
     edge_delay_m: float = 0.06  # mean range error of a return from an edge that splits the beam
-    period_s: float = 0.1  # of a sweep
+    period_s: float = 0.1  # time of a sweep
     response: Response = Response()  # reported intensity
 
     @property
@@ -94,76 +95,34 @@ def _beams_of(profile_name: str) -> Float64:
     return np.asarray(np.deg2rad(elevations_deg))
 
 
-def _ouster_os1(beams: int) -> SensorModel:
-    return SensorModel(
-        name=f"os1-{beams}",
-        elevation_rad=_beams(22.5, -22.5, beams),
-        azimuth_rad=_columns(1024),
-        height_m=1.0,
-        min_range_m=0.4,
-        max_range_m=100.0,
-        range_sigma_m=0.02,
-        beam_sigma_m=0.01,
-        detect_m=60.0,
-    )
+def _rotating(
+    name: str, elevation_rad: Float64, columns: int, height_m: float, range_m: tuple[float, float], **more: Any
+) -> SensorModel:
+    """A rotating sensor, its least and greatest range, and what differs from the defaults."""
+    least_m, most_m = range_m
+    grid: dict[str, Any] = {"elevation_rad": elevation_rad, "azimuth_rad": _columns(columns)}
+    return SensorModel(name=name, **grid, height_m=height_m, min_range_m=least_m, max_range_m=most_m, **more)
 
 
+_HDL_64E: dict[str, Any] = {
+    "origin_m": np.append(np.linspace(0.209, 0.198, 32), np.linspace(0.126, 0.116, 32)),
+    "response": Response(12.0, 17.0, near_loss=0.012, far_loss=0.009, least=0.08, most=0.99, steps=100),
+}
+"""Two blocks of 32 lasers at different heights. The intensity is not corrected for range: half of it is 0 at 45 m."""
+_OUSTER: dict[str, Any] = {"range_sigma_m": 0.02, "beam_sigma_m": 0.01, "detect_m": 60.0}
+_HESAI: dict[str, Any] = {"range_sigma_m": 0.01, "beam_sigma_m": 0.005}
+_NO_SCALE = Response(most=0.0)
+"""Materials are not known on the scale of the sensor."""
 _MODELS = (
-    # Two blocks of 32 lasers at different heights. The intensity is not corrected for range: half of it is 0 at 45 m.
-    SensorModel(
-        name="hdl-64e",
-        elevation_rad=np.append(_beams(1.94, -8.71, 32), _beams(-9.03, -25.0, 32)),
-        azimuth_rad=_columns(2083),
-        origin_m=np.append(np.linspace(0.209, 0.198, 32), np.linspace(0.126, 0.116, 32)),
-        height_m=1.73,
-        min_range_m=2.0,
-        max_range_m=80.0,
-        response=Response(12.0, 17.0, near_loss=0.012, far_loss=0.009, least=0.08, most=0.99, steps=100),
+    _rotating(
+        "hdl-64e", np.append(_beams(1.94, -8.71, 32), _beams(-9.03, -25.0, 32)), 2083, 1.73, (2.0, 80.0), **_HDL_64E
     ),
-    SensorModel(
-        name="hdl-32e",
-        elevation_rad=_beams(10.67, -30.67, 32),
-        azimuth_rad=_columns(2170),
-        height_m=1.5,
-        min_range_m=0.9,
-        max_range_m=80.0,
-    ),
-    SensorModel(
-        name="vlp-16",
-        elevation_rad=_beams(15.0, -15.0, 16),
-        azimuth_rad=_columns(1808),
-        height_m=0.8,
-        min_range_m=0.4,
-        max_range_m=90.0,
-    ),
-    SensorModel(
-        name="vlp-32c",
-        elevation_rad=_beams_of("vlp-32c"),
-        azimuth_rad=_columns(1808),
-        height_m=1.5,
-        min_range_m=0.9,
-        max_range_m=100.0,
-    ),
-    SensorModel(
-        name="pandar64",
-        elevation_rad=_beams_of("pandar64"),
-        azimuth_rad=_columns(1800),
-        height_m=2.1,
-        min_range_m=0.9,
-        max_range_m=100.0,
-        response=Response(most=0.0),  # materials are not known on its scale
-    ),
-    SensorModel(
-        name="xt-32",
-        elevation_rad=_beams(15.0, -16.0, 32),
-        azimuth_rad=_columns(2000),
-        height_m=0.8,
-        min_range_m=0.3,
-        max_range_m=100.0,
-        range_sigma_m=0.01,
-        beam_sigma_m=0.005,
-    ),
-    *(_ouster_os1(beams) for beams in (32, 64, 128)),
+    _rotating("hdl-32e", _beams(10.67, -30.67, 32), 2170, 1.5, (0.9, 80.0)),
+    _rotating("vlp-16", _beams(15.0, -15.0, 16), 1808, 0.8, (0.4, 90.0)),
+    _rotating("vlp-32c", _beams_of("vlp-32c"), 1808, 1.5, (0.9, 100.0)),
+    _rotating("pandar64", _beams_of("pandar64"), 1800, 2.1, (0.9, 100.0), response=_NO_SCALE),
+    _rotating("xt-32", _beams(15.0, -16.0, 32), 2000, 0.8, (0.3, 100.0), **_HESAI),
+    *(_rotating(f"os1-{n}", _beams(22.5, -22.5, n), 1024, 1.0, (0.4, 100.0), **_OUSTER) for n in (32, 64, 128)),
     # 200,000 points a second. The grid is finer than the spacing of one sweep, which takes each 17th ray.
     SensorModel(
         name="mid-360",

@@ -22,9 +22,9 @@ MOVING_MPS = 0.3
 class Body:
     """One object or piece of scenery."""
 
-    kind: Kind  # of the body
+    kind: Kind  # kind of the body
     size: tuple[float, float, float]  # length, width, height of its box [m]
-    path: Path  # its motion
+    path: Path  # motion of the body
     solids: Solids  # its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre)
 
 
@@ -36,7 +36,7 @@ class World:
     bodies: list[Body]
     people: People  # articulated parts of the bodies that are people
     ego: Path  # motion of the sensor's carrier
-    height_m: float  # of the sensor above the ground
+    height_m: float  # height of the sensor above the ground
     sway_rad: float  # amplitude of the carrier's roll and pitch
     mount_rad: tuple[float, float]  # roll and pitch of the sensor on its carrier
 

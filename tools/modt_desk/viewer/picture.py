@@ -21,7 +21,7 @@ from modt.geometry import corners
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64
 from modt.viewer import theme
-from modt.viewer.point_cells import SIDE, Cells
+from modt.viewer.packed import SIDE, Cells
 from modt.viewer.theme import LIGHT, REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.recorded_run import RecordedRun
@@ -54,11 +54,11 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
     """Draw points, tracks, truth, and the cost of the frame, in place of the former content of the figure.
 
     Args:
-        figure: drawn on.
-        run: what is recorded.
+        figure: figure to draw on.
+        run: recorded run.
         at: index of the frame.
         step_cm: width of a cell.
-        cells: of the sweep, None without points.
+        cells: cells of the sweep, None without points.
     """
     figure.clear()
     axes, reach = figure.add_axes((0, 0, 1, 1)), reach_m(run.tracks)
@@ -139,8 +139,7 @@ def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
     rows = run.tracks[(run.tracks[:, 0] == id_) & (now <= at) & (now >= at - TRAIL)]
     x, y, yaw = run.poses[at]
     c, s = np.cos(yaw), np.sin(yaw)
-    trail: Float64 = (rows[:, world : world + 2] / SCALE["world_x"] - [x, y]) @ np.array([[c, -s], [s, c]])
-    return trail
+    return np.asarray((rows[:, world : world + 2] / SCALE["world_x"] - [x, y]) @ np.array([[c, -s], [s, c]]))
 
 
 def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:

@@ -17,13 +17,14 @@ from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
 from modt.profile.yaml_text import to_yaml
-from modt.sinks.records import BROKEN, read_records, records_of
+from modt.sinks.records import BROKEN, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.types import Float64, Int
 from modt.viewer.track_rows import COLUMNS, planar
 from modt_desk.energy.run_energy import run_energy
 from modt_desk.evaluation.recorded_result import recorded_result
 from modt_desk.evaluation.run_record import RunRecord, broken
+from modt_desk.reporting.records import read_records
 from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
 

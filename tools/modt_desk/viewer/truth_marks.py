@@ -34,9 +34,9 @@ def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int
     Judged as by modt evaluate; where the run was made without --labels, a proposal has the points in its box.
 
     Args:
-        run: what is judged.
-        truth: in the numbers of its frames.
-        stream: that it is of, None where it is not found: then by the scans of the truth.
+        run: run that is judged.
+        truth: truth by the numbers of the frames of the run.
+        stream: stream of the run; None if it is not found, then the scans of the truth are used.
 
     Raises:
         MisuseError: the labels are not those of the run's recording.

@@ -21,9 +21,8 @@ from modt.sinks.output import writing
 from modt.sources.stream import Stream
 from modt.types import Float32
 from modt.viewer import theme
-from modt.viewer.html_page import content, page
-from modt.viewer.packed import packed_cells, packed_table
-from modt.viewer.point_cells import LEVEL_M, LEVELS, SIDE, Cells, occupied
+from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, occupied, packed_cells, packed_table
+from modt.viewer.theme import content, page
 from modt_desk.evaluation.run_record import FramesByNumber
 from modt_desk.evaluation.truth import by_stamp
 from modt_desk.evaluation.truth_files import labels_beside, open_truth
@@ -83,7 +82,7 @@ def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: 
 
     Args:
         path: the file.
-        run: what is recorded.
+        run: recorded run.
         start: index of the frame.
         step_cm: width of a cell.
         sweeps: cells of each frame, None without points.

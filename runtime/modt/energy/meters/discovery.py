@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from modt.energy.meters.meter import (
     Candidate,
@@ -24,9 +24,6 @@ from modt.energy.meters.meter import (
     text_or_none,
 )
 from modt.errors import MisuseError
-
-if TYPE_CHECKING:
-    from modt.energy.meters.boards import Board
 
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
 _SAME_J = 1e-3
@@ -96,6 +93,36 @@ def _scmi(zone: Path, name: str) -> Meter:
     return file_meter(Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED), zone / "power_uw")
 
 
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A board whose power rails are known, recognised by the model in its device tree and the labels of its rails.
+
+    Sources: NVIDIA's Jetson Linux developer guides and product design guides, and the device trees of the kernel.
+    """
+
+    name: str
+    model: str  # pattern in the model of the device tree
+    whole: tuple[str, ...]  # rails whose sum is the module's power
+    cpu: str  # narrowest rail with the CPU
+    parts: tuple[str, ...] = ()  # rails side by side that one of the whole feeds
+
+
+BOARDS = (
+    Board("Jetson Nano", r"Jetson Nano", ("POM_5V_IN",), "POM_5V_CPU", ("POM_5V_CPU", "POM_5V_GPU")),
+    Board("Jetson NX", r"Xavier NX|Orin (NX|Nano)", ("VDD_IN",), "VDD_CPU_GPU_CV", ("VDD_CPU_GPU_CV", "VDD_SOC")),
+    Board("Jetson AGX Xavier", r"AGX Xavier|Jetson-AGX", ("GPU", "CPU", "SOC", "CV", "VDDRQ", "SYS5V"), "CPU"),
+    Board("Jetson AGX Orin", r"AGX Orin", ("VDD_GPU_SOC", "VDD_CPU_CV", "VIN_SYS_5V0"), "VDD_CPU_CV"),
+)
+
+
+def board_of(model: str, labels: Collection[str]) -> Board | None:
+    """The board of a model in the device tree with these rails; by the rails alone where the model is empty."""
+    for board in BOARDS:
+        if {board.cpu, *board.whole}.issubset(labels) and (not model or re.search(board.model, model)):
+            return board
+    return None
+
+
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
 _PART_SHARE = 1.1
 """A module is refused if the rails that it feeds draw more than this factor of its own power."""
@@ -117,9 +144,7 @@ def find_hwmon(sys: Path) -> list[Candidate]:
 
 
 def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
-    """A candidate for each rail, after one for the module of a known board: the feeding rail or a sum."""
-    from modt.energy.meters.boards import board_of  # only machines with rails load it
-
+    """Candidates for the module of a known board (its supply rail or a sum of rails), then for each rail."""
     remedy, board = "make the chip's inputs readable", board_of(model, rails)
     found = [] if board is None else [_module(board, rails, remedy)]
     for label, meter in rails.items():
@@ -181,10 +206,8 @@ def _battery(folder: Path) -> Meter:
     computed = power.exists()
     unit = "uW" if computed else "uV x uA"
     facts = Facts(f"battery {folder.name}", unit, 0.01, 2000.0, Scope.ROBOT, Kind.INTEGRATED)
-    if computed:
-        drawn = file_meter(facts, power)
-    else:
-        drawn = file_meter(facts, folder / "voltage_now", folder / "current_now", scale=1e-12)
+    product = file_meter(facts, folder / "voltage_now", folder / "current_now", scale=1e-12)
+    drawn = file_meter(facts, power) if computed else product
 
     def read() -> float:
         status = read_text(folder / "status")
@@ -196,7 +219,7 @@ def _battery(folder: Path) -> Meter:
 
 
 _RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=(\S*)[AV](?!\S)")
-_STEP_W = 0.02  # by the width of the converter
+_STEP_W = 0.02  # one step of the converter
 _FACTS = Facts("Raspberry Pi 5 PMIC", "V x A", _STEP_W, 50.0, Scope.MODULE, Kind.INTEGRATED, privilege="group video")
 
 
@@ -249,7 +272,7 @@ FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Functions that search sysfs, mounted at a path, for candidates of one type of meter."""
 _KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
 _SCOPES = (Scope.CPU, Scope.CPU_RAIL, Scope.SOC, Scope.MODULE, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
-"""Order of preference. Of a narrower scope this program has a larger share."""
+"""Order of preference: this program has a larger share of a narrower scope."""
 
 
 @dataclass(frozen=True, slots=True)

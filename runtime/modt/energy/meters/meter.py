@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -110,18 +111,16 @@ def read_number(path: Path) -> float:
 
 def text_or_none(path: Path) -> str | None:
     """Content of a small file, None where it cannot be read."""
-    try:
+    with suppress(MeterLostError):
         return read_text(path)
-    except MeterLostError:
-        return None
+    return None
 
 
 def number_or_none(path: Path) -> float | None:
     """An integer written by the kernel, None where it cannot be read."""
-    try:
+    with suppress(MeterLostError):
         return read_number(path)
-    except MeterLostError:
-        return None
+    return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,8 @@ from dataclasses import replace
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LATE_S, LiveStream
-from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for, refuse
-from modt.sources.stream import StreamInfo
+from modt.sources.stream import Reception, StreamInfo, Sweep
 
 log = logging.getLogger(__name__)
 

@@ -13,8 +13,7 @@ from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.point_cloud2 import TYPE, read_cloud
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.stream import StreamInfo
+from modt.sources.stream import Reception, StreamInfo, Sweep
 
 REMEMBERED = 32
 NEEDED = 8
@@ -114,5 +113,5 @@ def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
     with host.threads_on(cores):
         joined = participant(domain_of(address))
     subscription = Subscription(joined, topic, TYPE, depth=DEPTH, reliable=reliable)
-    info = StreamInfo(f"/{topic}", "ros2")  # of nominal period, until the profile of the sensor is known
+    info = StreamInfo(f"/{topic}", "ros2")  # with the nominal period until the profile is known
     return LiveStream(info, PointCloudReader(subscription, info.name), cores=cores)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
+from modt.sources.stream import Reception, Sweep
 from modt.types import Float32
 
 HEADER = Struct("<BH2xH3xB13x4xQ")

@@ -12,8 +12,8 @@ import numpy as np
 
 from modt import assets
 from modt.errors import MisuseError
-from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, extra, one_line, refuse
+from modt.sources.stream import Reception, Sweep
 from modt.sources.text_file import read_text
 from modt.types import Bool, Float32
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError, install
-from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.stream import Reception, Sweep
 from modt.types import Self
 
 MAX_DRIFT = 1e-4

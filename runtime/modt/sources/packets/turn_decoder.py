@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
+from modt.sources.stream import Reception, Sweep
 from modt.types import Float32, Float64, Self
 
 log = logging.getLogger(__name__)
@@ -228,7 +228,7 @@ class TurnDecoder(PacketDecoder):
                 refuse(reception, self.name, self.unknown)
             return []
         self._signature, self._first = signature, None
-        self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # of two returns
+        self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # packets with two returns a firing
         return [s for r, p in first for s in self._packet(r, p, self.signature(p), reception)]
 
     def _packet(self, received_s: float, payload: bytes, signature: object, reception: Reception) -> Sequence[Sweep]:

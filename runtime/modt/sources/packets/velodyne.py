@@ -117,8 +117,8 @@ def azimuths(payload: bytes) -> tuple[int, int]:
 def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> tuple[Model | None, Signature | None]:
     """Model that sent most of some packets, or the declared one, and the signature of those packets.
 
-    The model is None where it is unknown. Where identity and pace of the packets disagree, the pace of the lasers is
-    right. A contradiction is logged as a warning.
+    The model is None where it is unknown. Where the identity of the packets contradicts their pace, the pace decides.
+    A contradiction is logged as a warning.
     """
     signatures = [signature_of(payload) for payload in payloads]
     signature, _ = Counter(signatures).most_common(1)[0]
@@ -205,5 +205,4 @@ class VelodyneDecoder(TurnDecoder):
         """(N, 8) table of the library."""
         if not entries:  # the library would crash
             return np.zeros((0, 8), np.float32)
-        table: Float32 = self._decoder.decode(self._library.PacketVector([e.packet for e in entries]))[1]
-        return table
+        return np.asarray(self._decoder.decode(self._library.PacketVector([e.packet for e in entries]))[1])
