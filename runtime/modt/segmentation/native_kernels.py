@@ -112,7 +112,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         n, width = points.shape
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
         scratch, out = buffers.scratch(n), pointers(kept)
-        k = self._library.modt_above_ground(
+        k = self.library.modt_above_ground(
             ctypes.addressof(buffers.constants), at(ground.grid.range_m), at(buffers.flat_m), sensor_height_m,
             at(points), n, width, address(scratch), at(buffers.rays), at(bounds), at(rows, INT64),
             address(out),
@@ -129,7 +129,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         heights, sampled = np.empty((2, k), np.float32), np.empty((4, k), np.float32)
         sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
         given, out, columns = self._columns(points), pointers(places, heights, entries), pointers(sampled)
-        n = self._library.modt_occupied_cells(
+        n = self.library.modt_occupied_cells(
             address(given), at(height), k, 1 / grid.step, grid.centre, grid.side, at(grid.number, INT32),
             at(sample, INT64), address(columns), at(cell, INT64), address(out),
         )  # fmt: skip
@@ -148,7 +148,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     def _connected(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool, shift: int) -> Int:
         """(C,) connected component of the cell of the grid, 2^shift times as wide, in which each cell used lies."""
         component, own = np.empty(len(cells), np.int64), self._cells(cells)
-        self._library.modt_connect(
+        self.library.modt_connect(
             address(own), at(max_gap_m), at(use, BOOL), len(cells), shift, grid.side,
             *self._scratch(grid, len(cells)), at(component, INT64),
         )  # fmt: skip
@@ -165,7 +165,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
         bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
         own, out = self._cells(cells), pointers(bounds, counts)
-        self._library.modt_cluster_bounds(
+        self.library.modt_cluster_bounds(
             address(own), at(points.x), at(points.y), at(cluster, INT64), len(cells), n,
             address(out),
         )  # fmt: skip
@@ -175,7 +175,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
         bounds, scale_m = np.empty((8, n), np.float32), np.empty(n, np.float32)
         cells, sampled, out = self._cells(clusters.cells), self._columns(clusters.sampled), pointers(bounds)
-        self._library.modt_view_bounds(
+        self.library.modt_view_bounds(
             address(cells), address(sampled), at(clusters.height), at(clusters.sample, INT64),
             at(clusters.of_cell, INT64), len(clusters.sample), at(number, INT64), n, address(out),
             at(scale_m),
@@ -191,7 +191,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         order, target = bounds.min[DIRECTION].argsort(kind="stable"), np.empty(n, np.int64)
         parent, united = np.empty(n, np.int32), np.empty((8, n), np.float32)
         given, out = pointers(bounds.min, bounds.max), pointers(united)
-        self._library.modt_merge_strips(
+        self.library.modt_merge_strips(
             ctypes.addressof(strips), address(given), at(bounds.scale_m), at(beam_rad), n,
             at(order, INT64), address(parent), address(out), at(target, INT64),
         )  # fmt: skip
@@ -201,7 +201,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
         rows, offsets = np.empty(len(labels), np.int64), np.empty(n + 1, np.int64)
         given = at(labels, INT64), len(labels), n, at(rows, INT64), at(offsets, INT64)
-        return Groups(rows[: self._library.modt_group(*given)], offsets)
+        return Groups(rows[: self.library.modt_group(*given)], offsets)
 
     def members_of(self, clusters: Clusters, index: Int) -> Members:
         """Points of each cluster, given (K,) the row of each point in the sweep."""
@@ -210,7 +210,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         offsets, rows, own = np.empty(clusters.n + 1, np.int64), np.empty(m, np.int64), np.empty((4, m), np.float32)
         columns = [at(column) for column in (points.x, points.y, points.z, clusters.height)]
         given, out = array("Q", (*columns, at(index, INT64))), pointers(offsets, rows, own)
-        self._library.modt_members(
+        self.library.modt_members(
             address(given), at(clusters.cell, INT64), len(index), at(of_cell, INT64),
             at(cells.entries, INT64), len(cells), clusters.n, address(out),
         )  # fmt: skip
@@ -219,7 +219,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
         best = np.empty(len(groups), np.int64)
-        self._library.modt_best_headings(
+        self.library.modt_best_headings(
             at(x), at(y), at(groups.rows, INT64), at(groups.offsets, INT64), len(groups), limit,
             at(AXES[0]), at(AXES[1]), len(HEADINGS), noise_m, at(best, INT64),
         )  # fmt: skip
@@ -229,7 +229,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
         points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
         sums, greatest = np.empty((5, n), np.float64), np.empty(n, np.float32)
-        self._library.modt_reflectance_sums(
+        self.library.modt_reflectance_sums(
             at(points), points.shape[1], at(index, INT64), at(offsets, INT64), n, BRIGHT, DARK,
             at(sums, FLOAT64), at(greatest),
         )  # fmt: skip

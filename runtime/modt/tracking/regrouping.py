@@ -65,7 +65,8 @@ class Pairs:
 
     Attributes:
         rows, proposals: (K,) of each pair.
-        known: (8, K) known extent of the track, as a k-DOP [m].
+        known: (8, R) known extents of tracks, as k-DOPs [m].
+        extent: (K,) that of the track among these.
         within: (K,) part of the proposal that lies within the known extent.
         free: (K,) the track may take the proposal, and most of one lies within the other.
     """
@@ -73,6 +74,7 @@ class Pairs:
     rows: Int
     proposals: Int
     known: Float64
+    extent: Int
     within: Float64
     free: Bool
 
@@ -124,8 +126,9 @@ class Regrouping:
         number = (kept.cumsum() - 1)[into]
         renewed = np.zeros(len(into), np.bool_)
         renewed[whole] = renewed[hosts] = renewed[n:] = True
-        label = number.take(piece)
-        proposals, observations = self._regrouped(frame, placement, label, source[kept], renewed[kept], yaw[kept])
+        proposals, observations = self._regrouped(
+            frame, placement, piece, number, source[kept], renewed[kept], yaw[kept]
+        )
         new = number[n:]
         if proposals.reflectance is not None:
             proposals.reflectance[new] = np.nan
@@ -143,33 +146,40 @@ class Regrouping:
         rank[order] = np.arange(len(order))
         rows = order[tracks.hits[order] > 1]
         known = tracks.known_kdops(rows)
-        k, part = self._kernels.overlapping_pairs(known, frame.observations.kdop)
-        rows, known, kdop = rows[k], known.take(k, axis=1), frame.observations.kdop.take(part, axis=1)
+        expected, seen = tracks.predicted_kdops(rows), frame.observations.kdop
+        k, part, within, around = self._kernels.covering_pairs(known, expected, seen)
+        rows = rows[k]
         other = owner[part]
         a, b = tracks.last_class[rows], tracks.last_class[other]
         one_class = (a == b) | ~(IS_PERSON[a] | IS_PERSON[b])  # background and cars are easily confused
         free = (other == NONE) | (other == rows) | (rank[other] > rank[rows]) & one_class
-        within, around = coverage(kdop, known), coverage(tracks.predicted_kdops(rows), kdop)
         free &= np.maximum(within, around) > MIN_COVERAGE
-        return Pairs(rows, part, known, within, free)
+        return Pairs(rows, part, known, k, within, free)
 
     def _regrouped(
-        self, frame: Associated, placement: Placement, label: Int, source: Int, renewed: Bool, yaw: Float64
+        self,
+        frame: Associated,
+        placement: Placement,
+        piece: Int,
+        number: Int,
+        source: Int,
+        renewed: Bool,
+        yaw: Float64,
     ) -> tuple[Proposals, Observations]:
         """Proposals and observations in another grouping.
 
         Args:
             frame: the grouping before.
             placement: of the frame in the world.
-            label: (K,) proposal of each member.
+            piece: (K,) of each member.
+            number: proposal of each piece.
             source: (Q,) former proposal whose columns each takes over.
             renewed: (Q,) those whose members changed: box and k-DOP come from their points.
             yaw: (Q,) heading of their boxes [rad, sensor frame].
         """
         old, changed, kernels = frame.proposals, renewed.nonzero()[0], self._kernels
-        # Sixteen bits hold every number of a proposal, and are sorted by radix.
-        order, count = label.astype(np.uint16).argsort(kind="stable"), np.bincount(label, minlength=len(source))
-        proposals = old.regrouped(old.members.take(order), old.coordinates.take(order, axis=1), count, source)
+        members, coordinates, count = kernels.regrouped(old.members, old.coordinates, piece, number, len(source))
+        proposals = old.regrouped(members, coordinates, count, source)
         runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
         copied = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
         few = proposals.regrouped(*copied, count[changed], changed)
@@ -211,7 +221,7 @@ def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int
     joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
     joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & ~IS_PERSON[tracks.last_class[pairs.rows]]
     k = joins.nonzero()[0]
-    rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(k, axis=1), host[k]
+    rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(pairs.extent[k], axis=1), host[k]
     part = observations.kdop.take(parts, axis=1)
     person = PART_PERSON.fits(
         widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts]

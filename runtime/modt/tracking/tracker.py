@@ -10,10 +10,9 @@ from modt.config import TrackingConfig
 from modt.geometry.kdop import AGREE_M, DIRECTIONS, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
-from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
-from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
+from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.states import Event, StateMachine
@@ -68,6 +67,7 @@ class Tracker:
         self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0)
         self._period_s = period_s
         self._regrouping = Regrouping(kernels)
+        self._filter = filter_of(kernels, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS)
         position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
         self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
         self._tracks = TrackTable.blank()
@@ -178,20 +178,13 @@ class Tracker:
         creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
         t.unseen_s += self._period_s if creeps else dt_s
         t.last_class = t.object_class
-        x, P = components_first(t.x, t.P)
-        t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS))
+        self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
     def _update(self, matches: Matches, observations: Observations) -> None:
         """Equation 1's filter on the matched positions; the proposals take over the standing of their tracks."""
         t, rows = self._tracks, matches.rows
-        x, P = components_first(t.x.take(rows, axis=0), t.P.take(rows, axis=0))
-        z, R = components_first(matches.position, matches.covariance)
-        slow = np.abs(x[SPEED]) < np.sqrt(P[SPEED, SPEED])
-        step_x, step_y = z - x[:2]
-        heading = np.where(slow, np.arctan2(step_y, step_x), x[HEADING])
-        x, P = kalman.update(*kalman.face(x, P, heading), z, R)
-        t.x[rows], t.P[rows] = tracks_first(*kalman.turn_about(x, P))
+        self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         self._advance(rows, Event.ASSOCIATED)
         t.state[rows] = self.machine.joined(t.state[rows])
         t.missed[rows], t.unseen_s[rows] = 0, 0.0
@@ -237,9 +230,7 @@ class Tracker:
         t.stationary[rows] = near & (hits > 2)
         t.rest_position[rows] = position + REST_GAIN * near[:, None] * step
         if self._extended:
-            still = rows[near]
-            x, P = components_first(t.x.take(still, axis=0), t.P.take(still, axis=0))
-            t.x[still], t.P[still] = tracks_first(*kalman.observe_speed(x, P, 0.0, STATIONARY_SIGMA_MPS))
+            self._filter.observe_speed(t.x, t.P, rows[near], 0.0, STATIONARY_SIGMA_MPS)
 
     def _coast(self, matched: Int) -> None:
         """Tracks without a proposal go on as predicted."""
