@@ -17,6 +17,7 @@ from modt.geometry import FieldOfView
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native import build
 from modt.native.library import NotAvailableError, load
+from modt.odometry.odometry import Odometry
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
@@ -25,6 +26,8 @@ from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.strips import CarLimits
 from modt.tracking.kalman import filter_of
+from modt.tracking.states import ACCURATE
+from modt.tracking.tracker import Tracker
 from modt.types import NONE, UNRECORDED
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop_pairs import WEIGHTS, random_pairs
@@ -280,6 +283,23 @@ def test_filter(kernels, seed, m, dt_s):
         tables += [own, covariance]
     for one, other in zip(tables[:2], tables[2:], strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", ["vlp-16", "hdl-64e"])
+def test_tracks_of_simulated_sweeps(kernels, name):
+    config, runs = profile.load(name), []
+    for each in (NUMPY, kernels):
+        segmenter = Segmenter(config.segmentation, config.sensor, FieldOfView(), each)
+        odometry, tracker = Odometry(each), Tracker(config.tracking, ACCURATE, kernels=each)
+        runs.append([])
+        for frame in SyntheticStream("street", name, 1.0, 4):
+            proposals = segmenter.segment(frame.points)
+            located = odometry.locate(frame, proposals, tracker.static_tracks)
+            tracked = tracker.follow(frame.stamp_s, proposals, located)
+            tracked.tracks.object_class = tracked.tracks.id // 2 % 4  # people and cars grow and lose parts
+            runs[-1].append((tracker.conclude(np.zeros(0, np.int64), np.zeros(0, np.bool_)), tracked.proposals))
+    assert all(map(same, *runs))
+    assert len(runs[0][-1][0]) > 5
 
 
 def test_another_kind_of_array_is_refused(kernels):

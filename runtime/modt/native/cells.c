@@ -123,7 +123,7 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
         while (span[above].place < place - side - 1)
             above++;
         for (i32 a = above; span[a].place <= place - side + 1; a++) /* ends at k */
-            if (near(&span[a], &span[k]))
+            if (parent[a] != parent[k] && near(&span[a], &span[k]))
                 join(parent, a, k);
     }
     for (i32 k = 0; k < n; k++)
