@@ -99,6 +99,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         super().__init__(library)
         declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
+        self._last_cells: tuple[Cells | None, array[int]] = None, array("Q")
         self._work = np.empty(1, np.int32)
         self._strips: dict[CarLimits, Any] = {}
         self._ground: dict[GroundEstimator, _GroundBuffers] = {}
@@ -239,8 +240,9 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     def _columns(points: PointColumns) -> array[int]:
         return array("Q", map(at, (points.x, points.y, points.z, points.sqrt_range)))
 
-    @staticmethod
-    def _cells(cells: Cells) -> array[int]:
-        for column, kind in ((cells.row, INT32), (cells.low, FLOAT32), (cells.entries, INT64)):
-            at(column, kind)
-        return pointers(cells.row, cells.column, cells.low, cells.high, cells.entries)
+    def _cells(self, cells: Cells) -> array[int]:
+        if self._last_cells[0] is not cells:
+            for column, kind in ((cells.row, INT32), (cells.low, FLOAT32), (cells.entries, INT64)):
+                at(column, kind)
+            self._last_cells = cells, pointers(cells.row, cells.column, cells.low, cells.high, cells.entries)
+        return self._last_cells[1]
