@@ -132,11 +132,12 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
 
 /* connect and connect_coarse: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
  * used lies, NONE for the others; in the order of the first of their wide cells, those in the order of their last
- * cells. Scratch: `next` of side, `scratch` of 5 n_cells, `span` of n_cells. */
+ * cells. Scratch: `next`, of side + 9 n_cells. */
 EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift,
-                         i32 side, i32 *next, i32 *scratch, Span *span, i64 *component)
+                         i32 side, i32 *next, i64 *component)
 {
-    i32 *order = scratch, *parent = scratch + n_cells, *wide = scratch + 2 * n_cells, *last = scratch + 3 * n_cells;
+    Span *span = (Span *)(next + side);
+    i32 *scratch = next + side + 4 * n_cells, *order = scratch, *parent = scratch + n_cells, *wide = scratch + 2 * n_cells, *last = scratch + 3 * n_cells;
     i32 used = 0, n = 0, count = 0, before = NONE;
     for (i64 i = 0; i < n_cells; i++) {
         PROVEN(cells->row[i] >= 0 && cells->row[i] >> shift < side && cells->column[i] >> shift > 0 &&

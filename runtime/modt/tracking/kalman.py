@@ -15,7 +15,7 @@ import numpy as np
 
 from modt.geometry import wrap
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT64, INT64, Signatures, address, at, declare
+from modt.native.library import FLOAT64, INT64, Own, Signatures, declare
 from modt.types import Float64, Int
 
 X, Y, HEADING, SPEED = range(4)
@@ -171,11 +171,11 @@ def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
     return heading
 
 
-_D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
+_D, _L = ctypes.c_double, ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_predict": (None, (_P, _P, _L, _P, _P, _D, _P)),
-    "modt_update": (None, (_P, _P, _P, _L, _P, _P, _P, _P, _P)),
-    "modt_observe_speed": (None, (_P, _P, _P, _L, _D, _D)),
+    "modt_predict": (None, (FLOAT64, FLOAT64, _L, Own, Own, _D, Own)),
+    "modt_update": (None, (FLOAT64, FLOAT64, INT64, _L, Own, Own, Own, FLOAT64, FLOAT64)),
+    "modt_observe_speed": (None, (FLOAT64, FLOAT64, INT64, _L, _D, _D)),
 }
 
 
@@ -190,27 +190,19 @@ class NativeFilter(Filter):
     def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
         """All states dt_s later."""
         heading, along = x[:, HEADING].copy(), np.square(dt_s * self.acceleration)
-        c, s = np.cos(heading), np.sin(heading)
         noise = array("d", (along, np.square(dt_s**2 / 2 * self.acceleration), np.square(dt_s * self.turn)))
-        self._library.modt_predict(
-            at(x, FLOAT64), at(P, FLOAT64), len(x), address(c), address(s), dt_s, address(noise)
-        )
+        self._library.modt_predict(x, P, len(x), np.cos(heading), np.sin(heading), dt_s, noise)
 
     def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:
         """The rows after the observed places z (K, 2) of covariance R (K, 2, 2), at a speed that is not negative."""
         own = x.take(rows, axis=0).T.copy()
         heading = _heading(own, P[rows, SPEED, SPEED], z.T.copy())
         turn = heading - own[HEADING]
-        c, s = np.cos(turn), np.sin(turn)
-        self._library.modt_update(
-            at(x, FLOAT64), at(P, FLOAT64), at(rows, INT64), len(rows), address(heading), address(c), address(s),
-            at(z, FLOAT64), at(R, FLOAT64),
-        )  # fmt: skip
+        self._library.modt_update(x, P, rows, len(rows), heading, np.cos(turn), np.sin(turn), z, R)
 
     def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
         """The rows after an observed speed of deviation sigma."""
-        given = at(x, FLOAT64), at(P, FLOAT64), at(rows, INT64), len(rows)
-        self._library.modt_observe_speed(*given, speed_mps, sigma_mps**2)
+        self._library.modt_observe_speed(x, P, rows, len(rows), speed_mps, sigma_mps**2)
 
 
 def filter_of(kernels: GeometryKernels, acceleration: float, turn: float) -> Filter:

@@ -26,7 +26,7 @@ from modt.classes import ObjectClass
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
-from modt.native.library import FLOAT64, INT64, Signatures, address, at, declare
+from modt.native.library import FLOAT64, Own, Signatures, declare, structure
 from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
@@ -50,8 +50,7 @@ _LIMITS = (
     *(ESTABLISHED_HITS, ObjectClass.CAR.value),
 )
 """Limits of regrouping.c."""
-_P, _L = ctypes.c_void_p, ctypes.c_int64
-_SIGNATURES: Signatures = {"modt_take_and_join": (None, (_P, _P, _P, _P, _P, _P, _P, _L, _P, _P, _P))}
+_SIGNATURES: Signatures = {"modt_take_and_join": (None, (*[Own] * 4, FLOAT64, Own, Own, ctypes.c_int64, *[Own] * 3))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,30 +173,15 @@ class Regrouping:
             free = _free(tracks, pairs, owner)
             _take_larger(tracks, observations, pairs, free, own, owner)
             return _join(tracks, observations, pairs, free, own, owner)
-        n, m, into = len(owner), len(own), np.arange(len(owner))
-        box, here = tracks.box, observations.box
-        ours = (
-            *(at(v, FLOAT64) for v in (pairs.known, box, *pairs.headings[0], tracks.x, tracks.anchor)),
-            *(at(v, INT64) for v in (pairs.rank, tracks.hits, tracks.last_class)),
-        )
-        theirs = (
-            *(at(v, FLOAT64) for v in (observations.kdop, here, *pairs.headings[1])),
-            *(at(v, FLOAT64) for v in (observations.bottom, observations.top)),
-            at(observations.count, INT64),
-        )
-        listed = (
-            *map(address, (pairs.rows, pairs.proposals, pairs.extent, pairs.within, pairs.around)),
-            len(pairs.rows),
-        )
-        limits, scratch = array("d", _LIMITS), np.empty(len(pairs.rows) + max(n, m), np.uint8)
-        a, b, c = (array("Q", given) for given in ((*ours, pairs.known.shape[1]), (*theirs, n), listed))
+        n, m, k, into = len(owner), len(own), len(pairs.rows), np.arange(len(owner))
+        ours = pairs.known, tracks.box, *pairs.headings[0], tracks.x, tracks.anchor, pairs.rank, tracks.hits
+        theirs = observations.kdop, observations.box, *pairs.headings[1], observations.bottom, observations.top
+        listed = pairs.rows, pairs.proposals, pairs.extent, pairs.within, pairs.around
         library.modt_take_and_join(
-            *map(address, (a, b, c, limits, MAX_SIZE_M, IS_PERSON, scratch)),
-            m,
-            address(own),
-            address(owner),
-            address(into),
-        )
+            structure(*ours, tracks.last_class, pairs.known.shape[1]), structure(*theirs, observations.count, n),
+            structure(*listed, k), array("d", _LIMITS), MAX_SIZE_M, IS_PERSON, np.empty(k + max(n, m), np.uint8),
+            m, own, owner, into,
+        )  # fmt: skip
         return into
 
     def _regrouped(
