@@ -77,8 +77,8 @@ def pointers(*arrays: NDArray[Any]) -> array[int]:
     addresses: list[int] = []
     for numbers in arrays:
         first, rows = address(numbers), 1 if numbers.ndim == 1 else len(numbers)
-        step = numbers.strides[0]
-        addresses += [first + i * step for i in range(rows)]
+        step = numbers.strides[0] or 1  # of an empty one
+        addresses += range(first, first + rows * step, step)
     return array("Q", addresses)
 
 

@@ -292,6 +292,8 @@ def _split(
     lost = (own == NONE) & (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
     lost &= tracks.last_class != ObjectClass.BACKGROUND.value
     k = lost[pairs.rows].nonzero()[0]
+    if not len(k):
+        return k, k, label
     rows, hosts = pairs.rows[k], pairs.proposals[k]
     expected, kdop = tracks.predicted_kdops(rows), observations.kdop.take(hosts, axis=1)
     covered = coverage(expected, kdop)
