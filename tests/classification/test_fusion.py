@@ -100,6 +100,16 @@ def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     assert EveryFrame().asks(tracks, proposals, np.zeros(2, np.bool_)).tolist() == [True, False]
 
 
+@pytest.mark.parametrize("mode", [FirstViews, FurtherViews])
+def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(mode: type[FusedTracks]) -> None:
+    proposals, tracks = scene()
+    fusion = mode(CONFIG, FixedPrior(CAR, CAR))
+    tracks.hidden[0] = True
+    assert fusion.asks(tracks, proposals, np.ones(2, np.bool_)).tolist() == [False, True]
+    assert (tracks.box_evidence[0] == 0).all()
+    assert (tracks.box_evidence[1] != 0).any()
+
+
 @given(
     views=arrays(np.float64, (6, 4), elements=st.floats(0.05, 1.0)),
     boxes=arrays(np.float64, (6, 4), elements=st.floats(0.05, 1.0)),

@@ -147,7 +147,7 @@ class Regrouping:
         rows, known, kdop = rows[k], known.take(k, axis=1), frame.observations.kdop.take(part, axis=1)
         other = owner[part]
         a, b = tracks.last_class[rows], tracks.last_class[other]
-        one_class = (a == b) | ~(IS_PERSON[a] | IS_PERSON[b])  # background and cars are easily confused
+        one_class = (a == b) | ~(IS_PERSON[a] & ~tracks.hidden[rows] | IS_PERSON[b])  # others are easily confused
         free = (other == NONE) | (other == rows) | (rank[other] > rank[rows]) & one_class
         within, around = coverage(kdop, known), coverage(tracks.predicted_kdops(rows), kdop)
         free &= np.maximum(within, around) > MIN_COVERAGE
@@ -209,7 +209,8 @@ def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int
     into, car = np.arange(len(owner)), tracks.last_class == ObjectClass.CAR.value
     host = own[pairs.rows]
     joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
-    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & ~IS_PERSON[tracks.last_class[pairs.rows]]
+    whole = ~IS_PERSON[tracks.last_class] | tracks.hidden  # of a hidden person the legs are left, one object
+    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & whole[pairs.rows]
     k = joins.nonzero()[0]
     rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(k, axis=1), host[k]
     part = observations.kdop.take(parts, axis=1)
