@@ -24,7 +24,7 @@ def heights(ceiling_m, n):
 @pytest.mark.parametrize("ceiling_m", [2.3, 2.4, 2.5, 2.62])
 def test_a_ceiling_is_cut_just_below(ceiling_m):
     limit_m = below_ceiling_m(heights(ceiling_m, 4000))
-    assert ceiling_m - 0.25 < limit_m < ceiling_m - 0.05
+    assert ceiling_m - 0.35 < limit_m < ceiling_m - 0.14  # some of its returns lie 0.1 m below it
 
 
 @pytest.mark.parametrize(("ceiling_m", "n"), [(2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000)])

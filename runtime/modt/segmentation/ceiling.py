@@ -14,7 +14,7 @@ BIN_M = 0.05
 """Width of a bin of the histogram of heights; two neighbouring bins hold a ceiling."""
 MIN_RETURNS, MIN_SHARE = 50, 0.5
 """Returns above ABOVE_M in a room, and share of them that are on the ceiling."""
-EDGE_SHARE, CLEARANCE_M = 0.05, 0.05
+EDGE_SHARE, CLEARANCE_M = 0.05, 0.15
 """Share of its returns from which the bin below belongs to it too; distance below it up to which objects reach."""
 SAMPLED = 8
 """One return of so many is looked at for a ceiling that begins above the greatest height used."""
