@@ -71,6 +71,15 @@ def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     assert subject.asks(False) == [True, False]
 
 
+@pytest.mark.parametrize("mode", [FirstViews, FurtherViews])
+def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(mode: type[FusedTracks]) -> None:
+    subject = Fused(mode(CONFIG, FixedPrior(CAR, CAR)), 50, 50, frames=3)
+    subject.tracks.hidden[0] = True
+    assert subject.asks() == [False, True]
+    assert (subject.tracks.box_evidence[0] == 0).all()
+    assert (subject.tracks.box_evidence[1] != 0).any()
+
+
 @given(
     views=arrays(np.float64, (6, 4), elements=st.floats(0.05, 1.0)),
     boxes=arrays(np.float64, (6, 4), elements=st.floats(0.05, 1.0)),

@@ -132,7 +132,7 @@ class FusedTracks:
         prior = self.prior.probability(proposals)[tracks.proposal[rows]]
         tracks.prior[rows] = prior
         evidence, known = _log(prior) - self._log_frequency, tracks.box_evidence.take(rows, axis=0)
-        gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING)[:, None]
+        gain = (np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows])[:, None]
         tracks.box_evidence[rows] = known + gain * (evidence - known)
         tracks.witness[rows] = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.length_m[rows])
         self._conclude(tracks, rows)
@@ -185,7 +185,7 @@ class FirstViews(FusedTracks):
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
-        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS)
+        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
         return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks))
 
 
@@ -194,7 +194,8 @@ class FurtherViews(FusedTracks):
 
     A track, a remembered place too, is classified as soon as its box may be an object's. An uncertain one is
     classified again where it shows clearly more points, and at growing intervals, as is a certain object. Certain
-    background is only where it shows far more points and may be an object by its box.
+    background is only where it shows far more points and may be an object by its box. A person is not while the view
+    cuts off more than half.
     """
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
@@ -206,7 +207,7 @@ class FurtherViews(FusedTracks):
         review |= first & _shows_more(tracks, FAR_MORE_POINTS)
         unsure = _shows_more(tracks) | (tracks.age >= UNSURE_GROWTH * tracks.key_age + UNSURE_FRAMES)
         further = np.where(self.certain(tracks.posterior), review, unsure)
-        asks: Bool = (tracks.proposal != NONE) & np.where(tracks.viewed, further, first)
+        asks: Bool = (tracks.proposal != NONE) & ~tracks.hidden & np.where(tracks.viewed, further, first)
         return asks
 
 

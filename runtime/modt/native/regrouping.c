@@ -71,15 +71,15 @@ static int joins(const Tracks *t, const Seen *s, const Limits *z, i64 r, i64 p, 
 /* _free, _take_larger and _join: proposal `own` of each of m tracks, `owner` of each proposal, and the proposal `into`
  * which each is joined, which is itself before. Scratch: a byte a pair, then one a track or a proposal. */
 EXPORT void modt_take_and_join(const Tracks *t, const Seen *s, const Pairs *pairs, const Limits *z,
-                               const double (*size)[2], const uint8_t *person, uint8_t *free, i64 m, i64 *own,
-                               i64 *owner, i64 *into)
+                               const double (*size)[2], const uint8_t *person, const uint8_t *whole, uint8_t *free,
+                               i64 m, i64 *own, i64 *owner, i64 *into)
 {
     uint8_t *changed = free + pairs->n;
     for (i64 k = 0; k < pairs->n; k++) {
         i64 r = pairs->row[k], other = owner[pairs->part[k]], a = t->last_class[r];
         free[k] = other == NONE || other == r ||
                   (t->rank[other] > t->rank[r] &&
-                   (a == t->last_class[other] || !(person[a] || person[t->last_class[other]])));
+                   (a == t->last_class[other] || (whole[r] && !person[t->last_class[other]])));
         free[k] &= high(pairs->within[k], pairs->around[k]) > z->min_coverage;
     }
     for (i64 r = 0; r < m; r++)
@@ -99,7 +99,7 @@ EXPORT void modt_take_and_join(const Tracks *t, const Seen *s, const Pairs *pair
     for (i64 k = 0; k < pairs->n; k++) { /* the most senior track is served first */
         i64 r = pairs->row[k], p = pairs->part[k], host = own[r];
         if (free[k] && pairs->within[k] > z->min_part_coverage && host != NONE && host != p && into[p] == p &&
-            t->hits[r] >= z->min_hits && !person[t->last_class[r]] &&
+            t->hits[r] >= z->min_hits && whole[r] &&
             joins(t, s, z, r, p, host, pairs->extent[k], owner[p]))
             into[p] = host;
     }

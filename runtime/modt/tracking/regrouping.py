@@ -50,7 +50,9 @@ _LIMITS = (
     *(ESTABLISHED_HITS, ObjectClass.CAR.value),
 )
 """Limits of regrouping.c."""
-_SIGNATURES: Signatures = {"modt_take_and_join": (None, (*[Own] * 4, FLOAT64, Own, Own, ctypes.c_int64, *[Own] * 3))}
+_SIGNATURES: Signatures = {
+    "modt_take_and_join": (None, (*[Own] * 4, FLOAT64, *[Own] * 3, ctypes.c_int64, *[Own] * 3))
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +76,10 @@ class Pairs:
 
     Attributes:
         rows, proposals: (K,) of each pair.
-        extent: (K,) known extent of the track among
+        extent: (K,) index of the known extent of the track.
         known: (8, R) known extents as k-DOPs [m].
         rank: (M,) seniority of the tracks, 0 the highest.
+        whole: (M,) tracks whose parts are joined: of a hidden person the legs are left, one object.
         within: (K,) part of the proposal that lies within the known extent.
         around: (K,) part of the track that is expected within the proposal.
         headings: (2, M) cosine and sine of the boxes of the tracks, and (2, P) of the proposals.
@@ -87,6 +90,7 @@ class Pairs:
     extent: Int
     known: Float64
     rank: Int
+    whole: Bool
     within: Float64
     around: Float64
     headings: tuple[Float64, Float64]
@@ -162,7 +166,8 @@ class Regrouping:
         known, expected = tracks.known_kdops(rows), tracks.predicted_kdops(rows)
         extent, part, within, around = self._kernels.covering_pairs(known, expected, observations.kdop)
         headings = _headings(tracks.box), _headings(observations.box)
-        return Pairs(rows[extent], part, extent, known, rank, within, around, headings)
+        whole = ~IS_PERSON[tracks.last_class] | tracks.hidden
+        return Pairs(rows[extent], part, extent, known, rank, whole, within, around, headings)
 
     def _take_and_join(
         self, tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int
@@ -179,8 +184,8 @@ class Regrouping:
         listed = pairs.rows, pairs.proposals, pairs.extent, pairs.within, pairs.around
         library.modt_take_and_join(
             structure(*ours, tracks.last_class, pairs.known.shape[1]), structure(*theirs, observations.count, n),
-            structure(*listed, k), array("d", _LIMITS), MAX_SIZE_M, IS_PERSON, np.empty(k + max(n, m), np.uint8),
-            m, own, owner, into,
+            structure(*listed, k), array("d", _LIMITS), MAX_SIZE_M, IS_PERSON, pairs.whole,
+            np.empty(k + max(n, m), np.uint8), m, own, owner, into,
         )  # fmt: skip
         return into
 
@@ -224,7 +229,7 @@ def _free(tracks: TrackTable, pairs: Pairs, owner: Int) -> Bool:
     """(K,) pairs of which the track may take the proposal, and most of one lies within the other."""
     rows, other = pairs.rows, owner[pairs.proposals]
     a, b = tracks.last_class[rows], tracks.last_class[other]
-    one_class = (a == b) | ~(IS_PERSON[a] | IS_PERSON[b])  # background and cars are easily confused
+    one_class = (a == b) | pairs.whole[rows] & ~IS_PERSON[b]  # background and cars are easily confused
     free: Bool = (other == NONE) | (other == rows) | (pairs.rank[other] > pairs.rank[rows]) & one_class
     free &= np.maximum(pairs.within, pairs.around) > MIN_COVERAGE
     return free
@@ -260,7 +265,7 @@ def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, free: Bo
     into, car = np.arange(len(owner)), tracks.last_class == ObjectClass.CAR.value
     host = own[pairs.rows]
     joins = free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
-    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & ~IS_PERSON[tracks.last_class[pairs.rows]]
+    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & pairs.whole[pairs.rows]
     k = joins.nonzero()[0]
     rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(pairs.extent[k], axis=1), host[k]
     part = observations.kdop.take(parts, axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_SIZE_M
-from modt.classes import ObjectClass
+from modt.classes import PERSON_M, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kdop import AGREE_M, DIRECTIONS, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -207,9 +207,11 @@ class Tracker:
         t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
         hidden_m = (known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2)
         kept = IS_PERSON[t.last_class[rows]] & (hidden_m > 0)
+        if kept.any():
+            kept &= frame.proposals.cut[own] & Cut.TOP > 0
+        t.hidden[rows] = kept & (t.box[rows, 5] < PERSON_M / 2)
         if not kept.any():
             return
-        kept &= frame.proposals.cut[own] & Cut.TOP > 0
         for boxes, index in ((t.box, rows[kept]), (frame.proposals.box, own[kept])):
             boxes[index, 2:6:3] += np.outer(hidden_m[kept], (0.5, 1.0))  # z of the middle, and height
 
