@@ -29,6 +29,7 @@ ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in MODES))
 ROW, YES = np.array([0]), np.array([True])
 WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
 DOUBTFUL = np.array([[0.4, 0.2, 0.2, 0.2]])
+PERHAPS_A_CAR = np.array([[0.75, 0.23, 0.01, 0.01]])
 LIKE_ANY = [0.8, 0.1, 0.05, 0.05]
 SURELY_BACKGROUND = np.array([[0.997, 0.001, 0.001, 0.001]])
 CLEARLY_A_CAR = np.array([[0.001, 0.997, 0.001, 0.001]])
@@ -115,8 +116,8 @@ def test_posterior_is_that_of_the_plain_formula(
     proposals, tracks = scene((50,))
     prior = FixedPrior(boxes[0].tolist(), pool_weight=pool_weight)
     fusion = FusedTracks(CONFIG, prior)
-    tracks.moved_m[:], tracks.observed_s[:], tracks.length_m[:] = moved_m, 3.0, 1.0
-    motion = log_likelihood(tracks.moved_m, tracks.observed_s, tracks.length_m)[0]
+    tracks.moved_m[:], tracks.observed_s[:], tracks.size_m[:] = moved_m, 3.0, 1.0
+    motion = log_likelihood(tracks.moved_m, tracks.observed_s, tracks.size_m)[0]
     log_frequency = np.log(FREQUENCY / FREQUENCY.sum())
     seen: list[tuple[float, Float64]] = []
     box_mean = np.zeros(4)
@@ -163,7 +164,7 @@ def test_the_same_view_again_adds_little() -> None:
 def test_motion_counts_once_however_long_it_lasts() -> None:
     proposals, tracks = scene((50,))
     fusion = FusedTracks(CONFIG, ALIKE)
-    tracks.moved_m[:], tracks.observed_s[:], tracks.length_m[:] = 1.5, 5.0, 0.7
+    tracks.moved_m[:], tracks.observed_s[:], tracks.size_m[:] = 1.5, 5.0, 0.7
     fusion.observe(tracks, proposals)
     once = tracks.posterior.copy()
     for _ in range(20):
@@ -227,7 +228,7 @@ def test_certain_background_whose_box_comes_to_look_like_an_object_is_looked_at_
     assert any(fusion.asks(tracks, proposals, ~YES)[0] for _ in range(5))
 
 
-@pytest.mark.parametrize(("view", "least", "most"), [(CLEARLY_A_CAR, 4, 4), (DOUBTFUL, 8, 12)])
+@pytest.mark.parametrize(("view", "least", "most"), [(CLEARLY_A_CAR, 4, 4), (PERHAPS_A_CAR, 8, 12)])
 def test_an_object_is_looked_at_again_at_growing_intervals(view: Float64, least: int, most: int) -> None:
     """An uncertain one more often, with as many points all the while."""
     proposals, tracks = scene((50,))
@@ -240,6 +241,25 @@ def test_an_object_is_looked_at_again_at_growing_intervals(view: Float64, least:
             fuse(fusion, tracks, proposals, ROW, view)
     assert least <= len(asked) <= most
     assert (np.diff(asked, 2) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "view", "person"), [(1.5, [0.75, 0.08, 0.15, 0.02], True), (0.0, LIKE_ANY, False)]
+)
+def test_what_may_be_a_person_is_looked_at_again_within_three_frames(
+    moved_m: float, view: list[float], person: bool
+) -> None:
+    proposals, tracks = scene((12,))
+    fusion = FurtherViews(CONFIG, FixedPrior(FREQUENCY.tolist()))
+    tracks.size_m[:], tracks.moved_m[:], tracks.observed_s[:] = 0.6, moved_m, 3.0
+    asked = []
+    for frame in range(1, 60):
+        tracks.age[:] = tracks.hits[:] = frame
+        if fusion.asks(tracks, proposals, ~tracks.final)[0]:
+            asked.append(frame)
+            assert not fuse(fusion, tracks, proposals, ROW, np.array([view])).any()
+    waits = np.diff(asked)
+    assert (waits.max() == 3) if person else (waits.max() > 10)
 
 
 def test_final_background_is_not_looked_at_again_while_its_box_stays() -> None:

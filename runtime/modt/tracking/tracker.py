@@ -297,7 +297,7 @@ class Tracker:
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
         t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
-        t.lagged_kdop[new] = t.kdop[new]
+        t.lagged_kdop[new], t.size_m[new] = t.kdop[new], t.box[new, 3:6]
         t.observe_motion(new, 0.0)
 
 
