@@ -182,7 +182,8 @@ class FirstViews(FusedTracks):
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
     minimum number of observations, since spurious proposals do not last. A track that is uncertain is classified
-    again once it shows clearly more points. Background is as final as an object here, and as certain.
+    again once it shows clearly more points, and every few frames where it may be a person. Background is as final as
+    an object here, and as certain.
     """
 
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
@@ -192,7 +193,7 @@ class FirstViews(FusedTracks):
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
         asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS)
-        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks))
+        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks) | _person_waits(tracks))
 
 
 class FurtherViews(FusedTracks):

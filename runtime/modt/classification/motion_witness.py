@@ -73,7 +73,8 @@ def log_likelihood(moved_m: Float64, observed_s: Float64, size_m: Float64) -> Fl
     """(R, 4) log P(motion, size | class) over that of background, 0 of a class without a table.
 
     Args:
-        moved_m, observed_s: as of `cells`.
+        moved_m: (R,) displacement within about the last two seconds [m].
+        observed_s: (R,) time since the first proposal [s].
         size_m: (R, 3) length, width and height of the track [m].
     """
     length, cell = cells(moved_m, observed_s, size_m[:, 0])
