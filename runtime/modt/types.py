@@ -205,7 +205,7 @@ class Tracks:
     missed: Int = column(int)  # frames since the last proposal
     moved_m: Float64 = column(float)  # displacement within about two seconds, as far as both ends show it
     observed_s: Float64 = column(float)  # from the first proposal to the last
-    length_m: Float64 = column(float)  # greatest extent seen
+    size_m: Float64 = column(float, 3)  # length, width and height, as large as they were seen for some frames
     hidden: Bool = column(bool)  # a person of whom the view cuts off the upper half
     # Columns of the fusion
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen

@@ -32,6 +32,7 @@ def new_tracks(proposals: Proposals) -> Tracks:
     tracks = Tracks.blank(n)
     tracks.id, tracks.proposal = np.arange(n), np.arange(n)
     tracks.points, tracks.box = proposals.count.copy(), proposals.box.copy()
+    tracks.size_m = proposals.box[:, 3:6].copy()
     tracks.age[:], tracks.hits[:] = 1, 1
     return tracks
 

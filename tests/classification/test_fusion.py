@@ -25,6 +25,7 @@ ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in (FirstViews, FurtherViews
 WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
 DOUBTFUL, LIKE_ANY = [0.4, 0.2, 0.2, 0.2], [0.8, 0.1, 0.05, 0.05]
 SURELY_BACKGROUND, CLEARLY_A_CAR = [0.997, 0.001, 0.001, 0.001], [0.001, 0.997, 0.001, 0.001]
+PERHAPS_A_CAR = [0.75, 0.23, 0.01, 0.01]
 
 
 class FixedPrior:
@@ -95,8 +96,8 @@ def test_posterior_is_that_of_the_plain_formula(
     prior = FixedPrior(boxes[0].tolist(), pool_weight=pool_weight)
     subject = Fused(FusedTracks(CONFIG, prior), 50)
     fusion, tracks = subject.fusion, subject.tracks
-    tracks.moved_m[:], tracks.observed_s[:], tracks.length_m[:] = moved_m, 3.0, 1.0
-    motion = log_likelihood(tracks.moved_m, tracks.observed_s, tracks.length_m)[0]
+    tracks.moved_m[:], tracks.observed_s[:], tracks.size_m[:] = moved_m, 3.0, 1.0
+    motion = log_likelihood(tracks.moved_m, tracks.observed_s, tracks.size_m)[0]
     log_frequency = np.log(FREQUENCY / FREQUENCY.sum())
     seen: list[tuple[float, Float64]] = []
     box_mean = np.zeros(4)
@@ -166,7 +167,7 @@ def test_certain_background_is_classified_again_near_by_or_where_its_box_comes_t
 
 @pytest.mark.parametrize(
     ("box", "view", "least", "most"),
-    [(CAR, CLEARLY_A_CAR, 4, 4), (CAR, DOUBTFUL, 8, 12), (LIKE_ANY, SURELY_BACKGROUND, 1, 1)],
+    [(CAR, CLEARLY_A_CAR, 4, 4), (CAR, PERHAPS_A_CAR, 8, 12), (LIKE_ANY, SURELY_BACKGROUND, 1, 1)],
 )
 def test_an_object_is_classified_again_at_growing_intervals_and_background_is_not(
     box: list[float], view: list[float], least: int, most: int
@@ -180,6 +181,25 @@ def test_an_object_is_classified_again_at_growing_intervals_and_background_is_no
             subject.fuse(*view)
     assert least <= len(asked) <= most
     assert (np.diff(asked, 2) >= 0).all()
+
+
+@pytest.mark.parametrize("make", [FirstViews, FurtherViews])
+@pytest.mark.parametrize(
+    ("moved_m", "view", "person"), [(1.5, [0.75, 0.08, 0.15, 0.02], True), (0.0, LIKE_ANY, False)]
+)
+def test_a_possible_person_is_classified_again_within_three_frames(
+    make: type[FusedTracks], moved_m: float, view: list[float], person: bool
+) -> None:
+    subject, asked = Fused(make(CONFIG, FixedPrior(FREQUENCY.tolist())), 12), []
+    tracks = subject.tracks
+    tracks.size_m[:], tracks.moved_m[:], tracks.observed_s[:] = 0.6, moved_m, 3.0
+    for frame in range(1, 60):
+        tracks.age[:] = tracks.hits[:] = frame
+        if subject.asks(~tracks.final)[0]:
+            asked.append(frame)
+            assert not subject.fuse(*view).any()
+    waits = np.diff([*asked, frame])
+    assert (waits.max() == 3) if person else (waits.max() > 10)
 
 
 def test_a_remembered_place_is_background_until_its_box_may_be_an_object() -> None:

@@ -8,27 +8,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt.classification.motion_witness import LOG_LIKELIHOOD_RATIO, log_likelihood
+from modt.classification.motion_witness import LOG_LIKELIHOOD_RATIO, TOO_LARGE, log_likelihood
 
 CAR, PEDESTRIAN, CYCLIST = (int(c) for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST))
 
 
-def ratios(moved_m: float, observed_s: float, length_m: float) -> np.ndarray:
-    return log_likelihood(np.array([moved_m]), np.array([observed_s]), np.array([length_m]))[0]
+def ratios(moved_m: float, observed_s: float, length_m: float, width_m: float = 0.4) -> np.ndarray:
+    size_m = np.array([[length_m, width_m, 1.5]])
+    return log_likelihood(np.array([moved_m]), np.array([observed_s]), size_m)[0]
 
 
 @given(st.floats(0, 1e3), st.floats(0, 1e4), st.floats(0, 1e3))
 def test_no_motion_rules_a_class_out(moved_m: float, observed_s: float, length_m: float) -> None:
     found = ratios(moved_m, observed_s, length_m)
     assert found[0] == 0.0
-    assert np.abs(found).max() <= np.abs(LOG_LIKELIHOOD_RATIO).max() == 1.5
+    assert np.abs(found[:CYCLIST]).max() <= np.abs(LOG_LIKELIHOOD_RATIO).max() == 1.5
+    assert np.abs(found[CYCLIST]) <= 1.5 + TOO_LARGE
 
 
 @pytest.mark.parametrize(
     ("moved_m", "observed_s", "length_m", "likely", "unlikely"),
     [
         (1.5, 4.0, 0.7, [PEDESTRIAN], []),  # walks
-        (15.0, 4.0, 4.2, [CAR, CYCLIST], [PEDESTRIAN]),  # went far
+        (15.0, 4.0, 4.2, [CAR], [PEDESTRIAN, CYCLIST]),  # went far
         (0.1, 5.0, 1.8, [], [CYCLIST]),  # stands for seconds
     ],
 )
@@ -42,3 +44,13 @@ def test_motion_tells_classes_apart(
 
 def test_a_young_track_tells_little() -> None:
     assert np.abs(ratios(0.0, 0.1, 0.7)).max() < np.abs(ratios(0.0, 3.0, 0.7)).max()
+
+
+def test_a_fragment_that_moves_with_its_car_is_no_person() -> None:
+    assert ratios(2.5, 2.0, 0.24)[PEDESTRIAN] < 0 < ratios(2.5, 2.0, 0.5)[PEDESTRIAN]
+
+
+def test_what_was_seen_wider_or_longer_than_a_cyclist_is_none() -> None:
+    cyclist = ratios(6.0, 3.0, 1.8, 0.7)[CYCLIST]
+    assert cyclist - ratios(6.0, 3.0, 1.8, 1.5)[CYCLIST] == TOO_LARGE
+    assert ratios(6.0, 3.0, 2.5, 0.7)[CYCLIST] < -1

@@ -25,6 +25,7 @@ def test_a_record_describes_the_frame_and_its_tracks():
     assert (seen["id"], seen["state"], seen["class"], seen["proposal"]) == (11, "tracked", "car", 0)
     assert seen["posterior"] == CAR
     assert seen["box"] == {"x": 10.0, "y": 0.0, "z": -1.0, "l": 4.0, "w": 2.0, "h": 1.5, "yaw": 0.0}
+    assert seen["size"] == [0.0] * 3
     assert seen["world"] == {"x": 0.0, "y": 0.0, "heading": 0.0, "speed_mps": 0.0}
     assert unsure["class"] == "background"
     assert (lost["proposal"], lost["box"], lost["state"]) == (None, None, "lost")
@@ -75,7 +76,12 @@ def results(draw):
     t = r.tracks
     for column in (t.points, t.age, t.missed):
         column[:] = draw(arrays(np.int64, column.shape, elements=COUNTS))
-    for column, elements in ((t.x, NUMBERS), (r.proposals.box, NUMBERS), (t.posterior, LIKELIHOODS)):
+    for column, elements in (
+        (t.x, NUMBERS),
+        (t.size_m, NUMBERS),
+        (r.proposals.box, NUMBERS),
+        (t.posterior, LIKELIHOODS),
+    ):
         column[:] = draw(arrays(np.float64, column.shape, elements=elements))
     t.final[:] = draw(arrays(np.bool_, len(t)))
     r.proposals.cut[:] = draw(arrays(np.int64, tracked, elements=st.sampled_from([0, Cut.TOP])))
@@ -106,6 +112,7 @@ def tracks_one_by_one(r):
             "age": int(t.age[k]),
             "missed": int(t.missed[k]),
             "box": box and dict(zip(BOX_KEYS, box, strict=True)),
+            "size": np.round(t.size_m[k], 3).tolist(),
             "world": dict(zip(WORLD_KEYS, np.round(t.x[k], 3).tolist(), strict=True)),
         }
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.class_sizes import IS_PERSON
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.motion_witness import log_likelihood
 from modt.classification.pool import pooled_prior
@@ -43,6 +44,11 @@ REVIEW_GROWTH, REVIEW_FRAMES = 2.0, 10
 """A certain object is classified again at REVIEW_GROWTH times its age at the last view, and REVIEW_FRAMES later."""
 UNSURE_GROWTH, UNSURE_FRAMES = 1.3, 2
 """The same of an uncertain track. With longer intervals, fewer calls are made and cars are recognised later."""
+LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
+"""Posterior from which an uncertain track is probably background, and UNSURE_GROWTH of such a track."""
+MAYBE_PERSON, PERSON_FRAMES = 0.25, 3
+"""Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
+a view of a few points says little, and many of them are right."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
@@ -134,7 +140,7 @@ class FusedTracks:
         evidence, known = _log(prior) - self._log_frequency, tracks.box_evidence.take(rows, axis=0)
         gain = (np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows])[:, None]
         tracks.box_evidence[rows] = known + gain * (evidence - known)
-        tracks.witness[rows] = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.length_m[rows])
+        tracks.witness[rows] = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m[rows])
         self._conclude(tracks, rows)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
@@ -176,7 +182,8 @@ class FirstViews(FusedTracks):
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
     minimum number of observations, since spurious proposals do not last. A track that is uncertain is classified
-    again once it shows clearly more points. Background is as final as an object here, and as certain.
+    again once it shows clearly more points, and every few frames where it may be a person. Background is as final as
+    an object here, and as certain.
     """
 
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
@@ -186,7 +193,7 @@ class FirstViews(FusedTracks):
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
         asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
-        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks))
+        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks) | _person_waits(tracks))
 
 
 class FurtherViews(FusedTracks):
@@ -205,7 +212,9 @@ class FurtherViews(FusedTracks):
         object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
         review = object_ & (tracks.age >= REVIEW_GROWTH * tracks.key_age + REVIEW_FRAMES)
         review |= first & _shows_more(tracks, FAR_MORE_POINTS)
-        unsure = _shows_more(tracks) | (tracks.age >= UNSURE_GROWTH * tracks.key_age + UNSURE_FRAMES)
+        likely_background = tracks.posterior[:, ObjectClass.BACKGROUND] > LIKELY_BACKGROUND
+        growth = np.where(likely_background, BACKGROUND_GROWTH, UNSURE_GROWTH)
+        unsure = _shows_more(tracks) | (tracks.age >= growth * tracks.key_age + UNSURE_FRAMES) | _person_waits(tracks)
         further = np.where(self.certain(tracks.posterior), review, unsure)
         asks: Bool = (tracks.proposal != NONE) & ~tracks.hidden & np.where(tracks.viewed, further, first)
         return asks
@@ -215,6 +224,12 @@ def _log(probability: Float64) -> Float64:
     """Logarithm, of MIN_PROBABILITY at least."""
     logarithm: Float64 = np.log(np.maximum(probability, MIN_PROBABILITY))
     return logarithm
+
+
+def _person_waits(tracks: Tracks) -> Bool:
+    """(M,) tracks that may be people and were last classified PERSON_FRAMES ago."""
+    waits: Bool = tracks.posterior[:, IS_PERSON].sum(axis=1) > MAYBE_PERSON
+    return waits & (tracks.age >= tracks.key_age + PERSON_FRAMES)
 
 
 def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:

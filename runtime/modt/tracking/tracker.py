@@ -294,8 +294,8 @@ class Tracker:
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
         t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
-        t.lagged_kdop[new] = t.kdop[new]
-        t.length_m[new] = widths(t.envelope[new].T).max(axis=0, initial=0.0)
+        t.lagged_kdop[new], t.size_m[new] = t.kdop[new], t.box[new, 3:6]
+        t.observe_motion(new, 0.0)
 
 
 def _oversized(object_class: Int, kdop: Float64) -> Int:
