@@ -122,7 +122,9 @@ def test_the_text_of_results_is_one_short_line(frames):
     assert f"{np.count_nonzero(found.visible)} visible" in repr(found)
     nothing = found.take(np.zeros(0, np.int64))
     assert repr(nothing) == "<0 tracked objects: none; 0 visible>"
-    assert all(len(repr(result)) < 120 and "\n" not in repr(result) for result in (found, nothing))
+    shown = found, nothing, frames[0], modt.Pipeline.from_profile("hdl-64e")
+    assert all(len(repr(each)) < 120 and "\n" not in repr(each) and " object at " not in repr(each) for each in shown)
+    assert found._repr_html_().count("<tr>") == len(found) + 1
 
 
 def test_pandas_has_the_columns_of_the_dictionaries_though_there_are_no_rows(frames, monkeypatch):
@@ -192,7 +194,7 @@ def test_a_board_goes_with_the_sensor_that_the_first_sweep_tells(frames, caplog)
     library.step(frames[0].points, 0.0)
     assert library.config.sensor.elevation_step_deg == pytest.approx(2.0, rel=0.02)
     assert library.config.energy == load("raspberry-pi-5").energy
-    assert "profile hdl-64e is not of this sensor" in caplog.text
+    assert "profile hdl-64e (the default) is not of this sensor" in caplog.text
 
 
 def test_a_profile_that_was_asked_for_is_kept_and_warned_of(frames, caplog):

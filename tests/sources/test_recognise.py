@@ -242,7 +242,7 @@ def test_a_stream_without_a_usable_scan_is_an_error(tmp_path):
         (lambda root: root / "nowhere", "no such file"),
         (lambda root: root, "no stream"),
         (lambda root: (root / "a.bin").write_bytes(b"") or root / "a.bin", "no stream"),
-        (lambda root: (root / "a.bag").write_bytes(b"#ROSBAG V2.0\n") and root / "a.bag", "ROS 1; convert it"),
+        (lambda root: (root / "a.bag").write_bytes(b"#ROSBAG V2.0\n") and root / "a.bag", "ROS 1; pip install rosbags"),
         (lambda root: layouts.raw_drive(root).parent.parent, "several streams.*drive_9999"),
     ],
     ids=["missing", "empty", "a file", "ROS 1", "a root"],
@@ -255,7 +255,7 @@ def test_a_path_without_a_stream_is_refused(tmp_path, make, cause):
 @pytest.mark.parametrize(
     ("name", "cause"),
     [
-        ("a.bag", r"is a recording of ROS 1; convert it: .*rosbags-convert"),
+        ("a.bag", r"is a recording of ROS 1; pip install rosbags; rosbags-convert --src FILE"),
         ("a.LAS", r"is a LAS file; convert it: pdal translate"),
         ("a.laz", r"is a LAS file; convert it: pdal translate"),
         ("a.npy", r"is an array of NumPy; convert it: numpy.load"),

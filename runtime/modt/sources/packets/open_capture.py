@@ -96,7 +96,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         raise MisuseError(path, f"no packets of a {layout} ({there})", remedy)
     _, first = next(_decoded(capture, decoder, Reception()), (0.0, None))
     if first is None:
-        raise MisuseError(path, f"no whole sweep of a {layout}", "record at least two turns of the sensor")
+        raise MisuseError(path, f"no whole sweep ({layout})", "record at least two turns of the sensor")
     info = StreamInfo(
         path.stem,
         f"{layout} packets",
