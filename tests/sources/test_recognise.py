@@ -242,7 +242,10 @@ def test_a_stream_without_a_usable_scan_is_an_error(tmp_path):
         (lambda root: root / "nowhere", "no such file"),
         (lambda root: root, "no stream"),
         (lambda root: (root / "a.bin").write_bytes(b"") or root / "a.bin", "no stream"),
-        (lambda root: (root / "a.bag").write_bytes(b"#ROSBAG V2.0\n") and root / "a.bag", "ROS 1; pip install rosbags"),
+        (
+            lambda root: (root / "a.bag").write_bytes(b"#ROSBAG V2.0\n") and root / "a.bag",
+            "ROS 1; pip install rosbags",
+        ),
         (lambda root: layouts.raw_drive(root).parent.parent, "several streams.*drive_9999"),
     ],
     ids=["missing", "empty", "a file", "ROS 1", "a root"],
