@@ -16,7 +16,7 @@ LAYOUTS = {"velodyne_msgs/msg/VelodyneScan": (1206, None), "pandar_msgs/msg/Pand
 
 
 def packets_of_bag(path: Path) -> Iterator[Timed]:
-    """Packets of a folder or a file, with their times [s].
+    """Packets of a folder or a file, with their times since the first [s].
 
     Raises:
         MisuseError: it holds no messages of packets.
@@ -27,6 +27,7 @@ def packets_of_bag(path: Path) -> Iterator[Timed]:
         messages = [(LAYOUTS[kind], data) for kind, data in rows if kind in LAYOUTS]
     if not messages:
         raise MisuseError(path, "no messages of packets", f"give a recording of {' or '.join(LAYOUTS)}")
+    began_s = None
     for (size, length_at), data in messages:
         at = 16 + struct.unpack_from("<I", data, 12)[0]  # behind the header, whose frame is a text
         at += -at % 4
@@ -34,4 +35,5 @@ def packets_of_bag(path: Path) -> Iterator[Timed]:
         for start in range(at + 4, at + 4 + step * struct.unpack_from("<I", data, at)[0], step):
             second, fraction = struct.unpack_from("<II", data, start)
             length = size if length_at is None else struct.unpack_from("<I", data, start + length_at)[0]
-            yield second + 1e-9 * fraction, data[start + 8 : start + 8 + length]
+            began_s = second + 1e-9 * fraction if began_s is None else began_s
+            yield second + 1e-9 * fraction - began_s, data[start + 8 : start + 8 + length]
