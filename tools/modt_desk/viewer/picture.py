@@ -115,8 +115,9 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
         axes.add_collection(shapes)
     labels = []
     for k in np.flatnonzero(is_object).tolist():
-        name = names[kind[k]]
-        text = f"{'false: ' if false[k] else ''}#{rows[k, 0]} {name} {100 * of[f'p_{name}'][k]:.0f} %"
+        name, mark = names[kind[k]], "false: " if false[k] else ""
+        share = of[f"p_{name}"][k]
+        text = f"{mark}#{rows[k, 0]} {name}{'?' if share < 0.5 else ''} {100 * share:.0f} %"
         labels.append((xy[k, 0], box[k, :, 1].max(), text, wrong if false[k] else INK))
     return labels
 

@@ -80,8 +80,8 @@ function trail(row) {
 }
 
 const label = (row) => {
-  const { name } = run.classes[row.class];
-  return `#${row.id} ${name} ${(100 * row[`p_${name}`]).toFixed(0)} %`;
+  const { name } = run.classes[row.class], share = row[`p_${name}`];
+  return `#${row.id} ${name}${share < 0.5 ? "?" : ""} ${(100 * share).toFixed(0)} %`;
 };
 
 // A line of text centred at x, above y, or further up where another one lies; left out where there is no room.
