@@ -22,6 +22,8 @@ def packets_of_bag(path: Path) -> Iterator[Timed]:
         MisuseError: it holds no messages of packets.
     """
     file = next(path.glob("*.db3"), path) if path.is_dir() else path
+    if not file.is_file():
+        raise MisuseError(path, "no such recording", "give a folder or a .db3 file of ROS 2")
     with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as bag:
         rows = bag.execute("select type, data from messages m join topics t on m.topic_id = t.id order by timestamp")
         messages = [(LAYOUTS[kind], data) for kind, data in rows if kind in LAYOUTS]
