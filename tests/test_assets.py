@@ -10,7 +10,9 @@ import pytest
 
 from modt import assets
 from modt.errors import MisuseError
+from tests.sources.packets.simulated import packets
 from tools import deps
+from tools.send.pcap_writer import write_capture
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PROBE = """
@@ -82,6 +84,10 @@ def test_from_a_wheel(expected, environment, tmp_path):
     package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path, kernels=kernels)
     assert package.startswith(str(environment))
     assert files == expected
+    write_capture(tmp_path / "drive.pcap", packets("xt-32"), 2368)
+    replay = [environment / "bin" / "modt", "replay", "drive.pcap", "--out", "run", "--quiet"]
+    subprocess.run(replay, cwd=tmp_path, check=True, capture_output=True)
+    assert b'"class":"car"' in (tmp_path / "run" / "tracks.jsonl").read_bytes()
     command = [environment / "bin" / "modt", "service", "install", "--root", tmp_path, "--prefix", "/opt/modt"]
     subprocess.run(command, check=True, capture_output=True)
     assert (tmp_path / "etc/systemd/system/modt.service").is_file()

@@ -110,9 +110,10 @@ def test_rows_are_had_as_arrays_as_dictionaries_and_by_index(found):
 
 def test_the_text_of_results_is_one_short_line(found):
     nothing = found.take(np.zeros(0, np.int64))
-    assert str(len(found)) in repr(found)
     assert f"{np.count_nonzero(found.visible)} visible" in repr(found)
-    assert all(len(repr(result)) < 120 and "\n" not in repr(result) for result in (found, nothing))
+    shown = found, nothing, modt.Pipeline.from_profile("hdl-64e")
+    assert all(len(repr(each)) < 120 and "\n" not in repr(each) and " object at " not in repr(each) for each in shown)
+    assert found._repr_html_().count("<tr>") == len(found) + 1
 
 
 def test_pandas_has_the_columns_of_the_dictionaries_though_there_are_no_rows(found, monkeypatch):
@@ -174,23 +175,3 @@ def test_without_a_profile_of_a_sensor_the_first_sweep_tells_it(frames, profiles
     assert library.config.sensor.elevation_step_deg == pytest.approx(2.0, rel=0.02)
     assert library.config.energy == load(*profiles).energy
     assert [record.message.count("used instead") for record in caplog.records] == [1]
-
-
-def test_a_profile_that_was_asked_for_is_kept_and_warned_of(frames, caplog):
-    library = modt.Pipeline.from_profile("os1-64")
-    for frame in frames[:3]:
-        library.step(frame.points, frame.stamp_s)
-    assert library.config == load("os1-64")
-    assert [record.message.count("profile os1-64 is not of this sensor") for record in caplog.records] == [1]
-
-
-@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e9, "nanoseconds")])
-def test_stamps_in_another_unit_are_recognised(factor, unit, caplog):
-    points = np.zeros((3, 4), np.float32)
-    with pytest.raises(MisuseError, match=f"no time in seconds: it is one in {unit}"):
-        modt.Pipeline.from_profile("vlp-16").step(points, 1.7e9 * factor)
-    library = modt.Pipeline.from_profile("vlp-16")
-    for k in range(3):
-        library.step(points, 0.1 * k * factor)
-    (line,) = [r.message for r in caplog.records if r.name == "modt.library"]
-    assert f"are they in {unit}?" in line

@@ -65,6 +65,10 @@ class Frame:
     R_level_sensor: Float64 | None = None
     frame_id: str = ""
 
+    def __repr__(self) -> str:
+        pose = "no" if self.T_world_sensor is None else "its"
+        return f"<frame {self.index} at {self.stamp_s:.3f} s: {len(self.points)} points, {pose} pose>"
+
     @property
     def time_s(self) -> float:
         """Time by which durations are measured [s]."""

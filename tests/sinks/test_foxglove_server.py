@@ -64,6 +64,15 @@ class Client:
         self.socket.close()
 
 
+def by_schema(channel, data):
+    """Content of a message, by the definition that its channel advertises and another implementation's decoder."""
+    typesys = pytest.importorskip("rosbags.typesys")
+    name = channel["schemaName"]
+    store = typesys.get_typestore(typesys.Stores.EMPTY)
+    store.register(typesys.get_types_from_msg(channel["schema"], name))
+    return store.deserialize_cdr(data, name)
+
+
 @pytest.fixture
 def server():
     made = FoxgloveServer("127.0.0.1", 0, points=True)
@@ -96,6 +105,10 @@ def test_a_client_sees_objects_points_and_energy(server, client):
             break
     for topic in SHOWN:
         assert seen[topic.name] == topic.encode(moving(3))
+    decoded = {c["topic"]: by_schema(c, seen[c["topic"]]) for c in channels.values() if c["topic"] in wanted}
+    assert [found.id for found in decoded["/modt/detections"].detections] == ["11", "12"]
+    assert decoded["/modt/points"].width == len(moving(3).frame.points)
+    assert decoded["/modt/energy/watts"].data == 0.5
     assert seen["/modt/energy/watts"][4:] == struct.pack("<d", 0.5)
     assert seen["/modt/cpu_ms/tracking"][4:] == struct.pack("<d", 2.0)
 

@@ -89,7 +89,7 @@ def test_the_page_opens_and_the_slider_moves(run, records, chromium):
     later = chromium.opened(run / "view.html", "slide:9")
     assert later["frame"] == records[9]["frame"]
     assert f"proposals {records[9]['proposals']} " in later["facts"]
-    said = {f"#{t['id']} {t['class']}" for t in records[9]["tracks"] if t["class"] != "background"}
+    said = {f"#{t['id']} {t['uncertain'] or t['class']}" for t in records[9]["tracks"] if t["class"] != "background"}
     drawn = {label.rpartition(" ")[0].rpartition(" ")[0] for label in later["labels"] if label.startswith("#")}
     assert drawn <= said
     assert len(drawn) > len(said) / 2
@@ -165,6 +165,21 @@ def test_a_frame_as_a_picture(run, records):
         colours = {colour: n for n, colour in pixels.getcolors(1 << 20)}
     for ground_or_above in ("line", "soft"):
         assert colours[(*bytes.fromhex(LIGHT[ground_or_above][1:]), 255)] > 1000
+
+
+def test_a_doubtful_class_has_a_question_mark_in_pages_and_pictures(run, records, tmp_path, chromium):
+    pytest.importorskip("matplotlib")
+    doubtful, (frame, *_) = shutil.copytree(run, tmp_path / "doubtful"), records[9:]
+    for track in frame["tracks"]:
+        track["posterior"] = [0.6, *(0.4 * (track["class"] == name) for name in CLASS_NAMES[1:])]
+    (doubtful / "tracks.jsonl").write_text(json.dumps(frame) + "\n")
+    for more in ([], ["--frame", frame["frame"]]):
+        done = modt("view", doubtful, *more, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    drawn = re.findall(r"#\d+ [a-z]+.*? %", (doubtful / f"view-{frame['frame']}.svg").read_text())
+    drawn += [label for label in chromium.opened(doubtful / "view.html")["labels"] if label.startswith("#")]
+    assert len(drawn) > 4
+    assert {label.partition(" ")[2].partition("?")[2] for label in drawn} == {" 40 %"}
 
 
 def test_a_film_by_ffmpeg(run):

@@ -123,7 +123,7 @@ def test_a_model_whose_units_differ_needs_its_calibration(tmp_path, angles_deg, 
     assert len(sweeps) == 3
     path = tmp_path / "forged.pcap"
     write_capture(path, timed, 2368)
-    with pytest.raises(MisuseError, match="no whole sweep of a Hesai, packets are refused: the calibration"):
+    with pytest.raises(MisuseError, match=r"no whole sweep \(Hesai\), packets are refused: the calibration"):
         open_capture(path, {})
 
 

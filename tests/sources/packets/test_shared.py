@@ -18,8 +18,9 @@ from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.point_cloud_file import read_pcd
-from tests.sources.packets.simulated import BEGAN_S, decoded, equal, packets, packets_of_bag, scene
+from tests.sources.packets.simulated import BEGAN_S, decoded, equal, packets, scene
 from tools.send.faults import Timed
+from tools.send.packet_bag import packets_of_bag
 
 OTHER = "of another model than the packets before"
 
@@ -189,12 +190,12 @@ def test_points_are_those_of_another_decoder(kitti_root: Path, name: str) -> Non
     (cloud,) = folder.glob("*.pcd")
     theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # cut elsewhere, with both returns
     if table is None:
-        sweeps, reception = decoded(VelodyneDecoder("sensor"), packets_of_bag(folder, 1206))
+        sweeps, reception = decoded(VelodyneDecoder("sensor"), packets_of_bag(folder))
         assert reception.lost == 0
         assert all(s.complete for s in sweeps)
     else:
         angles_deg = read_angles(folder.parent / "calibration" / f"{table}.csv")
-        sweeps, reception = decoded(HesaiDecoder("sensor", angles_deg), packets_of_bag(folder, 1500, 1508))
+        sweeps, reception = decoded(HesaiDecoder("sensor", angles_deg), packets_of_bag(folder))
         assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * n_sweeps, abs=2e-4)
         theirs = theirs[:, [1, 0, 2]] * [1, -1, 1]  # x right, y forward
     assert (len(sweeps), reception.refused) == (n_sweeps, {})

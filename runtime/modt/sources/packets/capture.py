@@ -270,7 +270,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     _, first = next(_decoded(capture, decoder, reception), (0.0, None))
     if first is None:
         why, _, remedy = max(reception.refused, key=reception.refused.__getitem__, default="").partition("; ")
-        cause = f"no whole sweep of a {layout}" + (f", packets are refused: {why}" if why else "")
+        cause = f"no whole sweep ({layout})" + (f", packets are refused: {why}" if why else "")
         raise MisuseError(path, cause, remedy or "record at least two turns of the sensor")
     info = StreamInfo(
         path.stem,
