@@ -92,25 +92,39 @@ def _ouster() -> tuple[Any, Any, tuple[bytes, ...]]:
     return sdk, info, tuple(p for p, frame in zip(captured, ids, strict=True) if frame == ids[0] + 1)
 
 
-def _ouster_stamped(payload: bytes, at_s: float) -> bytes:
-    sdk, info, _ = _ouster()
-    layout, packet = sdk.PacketFormat(info), sdk.LidarPacket(sdk.PacketFormat(info))
-    packet.buf[:] = np.frombuffer(payload, np.uint8)
-    first = int(layout.packet_header(sdk.ColHeader.MEASUREMENT_ID, packet.buf)[0])
-    turn = round(at_s / TURN_S - first / info.format.columns_per_frame)
-    layout.set_frame_id(packet, turn % (layout.max_frame_id + 1))
-    for column in range(info.format.columns_per_packet):
-        sent_ns = round((at_s + column / info.format.columns_per_frame * TURN_S) * 1e9)
-        layout.set_col_timestamp(packet, column, sent_ns % 2**64)
-    return bytes(packet.buf.tobytes())
+class OusterSensor:
+    """Number of the frame that an Ouster sends, which goes up where its columns begin anew."""
+
+    def __init__(self) -> None:
+        self.frame = self.column = 0
+
+    def decoder(self) -> PacketDecoder:
+        """Decoder for a sensor that has just been switched on."""
+        from modt.sources.packets.ouster import OusterDecoder
+
+        self.frame = self.column = 0
+        return OusterDecoder("sensor", OUSTER_METADATA)
+
+    def stamped(self, payload: bytes, at_s: float) -> bytes:
+        """Packet with another time, in the present frame."""
+        sdk, info, _ = _ouster()
+        layout, packet = sdk.PacketFormat(info), sdk.LidarPacket(sdk.PacketFormat(info))
+        packet.buf[:] = np.frombuffer(payload, np.uint8)
+        first = int(layout.packet_header(sdk.ColHeader.MEASUREMENT_ID, packet.buf)[0])
+        half, ahead = info.format.columns_per_frame // 2, first - self.column
+        if ahead < -half:
+            self.frame, self.column = self.frame + 1, first
+        else:
+            self.column = max(self.column, first if ahead < half else 0)
+        late = ahead >= half  # a packet of the frame before
+        layout.set_frame_id(packet, (self.frame - late) % (layout.max_frame_id + 1))
+        for column in range(info.format.columns_per_packet):
+            sent_ns = round((at_s + column / info.format.columns_per_frame * TURN_S) * 1e9)
+            layout.set_col_timestamp(packet, column, sent_ns % 10**18)  # no clock of a sensor is below 0
+        return bytes(packet.buf.tobytes())
 
 
-def _ouster_decoder() -> PacketDecoder:
-    from modt.sources.packets.ouster import OusterDecoder
-
-    return OusterDecoder("sensor", OUSTER_METADATA)
-
-
+_OUSTER = OusterSensor()
 MAKERS = {
     "velodyne": Maker(
         lambda: velodyne.VelodyneDecoder("sensor"),
@@ -133,9 +147,9 @@ MAKERS = {
         (0, 1, 5, 10, 35),
     ),
     "ouster": Maker(
-        _ouster_decoder,
+        _OUSTER.decoder,
         lambda: (_ouster()[2],),
-        _ouster_stamped,
+        _OUSTER.stamped,
         (0, 2, 4, 16, 32, 42),
     ),
 }

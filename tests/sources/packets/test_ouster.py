@@ -10,7 +10,7 @@ from modt.errors import MisuseError
 from modt.schemes import open_sensor
 from modt.sources.packets import ouster
 from modt.sources.packets.capture import Capture
-from modt.sources.packets.ouster import OusterDecoder
+from modt.sources.packets.ouster import RESTARTED_BY, OusterDecoder
 from tests.sources.packets.simulated import bearing_deg, decoded, equal
 
 sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
@@ -54,6 +54,38 @@ def test_sweeps_are_the_frames_of_the_sdk(timed, metadata):
     assert sweeps[0].stamp_s - timed[0][0] == pytest.approx(ahead_s, abs=2e-3)
     beam = sweeps[0].points[:600]  # rows of the image are beams: along one the head turns from behind to the right
     assert np.all(np.diff(np.unwrap(np.deg2rad(bearing_deg(beam)))) < 0.01)
+
+
+def numbered(timed, metadata, first):
+    """The packets with other numbers of their frames, from the first on."""
+    layout, out = sdk.PacketFormat(sdk.SensorInfo(metadata.read_text())), []
+    for k, (at_s, payload) in enumerate(timed):
+        packet = sdk.LidarPacket(layout)
+        packet.buf[:] = np.frombuffer(payload, np.uint8)
+        layout.set_frame_id(packet, first + k // 64)
+        out.append((at_s, packet.buf.tobytes()))
+    return out
+
+
+@pytest.mark.parametrize("lies", [1, 64 * 3])
+def test_frame_numbers_that_leap_ahead_or_begin_anew_cost_one_frame(timed, metadata, lies):
+    ahead = numbered(timed, metadata, 500)[:lies]  # a forged packet, or the sensor before it is restarted
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), [*ahead, *numbered(timed, metadata, 0)])
+    assert reception.refused == {"late: its frame has ended": RESTARTED_BY}
+    assert len(sweeps) == lies // 64 + 2
+    assert all(s.complete for s in sweeps)
+
+
+def test_a_frame_without_stamps_is_refused(timed, metadata):
+    layout, unstamped = sdk.PacketFormat(sdk.SensorInfo(metadata.read_text())), []
+    for at_s, payload in timed:
+        packet = sdk.LidarPacket(layout)
+        packet.buf[:] = np.frombuffer(payload, np.uint8)
+        for column in range(16):
+            layout.set_col_timestamp(packet, column, 0)
+        unstamped.append((at_s, packet.buf.tobytes()))
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), unstamped)
+    assert (sweeps, sum(reception.refused.values())) == ([], 3)
 
 
 def test_a_sweep_that_had_begun_is_dropped_and_a_lost_one_is_counted(timed, metadata):
