@@ -112,7 +112,7 @@ def test_views_and_triggers_are_refused_by_their_name(schema, tmp_path):
 
 
 MAGIC = b"\x89MCAP0\r\n"
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 1, 2, 3, 4, 5, 6
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, INDEX, STATISTICS, END = 1, 2, 3, 4, 5, 6, 8, 11, 15
 PACKERS = {b"zstd": zstandard.compress, b"lz4": lz4.frame.compress}
 
 
@@ -145,19 +145,34 @@ CONTENTS = {
 }
 
 
+KNOWN = record(SCHEMA, struct.pack("<H", 1) + text(CLOUD.encode()) + text(b"ros2msg") + text(b""))
+KNOWN += record(CHANNEL, struct.pack("<HH", 1, 1) + text(b"/points") + text(b"cdr") + text(b""))
+BEGIN = MAGIC + record(HEADER, text(b"ros2") + text(b"")) + KNOWN
+
+
+def indexed(part, place, entries, count):
+    """A closed file whose index says that a chunk lies at a place, as often as there are entries."""
+    counts = struct.pack("<IHQ", 10, 1, count)
+    statistics = record(STATISTICS, struct.pack("<QHIIIIQQ", 3, 1, 1, 0, 0, 1, 0, 2**40) + counts)
+    sizes = struct.pack("<IQ", 0, 0) + text(b"zstd") + struct.pack("<QQ", len(part), len(part))
+    entry = record(INDEX, struct.pack("<QQQQ", 0, 2**40, place, len(part)) + sizes)
+    whole = BEGIN + part + record(END, bytes(4))
+    footer = record(FOOTER, struct.pack("<QQI", len(whole), 0, 0))
+    return whole + KNOWN + statistics + entry * entries + footer + MAGIC
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("packer", PACKERS)
 @pytest.mark.parametrize("content", CONTENTS)
 def test_a_hostile_mcap_file_is_read_or_refused(content, packer, tmp_path):
-    begin = MAGIC + record(HEADER, text(b"ros2") + text(b""))
-    begin += record(SCHEMA, struct.pack("<H", 1) + text(CLOUD.encode()) + text(b"ros2msg") + text(b""))
-    begin += record(CHANNEL, struct.pack("<HH", 1, 1) + text(b"/points") + text(b"cdr") + text(b""))
     inner, path = CONTENTS[content](), tmp_path / "a.mcap"
-    nested = chunk(inner, packer)
-    for part in (*(chunk(inner, packer, size) for size in (None, 0, 2**31, 2**64 - 1)), chunk(nested, packer)):
-        for times in (1, 3):
-            path.write_bytes(begin + part * times)
-            assert_bounded(path)
+    whole = chunk(inner, packer)
+    files = [BEGIN + chunk(inner, packer, size) * times for size in (None, 0, 2**31, 2**64 - 1) for times in (1, 3)]
+    files += [BEGIN + chunk(whole, packer), indexed(whole, len(BEGIN), 500, 2**63 - 1)]
+    files += [indexed(whole, place, 1, 600_000) for place in (len(BEGIN), len(BEGIN) + 3, 2**62)]
+    for raw in files:
+        path.write_bytes(raw)
+        assert_bounded(path)
 
 
 @pytest.mark.parametrize("name", ["a.db3.zstd", "a.mcap.zstd"])
