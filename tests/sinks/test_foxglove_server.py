@@ -80,14 +80,8 @@ def server():
     made.close()
 
 
-@pytest.fixture
-def client(server):
-    made = Client(server.port)
-    yield made
-    made.close()
-
-
-def test_a_client_sees_objects_points_and_energy(server, client):
+def test_a_client_sees_objects_points_and_energy(server):
+    client = Client(server.port)
     channels = client.channels()
     wanted = {topic.name for topic in SHOWN} | {"/modt/energy/watts", "/modt/cpu_ms/tracking"}
     assert {channel["topic"] for channel in channels.values()} >= wanted
@@ -103,6 +97,7 @@ def test_a_client_sees_objects_points_and_energy(server, client):
             seen[channels[id_]["topic"]] = data
         if seen.keys() >= wanted:
             break
+    client.close()
     for topic in SHOWN:
         assert seen[topic.name] == topic.encode(moving(3))
     decoded = {c["topic"]: by_schema(c, seen[c["topic"]]) for c in channels.values() if c["topic"] in wanted}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -117,6 +117,7 @@ def tracks_one_by_one(r):
         }
 
 
+@settings(max_examples=60)
 @given(results())
 def test_a_line_equals_the_json_of_its_tracks_one_by_one(r):
     record = frame_record(r)

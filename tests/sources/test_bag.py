@@ -174,9 +174,3 @@ def test_scans_go_before_a_recording_beside_them(tmp_path):
     scans = layouts.bare(tmp_path)
     write_mcap(scans / "drive", clouds())
     assert open_stream(scans).info.layout != "rosbag2"
-
-
-@pytest.mark.kitti
-def test_a_recording_of_packets_is_refused_by_the_type_of_its_messages(kitti_root):
-    with pytest.raises(MisuseError, match=r"no sensor_msgs/PointCloud2; .* velodyne_msgs/VelodyneScan"):
-        open_stream(kitti_root / "packets" / "vlp16-1673400471837873222")

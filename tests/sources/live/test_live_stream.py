@@ -147,6 +147,7 @@ def test_steady_time_is_that_of_the_stamps_where_sweeps_arrive_late(driven):
     assert driven.sweep(0.1, 1.1).time_s == pytest.approx(1.1)
     assert driven.sweep(0.6, 1.2).time_s == pytest.approx(1.2)  # half a second late
     assert driven.sweep(0.0, 1.7).time_s == pytest.approx(1.7)
+    assert driven.sweep(0.0, 1.7) is None  # twice at once
 
 
 def test_a_sweep_from_before_the_process_was_stopped_is_discarded_and_no_sensor_blamed(driven, caplog):

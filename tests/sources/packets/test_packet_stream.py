@@ -48,12 +48,12 @@ def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(
         (0, "3 packets are missing", False),
         (3, "1 packets refused: no packet of a Velodyne", False),
     ]
-    timed = [*packets(), *((at_s - 59.4, payload) for at_s, payload in packets(sweeps=20))]
+    timed = [*packets(), *((at_s - 59.4, payload) for at_s, payload in packets(sweeps=8))]
     write_capture(path, timed, 2368)
     stream = open_stream(path)
     stamps_s = [f.stamp_s for f in stream]
     assert stamps_s == sorted(stamps_s)
-    assert len(stamps_s) >= 20
+    assert len(stamps_s) >= 8
     assert stream.faults.skipped == 0
 
 
