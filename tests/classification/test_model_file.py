@@ -168,7 +168,9 @@ def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):
         read_model(saved(tmp_path, network()))
 
 
-@pytest.mark.parametrize("raw", [b"", b"no model", b"\x08\x07\x12\x00", b"\x3a\xff\xff\xff\xff\x0f", b"\xba\x80\x80\x80\x10\x00"])
+@pytest.mark.parametrize(
+    "raw", [b"", b"no model", b"\x08\x07\x12\x00", b"\x3a\xff\xff\xff\xff\x0f", b"\xba\x80\x80\x80\x10\x00"]
+)
 def test_what_is_no_message_is_refused(raw, tmp_path):
     (tmp_path / "net.onnx").write_bytes(raw)
     with pytest.raises(MisuseError, match="not an ONNX model"):
