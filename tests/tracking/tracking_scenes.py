@@ -24,7 +24,7 @@ class Follower:
     """Odometry and tracker in a row, with what the last frame gave."""
 
     def __init__(self, config=None, machine=EFFICIENT, **parts):
-        self.odometry = Odometry()
+        self.frames, self.odometry = 0, Odometry()
         self.tracker = Tracker(config or TrackingConfig(), machine, **parts)
         self.proposals = self.wants_class = self.T_world_sensor = None
 
@@ -41,6 +41,7 @@ class Follower:
         self.T_world_sensor = located.placement.T_world_sensor
         tracked = self.tracker.follow(frame.stamp_s, proposals, located)
         self.proposals, self.wants_class = tracked.proposals, tracked.wants_class
+        self.frames += 1
         return tracked.tracks
 
     def conclude(self, rows, certain):
@@ -52,6 +53,15 @@ class Follower:
         for row in rows:
             set_class(self.tracks, row, classes[min(row, len(classes) - 1)])
         return self.conclude(rows, np.ones(len(rows), np.bool_))
+
+    def run(self, scenes, *classes, **options):
+        """Follow frames of boxes, and classify, by default as background; how often a track wanted a class."""
+        wanted = 0
+        for boxes in scenes:
+            self.follow(*frame_of(boxes, self.frames, EYE, **options))
+            wanted += int(np.count_nonzero(self.wants_class))
+            self.classify(*(classes or [ObjectClass.BACKGROUND]))
+        return wanted
 
 
 def set_class(tracks, row, object_class):
