@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from modt import assets
-from modt.errors import MisuseError
 from tools import deps
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -98,10 +96,3 @@ def test_from_a_wheel_made_without_a_compiler(expected, environment, tmp_path):
 @pytest.mark.install
 def test_a_wheel_is_the_same_wherever_and_whenever_it_is_built():
     assert deps.wheel() == 0
-
-
-def test_what_is_not_there_lists_what_is(tmp_path):
-    with pytest.raises(MisuseError, match="hdl-64e"):
-        assets.find("profiles", "nothing", ".yaml")
-    with pytest.raises(MisuseError, match="no such file"):
-        assets.find("profiles", str(tmp_path / "x.yaml"), ".yaml")

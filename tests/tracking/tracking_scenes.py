@@ -10,8 +10,9 @@ from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
 from modt.odometry.odometry import Odometry
+from modt.placement import Placement
 from modt.tracking.association import Matches
-from modt.tracking.regrouping import Associated
+from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.states import EFFICIENT
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tracker import Tracker
@@ -54,11 +55,11 @@ class Follower:
             set_class(self.tracks, row, classes[min(row, len(classes) - 1)])
         return self.conclude(rows, np.ones(len(rows), np.bool_))
 
-    def run(self, scenes, *classes, **options):
+    def run(self, scenes, *classes, T=EYE, **options):
         """Follow frames of boxes, and classify, by default as background; how often a track wanted a class."""
         wanted = 0
         for boxes in scenes:
-            self.follow(*frame_of(boxes, self.frames, EYE, **options))
+            self.follow(*frame_of(boxes, self.frames, T, **options))
             wanted += int(np.count_nonzero(self.wants_class))
             self.classify(*(classes or [ObjectClass.BACKGROUND]))
         return wanted
@@ -151,6 +152,11 @@ def associated(proposals, rows=(), matched=None):
     covariance = 0.01 * np.eye(2)[None].repeat(len(rows), axis=0)
     matches = Matches(rows, matched, observations.position[matched], covariance, np.zeros((len(rows), 4)))
     return Associated(proposals, observations, matches)
+
+
+def regrouped(tracks, frame):
+    """The frame in a better grouping."""
+    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 def owner_of_points(tracks, proposals, n_points):
