@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy
 import pytest
 
 from tools import deps
@@ -50,16 +51,17 @@ def expected(tmp_path_factory) -> str:
     return files
 
 
-@pytest.fixture
-def environment(tmp_path) -> Path:
+def bare_environment(folder: Path) -> Path:
     """A fresh environment that sees this one's libraries, but not this one's modt."""
-    folder = tmp_path / "environment"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
     site = next((folder / "lib").glob("python3*")) / "site-packages"
-    import numpy
-
     (site / "libraries.pth").write_text(str(Path(numpy.__file__).parents[1]) + "\n")
     return folder
+
+
+@pytest.fixture
+def environment(tmp_path) -> Path:
+    return bare_environment(tmp_path / "environment")
 
 
 def install(environment: Path, *what: str) -> None:

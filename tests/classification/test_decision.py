@@ -31,9 +31,7 @@ def tracks(*posteriors):
         ((9.0, 9.0, 9.0), [0.4, 0.0, 0.25, 0.35], CYCLIST),
     ],
 )
-def test_the_likelier_object_is_reported_where_missing_it_costs_more_than_a_false_one(
-    missed_cost, posterior, reported
-):
+def test_the_likelier_object_is_reported_where_missing_it_costs_more(missed_cost, posterior, reported):
     table = tracks(posterior)
     LikeliestClass(DecisionConfig(missed_cost=missed_cost), ASSUMED).decide(table)
     assert table.object_class.tolist() == [reported]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size
 from modt.config import ClassificationConfig
-from modt.types import NONE, UNLIMITED, Budget, Float64, Int, Proposals
+from modt.types import NONE, UNLIMITED, Budget, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
 
 COUNTS = st.lists(st.integers(1, 400), min_size=1, max_size=20)
@@ -112,15 +112,7 @@ SCENES = 400
 """Different frames; longer drives repeat them."""
 
 
-def drive(
-    budget: Budget,
-    n: int,
-    cost: LinearCost | None = None,
-    seed: int = 0,
-    slow: float = 1.0,
-    ask: float = 1.0,
-    period_s: float = 0.1,
-) -> tuple[Float64, Int]:
+def drive(budget, n, cost=None, seed=0, slow=1.0, ask=1.0, period_s=0.1):
     """(n,) CPU time and calls of frames in which a dozen proposals ask, or none, on a machine of some noise."""
     rng, scheduler = np.random.default_rng(seed), Scheduler(cost or cost_model(), period_s)
     tracks = new_tracks(dozen(0))
