@@ -25,7 +25,7 @@ assert len(pipeline.step([[5.0, 0.0, 0.0, 0.0]], 0.0)) == 0
 
 
 def probe(python: str, *, path: Path | None = None, cwd: Path, kernels: str = "auto") -> tuple[str, str]:
-    """Where modt is imported from, and the files it finds."""
+    """Folder from which modt is imported, and the files it finds."""
     env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"MODT_KERNELS": kernels}
     if path is not None:
         env["PYTHONPATH"] = str(path)
@@ -44,7 +44,7 @@ def built(folder: Path, **variables: str) -> Path:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory) -> str:
-    """What a checkout finds."""
+    """Files that a checkout finds."""
     package, files = probe(sys.executable, path=CHECKOUT / "runtime", cwd=tmp_path_factory.getbasetemp())
     assert package == str(CHECKOUT / "runtime" / "modt")
     assert "hdl-64e.yaml" in files

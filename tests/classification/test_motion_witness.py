@@ -38,5 +38,5 @@ def test_motion_tells_classes_apart(moved_m, observed_s, length_m, likely, unlik
     assert (found[unlikely] < 0.0).all()
 
 
-def test_a_young_track_tells_little() -> None:
+def test_a_young_track_weighs_little() -> None:
     assert np.abs(ratios(0.0, 0.1, 0.7)).max() < np.abs(ratios(0.0, 3.0, 0.7)).max()

@@ -23,12 +23,12 @@ BUDGETS = st.builds(
 
 
 def work_ms(points: Int, slow: float = 1.0) -> float:
-    """What a frame takes on some machine."""
+    """CPU time of a frame on some machine [ms]."""
     return slow * float(0.6 + (0.04 + 0.001 * np.minimum(points, 400)).sum()) if len(points) else 0.0
 
 
 def cost_model(max_points: int = 400, slow: float = 1.0) -> LinearCost:
-    """Of that machine, warmed up."""
+    """Cost model of that machine, warmed up."""
     cost = LinearCost(max_points, lambda points: int(np.minimum(points, max_points).sum()))
     for n, size in ((1, 8), (1, 128), (8, 8), (8, 128), (16, 128)):
         cost.warmed_up(np.full(n, size), work_ms(np.full(n, size), slow))
@@ -176,7 +176,7 @@ def test_a_budget_of_nothing_buys_nothing(nothing: Budget) -> None:
 
 
 def test_a_large_proposal_is_saved_for_while_small_ones_ask() -> None:
-    """Those that are worth less wait, else they would spend what it needs."""
+    """Calls of less worth wait, else they would spend the budget that it needs."""
     _, proposals = blobs([400] + [5] * 11, np.random.default_rng(0))
     tracks, scheduler = new_tracks(proposals), Scheduler(cost_model())
     served = np.zeros(12, np.int64)

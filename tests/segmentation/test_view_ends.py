@@ -43,7 +43,7 @@ def test_without_known_beams_nothing_is_cut_above_or_below():
     assert flags(person(1.0), sensor=SensorConfig(min_range_m=0.2)) == [Cut(0)]
 
 
-def test_a_table_of_beams_says_where_they_end():
+def test_beams_end_at_the_outermost_of_a_table():
     table = SensorConfig(min_range_m=0.2, elevations_deg=tuple(range(-15, 16, 2)))
     assert flags(person(1.0), person(8.0), sensor=table) == [Cut.TOP | Cut.BOTTOM, Cut(0)]
 

@@ -30,7 +30,7 @@ def test_the_position_moves_with_the_kdop():
 
 
 def test_a_lost_track_does_not_take_the_proposal_of_a_track_that_is_expected_there():
-    """By the deviations of the two, the person is nearer to the lost one."""
+    """Measured in deviations, the person is nearer to the lost track."""
     tracks, person = tracks_at([box(9.3, 0, 0.6, 0.6), box(11.5, 0, 0.6, 0.6)]), observed([box(10, 0, 0.6, 0.6)])
     tracks.P[:, :2, :2] = np.eye(2) * np.array([0.1, 9.0])[:, None, None]
     assert matched(tracks, person)[0] == [(0, 0)]

@@ -1,4 +1,4 @@
-"""Whatever is regrouped, every point stays in one proposal, and boxes and observations follow the points."""
+"""Every point stays in one proposal, and boxes and observations follow the points."""
 
 import dataclasses
 
