@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -124,6 +125,13 @@ def test_every_model_has_a_card_with_its_hash_and_licence(name: str) -> None:
     card = net.path.with_suffix(".md").read_text(encoding="utf-8")
     assert net.sha256 in card
     assert "licence:" in card
+
+
+def test_model_that_differs_from_its_card_is_misuse(tmp_path: Path, shipped: PointNet) -> None:
+    model = save(tmp_path, random_layers(0))
+    shutil.copy(shipped.path.with_suffix(".md"), model.with_suffix(".md"))
+    with pytest.raises(MisuseError, match=r"net\.onnx: is not the model of net\.md"):
+        network(model)
 
 
 @pytest.mark.parametrize(
