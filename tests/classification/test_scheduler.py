@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.scheduler import LinearCost, Scheduler, padded_size
+from modt.classification.scheduler import START_MARGIN, LinearCost, Scheduler, padded_size, warm_up
 from modt.config import ClassificationConfig
 from modt.types import NONE, UNLIMITED, Budget, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
@@ -234,3 +234,11 @@ def test_points_are_counted_with_padding(likelihood: str, points: int) -> None:
     size = padded_size(ClassificationConfig(likelihood=likelihood, max_points=400))
     assert size(np.array([10, 700, 290, 10, 20, 400])) == points
     assert size(np.zeros(0, np.int64)) == 0
+
+
+def test_the_warm_up_classifies_small_and_large_frames_and_prices_them() -> None:
+    sizes, clock = [], iter(range(0, 10**12, 2_000_000))
+    cost = LinearCost(128, lambda points: int(points.sum()))
+    warm_up(lambda _, __, which: sizes.append(len(which)), cost, 128, 8, lambda: next(clock))
+    assert set(sizes) == {1, 8, 16}
+    assert cost.cost_ms(np.array([60])) == pytest.approx(START_MARGIN * 2.0, rel=0.01)

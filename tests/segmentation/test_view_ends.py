@@ -56,6 +56,7 @@ def test_flags_are_those_of_a_loop_over_points(counts, seed, bound_deg):
         elevation_span_deg=(-15.0, 15.0),
         azimuth_step_deg=1.0,
         blind_sectors_deg=(bound_deg, bound_deg + 60.0),
+        blind_range_m=1.2,
     )
     xyz = np.random.default_rng(seed).normal(0, 1.0, (3, sum(counts))).astype(np.float32)
     parts = np.split(xyz, np.cumsum(counts)[:-1], axis=1)

@@ -33,9 +33,9 @@ def wall_with(*people, points=PERSON_POINTS, wall=WALL):
     return joined(frame_of([*people, wall], points=counts)[1], [range(len(people) + 1)])
 
 
-def split(tracks, proposals, rows=(), matched=None):
+def split(tracks, proposals, rows):
     """The frame after splitting."""
-    return regrouped(tracks, associated(proposals, rows, matched))
+    return regrouped(tracks, associated(proposals, rows))
 
 
 def tracks_of_person_and_wall(object_class=PEDESTRIAN, person=PERSON, **columns):
