@@ -6,10 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy
 import pytest
 
-from modt import assets
-from modt.errors import MisuseError
 from tests.sources.packets.simulated import packets
 from tools import deps
 from tools.send.pcap_writer import write_capture
@@ -28,7 +27,7 @@ assert len(pipeline.step([[5.0, 0.0, 0.0, 0.0]], 0.0)) == 0
 
 
 def probe(python: str, *, path: Path | None = None, cwd: Path, kernels: str = "auto") -> tuple[str, str]:
-    """Where modt is imported from, and the files it finds."""
+    """Folder from which modt is imported, and the files it finds."""
     env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"MODT_KERNELS": kernels}
     if path is not None:
         env["PYTHONPATH"] = str(path)
@@ -47,23 +46,24 @@ def built(folder: Path, **variables: str) -> Path:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory) -> str:
-    """What a checkout finds."""
+    """Files that a checkout finds."""
     package, files = probe(sys.executable, path=CHECKOUT / "runtime", cwd=tmp_path_factory.getbasetemp())
     assert package == str(CHECKOUT / "runtime" / "modt")
     assert "hdl-64e.yaml" in files
     return files
 
 
-@pytest.fixture
-def environment(tmp_path) -> Path:
+def bare_environment(folder: Path) -> Path:
     """A fresh environment that sees this one's libraries, but not this one's modt."""
-    folder = tmp_path / "environment"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
     site = next((folder / "lib").glob("python3*")) / "site-packages"
-    import numpy
-
     (site / "libraries.pth").write_text(str(Path(numpy.__file__).parents[1]) + "\n")
     return folder
+
+
+@pytest.fixture
+def environment(tmp_path) -> Path:
+    return bare_environment(tmp_path / "environment")
 
 
 def install(environment: Path, *what: str) -> None:
@@ -104,10 +104,3 @@ def test_from_a_wheel_made_without_a_compiler(expected, environment, tmp_path):
 @pytest.mark.install
 def test_a_wheel_is_the_same_wherever_and_whenever_it_is_built():
     assert deps.wheel() == 0
-
-
-def test_what_is_not_there_lists_what_is(tmp_path):
-    with pytest.raises(MisuseError, match="hdl-64e"):
-        assets.find("profiles", "nothing", ".yaml")
-    with pytest.raises(MisuseError, match="no such file"):
-        assets.find("profiles", str(tmp_path / "x.yaml"), ".yaml")

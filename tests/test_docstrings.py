@@ -11,9 +11,11 @@ DEPENDENT = re.compile(r"(Of|That of|By which|What)\b")
 
 def docstrings(source: str):
     """Line and text of the docstrings in a source, those of constants and attributes included."""
-    for node in ast.walk(ast.parse(source)):
-        body = getattr(node, "body", [])
-        for statement in body if isinstance(body, list) else []:
+    blocks = [ast.parse(source)]
+    for block in blocks:
+        for statement in block.body:
+            if isinstance(getattr(statement, "body", None), list):
+                blocks.append(statement)
             value = getattr(statement, "value", None) if isinstance(statement, ast.Expr) else None
             if isinstance(value, ast.Constant) and isinstance(value.value, str):
                 yield statement.lineno, value.value.strip()

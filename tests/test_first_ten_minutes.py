@@ -4,27 +4,15 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.test_assets import install
+from tests.test_assets import bare_environment, install
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = (
-    "runtime",
-    "tools",
-    "models",
-    "profiles",
-    "systemd",
-    "pyproject.toml",
-    "hatch_build.py",
-    "Makefile",
-    "README.md",
-    "LICENSE",
-)
+COPIED = ("runtime", "tools", "models", "profiles", "systemd")
+COPIED += ("pyproject.toml", "hatch_build.py", "Makefile", "README.md", "LICENSE")
 TIMEOUT_S = 600.0
 
 
@@ -41,10 +29,7 @@ def checkout(tmp_path) -> Path:
         place = ROOT / name
         copy = shutil.copytree if place.is_dir() else shutil.copy
         copy(place, tmp_path / name)
-    environment = tmp_path / ".venv"
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(environment)], check=True)
-    site = next((environment / "lib").glob("python3*")) / "site-packages"
-    (site / "libraries.pth").write_text(str(Path(np.__file__).parents[1]) + "\n")
+    environment = bare_environment(tmp_path / ".venv")
     install(environment, "--editable", str(tmp_path))
     (environment / ".run").touch()
     return tmp_path

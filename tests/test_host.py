@@ -107,8 +107,8 @@ V1, V2 = "4:cpu,cpuacct:/robot\n1:name=systemd:/", "0::/system.slice/modt.servic
 )
 def test_a_refused_priority_has_the_remedy_that_works(monkeypatch, tmp_path, facts, cause, remedy):
     monkeypatch.setattr(host.resource, "getrlimit", lambda _: (0, 0))
-    said, helps = host.fifo_refusal(10, *machine(tmp_path, **facts))
-    assert cause in said if cause else said == ""
+    found, helps = host.fifo_refusal(10, *machine(tmp_path, **facts))
+    assert cause in found if cause else found == ""
     assert remedy in helps
     if cause:
         assert "ulimit" not in helps

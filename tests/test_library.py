@@ -169,7 +169,7 @@ def test_an_unknown_mode_is_named():
 
 
 @pytest.mark.parametrize("profiles", [[], ["raspberry-pi-5"]])
-def test_without_a_profile_of_a_sensor_the_first_sweep_tells_it(frames, profiles, caplog):
+def test_without_a_profile_of_a_sensor_the_first_sweep_shows_which_it_is(frames, profiles, caplog):
     library = modt.Pipeline.from_profile(profiles)
     library.step(frames[0].points, 0.0)
     assert library.config.sensor.elevation_step_deg == pytest.approx(2.0, rel=0.02)

@@ -28,7 +28,7 @@ CLONE = "in a clone of modt"
 
 
 def commands(target: str) -> set[str]:
-    """What the Makefile runs for a target and for the phony targets that it needs."""
+    """Commands of the Makefile for a target and for the phony targets that it needs."""
     text = (ROOT / "Makefile").read_text()
     rule = re.search(rf"^{target}:(.*)\n((?:\t.*\n)*)", text, re.MULTILINE)
     assert rule, f"no target '{target}'"
@@ -94,8 +94,8 @@ def test_citation_and_changelog_name_this_version_and_the_paper():
 def test_no_text_installs_modt_from_an_index_where_nobody_has_published_it():
     files = [p for p in chain(ROOT.glob("*.md"), *(ROOT.joinpath(f).rglob("*") for f in FOLDERS)) if p.is_file()]
     named = re.compile(r"pip install [^\n]*?(?<![\w/.-])modt(?![\w/.-])")
-    said = {p for p in files if p.suffix in TEXTS and named.search(p.read_text(encoding="utf-8").replace(CLONE, ""))}
-    assert said == set()
+    found = {p for p in files if p.suffix in TEXTS and named.search(p.read_text(encoding="utf-8").replace(CLONE, ""))}
+    assert found == set()
 
 
 def test_the_remedy_for_a_missing_extra_names_one_that_exists():

@@ -1,4 +1,4 @@
-"""What a robot loads: modules of what it does, and nothing of the desk's package, which is installed beside it."""
+"""A robot loads the modules that it uses, and none of the desk's package, which is installed beside it."""
 
 import signal
 import subprocess

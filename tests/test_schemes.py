@@ -2,12 +2,9 @@
 
 import re
 import sys
-import threading
-from types import SimpleNamespace
 
 import pytest
 
-from modt import schemes
 from modt.address import Scheme
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
@@ -73,18 +70,6 @@ def test_what_is_no_address_of_a_sink_is_refused_with_what_is_wrong(text, part):
         pytest.importorskip("foxglove")
     with pytest.raises(MisuseError, match=re.escape(part)):
         open_sink(text)
-
-
-def test_a_sink_that_may_wait_is_written_in_the_background(monkeypatch):
-    threads = []
-    plain = SimpleNamespace(write=lambda _: threads.append(threading.current_thread().name), close=lambda: None)
-    opener = lambda address: schemes._in_background(address, plain, 2)  # noqa: E731
-    monkeypatch.setitem(SINKS, "plain", Scheme("plain://", opener))
-    sink = open_sink("plain://")
-    sink.write("frame")
-    sink.close()
-    assert threads == ["sink"]
-    assert sink.health()["written"] == 1
 
 
 def test_forms_begin_with_their_scheme():

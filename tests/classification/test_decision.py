@@ -31,9 +31,7 @@ def tracks(*posteriors):
         ((9.0, 9.0, 9.0), [0.4, 0.0, 0.25, 0.35], CYCLIST),
     ],
 )
-def test_the_likelier_object_is_reported_where_missing_it_costs_more_than_a_false_one(
-    missed_cost, posterior, reported
-):
+def test_the_likelier_object_is_reported_where_missing_it_costs_more(missed_cost, posterior, reported):
     table = tracks(posterior)
     LikeliestClass(DecisionConfig(missed_cost=missed_cost), ASSUMED).decide(table)
     assert table.object_class.tolist() == [reported]
@@ -57,7 +55,7 @@ def test_the_reported_class_is_kept_until_another_one_is_clearly_likelier(poster
 
 @pytest.mark.parametrize("cost", [1.0, 3.0])
 def test_no_class_lingers_below_its_threshold_and_below_what_keeps_it(cost):
-    """However long it was reported: a pedestrian of 25 % is one only where missing it costs three times as much."""
+    """A pedestrian of 25 % is reported only where missing it costs three times as much."""
     table = tracks([0.1, 0.0, 0.9, 0.0])
     decision = Decision(DecisionConfig(missed_cost=(cost,) * 3), ASSUMED)
     for _ in range(20):

@@ -15,7 +15,7 @@ from modt.classification.prior import FrequencyPrior, object_probability_reaches
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
-from modt.types import NONE, Bool, Float64, Int, Proposals
+from modt.types import NONE, Bool, Float64, Proposals
 from tests.classification.scenes import ROW, Fused, with_points
 
 CONFIG = FusionConfig()
@@ -88,9 +88,7 @@ def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(m
     moved_m=st.floats(0, 20),
     pool_weight=st.sampled_from([0.0, 0.5]),
 )
-def test_posterior_is_that_of_the_plain_formula(
-    views: Float64, boxes: Float64, counts: Int, moved_m: float, pool_weight: float
-) -> None:
+def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, pool_weight):
     """The slow reference: all views and boxes kept, and weighed anew in every frame."""
     views, boxes = (p / p.sum(axis=1, keepdims=True) for p in (views, boxes))
     prior = FixedPrior(boxes[0].tolist(), pool_weight=pool_weight)
@@ -153,9 +151,7 @@ def test_an_uncertain_track_is_classified_again_with_clearly_more_points(make: t
     ("points", "box", "asked"),
     [(50, LIKE_ANY, False), (100, LIKE_ANY, False), (110, LIKE_ANY, True), (50, CAR, True)],
 )
-def test_certain_background_is_classified_again_near_by_or_where_its_box_comes_to_look_like_an_object(
-    points: int, box: list[float], asked: bool
-) -> None:
+def test_certain_background_is_classified_again_for_many_points_or_another_box(points, box, asked):
     prior = FixedPrior(LIKE_ANY)
     subject = Fused(FurtherViews(CONFIG, prior), 50, frames=3)
     subject.asks()
@@ -169,9 +165,7 @@ def test_certain_background_is_classified_again_near_by_or_where_its_box_comes_t
     ("box", "view", "least", "most"),
     [(CAR, CLEARLY_A_CAR, 4, 4), (CAR, PERHAPS_A_CAR, 8, 12), (LIKE_ANY, SURELY_BACKGROUND, 1, 1)],
 )
-def test_an_object_is_classified_again_at_growing_intervals_and_background_is_not(
-    box: list[float], view: list[float], least: int, most: int
-) -> None:
+def test_an_object_is_classified_again_at_growing_intervals_and_background_is_not(box, view, least, most):
     """An uncertain object is classified more often, with as many points all the while."""
     subject, asked = Fused(FurtherViews(CONFIG, FixedPrior(box)), 50), []
     for frame in range(1, 80):
@@ -221,9 +215,7 @@ def test_lost_tracks_keep_their_posterior_and_ask_for_nothing() -> None:
 
 
 @pytest.mark.parametrize(("make", "certain"), [(FirstViews, False), (FurtherViews, True)])
-def test_background_needs_to_be_as_certain_as_an_object_where_nobody_looks_again(
-    make: type[FusedTracks], certain: bool
-) -> None:
+def test_background_needs_to_be_as_certain_as_an_object_where_nobody_looks_again(make, certain):
     subject = Fused(make(CONFIG, FixedPrior(FREQUENCY.tolist())), 50, frames=3)
     subject.asks()
     assert subject.fuse(0.97, 0.02, 0.005, 0.005).tolist() == [certain]

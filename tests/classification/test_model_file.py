@@ -169,7 +169,7 @@ def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "raw", [b"", b"no model", b"\x08\x07\x12\x00", b"\x3a\xff\xff\xff\xff\x0f", b"\xba\x80\x80\x80\x10\x00"]
+    "raw", [b"", b"no model", b"\x08", b"\x3a\xff\xff\xff\xff\x0f", b"\xff" * 20, b"\xba\x80\x80\x80\x10\x00"]
 )
 def test_what_is_no_message_is_refused(raw, tmp_path):
     (tmp_path / "net.onnx").write_bytes(raw)

@@ -34,15 +34,13 @@ def test_no_motion_rules_a_class_out(moved_m: float, observed_s: float, length_m
         (0.1, 5.0, 1.8, [], [CYCLIST]),  # stands for seconds
     ],
 )
-def test_motion_tells_classes_apart(
-    moved_m: float, observed_s: float, length_m: float, likely: list[int], unlikely: list[int]
-) -> None:
+def test_motion_tells_classes_apart(moved_m, observed_s, length_m, likely, unlikely):
     found = ratios(moved_m, observed_s, length_m)
     assert (found[likely] > 1.0).all()
     assert (found[unlikely] < 0.0).all()
 
 
-def test_a_young_track_tells_little() -> None:
+def test_a_young_track_weighs_little() -> None:
     assert np.abs(ratios(0.0, 0.1, 0.7)).max() < np.abs(ratios(0.0, 3.0, 0.7)).max()
 
 

@@ -99,9 +99,7 @@ def test_ground_of_the_proposals_overrides_the_profile(tmp_path: Path) -> None:
     assert not np.allclose(unknown.classify(points, proposals, rows), expected, atol=1e-3)
 
 
-def test_the_papers_network_stands_alone_and_takes_points_repeated_to_a_fixed_number(
-    shipped: PointNet, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_papers_network_stands_alone_and_takes_a_fixed_number_of_points(shipped, monkeypatch):
     points, proposals = blobs([40, 7, 500], np.random.default_rng(4))
     paper, sizes = network(shipped.path, max_points=400, likelihood="network"), []
     assert isinstance(paper.box_scores.boxes, NoBoxClassifier)

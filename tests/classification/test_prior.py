@@ -93,7 +93,7 @@ LOG_BOX = np.log(
 """Log posteriors by the box, up to a constant a row."""
 
 
-def test_the_box_says_whether_there_is_an_object_and_not_which() -> None:
+def test_the_box_tells_objects_from_background_and_not_from_each_other() -> None:
     odds = object_log_odds(LOG_BOX, np.log(ASSUMED))
     np.testing.assert_allclose(odds, np.log([1.0, 4.0, 4.0, 3e-4 / 0.9997 * 4.0]), atol=1e-12)
     np.testing.assert_allclose(softmax(pooled_prior(LOG_BOX[:2], np.log(ASSUMED), 1.0), axis=1)[0], ASSUMED)

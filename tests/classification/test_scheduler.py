@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.scheduler import LinearCost, Scheduler, padded_size
+from modt.classification.scheduler import START_MARGIN, LinearCost, Scheduler, padded_size, warm_up
 from modt.config import ClassificationConfig
-from modt.types import NONE, UNLIMITED, Budget, Float64, Int, Proposals
+from modt.types import NONE, UNLIMITED, Budget, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
 
 COUNTS = st.lists(st.integers(1, 400), min_size=1, max_size=20)
@@ -23,12 +23,12 @@ BUDGETS = st.builds(
 
 
 def work_ms(points: Int, slow: float = 1.0) -> float:
-    """What a frame takes on some machine."""
+    """CPU time of a frame on some machine [ms]."""
     return slow * float(0.6 + (0.04 + 0.001 * np.minimum(points, 400)).sum()) if len(points) else 0.0
 
 
 def cost_model(max_points: int = 400, slow: float = 1.0) -> LinearCost:
-    """Of that machine, warmed up."""
+    """Cost model of that machine, warmed up."""
     cost = LinearCost(max_points, lambda points: int(np.minimum(points, max_points).sum()))
     for n, size in ((1, 8), (1, 128), (8, 8), (8, 128), (16, 128)):
         cost.warmed_up(np.full(n, size), work_ms(np.full(n, size), slow))
@@ -112,15 +112,7 @@ SCENES = 400
 """Different frames; longer drives repeat them."""
 
 
-def drive(
-    budget: Budget,
-    n: int,
-    cost: LinearCost | None = None,
-    seed: int = 0,
-    slow: float = 1.0,
-    ask: float = 1.0,
-    period_s: float = 0.1,
-) -> tuple[Float64, Int]:
+def drive(budget, n, cost=None, seed=0, slow=1.0, ask=1.0, period_s=0.1):
     """(n,) CPU time and calls of frames in which a dozen proposals ask, or none, on a machine of some noise."""
     rng, scheduler = np.random.default_rng(seed), Scheduler(cost or cost_model(), period_s)
     tracks = new_tracks(dozen(0))
@@ -184,7 +176,7 @@ def test_a_budget_of_nothing_buys_nothing(nothing: Budget) -> None:
 
 
 def test_a_large_proposal_is_saved_for_while_small_ones_ask() -> None:
-    """Those that are worth less wait, else they would spend what it needs."""
+    """Calls of less worth wait, else they would spend the budget that it needs."""
     _, proposals = blobs([400] + [5] * 11, np.random.default_rng(0))
     tracks, scheduler = new_tracks(proposals), Scheduler(cost_model())
     served = np.zeros(12, np.int64)
@@ -242,3 +234,11 @@ def test_points_are_counted_with_padding(likelihood: str, points: int) -> None:
     size = padded_size(ClassificationConfig(likelihood=likelihood, max_points=400))
     assert size(np.array([10, 700, 290, 10, 20, 400])) == points
     assert size(np.zeros(0, np.int64)) == 0
+
+
+def test_the_warm_up_classifies_small_and_large_frames_and_prices_them() -> None:
+    sizes, clock = [], iter(range(0, 10**12, 2_000_000))
+    cost = LinearCost(128, lambda points: int(points.sum()))
+    warm_up(lambda _, __, which: sizes.append(len(which)), cost, 128, 8, lambda: next(clock))
+    assert set(sizes) == {1, 8, 16}
+    assert cost.cost_ms(np.array([60])) == pytest.approx(START_MARGIN * 2.0, rel=0.01)

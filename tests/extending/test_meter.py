@@ -41,7 +41,7 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
     assert abs(line["energy_J"] - 0.004) < 1e-9
 
 
-def test_a_machine_without_it_says_why(tmp_path, monkeypatch):
+def test_a_machine_without_the_meter_names_the_cause(tmp_path, monkeypatch):
     monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
     found = metering.discovery(EnergyConfig())
     assert found.best.name != "coulomb counter"

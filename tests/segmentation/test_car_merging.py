@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.clustering import StripMerger
+from modt.segmentation.clusters import ClusterSizes
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
 from modt.segmentation.segmenter import Segmenter
@@ -105,6 +106,14 @@ def test_two_objects_stay_two(pair):
     for seed in range(4):
         moved = [(x, y + 0.05 * seed, *rest) for x, y, *rest in pair]
         assert all(min(own) == 0 for own in scans.owners(moved, seed))
+
+
+def test_near_clusters_are_not_merged():
+    size, points = np.ones(3, np.float32), np.full(3, 50.0)
+    range_m = np.array([10.0, 24.0, 27.0], np.float32)
+    beam_m = range_m * np.float32(BEAM)
+    sizes = ClusterSizes(points, size, 0 * size, size, np.sqrt(range_m), np.arange(3), beam_m, np.zeros(3, np.bool_))
+    assert merger().candidates(sizes).tolist() == [False, False, True]
 
 
 def test_merged_cars_stay_within_the_size_of_an_object():

@@ -67,7 +67,7 @@ def test_one_object_is_not_split(thing):
 
 @pytest.mark.parametrize("place", [(12.0, 0.0), (25.0, 2.0), (38.0, -3.0), (20.0, 6.0), (15.0, 4.5)])
 def test_a_car_keeps_most_of_its_points(place):
-    """Of a side along the ray, whose returns lie far apart, a piece may be split off."""
+    """Returns on a side along the ray lie far apart, so a piece of it may be split off."""
     for seed in range(4):
         found = np.concatenate(scans.owners([(*place, *CAR)], seed=seed))
         assert found.max() > 0.7 * found.sum()

@@ -43,7 +43,7 @@ def test_without_known_beams_nothing_is_cut_above_or_below():
     assert flags(person(1.0), sensor=SensorConfig(min_range_m=0.2)) == [Cut(0)]
 
 
-def test_a_table_of_beams_says_where_they_end():
+def test_beams_end_at_the_outermost_of_a_table():
     table = SensorConfig(min_range_m=0.2, elevations_deg=tuple(range(-15, 16, 2)))
     assert flags(person(1.0), person(8.0), sensor=table) == [Cut.TOP | Cut.BOTTOM, Cut(0)]
 
@@ -56,6 +56,7 @@ def test_flags_are_those_of_a_loop_over_points(counts, seed, bound_deg):
         elevation_span_deg=(-15.0, 15.0),
         azimuth_step_deg=1.0,
         blind_sectors_deg=(bound_deg, bound_deg + 60.0),
+        blind_range_m=1.2,
     )
     xyz = np.random.default_rng(seed).normal(0, 1.0, (3, sum(counts))).astype(np.float32)
     parts = np.split(xyz, np.cumsum(counts)[:-1], axis=1)

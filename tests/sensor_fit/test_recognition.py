@@ -23,7 +23,7 @@ def test_a_sensor_fits_its_profile(name):
 
 
 @pytest.mark.parametrize("name", [name for name in SENSORS if name != "hdl-64e"])
-def test_another_sensor_is_told_from_the_default_and_named(name):
+def test_another_sensor_than_the_default_is_noticed_and_named(name):
     found = recognise(recording(name).sweeps[0], profile.load())
     assert found.differences
     assert found.nearest == name

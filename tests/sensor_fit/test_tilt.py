@@ -26,7 +26,7 @@ def stream(scene, sensor, mount_deg, seed=3):
 
 @pytest.mark.parametrize("mount_deg", MOUNTS)
 @pytest.mark.parametrize(("scene", "sensor"), [("yard", "vlp-16"), ("corridor", "os1-64"), ("hall", "mid-360")])
-def test_the_floor_tells_the_mount_to_half_a_degree(scene, sensor, mount_deg):
+def test_the_mount_is_measured_by_the_floor_to_half_a_degree(scene, sensor, mount_deg):
     frame = next(iter(stream(scene, sensor, mount_deg)))
     floor = find_floor(frame.points, HEIGHTS_M[sensor])
     off_deg = np.rad2deg(np.arccos(np.clip(floor.up @ frame.T_world_sensor[2, :3], -1, 1)))

@@ -64,20 +64,10 @@ def test_the_oldest_places_beyond_the_capacity_are_forgotten():
     assert recalled(map_of(POST, capacity=0), [POST], tracks_at([POST]), np.arange(1)) == [False]
 
 
-def run(follower, scenes, object_class=BACKGROUND):
-    """Number of tracks classified as the class, in scenes one after the other."""
-    first, classified = int(follower.tracks.age.max(initial=0)), 0
-    for i, boxes in enumerate(scenes, first):
-        follower.follow(*frame_of(boxes, i, EYE))
-        classified += int(np.count_nonzero(follower.wants_class))
-        follower.classify(object_class)
-    return classified
-
-
 def gone(machine=EFFICIENT, object_class=BACKGROUND, **options):
     """A follower of FAR, and of POST until it expired."""
     follower = Follower(TrackingConfig(max_missed=2, **options), machine)
-    run(follower, [[FAR, POST]] * 4 + [[FAR]] * 5, object_class)
+    follower.run([[FAR, POST]] * 4 + [[FAR]] * 5, object_class)
     assert follower.tracks.id.tolist() == [0]
     return follower
 
@@ -85,7 +75,7 @@ def gone(machine=EFFICIENT, object_class=BACKGROUND, **options):
 @pytest.mark.parametrize(("machine", "state"), [(EFFICIENT, "tracked"), (ACCURATE, "tracked_classified")])
 def test_an_heir_is_final_background_at_once(machine, state):
     follower = gone(machine)
-    assert run(follower, [[FAR, POST]]) == 0
+    assert follower.run([[FAR, POST]]) == 0
     tracks = follower.tracks
     assert follower.states == [state] * 2
     assert tracks.id.tolist() == [0, 2]
@@ -95,7 +85,7 @@ def test_an_heir_is_final_background_at_once(machine, state):
 
 @pytest.mark.parametrize("options", [{"object_class": CAR}, {"machine": CONVENTIONAL}, {"extensions": "none"}])
 def test_an_object_or_background_that_is_not_final_is_not_remembered(options):
-    assert run(gone(**options), [[FAR, POST]]) == 1
+    assert gone(**options).run([[FAR, POST]]) == 1
 
 
 WALL = [[box(10, 3, 12, 2.0, 1.8)]] * 4
@@ -105,11 +95,11 @@ PART = [[box(10, 3.6, 12, 0.8, 1.8), box(10, 2.8 - 0.15 * i, 0.5, 0.5, 1.7)] for
 
 def test_background_that_leaves_its_place_loses_its_class_and_is_classified():
     follower = Follower()
-    run(follower, WALL)
-    assert run(follower, PART[:2]) == 0
+    follower.run(WALL)
+    assert follower.run(PART[:2]) == 0
     assert follower.tracks.inherited.tolist() == [False, True]
-    for i, boxes in enumerate(PART[2:], 6):
-        follower.follow(*frame_of(boxes, i, EYE))
+    for boxes in PART[2:]:
+        follower.follow(*frame_of(boxes, follower.frames, EYE))
     assert follower.states == ["tracked", "unmatched"]
     assert follower.tracks.final.tolist() == [True, False]
     assert follower.wants_class.tolist() == [False, True]
@@ -118,8 +108,8 @@ def test_background_that_leaves_its_place_loses_its_class_and_is_classified():
 
 def test_a_class_that_a_view_confirmed_holds_away_from_the_place():
     follower = Follower()
-    run(follower, WALL + PART[:2])
+    follower.run(WALL + PART[:2])
     set_class(follower.tracks, 1, BACKGROUND)
-    assert run(follower, PART[2:]) == 0
+    assert follower.run(PART[2:]) == 0
     assert follower.states == ["tracked", "tracked"]
     assert not follower.tracks.inherited.any()

@@ -5,10 +5,8 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.geometry.kdop import DIRECTIONS
-from modt.placement import Placement
-from modt.tracking.regrouping import Regrouping
 from modt.types import NONE
-from tests.tracking.tracking_scenes import EYE, associated, box, frame_of, tracks_at
+from tests.tracking.tracking_scenes import associated, box, frame_of, regrouped, tracks_at
 
 BACKGROUND, CAR, PEDESTRIAN = ObjectClass.BACKGROUND, ObjectClass.CAR, ObjectClass.PEDESTRIAN
 WHOLE, REAR, FRONT, NEXT = box(12, 4), box(11.0, 4, l=1.9), box(13.3, 4, l=1.3), box(17.4, 4)
@@ -23,8 +21,7 @@ def ranked(boxes, *classes, points=None, hits=3):
 
 def reunited(tracks, boxes, rows, points):
     """Proposal of each track after regrouping, where the first proposals were matched with the rows given."""
-    frame = associated(frame_of(boxes, points=points)[1], rows)
-    matches = Regrouping().regroup(tracks, frame, Placement(EYE)).matches
+    matches = regrouped(tracks, associated(frame_of(boxes, points=points)[1], rows)).matches
     assert len(set(matches.rows.tolist())) == len(matches.rows)
     assert len(set(matches.proposals.tolist())) == len(matches.proposals)
     proposal = np.full(len(tracks), NONE)

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.tracking.states import ACCURATE
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
@@ -22,9 +21,7 @@ def at(stamp_s, boxes, pose=EYE):
 def settled(pose=EYE, **parts):
     """A follower of a street of classified background, at 0 to 0.5 s."""
     follower = Follower(**parts)
-    for k in range(6):
-        follower.follow(*at(0.1 * k, STREET, pose))
-        follower.classify(ObjectClass.BACKGROUND)
+    follower.run([STREET] * 6, T=pose)
     assert follower.tracks.final.all()
     return follower
 

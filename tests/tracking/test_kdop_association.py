@@ -21,14 +21,6 @@ def matched(tracks, observations):
     return sorted(zip(matches.rows.tolist(), matches.proposals.tolist(), strict=True)), matches
 
 
-def follow(follower, scenes, *classes, first=0, **options):
-    """Follow frames of boxes, every track classified as it wants."""
-    for i, boxes in enumerate(scenes, first):
-        follower.follow(*frame_of(boxes, i, EYE, **options))
-        follower.classify(*classes)
-    return follower.tracks
-
-
 def test_the_position_moves_with_the_kdop():
     tracks = tracks_at([box(10, 3), box(20, -5, 0.6, 0.6)])
     pairs, matches = matched(tracks, observed([box(20.1, -5, 0.6, 0.6), box(10.3, 3.1)], points=2000))
@@ -38,7 +30,7 @@ def test_the_position_moves_with_the_kdop():
 
 
 def test_a_lost_track_does_not_take_the_proposal_of_a_track_that_is_expected_there():
-    """By the deviations of the two, the person is nearer to the lost one."""
+    """Measured in deviations, the person is nearer to the lost track."""
     tracks, person = tracks_at([box(9.3, 0, 0.6, 0.6), box(11.5, 0, 0.6, 0.6)]), observed([box(10, 0, 0.6, 0.6)])
     tracks.P[:, :2, :2] = np.eye(2) * np.array([0.1, 9.0])[:, None, None]
     assert matched(tracks, person)[0] == [(0, 0)]
@@ -60,20 +52,21 @@ def test_what_changed_its_shape_is_matched_by_coverage(x, pairs):
 
 def test_a_stationary_car_that_comes_into_view_has_no_speed():
     """Its rear stays in place while its centre moves ahead at 1 m/s and its front at 2 m/s."""
-    tracks = follow(Follower(), [[box(10 + 0.1 * i, 3, l=1.0 + 0.2 * i)] for i in range(15)], CAR)
-    assert tracks.id.tolist() == [0]
-    assert tracks.x[0, 3] < 0.5
+    follower = Follower()
+    follower.run([[box(10 + 0.1 * i, 3, l=1.0 + 0.2 * i)] for i in range(15)], CAR)
+    assert follower.tracks.id.tolist() == [0]
+    assert follower.tracks.x[0, 3] < 0.5
 
 
 def test_two_cars_in_a_row_stay_two():
-    follower, row = Follower(), [box(10, 4), box(15.2, 4)]
-    for k, points in enumerate(((80, 40), (40, 80), (80, 40))):
-        tracks = follow(follower, [row] * 3, CAR, first=3 * k, points=points)
-        assert tracks.id[tracks.proposal.argsort()].tolist() == [0, 1]
+    follower = Follower()
+    for points in ((80, 40), (40, 80), (80, 40)):
+        follower.run([[box(10, 4), box(15.2, 4)]] * 3, CAR, points=points)
+        assert follower.tracks.id[follower.tracks.proposal.argsort()].tolist() == [0, 1]
 
 
 def test_a_lost_track_is_matched_along_its_prediction():
-    moving = [[box(10 + 0.8 * i, 0)] if i not in (8, 9, 10) else [] for i in range(13)]
-    tracks = follow(Follower(), moving, CAR)
-    assert tracks.id.tolist() == [0]
-    assert tracks.missed[0] == 0
+    follower = Follower()
+    follower.run([[box(10 + 0.8 * i, 0)] if i not in (8, 9, 10) else [] for i in range(13)], CAR)
+    assert follower.tracks.id.tolist() == [0]
+    assert follower.tracks.missed[0] == 0

@@ -1,21 +1,12 @@
-"""Lives of tracks through the pipeline: every row of every state machine, and what the machine says is final."""
-
-from types import SimpleNamespace
+"""Lives of tracks: every row of every state machine, and which classes are final."""
 
 import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
-from modt.energy.ledger import Ledger
-from modt.odometry.odometry import Odometry
-from modt.pipeline import Pipeline
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, Event, StateMachine
-from modt.tracking.tracker import Tracker
-from modt.types import NONE
-from tests.tracking.tracking_scenes import EYE, box, frame_of, set_class
-
-MAX_MISSED = 2
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, set_class
 
 
 class RecordedMachine(StateMachine):
@@ -32,55 +23,21 @@ class RecordedMachine(StateMachine):
         return after
 
 
-class Scripted:
-    """Segmenter, fusion, scheduler and classifier that follow a script."""
-
-    deferred = 0
-    cost = SimpleNamespace(size=np.sum)
-
-    def __init__(self):
-        self.proposals, self.certain = None, None
-
-    def segment(self, points):
-        return self.proposals
-
-    def asks(self, tracks, proposals, wants_class):
-        return tracks.proposal != NONE
-
-    def select(self, tracks, proposals, asks, budget):
-        self.rows = asks.nonzero()[0] if self.certain is not None else np.zeros(0, np.int64)
-        return self
-
-    def classify(self, points, proposals, which):
-        return np.full((len(which), 4), 0.25)
-
-    def decide(self, tracks):
-        pass
-
-    def fuse(self, tracks, proposals, rows, likelihood):
-        for row in rows:
-            set_class(tracks, row, ObjectClass.BACKGROUND)
-        return np.full(len(rows), self.certain)
-
-
 def live(machine, script):
     """State after every frame of a scene with one object, "gone" when its track is deleted.
 
     A step says whether the object is seen, seen 1 m further on ("moved"), hidden, or classified as certain or not.
     """
-    stub = Scripted()
-    tracker = Tracker(TrackingConfig(max_missed=MAX_MISSED), machine)
-    pipeline = Pipeline(stub, Odometry(), tracker, stub, stub, stub, stub, Ledger())
-    states = []
-    for i, step in enumerate(script):
+    follower, states = Follower(TrackingConfig(max_missed=2), machine), []
+    for step in script:
         boxes = [] if step == "hidden" else [box(11 if step == "moved" else 10, 2)]
-        frame, stub.proposals = frame_of(boxes, i, EYE)
-        stub.certain = {"certain": True, "uncertain": False}.get(step)
-        tracks = pipeline.step(frame).tracks
+        tracks = follower.follow(*frame_of(boxes, follower.frames, EYE))
+        if step in {"certain", "uncertain"}:
+            set_class(tracks, 0, ObjectClass.BACKGROUND)
+            follower.conclude([0], [step == "certain"])
         np.testing.assert_array_equal(tracks.final, machine.final[tracks.state])
-        np.testing.assert_array_equal(tracker.tracks.final, machine.final[tracker.tracks.state])
         assert len(tracks) <= 1
-        states.append(machine.names[tracks.state[0]] if len(tracks) else "gone")
+        states.extend(follower.states or ["gone"])
     return states
 
 

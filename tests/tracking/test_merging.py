@@ -9,8 +9,6 @@ from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
-from modt.placement import Placement
-from modt.tracking.regrouping import Regrouping
 from tests.tracking.tracking_scenes import (
     EYE,
     Follower,
@@ -19,6 +17,7 @@ from tests.tracking.tracking_scenes import (
     driving,
     frame_of,
     owner_of_points,
+    regrouped,
     tracks_at,
 )
 
@@ -26,11 +25,6 @@ BACKGROUND, CAR, PEDESTRIAN, CYCLIST = ObjectClass
 WHOLE, REAR, FRONT = (box(x, 3, length, 1.8, 1.5) for x, length in ((10, 4.2), (8.6, 1.4), (11.1, 2.0)))
 AHEAD, SLIM = box(15, 3, 4.2, 1.8, 1.5), box(11.1, 3, 0.6, 0.6, 1.5)
 POINTS = 80
-
-
-def merging(tracks, frame):
-    """The frame after merging."""
-    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 def frame_at_rest(tracks, boxes, *rows):
@@ -42,7 +36,7 @@ def frame_at_rest(tracks, boxes, *rows):
 
 def merged(tracks, boxes, rows):
     """Original proposals of each one after merging, and the frame; the first are matched with the rows."""
-    after, n = merging(tracks, frame_at_rest(tracks, boxes, *rows)), len(boxes)
+    after, n = regrouped(tracks, frame_at_rest(tracks, boxes, *rows)), len(boxes)
     label = after.proposals.label(n * POINTS)
     assert sorted(after.proposals.members) == list(range(n * POINTS))
     per_box = label.reshape(n, POINTS)
@@ -120,7 +114,7 @@ def test_of_two_cars_the_older_takes_parts_and_proposals_of_the_younger(ahead_m,
 def test_the_reflectance_is_that_of_the_matched_proposal():
     tracks, reflectance = tracks_at([WHOLE], CAR), np.arange(10.0).reshape(2, 5)
     frame = frame_at_rest(tracks, [FRONT, REAR], 0)
-    after = merging(tracks, replace(frame, proposals=replace(frame.proposals, reflectance=reflectance)))
+    after = regrouped(tracks, replace(frame, proposals=replace(frame.proposals, reflectance=reflectance)))
     np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
 
 
@@ -176,4 +170,4 @@ def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length
 def test_what_surrounds_the_part_last_seen_and_lies_outside_the_known_extent_is_no_part():
     tracks, strip = tracks_at([WHOLE], CAR), box(12, 3, 0.2, 1.8, 1.5)
     tracks.kdop[:] = tracks_at([strip]).kdop
-    assert len(merging(tracks, frame_at_rest(tracks, [strip, box(12.7, 3, 1.5, 1.8, 1.5)], 0)).proposals) == 2
+    assert len(regrouped(tracks, frame_at_rest(tracks, [strip, box(12.7, 3, 1.5, 1.8, 1.5)], 0)).proposals) == 2

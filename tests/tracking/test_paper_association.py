@@ -51,7 +51,7 @@ def test_pairs_above_the_threshold_are_not_matched(x, t_da, n):
 
 
 def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it():
-    """Whatever side is seen: boxes of one length at one centroid overlap wholly, wherever their middles are."""
+    """Boxes of one length at one centroid overlap wholly, wherever their middles are."""
     tracks, observations = pair(box(10, 0), box(12, 0))
     tracks.x[0, 0] += 2.0
     tracks.box[0, :2] += 3.0

@@ -1,4 +1,4 @@
-"""Whatever is regrouped, every point stays in one proposal, and boxes and observations follow the points."""
+"""Every point stays in one proposal, and boxes and observations follow the points."""
 
 import dataclasses
 
@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.observations import observe
-from modt.placement import Placement
-from modt.tracking.regrouping import Regrouping
-from tests.tracking.tracking_scenes import EYE, associated, box, frame_of, joined, tracks_at
+from tests.tracking.tracking_scenes import EYE, associated, box, frame_of, joined, regrouped, tracks_at
 
 POINTS = 60
 
@@ -43,10 +41,6 @@ def scenes(draw):
     matched = [k for k in range(min(n, len(known))) if draw(st.booleans())]
     tracks.x[:, :2] += rng.normal(0, 0.05, (len(tracks), 2))
     return tracks, associated(proposals, matched, matched)
-
-
-def regrouped(tracks, frame):
-    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 @given(scenes())

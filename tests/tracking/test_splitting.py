@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.geometry import inverse, transform_boxes
-from modt.placement import Placement
-from modt.tracking.regrouping import Regrouping
 from tests.odometry.test_deskew import skewed
 from tests.tracking.tracking_scenes import (
     EYE,
@@ -19,6 +17,7 @@ from tests.tracking.tracking_scenes import (
     frame_of,
     joined,
     owner_of_points,
+    regrouped,
     tracks_at,
 )
 
@@ -34,10 +33,9 @@ def wall_with(*people, points=PERSON_POINTS, wall=WALL):
     return joined(frame_of([*people, wall], points=counts)[1], [range(len(people) + 1)])
 
 
-def split(tracks, proposals, rows=(), matched=None):
+def split(tracks, proposals, rows):
     """The frame after splitting."""
-    frame = associated(proposals, rows, matched)
-    return Regrouping().regroup(tracks, frame, Placement(EYE))
+    return regrouped(tracks, associated(proposals, rows))
 
 
 def tracks_of_person_and_wall(object_class=PEDESTRIAN, person=PERSON, **columns):

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
+from modt.geometry import wrap
 from modt.geometry.kdop import DIRECTIONS
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
 from modt.types import NONE, Cut
@@ -22,16 +23,9 @@ def tracker(request):
     return Follower(TrackingConfig(association=request.param))
 
 
-def run(tracker, frames):
-    for frame, proposals in frames:
-        tracks = tracker.follow(frame, proposals)
-        rows = np.flatnonzero(tracker.wants_class)
-        tracker.conclude(rows, np.ones(len(rows), np.bool_))
-    return tracks
-
-
 def test_a_stationary_box_keeps_its_track(tracker):
-    tracks = run(tracker, [frame_of([box(10, 2)], i, EYE, seed=0) for i in range(10)])
+    tracker.run([[box(10, 2)]] * 10)
+    tracks = tracker.tracks
     assert len(tracks) == 1
     assert (tracks.id[0], tracks.age[0], tracks.hits[0]) == (0, 10, 10)
     assert tracks.x[0, 3] < 1.0
@@ -39,13 +33,12 @@ def test_a_stationary_box_keeps_its_track(tracker):
 
 @pytest.mark.parametrize("course", np.deg2rad([0, 90, 180, -45]))
 def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
-    tracker = Follower()
-    v = 8.0
-    step = v * 0.1 * np.array([np.cos(course), np.sin(course)])
-    tracks = run(tracker, [frame_of([box(12 + i * step[0], 6 + i * step[1], yaw=course)], i, EYE) for i in range(12)])
-    assert list(tracks.id) == [0]
-    assert abs(tracks.x[0, 3] - v) < 0.8
-    assert abs(np.angle(np.exp(1j * (tracks.x[0, 2] - course)))) < 0.1
+    tracker, speed = Follower(), 8.0
+    dx, dy = speed * 0.1 * np.array([np.cos(course), np.sin(course)])
+    tracker.run([[box(12 + i * dx, 6 + i * dy, yaw=course)] for i in range(12)])
+    assert tracker.tracks.id.tolist() == [0]
+    assert abs(tracker.tracks.x[0, 3] - speed) < 0.8
+    assert abs(wrap(tracker.tracks.x[0, 2] - course)) < 0.1
 
 
 def test_conclude_returns_a_copy(tracker):
@@ -99,23 +92,21 @@ def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine
 
 def test_a_track_at_rest_is_stationary_until_it_leaves_its_rest_position():
     tracker = Follower()
-    for i in range(20):
-        x = 10.0 + 0.4 * max(i - 7, 0)
-        tracks = run(tracker, [frame_of([box(x, 2, 0.6, 0.6)], i, EYE, seed=i)])
-        assert tracks.id.tolist() == [0]
-        if i == 7:
-            assert tracks.stationary[0]
-            assert tracks.x[0, 3] < 0.3
-    assert not tracks.stationary[0]
-    assert tracks.x[0, 3] == pytest.approx(4.0, abs=0.5)
+    tracker.run([[box(10, 2, 0.6, 0.6)]] * 8)
+    assert tracker.tracks.stationary[0]
+    assert tracker.tracks.x[0, 3] < 0.3
+    tracker.run([[box(10 + 0.4 * i, 2, 0.6, 0.6)] for i in range(1, 13)])
+    assert tracker.tracks.id.tolist() == [0]
+    assert not tracker.tracks.stationary[0]
+    assert tracker.tracks.x[0, 3] == pytest.approx(4.0, abs=0.5)
 
 
 def test_the_mean_kdop_follows_views_that_jitter_and_restarts_at_an_end_that_jumps():
     tracker = Follower()
-    for i in range(12):
-        tracks = run(tracker, [frame_of([box(12, 3, 2.0, 1.0)], i, EYE, points=2000)])
-    np.testing.assert_allclose(tracks.mean_kdop[0][[0, 2, 4, 6]], [1.0, 0.5, 1.0, 0.5], atol=0.05)
-    tracks = run(tracker, [frame_of([box(12.5, 3, 3.0, 1.0)], 12, EYE, points=2000)])  # its front comes into view
+    tracker.run([[box(12, 3, 2.0, 1.0)]] * 12, points=2000)
+    np.testing.assert_allclose(tracker.tracks.mean_kdop[0][[0, 2, 4, 6]], [1.0, 0.5, 1.0, 0.5], atol=0.05)
+    tracker.run([[box(12.5, 3, 3.0, 1.0)]], points=2000)  # its front comes into view
+    tracks = tracker.tracks
     reach = tracks.kdop[0] - tracks.x[0, :2] @ DIRECTIONS
     assert tracks.mean_kdop[0, 0] == pytest.approx(reach[0], abs=0.15)
     np.testing.assert_allclose(tracks.mean_kdop[0][[2, 4, 6]], [0.5, 1.0, 0.5], atol=0.15)
@@ -131,9 +122,7 @@ def test_the_mean_kdop_follows_views_that_jitter_and_restarts_at_an_end_that_jum
 )
 def test_a_person_of_whom_only_legs_are_left_is_as_high_as_before(object_class, cut, height_m):
     tracker = Follower()
-    for i in range(6):
-        tracker.follow(*frame_of([box(2 - 0.1 * i, 0, 0.5, 0.4, 1.6, z=0.6)], i, EYE))
-        tracker.classify(object_class)
+    tracker.run([[box(2 - 0.1 * i, 0, 0.5, 0.4, 1.6, z=0.6)] for i in range(6)], object_class)
     for i in (6, 7):
         frame, proposals = frame_of([box(1.4, 0, 0.5, 0.4, 0.6, z=0.1)], i, EYE)
         tracks = tracker.follow(frame, replace(proposals, cut=np.array([cut])))

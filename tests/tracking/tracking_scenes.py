@@ -10,8 +10,9 @@ from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
 from modt.odometry.odometry import Odometry
+from modt.placement import Placement
 from modt.tracking.association import Matches
-from modt.tracking.regrouping import Associated
+from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.states import EFFICIENT
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tracker import Tracker
@@ -24,7 +25,7 @@ class Follower:
     """Odometry and tracker in a row, with what the last frame gave."""
 
     def __init__(self, config=None, machine=EFFICIENT, **parts):
-        self.odometry = Odometry()
+        self.frames, self.odometry = 0, Odometry()
         self.tracker = Tracker(config or TrackingConfig(), machine, **parts)
         self.proposals = self.wants_class = self.T_world_sensor = None
 
@@ -41,6 +42,7 @@ class Follower:
         self.T_world_sensor = located.placement.T_world_sensor
         tracked = self.tracker.follow(frame.stamp_s, proposals, located)
         self.proposals, self.wants_class = tracked.proposals, tracked.wants_class
+        self.frames += 1
         return tracked.tracks
 
     def conclude(self, rows, certain):
@@ -52,6 +54,15 @@ class Follower:
         for row in rows:
             set_class(self.tracks, row, classes[min(row, len(classes) - 1)])
         return self.conclude(rows, np.ones(len(rows), np.bool_))
+
+    def run(self, scenes, *classes, T=EYE, **options):
+        """Follow frames of boxes, and classify, by default as background; how often a track wanted a class."""
+        wanted = 0
+        for boxes in scenes:
+            self.follow(*frame_of(boxes, self.frames, T, **options))
+            wanted += int(np.count_nonzero(self.wants_class))
+            self.classify(*(classes or [ObjectClass.BACKGROUND]))
+        return wanted
 
 
 def set_class(tracks, row, object_class):
@@ -141,6 +152,11 @@ def associated(proposals, rows=(), matched=None):
     covariance = 0.01 * np.eye(2)[None].repeat(len(rows), axis=0)
     matches = Matches(rows, matched, observations.position[matched], covariance, np.zeros((len(rows), 4)))
     return Associated(proposals, observations, matches)
+
+
+def regrouped(tracks, frame):
+    """The frame in a better grouping."""
+    return Regrouping().regroup(tracks, frame, Placement(EYE))
 
 
 def owner_of_points(tracks, proposals, n_points):
