@@ -167,7 +167,7 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
 
 
 def regrouped(members: Int, coordinates: Float32, label: Int, n: int) -> tuple[Int, Float32, Int]:
-    """Members (K,) and their (3, K) coordinates by label (K,), below n, each in its order; (n,) count of each label."""
+    """Members (K,) and (3, K) coordinates by label (K,), below n, each in its order; (n,) count of each label."""
     # Sixteen bits hold every number of a proposal, and are sorted by radix.
     order = label.astype(np.uint16).argsort(kind="stable")
     return members.take(order), coordinates.take(order, axis=1), np.bincount(label, minlength=n)
