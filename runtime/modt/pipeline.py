@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from modt.classification.decision import LikeliestClass
 from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import Ledger
 from modt.observations import Located, StaticTracks
@@ -93,17 +94,6 @@ class Fusion(Protocol):
         """Write the posterior of the rows; (R,) whether each class is confirmed."""
 
 
-class Decision(Protocol):
-    """Posteriors to classes."""
-
-    @property
-    def frequency(self) -> Float64:
-        """(4,) frequency of the classes among the proposals of the stream."""
-
-    def decide(self, tracks: Tracks) -> None:
-        """Write the reported class of every track."""
-
-
 @dataclass(frozen=True, slots=True)
 class Pipeline:
     """The stages in their order; a mode of the method is a choice of these parts."""
@@ -114,7 +104,7 @@ class Pipeline:
     fusion: Fusion
     scheduler: Scheduler
     classifier: Classifier
-    decision: Decision
+    decision: LikeliestClass
     ledger: Ledger
     mount: Mount = LEVEL
 

@@ -170,20 +170,11 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
     )
 
 
-def regrouped(members: Int, coordinates: Float32, piece: Int, number: Int, n: int) -> tuple[Int, Float32, Int]:
-    """(K,) members and their (3, K) coordinates in n groups, in their order within a group, and (n,) count of each.
-
-    Args:
-        members: (K,) of the proposals.
-        coordinates: (3, K) of them.
-        piece: (K,) to which each belongs.
-        number: of the group of each piece.
-        n: number of groups.
-    """
+def regrouped(members: Int, coordinates: Float32, label: Int, n: int) -> tuple[Int, Float32, Int]:
+    """Members (K,) and (3, K) coordinates by label (K,), below n, each in its order; (n,) count of each label."""
     # Sixteen bits hold every number of a proposal, and are sorted by radix.
-    group = number.take(piece)
-    order = group.astype(np.uint16).argsort(kind="stable")
-    return members.take(order), coordinates.take(order, axis=1), np.bincount(group, minlength=n)
+    order = label.astype(np.uint16).argsort(kind="stable")
+    return members.take(order), coordinates.take(order, axis=1), np.bincount(label, minlength=n)
 
 
 def column(kind: type, *shape: int, fill: float = 0) -> Any:

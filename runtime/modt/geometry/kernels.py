@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 
 from modt.geometry.boxes import upright_boxes
-from modt.geometry.kdop import certain_pairs, covering_pairs, kdop_ends, overlapping_pairs, pair_costs
+from modt.geometry.kdop import certain_pairs, kdop_ends, overlapping_pairs, pair_costs
 from modt.types import Float32, Float64, Int, copy_runs, regrouped
 
 
@@ -60,7 +60,6 @@ class GeometryKernels:
     copy_runs = staticmethod(copy_runs)
     regrouped = staticmethod(regrouped)
     overlapping_pairs = staticmethod(overlapping_pairs)
-    covering_pairs = staticmethod(covering_pairs)
     pair_costs = staticmethod(pair_costs)
     assign = staticmethod(assign)
 

@@ -7,7 +7,7 @@ from array import array
 
 import numpy as np
 
-from modt.geometry.kdop import END_PAD_M, HALF_ROOT, PAD_M, PairWeights, Shapes
+from modt.geometry.kdop import HALF_ROOT, PAD_M, PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
 from modt.native.library import FLOAT32, FLOAT64, INT64, Own, Signatures, declare, pointers, structure
 from modt.types import Float32, Float64, Int
@@ -20,10 +20,9 @@ _SIGNATURES: Signatures = {
     "modt_copy_runs": (None, (Own, INT64, INT64, _L, Own)),
     "modt_overlapping_pairs": (_L, (FLOAT64, _L, FLOAT64, _L, Own, _L, Own, Own)),
     "modt_pair_costs": (None, (Own, Own, FLOAT64, _D, INT64, INT64, _L, Own, _D, _D, Own, Own, Own)),
-    "modt_coverages": (None, (FLOAT64, FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _D, Own, Own)),
     "modt_certain_pairs": (None, (Own, FLOAT64, _L, _D, Own, Own, Own, Own)),
     "modt_settle_pairs": (ctypes.c_int, (Own, FLOAT64, _L, _D, Own, Own, Own, Own, Own)),
-    "modt_regrouped": (None, (Own, INT64, INT64, _L, _L, Own, Own, Own)),
+    "modt_regrouped": (None, (Own, INT64, _L, _L, Own, Own, Own)),
 }
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
@@ -95,14 +94,6 @@ class NativeGeometryKernels(GeometryKernels):
         self.library.modt_pair_costs(*given, spread, cost, coverage)
         return cost + np.log(spread) / 2, coverage
 
-    def covering_pairs(self, known: Float64, expected: Float64, seen: Float64) -> tuple[Int, Int, Float64, Float64]:
-        """Pairs of known and seen k-DOPs that overlap, and (K,) how much of the seen and the expected is covered."""
-        one, other = self.overlapping_pairs(known, seen)
-        within, around = np.empty((2, len(one)))
-        shapes = known, expected, known.shape[1], seen, seen.shape[1]
-        self.library.modt_coverages(*shapes, one, other, len(one), END_PAD_M, within, around)
-        return one, other, within, around
-
     def assign(self, rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
         """Indices, ascending, of the candidate pairs that a least-cost assignment keeps."""
         n, sizes = len(rows), array("q", (int(rows.max(initial=-1)) + 1, int(columns.max(initial=-1)) + 1))
@@ -118,11 +109,9 @@ class NativeGeometryKernels(GeometryKernels):
                 raise ValueError("no assignment has a finite cost")
         return state.nonzero()[0]
 
-    def regrouped(
-        self, members: Int, coordinates: Float32, piece: Int, number: Int, n: int
-    ) -> tuple[Int, Float32, Int]:
-        """Members and (3, K) coordinates in n groups, given the piece of each and the group of each piece."""
+    def regrouped(self, members: Int, coordinates: Float32, label: Int, n: int) -> tuple[Int, Float32, Int]:
+        """Members and (3, K) coordinates by label (K,), below n, and (n,) count of each."""
         rows, xyz, (following, count) = np.empty_like(members), np.empty_like(coordinates), np.empty((2, n), np.int64)
         given, out = pointers(members, coordinates), pointers(rows, xyz)
-        self.library.modt_regrouped(given, piece, number, len(members), n, following, count, out)
+        self.library.modt_regrouped(given, label, len(members), n, following, count, out)
         return rows, xyz, count

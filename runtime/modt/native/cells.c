@@ -137,7 +137,7 @@ EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8
                          i32 side, i32 *next, i64 *component)
 {
     Span *span = (Span *)(next + side);
-    i32 *scratch = next + side + 4 * n_cells, *order = scratch, *parent = scratch + n_cells, *wide = scratch + 2 * n_cells, *last = scratch + 3 * n_cells;
+    i32 *order = next + side + 4 * n_cells, *parent = order + n_cells, *wide = parent + n_cells, *last = wide + n_cells;
     i32 used = 0, n = 0, count = 0, before = NONE;
     for (i64 i = 0; i < n_cells; i++) {
         PROVEN(cells->row[i] >= 0 && cells->row[i] >> shift < side && cells->column[i] >> shift > 0 &&

@@ -136,16 +136,15 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         cells = Cells(row, column, low, high, entries[k - n :])
         return cells, sample[k - n :], PointColumns(*sampled[:, k - n :]), cell
 
-    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
-        """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
-        return self._connected(grid, cells, max_gap_m, use, 0)
-
     def connect_coarse(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
         """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
-        return self._connected(grid, cells, max_gap_m, np.ones(len(cells), np.bool_), 1)
+        return self.connect(grid, cells, max_gap_m, np.ones(len(cells), np.bool_), 1)
 
-    def _connected(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool, shift: int) -> Int:
-        """(C,) connected component of the cell of the grid, 2^shift times as wide, in which each cell used lies."""
+    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool, shift: int = 0) -> Int:
+        """(C,) connected component of the cell of the grid, 2^shift times as wide, in which each cell used lies.
+
+        They are in the order of their first cells; NONE for the other cells.
+        """
         n, component = len(cells), np.empty(len(cells), np.int64)
         if len(self._work) < grid.side + 9 * n:
             self._work = np.empty(grid.side + 9 * n, np.int32)
