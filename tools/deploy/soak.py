@@ -6,8 +6,8 @@ A process of its own sends the recording as the packets of a VLP-16 to a UDP por
 
 The exit status is 0 if the run keeps these promises. Each fault is counted where the status shows it; a process that
 takes the core ("hog") needs to be counted only if results stall. A second after a fault there are results of full
-quality again. Records are lost only on a full disk. At most one deadline in 1,000 is missed between faults. Memory and
-open descriptors stay flat.
+quality again. Records are lost only on a full disk. At most one deadline in 1,000 is missed between faults. Memory
+and open descriptors stay flat.
 
 `--fifo` runs at the real-time priority of a service; hogs get a higher one.
 """
