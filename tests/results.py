@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from typing import Any
 
 import numpy as np
@@ -70,3 +71,35 @@ class Kept:
 
     def close(self):
         pass
+
+
+def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
+    """A status as `modt run` writes it."""
+    times = {"p50": 0.1, "p99": 0.9}
+    return {
+        "schema": "modt.status/1",
+        "time_s": time.time(),
+        "up_s": 2.0,
+        "period_s": 0.1,
+        "source": "a\x1b[2Jb",
+        "mode": "accurate",
+        "profile": "vlp-16",
+        "counts": {"rate_hz": rate_hz, "tracks": 7, "visible": {"background": 3, "car": 2}},
+        "loop": {
+            "frames": 20,
+            "missed_deadlines": 1,
+            "shed_sweeps": 0,
+            **dict.fromkeys(("lateness_ms", "execution_ms", "latency_ms"), times),
+            "budget_ms": 80.0,
+            "other_stages_ms": 12.0,
+            "step": "reduced",
+            "steps_entered": {"reduced": 1},
+            "failures": {'frame: "x"': 2},
+        },
+        "power": {"watts": 6.25, "kind": "estimated", "frame_J": 0.6, "stages_J": {"segmentation": 0.25}, **power},
+        "sensor": {"lost_messages": 4, "silent": False, "refused_messages": {"too short": 3}},
+        "odometry": {"source": "none"},
+        "sinks": {"udp://x": {"written": 5, "state": "ok"}},
+        "recording": {"lines": 40, "lost_lines": 0, "failing": None},
+        "host": {"lacking": []},
+    }

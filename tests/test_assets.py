@@ -10,7 +10,9 @@ import pytest
 
 from modt import assets
 from modt.errors import MisuseError
+from tests.sources.packets.simulated import packets
 from tools import deps
+from tools.send.pcap_writer import write_capture
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PROBE = """
@@ -82,6 +84,10 @@ def test_from_a_wheel(expected, environment, tmp_path):
     package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path, kernels=kernels)
     assert package.startswith(str(environment))
     assert files == expected
+    write_capture(tmp_path / "drive.pcap", packets("xt-32"), 2368)
+    replay = [environment / "bin" / "modt", "replay", "drive.pcap", "--out", "run", "--quiet"]
+    subprocess.run(replay, cwd=tmp_path, check=True, capture_output=True)
+    assert b'"class":"car"' in (tmp_path / "run" / "tracks.jsonl").read_bytes()
     command = [environment / "bin" / "modt", "service", "install", "--root", tmp_path, "--prefix", "/opt/modt"]
     subprocess.run(command, check=True, capture_output=True)
     assert (tmp_path / "etc/systemd/system/modt.service").is_file()
@@ -98,14 +104,6 @@ def test_from_a_wheel_made_without_a_compiler(expected, environment, tmp_path):
 @pytest.mark.install
 def test_a_wheel_is_the_same_wherever_and_whenever_it_is_built():
     assert deps.wheel() == 0
-
-
-@pytest.mark.install
-def test_from_an_editable_install(expected, environment, tmp_path):
-    install(environment, "--editable", str(CHECKOUT))
-    package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path)
-    assert package == str(CHECKOUT / "runtime" / "modt")
-    assert files == expected
 
 
 def test_what_is_not_there_lists_what_is(tmp_path):

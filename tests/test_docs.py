@@ -67,22 +67,6 @@ def test_every_page_is_linked_from_the_readme_or_another_page():
     assert [page.name for page in (*DOCS.glob("*.md"), ROOT / "CONTRIBUTING.md") if page not in linked] == []
 
 
-def test_the_way_in_names_the_steps_in_order():
-    text = (DOCS / "life-of-a-frame.md").read_text()
-    steps = [
-        "Segmenter.segment",
-        "Odometry.locate",
-        "Tracker.follow",
-        "FurtherViews.asks",
-        "Scheduler.select",
-        "PointNet.classify",
-        "FurtherViews.fuse",
-        "Tracker.conclude",
-    ]
-    places = [text.index(step) for step in steps]
-    assert places == sorted(places)
-
-
 def test_the_example_of_the_library_runs(capsys, tmp_path, monkeypatch):
     (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "library.md").read_text(), re.DOTALL)
     frames = list(SyntheticStream("street", "vlp-16", 0.5, seed=3))

@@ -1,178 +1,118 @@
-"""The step: every stage once, in order, with what the stage before it made."""
+"""The step: what each stage is handed and booked with; golden replays hold what comes out."""
 
 from dataclasses import replace
 from itertools import count
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from modt.app import assembly
 from modt.energy.ledger import Ledger
-from modt.geometry import rotation_zyx, se3
-from modt.observations import Located, observe
-from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING, Pipeline
-from modt.placement import Placement
-from modt.types import NONE, Budget, Frame, TrackedFrame, Tracks
-from tests.results import STATES, proposals
+from modt.geometry import FieldOfView
+from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
+from modt.profile import load
+from modt.types import NONE, Budget
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+
+FRAMES = list(SyntheticStream("street", "vlp-16", 0.4, seed=3))
+CALLS = {
+    "segmenter.segment": SEGMENTATION,
+    "odometry.locate": ODOMETRY,
+    "tracker.follow": TRACKING,
+    "fusion.asks": FUSION,
+    "scheduler.select": SCHEDULING,
+    "classifier.classify": CLASSIFICATION,
+    "fusion.fuse": FUSION,
+    "decision.decide": FUSION,
+    "tracker.conclude": TRACKING,
+}
+"""Calls of a step, in order, and the stages that they are booked on."""
 
 
-class Selected:
-    def __init__(self, rows, deferred):
-        self.rows, self.deferred = np.array(rows, np.int64), deferred
+@pytest.fixture(name="pipe")
+def a_pipeline_that_has_seen_three_frames():
+    pipe = assembly.pipeline(assembly.MODES["accurate"], load("vlp-16"), FieldOfView())
+    for frame in FRAMES[:3]:
+        pipe.step(frame)
+        pipe.ledger.close_frame(frame.index)
+    return pipe
 
 
-class Stages:
-    """All stages in one, which record their calls."""
+class Spy:
+    """A stage whose calls are recorded by their names, with arguments and results; one call may fail."""
 
-    state_names = STATES
+    def __init__(self, stage, name, calls, failing=None):
+        self._stage, self._name, self._calls, self._failing = stage, name, calls, failing
 
-    def __init__(self, choose=lambda asks, budget: np.flatnonzero(asks)):
-        self.calls, self.choose = [], choose
-        self.tracks = Tracks.blank(3)
-        self.tracks.id[:] = [4, 5, 6]
-        self.tracks.proposal[:] = [1, NONE, 0]
-        self.cost = self
+    def __getattr__(self, name):
+        there, called = getattr(self._stage, name), f"{self._name}.{name}"
+        if called not in CALLS:
+            return there
 
-    def segment(self, points):
-        self.calls.append(("segment", len(points)))
-        return proposals([3, 4])
+        def call(*arguments):
+            if called == self._failing:
+                raise ZeroDivisionError
+            result = there(*arguments)
+            self._calls[called] = SimpleNamespace(arguments=arguments, result=result)
+            return result
 
-    def static_tracks(self, stamp_s):
-        self.calls.append(("static_tracks", stamp_s))
-
-    def locate(self, frame, found, static_tracks):
-        self.calls.append(("locate", frame.index, len(found)))
-        static_tracks(frame.stamp_s)
-        placement = Placement(PLACED)
-        return Located(placement, observe(found, placement.T_world_sensor))
-
-    def follow(self, stamp_s, found, located):
-        self.calls.append(("follow", stamp_s, len(found), len(located)))
-        regrouped = found.take(np.array([1, 0]))
-        return TrackedFrame(self.tracks, regrouped, np.array([True, False, True]))
-
-    def asks(self, tracks, found, wants_class):
-        self.calls.append(("asks", found.count.tolist(), wants_class.tolist()))
-        return wants_class
-
-    def select(self, tracks, found, asks, budget):
-        rows = self.choose(asks, budget)
-        self.calls.append(("select", budget))
-        return Selected(rows, int(asks.sum()) - len(rows))
-
-    def size(self, count):
-        return 10 * int(count.sum())
-
-    def paid(self, count, cpu_ms):
-        self.calls.append(("paid", count.tolist(), cpu_ms))
-
-    def classify(self, points, found, which):
-        self.calls.append(("classify", found.count.tolist(), which.tolist()))
-        return np.tile([0.0, 1, 0, 0], (len(which), 1))
-
-    def fuse(self, tracks, found, rows, likelihood):
-        self.calls.append(("fuse", rows.tolist(), likelihood.shape))
-        tracks.posterior[rows] = likelihood
-        return np.arange(len(rows)) == 0
-
-    def decide(self, tracks):
-        self.calls.append(("decide",))
-        tracks.object_class[:] = tracks.posterior.argmax(axis=1)
-
-    def conclude(self, rows, certain):
-        self.calls.append(("conclude", rows.tolist(), certain.tolist()))
-        return self.tracks.copy()
+        return call
 
 
-FRAME = Frame(7, 0.7, np.ones((9, 4), np.float32))
-PLACED = se3(rotation_zyx(0.0, 0.0, 0.3), np.array([4.0, -2.0, 0.1]))
+def spied(pipe, failing=None):
+    """The pipeline, and the calls that it will make."""
+    calls = {}
+    names = {called.partition(".")[0] for called in CALLS}
+    return replace(pipe, **{name: Spy(getattr(pipe, name), name, calls, failing) for name in names}), calls
 
 
-def pipeline(stages):
-    return Pipeline(stages, stages, stages, stages, stages, stages, stages, Ledger())
+def test_every_stage_has_what_the_one_before_it_made(pipe):
+    pipe, calls = spied(pipe)
+    result = pipe.step(FRAMES[3], Budget(calls=5))
+    assert list(calls) == list(CALLS)
+    rows, certain = calls["tracker.conclude"].arguments
+    np.testing.assert_array_equal(rows, calls["scheduler.select"].result.rows)
+    np.testing.assert_array_equal(certain, calls["fusion.fuse"].result)
+    tracked = calls["tracker.follow"].result
+    points, proposals, which = calls["classifier.classify"].arguments
+    assert points is FRAMES[3].points
+    assert proposals is result.proposals is tracked.proposals
+    np.testing.assert_array_equal(which, tracked.tracks.proposal[rows])
+    assert NONE not in which
+    assert 0 < len(result.classified) == len(rows) <= 5
+    assert result.n_deferred == calls["scheduler.select"].result.deferred
+    assert set(pipe.ledger.close_frame(3)["stages"]) == set(STAGES)
 
 
-def test_the_stages_run_once_and_in_order():
-    stages = Stages()
-    pipe = pipeline(stages)
-    result = pipe.step(FRAME, Budget(calls=5))
-    assert stages.calls == [
-        ("segment", 9),
-        ("locate", 7, 2),
-        ("static_tracks", 0.7),
-        ("follow", 0.7, 2, 2),
-        ("asks", [4, 3], [True, False, True]),
-        ("select", Budget(calls=5)),
-        ("classify", [4, 3], [1, 0]),  # the proposals of rows 0 and 2, as regrouped by the tracker
-        ("fuse", [0, 2], (2, 4)),
-        ("decide",),
-        ("conclude", [0, 2], [True, False]),
-    ]
-    assert (len(result.classified), result.n_deferred) == (2, 0)
-    assert result.proposals.count.tolist() == [4, 3]
-    assert result.state_names == STATES
-    np.testing.assert_array_equal(result.T_world_sensor, PLACED)
-    assert set(pipe.ledger.close_frame(7)["stages"]) == set(STAGES)
-
-
-def test_without_a_selection_nothing_is_classified():
-    stages = Stages(choose=lambda asks, budget: [])
-    pipe = pipeline(stages)
-    result = pipe.step(FRAME)
-    assert [c[0] for c in stages.calls] == [
-        "segment", "locate", "static_tracks", "follow", "asks", "select", "decide", "conclude"
-    ]  # fmt: skip
-    assert stages.calls[-1] == ("conclude", [], [])
-    assert (len(result.classified), result.n_deferred) == (0, 2)
-    assert CLASSIFICATION not in pipe.ledger.close_frame(7)["stages"]
+def test_without_a_selection_nothing_is_classified(pipe):
+    pipe, calls = spied(pipe)
+    result = pipe.step(FRAMES[3], Budget(calls=0))
+    assert list(calls) == [name for name in CALLS if name not in {"classifier.classify", "fusion.fuse"}]
+    assert len(result.classified) == 0 < result.n_deferred
+    assert CLASSIFICATION not in pipe.ledger.close_frame(3)["stages"]
 
 
 @pytest.mark.parametrize(
-    ("budget", "learnt"),
-    [
-        (Budget(calls=5), []),
-        (Budget(cpu_ms=9.0), [("paid", [3, 4], 0.25)]),
-        (Budget(mean_ms=9.0), [("paid", [3, 4], 0.25)]),
-    ],
+    ("budget", "learns"), [(Budget(calls=5), False), (Budget(cpu_ms=9.0), True), (Budget(mean_ms=9.0), True)]
 )
-def test_points_are_counted_and_the_cost_model_learns_where_cpu_time_binds(budget, learnt):
-    stages, cpu_ns = Stages(), count(0, 250_000)
-    pipe = replace(pipeline(stages), ledger=Ledger(cpu_ns=lambda: next(cpu_ns)))
-    pipe.step(FRAME, budget)
-    assert [call for call in stages.calls if call[0] == "paid"] == learnt
-    row = pipe.ledger.close_frame(7)["stages"][CLASSIFICATION]
-    assert (row["calls"], row["items"], row["points"]) == (1, 2, 70)
+def test_points_are_counted_and_the_cost_model_learns_where_cpu_time_binds(pipe, budget, learns, monkeypatch):
+    paid, cpu_ns = [], count(0, 250_000)
+    monkeypatch.setattr(pipe.scheduler, "paid", lambda points, cpu_ms: paid.append((points.tolist(), cpu_ms)))
+    pipe, calls = spied(replace(pipe, ledger=Ledger(cpu_ns=lambda: next(cpu_ns))))
+    pipe.step(FRAMES[3], budget)
+    _, proposals, which = calls["classifier.classify"].arguments
+    assert paid == [(proposals.count[which].tolist(), 0.25)] * learns
+    row = pipe.ledger.close_frame(3)["stages"][CLASSIFICATION]
+    size = pipe.scheduler.cost.size(proposals.count[which])
+    assert (row["calls"], row["items"], row["points"]) == (1, len(which), size)
 
 
-def test_a_result_is_independent_of_the_live_tracks():
-    stages = Stages()
-    result = pipeline(stages).step(FRAME)
-    stages.tracks.id[:] = 99
-    assert result.tracks.id.tolist() == [4, 5, 6]
-
-
-@pytest.mark.parametrize(
-    ("call", "stage"),
-    [
-        ("segment", SEGMENTATION),
-        ("locate", ODOMETRY),
-        ("follow", TRACKING),
-        ("asks", FUSION),
-        ("select", SCHEDULING),
-        ("classify", CLASSIFICATION),
-        ("fuse", FUSION),
-        ("conclude", TRACKING),
-    ],
-)
-def test_every_call_is_booked_on_its_stage_even_if_it_fails(call, stage):
-    def fail(*arguments):
-        raise ZeroDivisionError
-
-    healthy, failing = pipeline(Stages()), Stages()
-    setattr(failing, call, fail)
-    pipe = pipeline(failing)
+@pytest.mark.parametrize(("call", "stage"), CALLS.items())
+def test_every_call_is_booked_on_its_stage_even_if_it_fails(pipe, call, stage):
+    pipe, calls = spied(pipe, failing=call)
     with pytest.raises(ZeroDivisionError):
-        pipe.step(FRAME)
-    booked = pipe.ledger.close_frame(7)["stages"]
-    assert booked[stage]["calls"] == 1 + (call in {"fuse", "conclude"})
-    healthy.step(FRAME)
-    assert set(booked) <= set(healthy.ledger.close_frame(7)["stages"])
+        pipe.step(FRAMES[3])
+    booked = pipe.ledger.close_frame(3)["stages"]
+    assert booked[stage]["calls"] == 1 + sum(CALLS[name] == stage for name in calls)
+    assert set(booked) == {stage, *(CALLS[name] for name in calls)}

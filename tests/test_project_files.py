@@ -12,7 +12,6 @@ import yaml
 from packaging.requirements import Requirement
 
 import modt
-from modt.errors import install
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -21,7 +20,6 @@ else:
 
 ROOT = Path(__file__).resolve().parents[1]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-YAML = [*sorted((ROOT / ".github").rglob("*.yml")), ROOT / ".pre-commit-config.yaml", ROOT / "CITATION.cff"]
 
 PROJECT_FILE = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PROJECT = PROJECT_FILE["project"]
@@ -40,7 +38,7 @@ def commands(target: str) -> set[str]:
 
 def test_make_quick_runs_every_test_once_that_none_of_its_markers_leaves_out():
     text = (ROOT / "Makefile").read_text()
-    registered = {line.partition(":")[0] for line in pytest_options()["markers"]}
+    registered = {line.partition(":")[0] for line in PROJECT_FILE["tool"]["pytest"]["ini_options"]["markers"]}
     assert set(re.findall(r"not (\w+)", text)) == registered
     folders = re.search(r"^ONE +:= (.*)$", text, re.MULTILINE)[1].split()
     assert all((ROOT / folder).is_dir() for folder in folders)
@@ -48,35 +46,21 @@ def test_make_quick_runs_every_test_once_that_none_of_its_markers_leaves_out():
     assert commands("quick-other") == {"$(QUICK) tests $(ONE:%=--ignore=%)"}
 
 
-def pytest_options():
-    return PROJECT_FILE["tool"]["pytest"]["ini_options"]
-
-
 def parsed(path: Path):
     return yaml.safe_load(path.read_text())
 
 
-@pytest.mark.parametrize("path", YAML, ids=lambda p: p.name)
-def test_yaml_is_a_mapping(path):
-    assert isinstance(parsed(path), dict)
-
-
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.name)
-def test_workflows_run_the_two_commands_from_the_lowest_python_on(path):
-    lowest = PROJECT["requires-python"].removeprefix(">=")
-    for job in parsed(path)["jobs"].values():
+def test_workflows_run_the_two_commands_from_the_lowest_python_on_and_may_only_read(path):
+    lowest, workflow = PROJECT["requires-python"].removeprefix(">="), parsed(path)
+    assert workflow["permissions"] == {"contents": "read"}
+    for job in workflow["jobs"].values():
         pythons = [tuple(map(int, version.split("."))) for version in job["strategy"]["matrix"]["python"]]
         assert min(pythons) == tuple(map(int, lowest.split(".")))
         assert [step["run"] for step in job["steps"] if "run" in step] == ["make replay", "make test"]
-
-
-@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.name)
-def test_workflows_may_only_read_and_pin_what_they_use(path):
-    workflow = parsed(path)
-    assert workflow["permissions"] == {"contents": "read"}
-    used = [step["uses"] for job in workflow["jobs"].values() for step in job["steps"] if "uses" in step]
-    assert used
-    assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@v\d+", action)] == []
+        used = [step["uses"] for step in job["steps"] if "uses" in step]
+        assert used
+        assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@v\d+", action)] == []
 
 
 def test_hooks_run_what_make_test_runs_before_pytest():
@@ -98,19 +82,13 @@ def test_the_lock_of_the_service_holds_each_dependency_within_its_bounds_and_wit
         assert all(version in requirement.specifier for version in versions)
 
 
-def test_citation_names_this_version_and_the_paper():
+def test_citation_and_changelog_name_this_version_and_the_paper():
     citation = parsed(ROOT / "CITATION.cff")
-    assert citation["version"] == modt.__version__
+    heading = re.search(r"^## \[(.+)\] - ", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert heading[1] == citation["version"] == modt.__version__
     (paper,) = citation["references"]
     assert paper["title"] in " ".join((ROOT / "README.md").read_text().split())
     assert [author["family-names"] for author in paper["authors"]] == ["Li", "Guivant"]
-
-
-def test_changelog_begins_with_this_version():
-    text = (ROOT / "CHANGELOG.md").read_text()
-    heading = re.search(r"^## \[(.+)\] - (unreleased|\d{4}-\d\d-\d\d)$", text, re.MULTILINE)
-    assert heading
-    assert heading[1] == modt.__version__
 
 
 def test_no_text_installs_modt_from_an_index_where_nobody_has_published_it():
@@ -124,4 +102,3 @@ def test_the_remedy_for_a_missing_extra_names_one_that_exists():
     extras = PROJECT["optional-dependencies"]
     code = "".join(p.read_text() for f in ("runtime", "tools") for p in (ROOT / f).rglob("*.py"))
     assert set(re.findall(r"\binstall\([\"'](\w+)[\"']\)", code)) <= set(extras)
-    assert install("view") == "pip install '.[view]' in a clone of modt, or 'FILE.whl[view]' of its wheel"

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from modt.app.assembly import chosen_kernels
-from modt.cli import main, profile, profile_group
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import environment
 
@@ -74,15 +73,3 @@ def test_no_frame_loads_scipy(command, tmp_path):
     modules = loaded(command, "scans", "--core", "none", "--out", "out", cwd=tmp_path)
     assert "modt.sensor_fit.recognition" in modules
     assert [name for name in modules if name.startswith("scipy")] == []
-
-
-@pytest.mark.parametrize(
-    ("module", "of_the_desk"),
-    [
-        (main, {"view", "evaluate", "export", "simulate", "track", "completion", "service"}),
-        (profile_group, {"fit", "schema"}),
-        (profile, {"calibrate", "report", "compare", "predict"}),
-    ],
-)
-def test_the_desks_commands_are_told_by_their_module(module, of_the_desk):
-    assert {name for name, path in module.COMMANDS.items() if path.startswith("modt_desk.")} == of_the_desk

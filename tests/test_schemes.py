@@ -1,7 +1,9 @@
 """Addresses lead to the opener of their scheme."""
 
+import re
 import sys
 import threading
+from types import SimpleNamespace
 
 import pytest
 
@@ -60,48 +62,28 @@ def test_what_is_no_address_of_a_sensor_is_refused(text):
         ("udp://no.such.host.invalid:9", "unknown host"),
         ("unix://", "unix:///PATH"),
         ("unix:///" + 110 * "a", "107"),
-    ],
-)
-def test_what_is_no_address_of_a_sink_is_one_line(text, part):
-    with pytest.raises(MisuseError) as caught:
-        open_sink(text)
-    assert part in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "part"),
-    [
         ("mcap://", "mcap:///PATH"),
         ("mcap:///tmp/a.mcap?max_mb=much", "max_mb"),
         ("mcap:///tmp/a.mcap?points=some", "points=all"),
         ("foxglove://no.such.host.invalid:1", "cannot be bound"),
     ],
 )
-def test_what_is_no_address_of_a_picture_is_one_line(text, part):
-    pytest.importorskip("foxglove")
-    with pytest.raises(MisuseError) as caught:
+def test_what_is_no_address_of_a_sink_is_refused_with_what_is_wrong(text, part):
+    if text.startswith(("mcap", "foxglove")):
+        pytest.importorskip("foxglove")
+    with pytest.raises(MisuseError, match=re.escape(part)):
         open_sink(text)
-    assert part in str(caught.value)
 
 
 def test_a_sink_that_may_wait_is_written_in_the_background(monkeypatch):
-    class Plain:
-        def __init__(self):
-            self.frames = []
-
-        def write(self, result):
-            self.frames.append((threading.current_thread().name, result))
-
-        def close(self):
-            pass
-
-    made = Plain()
-    opener = lambda address: schemes._in_background(address, made, 2)  # noqa: E731
+    threads = []
+    plain = SimpleNamespace(write=lambda _: threads.append(threading.current_thread().name), close=lambda: None)
+    opener = lambda address: schemes._in_background(address, plain, 2)  # noqa: E731
     monkeypatch.setitem(SINKS, "plain", Scheme("plain://", opener))
     sink = open_sink("plain://")
     sink.write("frame")
     sink.close()
-    assert made.frames == [("sink", "frame")]
+    assert threads == ["sink"]
     assert sink.health()["written"] == 1
 
 

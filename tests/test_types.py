@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classes import N_CLASSES
-from modt.types import NONE, Proposals, Tracks
+from modt.types import NONE, Tracks
 from tests.results import proposals
 
 
@@ -33,12 +32,6 @@ def test_some_of_the_proposals(counts, data):
     np.testing.assert_array_equal(some.box, found.box[which])
 
 
-def test_no_proposals():
-    empty = Proposals.empty()
-    assert len(empty) == 0
-    assert empty.label(4).tolist() == [NONE] * 4
-
-
 @given(st.lists(st.booleans(), max_size=6), st.integers(0, 5))
 def test_tracks_are_renewed_in_every_column(kept, n):
     tracks = Tracks.blank(len(kept))
@@ -51,20 +44,6 @@ def test_tracks_are_renewed_in_every_column(kept, n):
         np.testing.assert_array_equal(column, np.concatenate([getattr(tracks, name)[rows], getattr(blank, name)]))
     assert (renewed.id[len(rows) :] == NONE).all()
     assert {name for name, _ in renewed.columns()} == {f.name for f in dataclasses.fields(Tracks)}
-
-
-def test_a_blank_track_knows_nothing():
-    blank = Tracks.blank(2)
-    assert blank.posterior.tolist() == [[1 / N_CLASSES] * N_CLASSES] * 2
-    assert blank.proposal.tolist() == [NONE, NONE]
-    assert not blank.final.any()
-
-
-def test_a_copy_is_independent():
-    first = Tracks.blank(1)
-    second = first.copy()
-    second.id[0] = 7
-    assert first.id[0] == NONE
 
 
 def test_rows_by_proposal():

@@ -1,17 +1,18 @@
 """Feed the pipeline with random sequences of frames, and check its promises after each.
 
     python -m tools.sequences --n 10000 --seed 1
-    python -m tools.sequences --n 1000 --live
+    python -m tools.sequences --live hesai livox --seconds 1800
 
 Frames are empty, huge, repeated, late or not finite; poses leap, clocks are set, sensors change in mid-run. With
---live the input is packets, clouds and poses, thousands in a sequence. They are lost, forged or late on their way to
-the loop of a robot, whose process is stopped at times. The first broken promise is printed with the shortest sequence
-that breaks it; then the exit status is 1.
+--live the input is packets of a maker or clouds, and poses, thousands in a sequence. They are lost, forged or late on
+their way to the loop of a robot, whose process is stopped at times. The first broken promise is printed with the
+shortest sequence that breaks it; then the exit status is 1.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import sys
 import time
 import warnings
@@ -27,21 +28,29 @@ def main() -> None:
     options.add_argument("--n", type=int, default=1000, help="sequences (default: %(default)s)")
     options.add_argument("--steps", type=int, default=25, help="longest sequence (default: %(default)s)")
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--live", action="store_true", help="packets, clouds and poses instead of frames")
+    options.add_argument("--seconds", type=float, default=math.inf, help="CPU time after which no block begins")
+    options.add_argument("--live", nargs="*", metavar="SOURCE", help="live inputs instead of frames; default: all")
     given = options.parse_args()
     from hypothesis import HealthCheck, Phase, seed, settings
     from hypothesis.stateful import run_state_machine_as_test
 
-    if given.live:
+    if given.live is not None:
+        from tests.sequences.live_machine import SOURCES
         from tests.sequences.live_machine import LiveSequences as Sequences
+
+        if unknown := set(given.live) - set(SOURCES):
+            options.error(f"no source {', '.join(sorted(unknown))}; there are {', '.join(SOURCES)}")
+        SOURCES[:] = given.live or SOURCES
     else:
         from tests.sequences.machine import Sequences  # type: ignore[assignment]
 
     warnings.simplefilter("error")
     logging.lastResort = None
-    logging.disable(logging.CRITICAL if not given.live else logging.NOTSET)
-    began_s, block = time.monotonic(), 20 if given.live else BLOCK
+    logging.disable(logging.CRITICAL if given.live is None else logging.NOTSET)
+    began_s, block = time.monotonic(), BLOCK if given.live is None else 20
     for done in range(0, given.n, block):
+        if time.process_time() > given.seconds:
+            break
         chosen = settings(
             max_examples=min(block, given.n - done),
             stateful_step_count=given.steps,

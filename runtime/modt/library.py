@@ -95,6 +95,13 @@ class TrackedObjects:
         named = ", ".join(f"{n} {name}" for n, name in zip(counts, CLASS_NAMES, strict=True) if n)
         return f"<{len(self)} tracked objects: {named or 'none'}; {np.count_nonzero(self.visible)} visible>"
 
+    def _repr_html_(self) -> str:
+        """Table of the rows, for notebooks."""
+        names = "id", "object_class", "final", "points", "age", "speed_mps"
+        rows = [[f"{row[n]:.1f}" if n == "speed_mps" else str(row[n]) for n in names] for row in self.as_dicts()]
+        cells = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in rows)
+        return f"<table><tr><th>{'</th><th>'.join(names)}</th></tr>{cells}</table>"
+
     def take(self, rows: Int | Bool) -> Self:
         """Rows selected by index or mask."""
         return replace(self, **{name: column[rows] for name, column in self._columns().items()})
@@ -144,6 +151,9 @@ class Pipeline:
         self._asked: profile.Names | ProfileConfig = config
         self._use(config)
         self._index, self._stamp_s, self._warned = 0, -math.inf, False
+
+    def __repr__(self) -> str:
+        return f"<pipeline in mode {self.mode} after {self._index} frames>"
 
     def _use(self, config: ProfileConfig) -> None:
         chosen = assembly.MODES[self.mode]

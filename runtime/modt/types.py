@@ -65,6 +65,10 @@ class Frame:
     R_level_sensor: Float64 | None = None
     frame_id: str = ""
 
+    def __repr__(self) -> str:
+        pose = "no" if self.T_world_sensor is None else "its"
+        return f"<frame {self.index} at {self.stamp_s:.3f} s: {len(self.points)} points, {pose} pose>"
+
     @property
     def time_s(self) -> float:
         """Time by which durations are measured [s]."""
@@ -166,6 +170,22 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
     )
 
 
+def regrouped(members: Int, coordinates: Float32, piece: Int, number: Int, n: int) -> tuple[Int, Float32, Int]:
+    """(K,) members and their (3, K) coordinates in n groups, in their order within a group, and (n,) count of each.
+
+    Args:
+        members: (K,) of the proposals.
+        coordinates: (3, K) of them.
+        piece: (K,) to which each belongs.
+        number: of the group of each piece.
+        n: number of groups.
+    """
+    # Sixteen bits hold every number of a proposal, and are sorted by radix.
+    group = number.take(piece)
+    order = group.astype(np.uint16).argsort(kind="stable")
+    return members.take(order), coordinates.take(order, axis=1), np.bincount(group, minlength=n)
+
+
 def column(kind: type, *shape: int, fill: float = 0) -> Any:
     """Column of a track table: type and shape of an entry, and its value in a new row."""
     return field(metadata={"blank": np.full(shape, fill, kind)})
@@ -189,7 +209,8 @@ class Tracks:
     missed: Int = column(int)  # frames since the last proposal
     moved_m: Float64 = column(float)  # displacement within about two seconds, as far as both ends show it
     observed_s: Float64 = column(float)  # from the first proposal to the last
-    length_m: Float64 = column(float)  # greatest extent seen
+    size_m: Float64 = column(float, 3)  # length, width and height, as large as they were seen for some frames
+    hidden: Bool = column(bool)  # a person of whom the view cuts off the upper half
     # Columns of the fusion
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen
     posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, boxes, motion)

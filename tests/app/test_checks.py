@@ -1,5 +1,7 @@
 """Checks before the first frame: each outcome has its line and, where something is wrong, a remedy."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,27 +14,91 @@ from modt.sources.live.live_stream import LiveStream
 from modt.sources.stream import Reception, StreamInfo, Sweep
 
 
-def sysfs(root, **files):
-    for path, text in files.items():
-        file = root / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text)
-    return root
+def core(sys, isolated, number):
+    (sys / "devices/system/cpu").mkdir(parents=True)
+    (sys / "devices/system/cpu/isolated").write_text(isolated)
+    return checks.core(number, sys)
+
+
+def governor(sys, name):
+    folder = sys / "devices/system/cpu/cpu3/cpufreq"
+    folder.mkdir(parents=True)
+    (folder / "scaling_governor").write_text(f"{name}\n")
+    return checks.governor(3, sys)
+
+
+def candidate(kind, why_not="", remedy=""):
+    facts = Facts(name=str(kind), unit="J", resolution=1.0, max_W=1.0, scope=Scope.CPU, kind=kind)
+    return Candidate(str(kind), (Meter(facts, lambda: 0.0),), why_not, remedy)
+
+
+def refuse():
+    raise MisuseError("a.onnx", "hash differs", "install it again")
+
+
+def disk(folder, free_bytes, **recording):
+    config = ProfileConfig(recording=RecordingConfig(disk_mb=100, **recording))
+    found = checks.disk(folder / "a" / "b", config, lambda _: int(free_bytes))
+    assert not (folder / "a").exists()
+    return found
+
+
+def near(height_m, **sensor):
+    return checks.near(SensorConfig(height_m=height_m, **sensor))
+
+
+def sensor(sweeps, messages, **refused):
+    waiting = [sweeps]
+    reader = SimpleNamespace(profile=None, reception=Reception(messages, 0, refused), close=lambda: None)
+    reader.read = lambda timeout_s: waiting.pop() if waiting else []
+    info = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
+    (found,) = checks.sensor(lambda: LiveStream(info, reader), 0.3)
+    return found
+
+
+MEASURED, ESTIMATED = candidate(Kind.MEASURED), candidate(Kind.ESTIMATED)
+DENIED = candidate(Kind.MEASURED, "Permission denied", "grant CAP_DAC_READ_SEARCH")
+SWEEP = Sweep(1.0, np.full((10, 4), 0.5, np.float32))
 
 
 @pytest.mark.parametrize(
-    ("isolated", "number", "level"), [("1-3\n", 2, "ok"), ("\n", 2, "warn"), ("1-3\n", None, "warn")]
+    ("check", "level", "words"),
+    [
+        (lambda sys: core(sys, "1-3\n", 2), "ok", ""),
+        (lambda sys: core(sys, "\n", 2), "warn", ""),
+        (lambda sys: core(sys, "1-3\n", None), "warn", ""),
+        (lambda sys: governor(sys, "performance"), "ok", ""),
+        (lambda sys: governor(sys, "powersave"), "warn", "powersave"),
+        (lambda sys: checks.governor(3, sys), "ok", ""),
+        (lambda _: checks.meters(Discovery((MEASURED, ESTIMATED))), "ok", ""),
+        (lambda _: checks.meters(Discovery((ESTIMATED, DENIED))), "warn", "grant CAP_DAC_READ_SEARCH"),
+        (lambda _: checks.meters(Discovery((ESTIMATED,))), "warn", ""),
+        (lambda _: checks.model(ClassificationConfig(), lambda: {"sha256": "0123456789abcdef"}), "ok", ""),
+        (lambda _: checks.model(ClassificationConfig(), refuse), "fail", "a.onnx: hash differs; install it again"),
+        (lambda out: disk(out, 2e8), "ok", ""),
+        (lambda out: disk(out, 5e7), "warn", ""),
+        (lambda out: disk(out, 5e7, keep="none"), "ok", ""),
+        (lambda _: checks.clock(0, None), "ok", ""),
+        (lambda _: checks.clock(5, None), "warn", ""),
+        (lambda _: checks.clock(0, 1000.0), "fail", ""),
+        (lambda _: near(0.3, elevation_span_deg=(-15.0, 15.0)), "warn", "from 1.1 m on"),
+        (lambda _: near(0.5, elevations_deg=(-25.0, 0.0, 25.0)), "ok", "from 0.7 m on"),
+        (lambda _: near(0.3), "ok", "not known"),
+        (lambda _: near(None, elevation_span_deg=(-15.0, 15.0)), "ok", "not known"),
+        (lambda _: near(5.0, elevation_span_deg=(-5.0, 15.0)), "ok", "not known"),
+        (lambda _: sensor([SWEEP], 1), "ok", "a sweep of 10 points"),
+        (lambda _: sensor([], 0), "fail", "nothing received"),
+        (lambda _: sensor([], 20, short=20), "fail", "only unusable messages (short)"),
+        (lambda _: sensor([], 20), "fail", "but no sweep"),
+        (lambda _: checks.sensor(refuse)[0], "fail", "a.onnx: hash differs; install it again"),
+        (lambda _: checks.kernels(refuse), "fail", "install it again"),
+    ],
 )
-def test_a_core_is_isolated_or_not(tmp_path, isolated, number, level):
-    sys = sysfs(tmp_path, **{"devices/system/cpu/isolated": isolated})
-    assert checks.core(number, sys).level == level
-
-
-@pytest.mark.parametrize(("name", "level"), [("performance", "ok"), ("powersave", "warn"), (None, "ok")])
-def test_a_governor_that_saves_power_is_warned_of(tmp_path, name, level):
-    path = "devices/system/cpu/cpu3/cpufreq/scaling_governor"
-    sys = sysfs(tmp_path, **({path: f"{name}\n"} if name else {}))
-    assert checks.governor(3, sys).level == level
+def test_each_outcome_has_its_level_and_what_is_wrong_its_remedy(check, level, words, tmp_path):
+    found = check(tmp_path)
+    assert found.level == level
+    assert words in str(found)
+    assert found.remedy or level == "ok"
 
 
 @pytest.mark.parametrize(
@@ -45,98 +111,3 @@ def test_each_missing_permission_has_its_line(monkeypatch, loop, receiver, level
     found = checks.permissions()
     assert [f.level for f in found] == levels
     assert all(f.remedy for f in found if f.level != "ok")
-
-
-def candidate(kind, why_not="", remedy=""):
-    facts = Facts(name=str(kind), unit="J", resolution=1.0, max_W=1.0, scope=Scope.CPU, kind=kind)
-    return Candidate(str(kind), (Meter(facts, lambda: 0.0),), why_not, remedy)
-
-
-def test_an_estimate_is_warned_of_with_the_remedy_of_the_meter_that_is_denied():
-    assert checks.meters(Discovery((candidate(Kind.MEASURED), candidate(Kind.ESTIMATED)))).level == "ok"
-    denied = candidate(Kind.MEASURED, "Permission denied", "grant CAP_DAC_READ_SEARCH")
-    found = checks.meters(Discovery((candidate(Kind.ESTIMATED), denied)))
-    assert (found.level, found.remedy) == ("warn", "grant CAP_DAC_READ_SEARCH")
-    assert checks.meters(Discovery((candidate(Kind.ESTIMATED),))).level == "warn"
-
-
-def test_a_model_that_differs_from_its_card_fails():
-    def refuse():
-        raise MisuseError("a.onnx", "hash differs", "install it again")
-
-    config = ClassificationConfig()
-    assert checks.model(config, lambda: {"sha256": "0123456789abcdef"}).level == "ok"
-    assert checks.model(config, refuse) == checks.Finding("fail", "model", "a.onnx: hash differs", "install it again")
-
-
-def test_a_disk_with_less_room_than_the_records_take_is_warned_of(tmp_path):
-    out, config = tmp_path / "a" / "b", ProfileConfig(recording=RecordingConfig(disk_mb=100))
-    assert checks.disk(out, config, lambda _: int(2e8)).level == "ok"
-    assert checks.disk(out, config, lambda _: int(5e7)).level == "warn"
-    none = ProfileConfig(recording=RecordingConfig(keep="none", disk_mb=100))
-    assert checks.disk(out, none, lambda _: int(5e7)).level == "ok"
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(("state", "now_s", "level"), [(0, None, "ok"), (5, None, "warn"), (0, 1000.0, "fail")])
-def test_a_clock_is_set_and_synchronised_or_not(state, now_s, level):
-    assert checks.clock(state, now_s).level == level
-
-
-class Reader:
-    def __init__(self, sweeps, messages=0, refused=None):
-        self.reception = Reception(messages, 0, refused or {})
-        self.sweeps = sweeps
-
-    profile = None
-
-    def read(self, timeout_s):
-        sweeps, self.sweeps = self.sweeps, []
-        return sweeps
-
-    def close(self):
-        pass
-
-
-SWEEP = Sweep(1.0, np.full((10, 4), 0.5, np.float32))
-
-
-@pytest.mark.parametrize(
-    ("reader", "level", "said"),
-    [
-        (Reader([SWEEP], 1), "ok", "a sweep of 10 points"),
-        (Reader([]), "fail", "nothing received"),
-        (Reader([], 20, {"too short": 20}), "fail", "only unusable messages (too short)"),
-        (Reader([], 20), "fail", "but no sweep"),
-    ],
-)
-def test_a_sensor_is_heard_or_not(reader, level, said):
-    info = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
-    (found,) = checks.sensor(lambda: LiveStream(info, reader), 0.3)
-    assert found.level == level
-    assert said in found.what
-    assert found.remedy or level == "ok"
-
-
-def test_a_sensor_that_cannot_be_opened_fails_with_the_remedy():
-    def refuse():
-        raise MisuseError("udp://x", "port taken", "give a free port")
-
-    assert checks.sensor(refuse) == [checks.Finding("fail", "sensor", "udp://x: port taken", "give a free port")]
-
-
-@pytest.mark.parametrize(
-    ("sensor", "level", "said"),
-    [
-        ({"height_m": 0.3, "elevation_span_deg": (-15.0, 15.0)}, "warn", "from 1.1 m on"),
-        ({"height_m": 0.5, "elevation_span_deg": (-7.0, 52.0)}, "ok", "from 0.5 m on"),
-        ({"height_m": 0.5, "elevations_deg": (-25.0, 0.0, 25.0)}, "ok", "from 0.7 m on"),
-        ({"height_m": 0.3}, "ok", "not known"),
-        ({"height_m": None, "elevation_span_deg": (-15.0, 15.0)}, "ok", "not known"),
-        ({"height_m": 5.0, "elevation_span_deg": (-5.0, 15.0)}, "ok", "not known"),
-    ],
-)
-def test_how_much_is_seen_of_people_near_the_sensor_is_said(sensor, level, said):
-    found = checks.near(SensorConfig(**sensor))
-    assert found.level == level
-    assert said in str(found)

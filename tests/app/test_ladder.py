@@ -30,38 +30,28 @@ class Frames:
         return self
 
 
-def test_overruns_step_up_one_at_a_time_to_the_last_step():
-    frames = Frames().run(0.5, 1.2)
-    assert frames.changes == [(0.1, Step.DEFERRED), (0.2, Step.REDUCED), (0.3, Step.DROPPED)]
+UP = [Step.DEFERRED, Step.REDUCED, Step.DROPPED]
 
 
-def test_a_step_that_is_enough_is_the_last_one():
-    frames = Frames().run(0.5, lambda step: 1.1 if step < Step.REDUCED else 0.85)
-    assert frames.ladder.step is Step.REDUCED
-
-
-def test_a_second_of_ample_slack_gives_everything_back():
-    frames = Frames().run(0.5, 1.2)
-    frames.run(1.0, 0.3)
-    assert frames.ladder.step is Step.ALL
-    assert frames.changes[-1][0] - 0.5 <= 1.0
-
-
-def test_slack_that_becomes_ample_gives_everything_back_as_soon():
-    frames = Frames().run(0.3, 1.2).run(0.2, 0.75).run(CALM_S + 0.1, 0.3)
-    assert [step for _, step in frames.changes[3:]] == [Step.REDUCED, Step.ALL]
-
-
-def test_little_slack_is_tried_step_by_step():
-    frames = Frames().run(0.3, 1.2).run(5.0, 0.7)
-    assert [step for _, step in frames.changes[3:]] == [Step.REDUCED, Step.DEFERRED, Step.ALL]
-    times = [at for at, _ in frames.changes[2:]]
+@pytest.mark.parametrize(
+    ("parts", "steps"),
+    [
+        ([(0.5, 1.2)], UP),
+        ([(0.5, lambda step: 1.1 if step < Step.REDUCED else 0.85)], UP[:2]),
+        ([(0.3, 1.2), (60.0, 0.9)], UP),
+        ([(0.5, 1.2), (1.0, 0.3)], [*UP, Step.ALL]),
+        ([(0.3, 1.2), (0.2, 0.75), (CALM_S + 0.1, 0.3)], [*UP, Step.REDUCED, Step.ALL]),
+        ([(0.3, 1.2), (5.0, 0.7)], [*UP, Step.REDUCED, Step.DEFERRED, Step.ALL]),
+    ],
+    ids=["overruns", "enough", "no slack", "ample slack", "slack that becomes ample", "little slack"],
+)
+def test_overruns_step_up_one_at_a_time_and_slack_steps_back(parts, steps):
+    frames = Frames()
+    for seconds, share in parts:
+        frames.run(seconds, share)
+    assert [step for _, step in frames.changes] == steps
+    times = [at for at, step in frames.changes[2:] if step is not Step.ALL]
     assert all(b - a >= CALM_S - 0.01 for a, b in itertools.pairwise(times))
-
-
-def test_no_slack_gives_nothing_back():
-    frames = Frames().run(0.3, 1.2).run(60.0, 0.9)
-    assert frames.ladder.step is Step.DROPPED
 
 
 def test_trials_that_fail_become_rare():
@@ -83,13 +73,6 @@ def test_a_power_limit_is_kept_by_the_same_steps():
         frames.ladder.power(frames.now, watts)
     assert over < 20  # of 120 windows: the first ones, and trials
     assert frames.ladder.step in (Step.DEFERRED, Step.REDUCED)
-
-
-def test_below_the_limit_nothing_happens_and_without_one_neither():
-    for limit_W in (10.0, None):
-        frames = Frames(limit_W)
-        assert frames.ladder.power(0.0, 5.0) is None
-        assert frames.ladder.step is Step.ALL
 
 
 def test_the_budget_is_the_time_that_is_left_or_less():

@@ -9,7 +9,7 @@ import pytest
 
 from modt import profile
 from modt.app.inputs import Request
-from modt.app.stages import RANGE_SHARE, SensorWatch, Stages, within
+from modt.app.stages import RANGE_SHARE, SWEEPS, SensorWatch, Stages, within
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED, Frame
@@ -31,55 +31,29 @@ CALLS = ("segmenter.segment", "odometry.locate", "tracker.follow", "fusion.asks"
 CALLS += ("classifier.classify", "fusion.fuse", "decision.decide", "tracker.conclude")
 
 
-class Broken:
-    """A stage of which one method fails, before or after it has done its work."""
-
-    def __init__(self, stage, method, after):
-        self._stage, self._method, self._after = stage, method, after
-
-    def __getattr__(self, name):
-        real = getattr(self._stage, name)
-        if name != self._method:
-            return real
-
-        def fail(*arguments):
-            if self._after:
-                real(*arguments)
-            raise RuntimeError(name)
-
-        return fail
-
-
-def broken(pipeline, call, after):
-    stage, method = call.split(".")
-    return dataclasses.replace(pipeline, **{stage: Broken(getattr(pipeline, stage), method, after)})
-
-
-@cache
-def undisturbed():
-    """Numbers of the tracks of each frame where nothing fails."""
-    stages = stages_of()
-    return {f.index: set(stages.step(f, UNLIMITED, reduced=False).tracks.id.tolist()) for f in frames()}
-
-
 @pytest.mark.parametrize("after", [False, True], ids=["before its work", "after it"])
 @pytest.mark.parametrize("call", CALLS)
-def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after):
-    stages, failures = stages_of(), 0
-    ids, whole = {}, undisturbed()
-    for frame in frames():
-        pipeline = stages.pipeline
-        if frame.index in (8, 9):
-            stages.pipeline = broken(pipeline, call, after)
-        try:
-            result = stages.step(frame, UNLIMITED, reduced=False)
-        except RuntimeError:
-            failures += 1
-            stages.pipeline = pipeline
-            stages.recover(anew=False)
-            continue
-        finally:
-            stages.pipeline = pipeline
+def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after, monkeypatch):
+    stages, failures, ids = stages_of(), 0, {}
+    stage, method = call.split(".")
+    real = getattr(getattr(stages.pipeline, stage), method)
+
+    def fail(*arguments):
+        if after:
+            real(*arguments)
+        raise RuntimeError(call)
+
+    for frame in frames()[:12]:
+        with monkeypatch.context() as patch:
+            if frame.index in (8, 9):
+                patch.setattr(getattr(stages.pipeline, stage), method, fail)
+            try:
+                result = stages.step(frame, UNLIMITED, reduced=False)
+            except RuntimeError:
+                failures += 1
+                patch.undo()
+                stages.recover(anew=False)
+                continue
         tracks = result.tracks
         ids[frame.index] = set(tracks.id.tolist())
         assert len(ids[frame.index]) == len(tracks)
@@ -87,14 +61,14 @@ def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after):
         assert sorted(owned.tolist()) == list(range(len(result.proposals)))
         assert np.isfinite(tracks.x).all()
     assert failures in (1, 2)  # a call that no track asks for is not made
-    assert len(ids[7] & ids[10]) >= 0.8 * len(whole[7] & whole[10])
+    assert len(ids[7] & ids[10]) >= 0.7 * len(ids[7])
 
 
 @pytest.mark.parametrize("posed", [False, True])
 def test_a_clock_that_steps_costs_no_track(posed):
     steady, stepping = stages_of(), stages_of()
     pose = np.eye(4) if posed else None
-    for given in frames():
+    for given in frames()[:15]:
         frame = dataclasses.replace(given, T_world_sensor=pose, steady_s=given.stamp_s)
         expected = steady.step(frame, UNLIMITED, reduced=False)
         step_s = 3600.0 * (frame.index >= 6) - 7200.0 * (frame.index >= 12)
@@ -132,30 +106,14 @@ def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
     stages.step(frames()[9], stages.budget, reduced=False)
 
 
-def test_a_reload_keeps_the_tilt_that_the_first_sweep_showed():
+def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
     tilted = SyntheticStream("yard", "vlp-16", 0.2, 3, mount_deg=(0.0, 12.0))
-    stages = stages_of()
-    first, second = tilted
-    stages.recognise(first)
-    results = [stages.step(frame, stages.budget, reduced=False) for frame in (first, second)]
-    pitch_deg = stages.config.sensor.pitch_deg
-    assert pitch_deg == pytest.approx(12.5, abs=1.0)
-    assert results[0].frame.R_level_sensor is not None
-    stages.reload()
-    assert stages.config.sensor.pitch_deg == pitch_deg
-
-
-def test_a_profile_that_fits_keeps_its_stages():
-    stages = stages_of()
-    made = stages.pipeline
-    stages.recognise(frames()[0])
-    assert stages.pipeline is made
-
-
-def test_a_reload_keeps_what_the_first_sweep_has_shown():
     stages = stages_of(profile=None)
-    stages.recognise(frames()[0])
+    first, _ = tilted
+    stages.recognise(first)
     sensor, made = stages.config.sensor, stages.pipeline
+    assert sensor.pitch_deg == pytest.approx(12.5, abs=1.0)
+    assert stages.step(first, stages.budget, reduced=False).frame.R_level_sensor is not None
     stages.reload()
     assert stages.config.sensor == sensor
     assert stages.pipeline is not made
@@ -204,3 +162,20 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
     stages.watch(Frame(100, 10.0, few))
     stages.looking.join()
     assert looks[1:] == [100]  # what it could not look at meanwhile
+
+
+@pytest.mark.parametrize(
+    ("sizes", "noticed"),
+    [
+        ([800] * 20 + [200] * 30, [20 + SWEEPS - 1]),
+        ([200] * 20 + [800] * 30, [20 + SWEEPS - 1]),
+        (([800] * 5 + [100] * (SWEEPS - 1)) * 5, []),
+        ([0] * 50, []),
+        (np.linspace(800, 500, 200).astype(int).tolist(), []),
+    ],
+    ids=["fewer", "more", "for a moment", "none", "gradual"],
+)
+def test_sweeps_of_another_size_are_noticed_once_when_they_stay(sizes, noticed):
+    watch, points = SensorWatch(), np.zeros((1000, 4), np.float32)
+    points[:, 0] = 5.0
+    assert [k for k, size in enumerate(sizes) if watch.unlike(points[:size])] == noticed

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
-from modt.types import Float32, Proposals, Tracks
+from modt.pipeline import Fusion
+from modt.types import Bool, Float32, Int, Proposals, Tracks
 
 
 def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposals]:
@@ -29,5 +32,34 @@ def new_tracks(proposals: Proposals) -> Tracks:
     tracks = Tracks.blank(n)
     tracks.id, tracks.proposal = np.arange(n), np.arange(n)
     tracks.points, tracks.box = proposals.count.copy(), proposals.box.copy()
+    tracks.size_m = proposals.box[:, 3:6].copy()
     tracks.age[:], tracks.hits[:] = 1, 1
     return tracks
+
+
+def with_points(proposals: Proposals, *counts: int) -> Proposals:
+    """The proposals with other numbers of points."""
+    return dataclasses.replace(proposals, offsets=np.append(0, np.cumsum(counts)))
+
+
+ROW = np.array([0])
+
+
+class Fused:
+    """Blobs of some numbers of points, their tracks, and what fuses their views."""
+
+    def __init__(self, fusion: Fusion, *counts: int, frames: int = 1) -> None:
+        _, self.proposals = blobs(list(counts), np.random.default_rng(3))
+        self.fusion, self.tracks = fusion, new_tracks(self.proposals)
+        self.tracks.hits[:] = self.tracks.age[:] = frames
+
+    def asks(self, wants_class: Bool | bool = True) -> list[bool]:
+        """The tracks that ask for a classification, where these or all of them want one."""
+        wanted = np.zeros(len(self.tracks), np.bool_) | wants_class
+        return self.fusion.asks(self.tracks, self.proposals, wanted).tolist()
+
+    def fuse(self, *view: float, rows: Int = ROW) -> Bool:
+        """Fuse a view, and make final what is certain, as the state machine does."""
+        likelihood = np.tile(view, (len(rows), 1))
+        self.tracks.final[rows] = certain = self.fusion.fuse(self.tracks, self.proposals, rows, likelihood)
+        return certain

@@ -1,94 +1,131 @@
-"""Box features of crops (training) and of proposals (run time) agree; training of box and reflectance classifiers."""
+"""The box classifier: its features at run time and in training, its perceptron, and its place in a model."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
-from modt.classification.box_classifier import N_FEATURES, proposal_features
-from modt.classification.crops import Crops, gather, ground_z_m
+from modt.classification.box_classifier import (
+    METADATA_KEY,
+    N_BOUND_FEATURES,
+    N_FEATURES,
+    MlpBoxClassifier,
+    bound_features,
+    box_features,
+    from_lists,
+    from_metadata,
+    logits,
+    proposal_features,
+    to_lists,
+    to_metadata,
+)
+from modt.classification.crops import gather, ground_z_m
+from modt.classification.pool import PoolWeights
+from modt.classification.prior import BoxScores
+from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.types import N_REFLECTANCE, Float64, Int
+from modt.types import Cut, Float64
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.tools.train.datasets import data_of, truth_of
-from tools.train.dataset import Dataset, Sensors, crop_features, dataset_features
+from tests.classification.scenes import blobs
+from tools.train.dataset import Sensors, crop_features
+
+RNG = np.random.default_rng(5)
+SENSOR = SensorConfig()
+LAYERS = [(RNG.normal(size=shape), RNG.normal(size=shape[1])) for shape in pairwise((N_FEATURES, 5, 4))]
+WEIGHTS = PoolWeights(network=0.8, box=0.4)
+
+
+@given(arrays(np.float64, (6, N_FEATURES), elements=st.floats(-5, 5)))
+def test_logits_agree_with_the_reference_also_in_single_precision(feature: Float64) -> None:
+    (w0, b0), (w1, b1) = LAYERS
+    for row, found in zip(feature, logits(LAYERS, feature), strict=True):
+        hidden = [np.tanh(sum(row[i] * w0[i, j] for i in range(N_FEATURES)) + b0[j]) for j in range(5)]
+        expected = [sum(hidden[j] * w1[j, k] for j in range(5)) + b1[k] for k in range(4)]
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    single = from_lists(to_lists(LAYERS), N_FEATURES)
+    np.testing.assert_allclose(logits(single, feature), logits(LAYERS, feature), rtol=0, atol=2e-5)
+
+
+def test_a_model_keeps_layers_in_single_precision_and_weights() -> None:
+    loaded = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
+    assert loaded.weights == WEIGHTS
+    features, whole = RNG.normal(size=(6, N_FEATURES)), np.zeros(6, np.int64)
+    single = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in LAYERS]
+    expected = MlpBoxClassifier(single, WEIGHTS).log_probability(features, whole)
+    np.testing.assert_array_equal(loaded.log_probability(features, whole), expected)
+    assert not from_metadata({}).log_probability(features, whole).any()
+
+
+@pytest.mark.parametrize(
+    "layers",
+    [
+        [],
+        [[[[1]], [1]]],
+        [[[[float("nan")] * 4] * N_FEATURES, [0.0] * 4]],
+        [[[[1e300] * 4] * N_FEATURES, [0.0] * 4]],
+        [[[[0.0] * 4] * (N_FEATURES - 1), [0.0] * 4]],
+        [[[[0.0] * 3] * N_FEATURES, [0.0] * 3]],
+        {},
+        3,
+    ],
+)
+def test_malformed_layers_are_rejected(layers: object) -> None:
+    text = json.dumps({"weights": WEIGHTS.as_dict(), "layers": layers})
+    with pytest.raises((TypeError, ValueError)):
+        from_metadata({METADATA_KEY: text})
+
+
+@pytest.mark.parametrize(
+    "weights", [{"network": 1.5, "box": 0.5, "reflectance": 0}, {"network": 0.5, "box": 0.5}, None]
+)
+def test_malformed_metadata_is_rejected(weights: dict[str, float] | None) -> None:
+    entry = {"weights": weights, "layers": to_lists(LAYERS)}
+    for text in (json.dumps(entry), "[]", "{}", "no json"):
+        with pytest.raises((KeyError, TypeError, ValueError)):
+            from_metadata({METADATA_KEY: text})
+
+
+def test_features_are_independent_of_the_resolution() -> None:
+    box, ground = np.array([[20.0, 0.0, -0.73, 4.0, 1.6, 1.4, 0.0]]), np.array([-1.73])
+    fine = box_features(np.array([160]), box, ground, np.deg2rad(0.1) * np.deg2rad(0.2))
+    coarse = box_features(np.array([40]), box, ground, np.deg2rad(0.2) * np.deg2rad(0.4))
+    np.testing.assert_allclose(fine, coarse)
+
+
+def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds() -> None:
+    rng = np.random.default_rng(3)
+    sizes, bounds = ([(rng.normal(size=(n, 4)), rng.normal(size=4))] for n in (N_FEATURES, N_BOUND_FEATURES))
+    _, blob = blobs([10] * 6, rng)
+    box = np.tile([2.0, 0.0, 0.0, 0.5, 0.5, 0.4, 0.0], (6, 1))
+    box[3, 5] = 5.0  # higher than any person
+    box[4, 2] = 0.6  # begins above the knees
+    cut = np.array([0, Cut.TOP, Cut.TOP | Cut.NEAR, Cut.TOP, Cut.BOTTOM, Cut.BOTTOM])
+    proposals = dataclasses.replace(blob, box=box, cut=cut, ground_z_m=np.full(6, -0.3))
+    scored = BoxScores(MlpBoxClassifier(sizes, 0.4, bounds), NoReflectanceClassifier(), SENSOR).of(proposals)[0]
+    features = proposal_features(proposals, SENSOR)
+    by_size, by_bounds = logits(sizes, features), logits(bounds, bound_features(features, cut))
+    is_bound = [False, True, True, False, True, False]
+    np.testing.assert_allclose(scored, np.where(np.array(is_bound)[:, None], by_bounds, by_size))
+    without = BoxScores(MlpBoxClassifier(sizes, 0.4), NoReflectanceClassifier(), SENSOR).of(proposals)[0]
+    np.testing.assert_array_equal(without, by_size)
 
 
 def test_features_of_crops_and_proposals_agree() -> None:
-    sensor = SensorConfig()
     frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
-    proposals = Segmenter(SegmentationConfig(), sensor, FieldOfView()).segment(frame.points)
+    proposals = Segmenter(SegmentationConfig(), SENSOR, FieldOfView()).segment(frame.points)
     crops = gather(frame.points, proposals, np.arange(len(proposals)), 100_000)
-    expected = proposal_features(proposals, sensor)
+    expected = proposal_features(proposals, SENSOR)
     assert len(crops) > 50
-    off = np.abs(
-        crop_features(crops, Sensors.of(sensor, proposals.box, ground_z_m(proposals, slice(None), sensor))) - expected
-    )
+    sensors = Sensors.of(SENSOR, proposals.box, ground_z_m(proposals, slice(None), SENSOR))
+    off = np.abs(crop_features(crops, sensors) - expected)
     assert off[:, 4:].max() < 1e-3  # height, foot and top
     assert np.quantile(off[:, :4], 0.9, axis=0).max() < 0.15  # at run time headings are fitted to fewer points
-
-
-def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
-    """Cubes of the given sides, ten metres ahead, in four drives."""
-    n = len(sides_m)
-    xyz = (rng.uniform(-0.5, 0.5, (n, 60, 3)) * sides_m[:, None, None] + [10.0, 0.0, -1.0]).reshape(-1, 3)
-    crops = Crops(xyz.astype(np.float32), np.arange(n + 1) * 60)
-    drive = np.arange(n) % 4
-    return data_of(crops, label, drive=drive, truth=truth_of(label, drive, row=np.arange(n)))
-
-
-def test_training_separates_classes_by_size() -> None:
-    pytest.importorskip("torch", reason="extra [train] is not installed")
-    from modt.classification.box_classifier import logits
-    from tools.train.train_box_classifier import cross_validate, train
-
-    rng = np.random.default_rng(0)
-    label = np.arange(80) // 2 % 4
-    data = cubes(0.1 * 4.0**label, label, rng)
-    layers = train(data, np.arange(80), 150, seed=1)
-    again = train(data, np.arange(80), 150, seed=1)
-    feature = dataset_features(data, np.arange(80))
-    assert feature.shape == (80, N_FEATURES)
-    assert np.mean(logits(layers, feature).argmax(axis=1) == label) > 0.9
-    assert all(
-        (a == b).all() for one, other in zip(layers, again, strict=True) for a, b in zip(one, other, strict=True)
-    )
-    _, report = cross_validate(data, np.full((80, 4), 0.25), 2, 150, seed=1)
-    scores = report["cross_validation"]["hdl-64e"]
-    assert min(scores["average_precision"].values()) > 0.8
-    assert min(kind["of_all"] for kind in scores["recall"]["0.9"].values()) > 0.9
-    assert report["weights"]["box"] > 0.9  # a network that knows nothing leaves all of it
-    shares = [row["share"]["background"] for row in report["ruled_out"]]
-    assert shares == sorted(shares)
-
-
-def test_training_separates_classes_by_reflectance() -> None:
-    pytest.importorskip("torch", reason="extra [train] is not installed")
-    from modt.classification.box_classifier import logits
-    from tools.train.train_reflectance_classifier import cross_validate, features_of, has_reflectance, on_scale, train
-
-    rng = np.random.default_rng(0)
-    label = np.arange(160) // 2 % 4
-    alike = cubes(np.ones(160), label, rng)
-    told = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
-    told[::20] = np.nan  # not measured
-    data = on_scale(dataclasses.replace(alike, reflectance=told), "hdl-64e")
-    features = features_of(data)
-    dumb = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
-    layers = train(data, features, np.arange(160), dumb, 200, seed=1)
-    known = np.isfinite(told).all(axis=1)
-    assert np.mean(logits(layers, features[known]).argmax(axis=1) == label[known]) > 0.9
-
-    assert not has_reflectance(on_scale(data, "pandar64"), np.arange(160)).any()
-
-    data = dataclasses.replace(alike, reflectance=np.nan_to_num(told, nan=0.3))
-    network = np.full((160, 4), 0.25)
-    _, report = cross_validate(data, features_of(data), network, 2, 200, seed=1)
-    assert report["weights"]["reflectance"] > 0.9  # a network that knows nothing leaves all of it
-    pool = report["pool"]["hdl-64e"]
-    assert min(pool["average_precision"].values()) > 0.7
-    assert pool["log_loss"] < 0.5 * np.log(4)

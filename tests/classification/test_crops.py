@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.crops import Crops, canonical, gather
-from modt.types import Proposals
+from modt.classification.crops import canonical, gather
 from tests.classification.scenes import blobs
 
 COUNTS = st.lists(st.integers(1, 60), min_size=1, max_size=6)
@@ -51,26 +49,6 @@ def test_canonical_crops_are_independent_of_azimuth(angle: float, seed: int) -> 
     )
 
 
-@pytest.mark.parametrize(
-    ("distance_m", "rise_m", "lowest_m"), [(40.0, 0.25, 0.3), (40.0, -0.25, 0.3), (5.0, 1.0, 1.175)]
-)
-def test_ground_follows_a_far_crop_and_not_a_near_one_above_it(
-    distance_m: float, rise_m: float, lowest_m: float
-) -> None:
-    xyz = np.random.default_rng(0).uniform(0.0, 1.5, (40, 3)).astype(np.float32)
-    xyz[0, 2] = 0.0
-    xyz += np.array([distance_m - 0.75, -0.75, rise_m - 1.73 + 0.3], np.float32)
-    crop = canonical(Crops(xyz, np.array([0, 40])), np.array([-1.73]))
-    assert crop.xyz[:, 2].min() == pytest.approx(lowest_m, abs=0.02)
-
-
-def test_gather_keeps_the_order_of_its_argument() -> None:
-    points, proposals = blobs([3, 4, 5], np.random.default_rng(0))
-    crops = gather(points, proposals, np.array([2, 0]), 100)
-    assert crops.count.tolist() == [5, 3]
-    np.testing.assert_array_equal(crops.xyz[:5], points[proposals.members[7:], :3])
-
-
 @given(own=st.integers(1, 500), most=st.integers(1, 100))
 def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
     points, proposals = blobs([own], np.random.default_rng(own))
@@ -91,9 +69,3 @@ def test_padding_repeats_own_points(counts: list[int]) -> None:
     for i, own in enumerate(batch):
         expected = crops.xyz[crops.offsets[i] : crops.offsets[i + 1]]
         assert {tuple(p) for p in own} == {tuple(p) for p in expected}
-
-
-def test_no_proposals_give_no_crops() -> None:
-    empty = gather(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64), 100)
-    assert len(canonical(empty, np.zeros(0))) == 0
-    assert isinstance(empty, Crops)

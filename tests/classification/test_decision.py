@@ -10,6 +10,7 @@ from modt.classification.decision import Decision, LikeliestClass
 from modt.config import DecisionConfig
 from modt.types import NONE, Tracks
 
+BACKGROUND, PEDESTRIAN, CYCLIST = ObjectClass.BACKGROUND, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST
 ASSUMED = np.array([0.8, 0.1, 0.06, 0.04])
 ALIKE = DecisionConfig(missed_cost=(1.0, 1.0, 1.0))
 
@@ -21,32 +22,37 @@ def tracks(*posteriors):
     return table
 
 
-def said(config, *posteriors):
-    table = tracks(*posteriors)
-    LikeliestClass(config, ASSUMED).decide(table)
-    return table.object_class.tolist()
+@pytest.mark.parametrize(
+    ("missed_cost", "posterior", "reported"),
+    [
+        ((1.0, 1.0, 1.0), [0.7, 0.0, 0.3, 0.0], BACKGROUND),
+        ((1.0, 3.0, 1.0), [0.7, 0.0, 0.3, 0.0], PEDESTRIAN),
+        ((1.0, 3.0, 1.0), [0.7, 0.3, 0.0, 0.0], BACKGROUND),
+        ((9.0, 9.0, 9.0), [0.4, 0.0, 0.25, 0.35], CYCLIST),
+    ],
+)
+def test_the_likelier_object_is_reported_where_missing_it_costs_more_than_a_false_one(
+    missed_cost, posterior, reported
+):
+    table = tracks(posterior)
+    LikeliestClass(DecisionConfig(missed_cost=missed_cost), ASSUMED).decide(table)
+    assert table.object_class.tolist() == [reported]
 
 
-def test_an_object_is_said_where_missing_it_costs_more_than_a_false_one():
-    doubtful = [0.7, 0.0, 0.3, 0.0]
-    assert said(ALIKE, doubtful) == [ObjectClass.BACKGROUND]
-    dear = DecisionConfig(missed_cost=(1.0, 3.0, 1.0))
-    assert said(dear, doubtful, [0.7, 0.3, 0.0, 0.0]) == [ObjectClass.PEDESTRIAN, ObjectClass.BACKGROUND]
-
-
-def test_of_two_objects_the_likelier_is_said():
-    config = DecisionConfig(missed_cost=(9.0, 9.0, 9.0))
-    assert said(config, [0.4, 0.0, 0.25, 0.35]) == [ObjectClass.CYCLIST]
-
-
-def test_the_class_that_was_reported_is_kept_down_to_a_lower_probability():
-    table, decision = tracks([0.4, 0.6, 0.0, 0.0]), Decision(ALIKE, ASSUMED)
-    history = []
-    for car in (0.6, 0.45, 0.41, 0.39, 0.45, 0.51):
-        table.posterior[:] = [1 - car, car, 0.0, 0.0]
+@pytest.mark.parametrize(
+    ("posteriors", "reported"),
+    [
+        ([[1 - car, car, 0.0, 0.0] for car in (0.6, 0.45, 0.41, 0.39, 0.45, 0.51)], [1, 1, 1, 0, 0, 1]),
+        ([[0.1, 0.0, walks, 0.9 - walks] for walks in (0.6, 0.42, 0.39, 0.42)], [2, 2, 3, 3]),
+    ],
+)
+def test_the_reported_class_is_kept_until_another_one_is_clearly_likelier(posteriors, reported):
+    table, decision, history = tracks(posteriors[0]), Decision(ALIKE, ASSUMED), []
+    for posterior in posteriors:
+        table.posterior[:] = posterior
         decision.decide(table)
         history.append(table.object_class[0])
-    assert history == [ObjectClass.CAR] * 3 + [ObjectClass.BACKGROUND] * 2 + [ObjectClass.CAR]
+    assert history == reported
 
 
 @pytest.mark.parametrize("cost", [1.0, 3.0])
@@ -58,18 +64,7 @@ def test_no_class_lingers_below_its_threshold_and_below_what_keeps_it(cost):
         decision.decide(table)
     table.posterior[:] = [0.74, 0.0, 0.26, 0.0]
     decision.decide(table)
-    assert table.object_class[0] == (ObjectClass.PEDESTRIAN if cost == 3.0 else ObjectClass.BACKGROUND)
-
-
-def test_another_object_is_said_where_it_is_clearly_likelier():
-    table, decision = tracks([0.1, 0.0, 0.6, 0.3]), Decision(ALIKE, ASSUMED)
-    history = []
-    for pedestrian in (0.6, 0.42, 0.39, 0.42):
-        table.posterior[:] = [0.1, 0.0, pedestrian, 0.9 - pedestrian]
-        decision.decide(table)
-        history.append(table.object_class[0])
-    pedestrian, cyclist = ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST
-    assert history == [pedestrian, pedestrian, cyclist, cyclist]
+    assert table.object_class[0] == (PEDESTRIAN if cost == 3.0 else BACKGROUND)
 
 
 def stream(frequency, rng, n):
@@ -90,36 +85,16 @@ def test_the_frequency_of_the_stream_is_learnt(frequency):
     assert np.abs(decision.frequency - frequency).max() <= max(0.05, np.abs(ASSUMED - frequency).max() / 2)
 
 
-@pytest.fixture
-def soon(monkeypatch):
-    """The frequency at the start counts for a single proposal."""
-    monkeypatch.setattr(constants, "START_PROPOSALS", 1)
-
-
-@pytest.mark.usefixtures("soon")
-def test_no_object_becomes_rarer_than_the_model_assumes():
-    rng = np.random.default_rng(1)
-    decision = Decision(DecisionConfig(), ASSUMED)
-    for _ in range(100):
-        decision.decide(tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60)))
-    assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)
-
-
-@pytest.mark.usefixtures("soon")
-def test_what_is_not_seen_teaches_nothing():
-    decision = Decision(DecisionConfig(), ASSUMED)
+def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_teaches_nothing(monkeypatch):
+    monkeypatch.setattr(constants, "START_PROPOSALS", 1)  # what is seen counts soon
+    rng, decision = np.random.default_rng(1), Decision(DecisionConfig(), ASSUMED)
     lost = tracks([0.0, 0.0, 1.0, 0.0])
     lost.proposal[:] = NONE
     decision.decide(lost)
     assert decision.frequency == pytest.approx(ASSUMED)
-
-
-def test_the_profile_sets_the_frequency_at_the_start():
-    decision = Decision(DecisionConfig(frequency=(0.2, 0.1, 0.1)), ASSUMED)
-    assert decision.frequency == pytest.approx([0.6, 0.2, 0.1, 0.1])
-    table = tracks([0.4, 0.1, 0.45, 0.05])
-    decision.decide(table)
-    assert table.object_class.tolist() == [ObjectClass.PEDESTRIAN]
+    for _ in range(100):
+        decision.decide(tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60)))
+    assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)
 
 
 @given(arrays(np.float64, (20, 4), elements=st.floats(1e-4, 1.0)))
@@ -132,7 +107,3 @@ def test_frequencies_stay_a_distribution_within_bounds(weights):
     assert decision.frequency.sum() == pytest.approx(1.0)
     assert (decision.frequency > 0.05 * ASSUMED).all()
     np.testing.assert_allclose(decision.adapted(posterior).sum(axis=1), 1.0)
-
-
-def test_without_tracks_nothing_is_said():
-    assert said(DecisionConfig()) == []

@@ -39,58 +39,43 @@ def external(tensor: TensorProto) -> None:
         entry.key, entry.value = key, value
 
 
-def with_weight_elsewhere() -> onnx.ModelProto:
-    model = network()
+def weight_elsewhere(model: onnx.ModelProto) -> None:
     external(model.graph.initializer[0])
-    return model
 
 
-def with_constant_elsewhere() -> onnx.ModelProto:
-    model, tensor = network(), numpy_helper.from_array(np.zeros(12, np.float32), "c")
+def constant_elsewhere(model: onnx.ModelProto) -> None:
+    tensor = numpy_helper.from_array(np.zeros(12, np.float32), "c")
     external(tensor)
     model.graph.node.append(helper.make_node("Constant", [], ["c"], value=tensor))
-    return model
 
 
-def with_sparse_weight_elsewhere() -> onnx.ModelProto:
-    model = network()
+def sparse_weight_elsewhere(model: onnx.ModelProto) -> None:
     sparse = model.graph.sparse_initializer.add()
     sparse.values.name = "s"
     external(sparse.values)
-    return model
 
 
-def with_branch() -> onnx.ModelProto:
-    model = network()
-    branch = helper.make_graph([], "branch", [], [])
-    model.graph.node.append(helper.make_node("If", ["x"], ["y"], then_branch=branch, else_branch=branch))
-    return model
-
-
-def with_function() -> onnx.ModelProto:
-    model = network()
-    model.functions.append(helper.make_function("own", "f", ["a"], ["a"], [], []))
-    return model
-
-
-def with_initializer(tensor: TensorProto) -> Callable[[], onnx.ModelProto]:
-    model = network()
-    model.graph.initializer.append(tensor)
-    return lambda: model
-
-
-def with_node(*named: str, **attributes: object) -> Callable[[], onnx.ModelProto]:
-    model = network()
-    model.graph.node.append(helper.make_node(*named, ["points"], ["x"], **attributes))
-    return lambda: model
-
-
-def with_sparse_zeros() -> onnx.ModelProto:
-    model = network()
+def sparse_zeros(model: onnx.ModelProto) -> None:
     sparse = model.graph.sparse_initializer.add(dims=[1 << 20, 1 << 12])
     sparse.values.CopyFrom(numpy_helper.from_array(np.zeros(1, np.float32), "s"))
     sparse.indices.CopyFrom(numpy_helper.from_array(np.zeros(1, np.int64), "s_indices"))
-    return model
+
+
+def branch(model: onnx.ModelProto) -> None:
+    graph = helper.make_graph([], "branch", [], [])
+    model.graph.node.append(helper.make_node("If", ["x"], ["y"], then_branch=graph, else_branch=graph))
+
+
+def function(model: onnx.ModelProto) -> None:
+    model.functions.append(helper.make_function("own", "f", ["a"], ["a"], [], []))
+
+
+def initializer(tensor: TensorProto) -> Callable[[onnx.ModelProto], None]:
+    return lambda model: model.graph.initializer.append(tensor)
+
+
+def node(kind: str, **attributes: object) -> Callable[[onnx.ModelProto], None]:
+    return lambda model: model.graph.node.append(helper.make_node(kind, ["points"], ["x"], **attributes))
 
 
 TEXT = helper.make_tensor("t", TensorProto.STRING, [2], [b"a", b"b"])
@@ -99,34 +84,37 @@ EMPTY = TensorProto(name="t", data_type=TensorProto.FLOAT, dims=[1 << 20, 1 << 1
 
 
 @pytest.mark.parametrize(
-    ("model", "said"),
+    ("change", "cause"),
     [
-        (with_initializer(TEXT), "text"),
-        (with_initializer(EMPTY_TEXT), "text"),
-        (with_initializer(EMPTY), "more numbers than the file holds"),
-        (with_sparse_zeros, "more numbers than the file holds"),
-        (with_node("ConstantOfShape", value=TEXT), "text"),
-        (with_node("Constant", value_string="a"), "text"),
-        (with_node("Constant", value_strings=["a", "b"]), "text"),
-        (with_node("Cast", to=TensorProto.STRING), "text"),
-        (with_weight_elsewhere, "another file"),
-        (with_constant_elsewhere, "another file"),
-        (with_sparse_weight_elsewhere, "another file"),
-        (with_branch, "a graph within a node"),
-        (with_function, "functions"),
+        (initializer(TEXT), "text"),
+        (initializer(EMPTY_TEXT), "text"),
+        (initializer(EMPTY), "more numbers than the file holds"),
+        (sparse_zeros, "more numbers than the file holds"),
+        (node("ConstantOfShape", value=TEXT), "text"),
+        (node("Constant", value_string="a"), "text"),
+        (node("Constant", value_strings=["a", "b"]), "text"),
+        (node("Cast", to=TensorProto.STRING), "text"),
+        (weight_elsewhere, "another file"),
+        (constant_elsewhere, "another file"),
+        (sparse_weight_elsewhere, "another file"),
+        (branch, "a graph within a node"),
+        (function, "functions"),
     ],
 )
-def test_what_reaches_beyond_the_file_is_refused_before_it_runs(model, said, tmp_path, monkeypatch):
+def test_what_reaches_beyond_the_file_is_refused_before_it_runs(change, cause, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / SECRET).write_bytes(bytes(48))
-    path = saved(tmp_path, model())
-    with pytest.raises(MisuseError, match=said):
-        read_model(path)
+    model = network()
+    change(model)
+    with pytest.raises(MisuseError, match=cause):
+        read_model(saved(tmp_path, model))
 
 
 def test_an_attribute_of_another_name_may_have_the_number_of_the_type_of_text(tmp_path):
     for attributes in ({"axis": 8}, {"group": 8}, {"to": TensorProto.DOUBLE}, {"auto_pad": "SAME_UPPER"}):
-        path = saved(tmp_path, with_node("Cast", **attributes)())
+        model = network()
+        node("Cast", **attributes)(model)
+        path = saved(tmp_path, model)
         assert read_model(path)[0] == path.read_bytes()
 
 
@@ -181,7 +169,7 @@ def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "raw", [b"", b"\x08", b"\x3a\xff\xff\xff\xff\x0f", b"\x0b", b"\xff" * 20, b"\xba\x80\x80\x80\x10\x00"]
+    "raw", [b"", b"no model", b"\x08\x07\x12\x00", b"\x3a\xff\xff\xff\xff\x0f", b"\xba\x80\x80\x80\x10\x00"]
 )
 def test_what_is_no_message_is_refused(raw, tmp_path):
     (tmp_path / "net.onnx").write_bytes(raw)

@@ -1,25 +1,18 @@
-"""Priors by class frequency and by box."""
+"""Priors by class frequency and by box, and their pool with the network."""
 
 from __future__ import annotations
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.special import softmax
 
 from modt.classes import ObjectClass
-from modt.classification.box_classifier import (
-    METADATA_KEY,
-    N_FEATURES,
-    MlpBoxClassifier,
-    NoBoxClassifier,
-    box_features,
-    from_lists,
-    from_metadata,
-    to_metadata,
-)
+from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, NoBoxClassifier, proposal_features
 from modt.classification.pointnet import PointNet
-from modt.classification.pool import PoolWeights
+from modt.classification.pool import PoolWeights, log_pool, object_log_odds, pooled_prior
 from modt.classification.prior import BoxPrior, BoxScores, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import ClassificationConfig, SensorConfig
@@ -28,13 +21,12 @@ from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(5)
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
-WEIGHTS = PoolWeights(network=0.8, box=0.4)
-SHAPES = ((N_FEATURES, 5), (5, 4))
-LAYERS = from_lists([[RNG.normal(size=shape), RNG.normal(size=shape[1])] for shape in SHAPES], N_FEATURES)
-BOXES = MlpBoxClassifier(LAYERS, WEIGHTS)
-NO_REFLECTANCE = NoReflectanceClassifier()
-SCORES = BoxScores(BOXES, NO_REFLECTANCE, SensorConfig())
-SHIPPED = ("pointnet-kitti", "pointnet-synthetic")
+LAYERS = [(RNG.normal(size=shape), RNG.normal(size=shape[1])) for shape in pairwise((N_FEATURES, 5, 4))]
+BOXES = MlpBoxClassifier(LAYERS, PoolWeights(network=0.8, box=0.4))
+
+
+def scores_of(boxes: MlpBoxClassifier | NoBoxClassifier, height_m: float = 1.73) -> BoxScores:
+    return BoxScores(boxes, NoReflectanceClassifier(), SensorConfig(height_m=height_m))
 
 
 def standing(points: int, distance_m: float, length_m: float, width_m: float, height_m: float) -> Proposals:
@@ -47,45 +39,44 @@ def standing(points: int, distance_m: float, length_m: float, width_m: float, he
 
 def test_box_prior_excludes_proposals_below_the_threshold() -> None:
     probability = np.array([[0.995, 0.005, 0.0, 0.0], [0.97, 0.01, 0.01, 0.01], [0.1, 0.9, 0.0, 0.0]])
-    prior = BoxPrior(SCORES, FREQUENCY)
+    prior = make_prior(scores_of(BOXES), FREQUENCY)
     assert prior.may_be_object(probability, 0.02).tolist() == [False, True, True]
+    assert prior.pool_weight == 0.4
+    assert prior.probability(Proposals.empty()).shape == (0, 4)
 
 
 def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
     _, proposals = blobs([10, 20], np.random.default_rng(0))
-    prior = make_prior(
-        BoxScores(NoBoxClassifier(), NO_REFLECTANCE, SensorConfig()), np.array([0.89, 0.08, 0.02, 0.01])
-    )
-    np.testing.assert_allclose(prior.probability(proposals), [[0.89, 0.08, 0.02, 0.01]] * 2)
-    assert prior.may_be_object(prior.probability(proposals), 1.0).all()
+    prior = make_prior(scores_of(NoBoxClassifier()), FREQUENCY)
     assert isinstance(prior, FrequencyPrior)
-    boxes = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
-    by_box = make_prior(BoxScores(boxes, NO_REFLECTANCE, SensorConfig()), FREQUENCY)
-    assert isinstance(by_box, BoxPrior)
-    assert (prior.pool_weight, by_box.pool_weight) == (0.0, 0.4)
+    np.testing.assert_allclose(prior.probability(proposals), [FREQUENCY] * 2)
+    assert prior.may_be_object(prior.probability(proposals), 1.0).all()
+    assert prior.pool_weight == 0.0
+    assert prior.probability(Proposals.empty()).shape == (0, 4)
 
 
-def test_features_are_independent_of_the_resolution() -> None:
-    near = standing(40, 20.0, 4.0, 1.6, 1.4)
-    fine = box_features(np.array([160]), near.box, np.array([-1.73]), np.deg2rad(0.1) * np.deg2rad(0.2))
-    coarse = box_features(np.array([40]), near.box, np.array([-1.73]), np.deg2rad(0.2) * np.deg2rad(0.4))
-    np.testing.assert_allclose(fine, coarse)
+def test_scores_are_of_the_frame_that_is_given() -> None:
+    """The scores of the last frame are kept."""
+    scores = scores_of(BOXES)
+    first, second = (blobs(counts, RNG)[1] for counts in ([10, 30], [20, 5, 7]))
+    for proposals in (first, first, second, first):
+        log_box, log_reflectance = scores.of(proposals)
+        expected = BOXES.log_probability(proposal_features(proposals, SensorConfig(height_m=1.73)), proposals.cut)
+        np.testing.assert_array_equal(log_box, expected)
+        assert not log_reflectance.any()
 
 
 def test_ground_of_the_proposals_overrides_the_profile() -> None:
-    sensors = (SensorConfig(height_m=height_m) for height_m in (1.0, 2.0))
-    low, high = (BoxPrior(BoxScores(BOXES, NO_REFLECTANCE, sensor), FREQUENCY) for sensor in sensors)
+    low, high = (BoxPrior(scores_of(BOXES, height_m), FREQUENCY) for height_m in (1.0, 2.0))
     unknown = standing(40, 20.0, 4.0, 1.6, 1.4)
     measured = dataclasses.replace(unknown, ground_z_m=np.array([-2.0]))
     assert (low.probability(measured) == high.probability(unknown)).all()
     assert (low.probability(measured) != low.probability(unknown)).all()
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", ["pointnet-kitti", "pointnet-synthetic"])
 def test_box_priors_of_the_shipped_models(name: str) -> None:
-    sensor = SensorConfig()
-    model = PointNet(ClassificationConfig(model=name), sensor)
-    prior = make_prior(model.box_scores, FREQUENCY)
+    prior = make_prior(PointNet(ClassificationConfig(model=name), SensorConfig()).box_scores, FREQUENCY)
     car = prior.probability(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
     person = prior.probability(standing(120, 12.0, 0.6, 0.5, 1.4))[0]
     wall = prior.probability(standing(600, 15.0, 12.0, 0.5, 2.3))[0]
@@ -95,31 +86,24 @@ def test_box_priors_of_the_shipped_models(name: str) -> None:
     assert max(1 - wall[0], 1 - speck[0]) < 0.02
 
 
-def test_no_proposals_give_no_priors() -> None:
-    assert BoxPrior(SCORES, FREQUENCY).probability(Proposals.empty()).shape == (0, 4)
-    assert FrequencyPrior(FREQUENCY).probability(Proposals.empty()).shape == (0, 4)
-
-
-@pytest.mark.parametrize(
-    "entry",
-    [
-        "[]",
-        "no json",
-        "{}",
-        '{"weights": {"network": 1.5, "box": 0.5, "reflectance": 0}, "layers": []}',
-        '{"weights": {"network": 0.5, "box": 0.5}, "layers": []}',
-        '{"weights": {"network": 0.5, "box": 0.5, "reflectance": 0}, "layers": []}',
-    ],
+ASSUMED = np.array([0.8, 0.1, 0.06, 0.04])
+LOG_BOX = np.log(
+    [[0.8, 0.1, 0.06, 0.04], [1.0, 0.98, 0.01, 0.01], [0.5, 0.005, 0.005, 0.49], [0.9997, 1e-4, 1e-4, 1e-4]]
 )
-def test_malformed_metadata_is_rejected(entry: str) -> None:
-    with pytest.raises((KeyError, TypeError, ValueError)):
-        from_metadata({METADATA_KEY: entry})
+"""Log posteriors by the box, up to a constant a row."""
 
 
-def test_box_classifier_round_trips_through_metadata() -> None:
-    features = RNG.normal(size=(6, N_FEATURES))
-    loaded = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
-    whole = np.zeros(6, np.int64)
-    np.testing.assert_array_equal(loaded.log_probability(features, whole), BOXES.log_probability(features, whole))
-    assert loaded.weights == WEIGHTS
-    assert not from_metadata({}).log_probability(features, whole).any()
+def test_the_box_says_whether_there_is_an_object_and_not_which() -> None:
+    odds = object_log_odds(LOG_BOX, np.log(ASSUMED))
+    np.testing.assert_allclose(odds, np.log([1.0, 4.0, 4.0, 3e-4 / 0.9997 * 4.0]), atol=1e-12)
+    np.testing.assert_allclose(softmax(pooled_prior(LOG_BOX[:2], np.log(ASSUMED), 1.0), axis=1)[0], ASSUMED)
+    np.testing.assert_allclose(softmax(pooled_prior(LOG_BOX, np.log(ASSUMED), 0.0), axis=1), np.tile(ASSUMED, (4, 1)))
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.5, 1.0])
+def test_evidence_multiplies_the_class_frequency_once(weight: float) -> None:
+    none = np.zeros((4, 4))
+    frequency = np.tile(ASSUMED, (4, 1))
+    weights = PoolWeights(weight, weight, weight)
+    pool = softmax(log_pool(frequency, np.log(frequency), none, np.log(ASSUMED), weights), axis=1)
+    np.testing.assert_allclose(pool, frequency)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import softmax
 
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
@@ -29,7 +30,6 @@ from modt.types import N_REFLECTANCE, Cut, Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)
-FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 BOX_LAYERS = from_lists([[RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4)]], N_FEATURES)
 BOXES = MlpBoxClassifier(BOX_LAYERS, PoolWeights())
 N_BOTH = N_FEATURES + N_REFLECTANCE
@@ -54,14 +54,16 @@ def measured() -> Proposals:
     return dataclasses.replace(proposals, reflectance=REFLECTANCE)
 
 
+def prior_with_reflectance() -> BoxPrior:
+    """The prior with the reflectance of the sensor's scale."""
+    return BoxPrior(BoxScores(BOXES, from_metadata(METADATA, SENSOR), SENSOR), FREQUENCY)
+
+
 def test_prior_is_box_probability_times_reflectance_likelihood() -> None:
     proposals = measured()
     boxes = proposal_features(proposals, SENSOR)
-    score = logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE])
-    expected = np.exp(score) / np.exp(score).sum(axis=1, keepdims=True)
-    reflectance = from_metadata(METADATA, SENSOR)
-    prior = make_prior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY)
-    np.testing.assert_allclose(prior.probability(proposals), expected)
+    expected = softmax(logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE]), axis=1)
+    np.testing.assert_allclose(prior_with_reflectance().probability(proposals), expected)
 
 
 def test_a_sensor_has_the_classifier_of_its_scale() -> None:
@@ -82,30 +84,24 @@ def test_another_sensor_or_a_model_without_classifier_adds_nothing() -> None:
 
 
 def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.LogCaptureFixture) -> None:
-    reflectance = from_metadata(METADATA, SENSOR)
-    bare = dataclasses.replace(measured(), reflectance=None)
+    prior, bare = prior_with_reflectance(), blobs([10, 30], RNG)[1]
     with caplog.at_level(logging.WARNING):
+        assert prior.probability(Proposals.empty()).shape == (0, 4)
+        assert not caplog.records  # a frame without proposals does not say whether the sensor measures it
         for _ in range(3):
-            probability = BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY).probability(bare)
+            probability = prior.probability(bare)
             np.testing.assert_array_equal(probability, WITHOUT.probability(bare))
     assert len(caplog.records) == 1
     assert "sensor.reflectance" in caplog.text
 
 
 def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
-    reflectance = from_metadata(METADATA, SENSOR)
-    prior, whole = BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY), measured()
+    prior, whole = prior_with_reflectance(), measured()
     statistics = REFLECTANCE.copy()
     statistics[1] = np.nan
     probability = prior.probability(dataclasses.replace(whole, reflectance=statistics))
     np.testing.assert_array_equal(probability[1], WITHOUT.probability(whole)[1])
     np.testing.assert_array_equal(probability[[0, 2]], prior.probability(whole)[[0, 2]])
-
-
-def test_no_warning_for_an_empty_frame(caplog: pytest.LogCaptureFixture) -> None:
-    reflectance = from_metadata(METADATA, SENSOR)
-    assert BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY).probability(Proposals.empty()).shape == (0, 4)
-    assert not caplog.records
 
 
 @pytest.mark.parametrize(
@@ -133,19 +129,6 @@ def _with_metadata(path: Path, metadata: dict[str, str]) -> ClassificationConfig
     onnx.helper.set_model_props(model, metadata)
     path.write_bytes(model.SerializeToString())
     return ClassificationConfig(model=str(path))
-
-
-def test_network_and_weighted_reflectance_likelihood_are_multiplied(tmp_path: Path) -> None:
-    points, _ = blobs([10, 30, 60], np.random.default_rng(0))
-    proposals, which = measured(), np.array([2, 0])
-    shape_only = PointNet(_with_metadata(tmp_path / "shape_only.onnx", {}), SENSOR)
-    with_reflectance = PointNet(_with_metadata(tmp_path / "with_reflectance.onnx", METADATA), SENSOR)
-    shape, both = (network.classify(points, proposals, which) for network in (shape_only, with_reflectance))
-    added = logits(LAYERS, np.c_[proposal_features(proposals, SENSOR)[which], REFLECTANCE[which]])
-    expected = shape * np.exp(0.5 * added)
-    np.testing.assert_allclose(both, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
-    bare = dataclasses.replace(proposals, reflectance=None)
-    np.testing.assert_allclose(with_reflectance.classify(points, bare, which), shape, rtol=1e-5)
 
 
 def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:

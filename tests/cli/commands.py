@@ -1,18 +1,21 @@
 """Running the commands as a user would."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+from modt.app.inputs import Request
+from modt.app.session import Session, replay
+from modt.cli.main import main
+
 ROOT = Path(__file__).resolve().parents[2]
+PINNED = ("replay", "run", "check", "calibrate", "compare", "predict")
 PACKAGES = os.pathsep.join([str(ROOT / "runtime"), str(ROOT / "tools")])
 
 
 def environment() -> dict[str, str]:
-    """This one's, with the checkout's packages and without sizes of thread pools."""
+    """The environment of this process, with the checkout's packages and without sizes of thread pools."""
     own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     return {**own, "PYTHONPATH": PACKAGES, "PYTHONWARNINGS": "error", "PYTHONUNBUFFERED": "1"}
 
@@ -24,8 +27,30 @@ def modt(*arguments: object, cwd: Path, module: str = "modt.cli.main", **options
     return subprocess.run(command, check=False, **options)
 
 
-def begin(*arguments: object, cwd: Path) -> subprocess.Popen[str]:
+def begin(*arguments: object, cwd: Path, env: dict[str, str] | None = None) -> subprocess.Popen[str]:
     """Start a command and leave it running."""
     command = [sys.executable, "-m", "modt.cli.main", *map(str, arguments)]
     pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment(), cwd=cwd)
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=env or environment(), cwd=cwd)
+
+
+def here(command: str, *words: object, program=main) -> int:
+    """Run a command in this process, on any core; returns its exit status."""
+    free = ["--core", "none"] if command in PINNED else []
+    try:
+        return program([command, *free, *map(str, words)])
+    except SystemExit as ended:
+        return int(ended.code or 0)
+
+
+def refusal(capsys, *arguments: object, program=main) -> str:
+    """Last line that a command prints which is misused."""
+    assert here(*arguments, program=program) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    return said.err.splitlines()[-1]
+
+
+def session(out: Path, frames: int | None, **options) -> Session:
+    """A replay in this process."""
+    return replay(Request(mode="efficient", frames=(0, frames), **options), {}, out, None, ["modt"])

@@ -2,12 +2,15 @@
 
 import json
 
+import numpy as np
 import pytest
 
+from modt.ros2.point_cloud2 import write_cloud
+from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-from .commands import modt
+from .commands import here, modt, refusal
 
 pytestmark = pytest.mark.command
 
@@ -20,23 +23,18 @@ def capture(tmp_path):
     return tmp_path / "drive.pcap"
 
 
-def test_a_capture_is_replayed(tmp_path, capture):
-    done = modt("replay", capture, "--capture", "model=vlp-16", "--out", "run", cwd=tmp_path)
+@pytest.mark.parametrize(("options", "frames"), [(("--capture", "model=vlp-16"), 3), (("--frames", "50:"), 0)])
+def test_a_capture_is_replayed(tmp_path, capture, options, frames):
+    done = modt("replay", capture, *options, "--out", "run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert (summary["frames"], summary["faults"]["count"]) == (3, 0)
+    assert (summary["frames"], summary["faults"]["count"]) == (frames, 0)
     assert summary["run"]["stream"] == "drive"
-    assert "leaked" not in done.stderr  # of the decoder's library
-
-
-def test_a_part_without_frames_is_an_empty_run(tmp_path, capture):
-    done = modt("replay", capture, "--frames", "50:", "--out", "run", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert json.loads((tmp_path / "run" / "summary.json").read_text())["frames"] == 0
+    assert "leaked" not in done.stderr, "the decoder's library leaks"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "named"),
     [
         (["--capture", "colour=red"], "KEY one of model, calibration, metadata"),
         (["--capture", "model"], "write KEY=VALUE"),
@@ -44,9 +42,14 @@ def test_a_part_without_frames_is_an_empty_run(tmp_path, capture):
         (["--capture", "metadata=nowhere.json"], "nowhere.json: cannot be read"),
     ],
 )
-def test_invalid_options_are_misuse(tmp_path, capture, arguments, said):
+def test_invalid_options_are_misuse(capsys, capture, arguments, named):
     if "metadata" in arguments[1]:
         pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
-    done = modt("replay", capture, *arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert said in done.stderr
+    assert named in refusal(capsys, "replay", capture, *arguments)
+
+
+def test_topics_are_named_on_the_command_line(tmp_path, capsys):
+    recorded = [(f"/{k}", CLOUD, BEGAN_S, write_cloud(BEGAN_S, "lidar", np.ones((9, 4), np.float32))) for k in "ab"]
+    path = write_mcap(tmp_path / "drive", recorded)
+    assert "choose by --capture topic=NAME: /a, /b" in refusal(capsys, "replay", path, "--quiet")
+    assert here("replay", path, "--capture", "topic=/b", "--quiet", "--out", tmp_path / "run") == 0

@@ -1,4 +1,4 @@
-"""`modt replay` with poses from elsewhere: a file, nobody, another process."""
+"""`modt replay` with poses of a file, of another process, or without poses."""
 
 import json
 import socket
@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 import yaml
 
-from modt.app.inputs import Request
-from modt.app.session import replay
 from modt.app.supervisor import Supervisor
 from modt.geometry import inverse, rotation_zyx, se3
-from modt.sinks.tracks import SCHEMA
-from modt_desk.reporting.records import read_records
+from modt.ros2 import odometry
+from modt.types import Frame
 from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.ros2.network import FAR, NEAR, until
 from tests.sources import layouts
 
-from .commands import modt
+from .commands import refusal, session
 
 pytestmark = pytest.mark.command
 
@@ -31,13 +30,9 @@ def the_embedded_street():
     return [(i * period_s, simulator.world.ego_pose(i * period_s)) for i in range(FRAMES)]
 
 
-def session(out, **options):
-    return replay(Request(mode="efficient", frames=(0, FRAMES), **options), {}, out, None, ["modt"])
-
-
 def run(out, **options):
     """Summary of a run and the bytes of its tracks."""
-    summary = session(out, **options).run(Supervisor())
+    summary = session(out, FRAMES, **options).run(Supervisor())
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
@@ -46,11 +41,9 @@ def a_run_with_its_own_odometry(tmp_path_factory):
     return run(tmp_path_factory.mktemp("recorded") / "run")
 
 
-def lives(raw, tmp_path):
+def lives(raw):
     """Mean age of the tracks seen in the last frame."""
-    (tmp_path / "t.jsonl").write_bytes(raw)
-    last = list(read_records(tmp_path / "t.jsonl", SCHEMA))[-1]
-    return np.mean([t["age"] for t in last["tracks"] if t["proposal"] is not None])
+    return np.mean([t["age"] for t in json.loads(raw.splitlines()[-1])["tracks"] if t["proposal"] is not None])
 
 
 @pytest.mark.parametrize("restarted", [False, True])
@@ -58,39 +51,52 @@ def test_poses_from_a_socket_equal_recorded_poses_and_a_restart_of_the_sender_mo
     restarted, tmp_path, street, recorded
 ):
     T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
-    played = session(tmp_path / "run", odometry=f"unix://{tmp_path / 's'}")
+    played = session(tmp_path / "run", FRAMES, odometry=f"unix://{tmp_path / 's'}")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
         for i, (stamp_s, T) in enumerate(street):
             pose = T_elsewhere @ T if restarted and i >= FRAMES // 2 else T
             message = {"stamp": stamp_s, "pose": pose.ravel().tolist()}
             out.sendto(json.dumps(message).encode(), str(tmp_path / "s"))
-    odometry = played.run(Supervisor())["odometry"]
+    received = played.run(Supervisor())["odometry"]
     tracks = (tmp_path / "run" / "tracks.jsonl").read_bytes()
     assert not (tmp_path / "s").exists()
     if restarted:
-        assert odometry["restarts"] == 1
-        assert lives(tracks, tmp_path) > 0.9 * lives(recorded[1], tmp_path)
+        assert received["restarts"] == 1
+        assert lives(tracks) > 0.9 * lives(recorded[1])
     else:
-        assert (odometry["frames_posed"], odometry["used"]) == (FRAMES, FRAMES)
+        assert (received["frames_posed"], received["used"]) == (FRAMES, FRAMES)
         assert tracks == recorded[1]
+
+
+def test_the_poses_of_a_topic_place_the_sweeps(tmp_path, street, loopback):
+    from modt.ros2 import dds
+
+    made = session(tmp_path / "run", FRAMES, odometry=f"ros2:///odom?domain={NEAR}")
+    sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
+    until(lambda: sent.receivers and made.stages.odometry._subscription.senders)
+    for stamp_s, T in street:
+        sent.write(odometry.write_odometry(stamp_s, "odom", "lidar", T))
+    first = Frame(0, street[0][0], np.zeros((0, 4), np.float32))
+    until(lambda: made.stages.odometry.place(first).T_world_sensor is not None)
+    assert made.run(Supervisor())["odometry"]["used"] == FRAMES
 
 
 def test_without_poses_they_are_estimated(tmp_path, recorded):
     summary, tracks = run(tmp_path / "run", odometry="none")
     assert summary["odometry"] == {"source": "none"}
     assert tracks != recorded[1]
-    assert lives(tracks, tmp_path) > 0.9 * lives(recorded[1], tmp_path)
+    assert lives(tracks) > 0.9 * lives(recorded[1])
 
 
 def test_poses_of_a_file_equal_recorded_poses(tmp_path, street, recorded):
-    """As `modt simulate` writes them: the camera's, from where it started."""
+    """`modt simulate` writes those of the camera, from its start on."""
     camera = SyntheticStream("street", "hdl-64e", 1.0).info.camera.T_camera_sensor
     rows = [(camera @ inverse(street[0][1]) @ T @ inverse(camera))[:3].ravel() for _, T in street]
     np.savetxt(tmp_path / "poses.txt", rows, fmt="%.12e")
     summary, tracks = run(tmp_path / "run", poses=tmp_path / "poses.txt")
     assert summary["odometry"]["source"].endswith("poses.txt")
-    assert lives(tracks, tmp_path) > 0.9 * lives(recorded[1], tmp_path)
-    again = list(read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA))[-1]["tracks"]
+    assert lives(tracks) > 0.9 * lives(recorded[1])
+    again = json.loads(tracks.splitlines()[-1])["tracks"]
     before = {t["id"]: t for t in json.loads(recorded[1].splitlines()[-1])["tracks"]}
     T, apart = inverse(street[0][1]), []
     for t in again:
@@ -106,18 +112,17 @@ GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
-    [({}, True), ({"odometry": "none"}, False), ({"poses": "poses.txt"}, False), ({"odometry": "unix"}, False)],
+    ("options", "noted"), [({}, True), ({"poses": "poses.txt"}, False), ({"odometry": "unix"}, False)]
 )
-def test_a_stream_without_poses_is_said_to_have_none_unless_they_come_from_elsewhere(tmp_path, options, said):
+def test_missing_poses_are_noted_unless_they_come_from_elsewhere(tmp_path, options, noted):
     places = {"poses.txt": tmp_path / "poses.txt", "unix": f"unix://{tmp_path / 's'}"}
     (tmp_path / "poses.txt").write_text(3 * GOOD)
-    request = Request(path=layouts.bare(tmp_path), **{key: places.get(name, name) for key, name in options.items()})
-    made = replay(request, {}, tmp_path / "run", None, ["modt"])
+    options = {key: places.get(name, name) for key, name in options.items()}
+    made = session(tmp_path / "run", None, path=layouts.bare(tmp_path), **options)
     made.run(Supervisor())
     notes = [*made.stages.info.notes, *made.stages.info.pose_notes]
     assert any("no calibration" in note for note in notes)
-    assert any("no odometry" in note for note in notes) == said
+    assert any("no odometry" in note for note in notes) == noted
     written = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())["stream"]["notes"]
     assert written == notes
 
@@ -131,11 +136,10 @@ def test_a_stream_without_poses_is_said_to_have_none_unless_they_come_from_elsew
         (["--odometry", "udp://127.0.0.1:0"], ["udp://127.0.0.1:0"]),
     ],
 )
-def test_misuse_is_one_line_and_status_2(tmp_path, arguments, words):
+def test_misuse_is_one_line_and_status_2(tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
     layouts.bare(tmp_path)
     (tmp_path / "short.txt").write_text(GOOD)
-    done = modt("replay", *arguments, cwd=tmp_path)
-    assert done.returncode == 2, done.stderr
-    assert "Traceback" not in done.stderr
-    assert all(word in done.stderr.splitlines()[-1] for word in words), done.stderr
+    line = refusal(capsys, "replay", *arguments)
+    assert all(word in line for word in words), line
     assert not (tmp_path / "runs").exists()

@@ -1,11 +1,9 @@
-"""`modt run` from the outside: a recording as a live source, signals, records, and what systemd is told."""
+"""`modt run` from the outside: a recording as a live source, signals, records, and messages to systemd."""
 
 import json
 import re
 import signal
 import socket
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,11 +12,13 @@ import pytest
 import yaml
 
 from modt import profile
+from modt.cli.profile import main as modt_profile
 from modt.sinks.tracks import SCHEMA
 from modt_desk.reporting.records import read_records
 from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.desk import recorded
 
-from .commands import environment, modt
+from .commands import begin, environment, here, modt, refusal
 
 pytestmark = pytest.mark.command
 
@@ -28,57 +28,50 @@ DEADLINE_S = 60.0
 @pytest.fixture(scope="module")
 def scans(tmp_path_factory):
     """Fifteen scans of a small sensor."""
-    folder = tmp_path_factory.mktemp("scans")
-    for frame in SyntheticStream("street", "vlp-16", 1.5, 0):
-        frame.points.tofile(folder / f"{frame.index:06d}.bin")
-    return folder
+    return recorded.scans(tmp_path_factory.mktemp("scans"), SyntheticStream("street", "vlp-16", 1.5, 0))
 
 
 class Service:
-    """A running `modt run`, and where it notifies."""
+    """A running `modt run`, and the socket that it notifies."""
 
-    def __init__(self, folder, *arguments, watchdog_s=2.0):
+    def __init__(self, folder, *arguments):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.socket.bind(str(folder / "notify"))
         self.socket.settimeout(DEADLINE_S)
-        told = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": str(int(1e6 * watchdog_s))}
-        command = [sys.executable, "-m", "modt.cli.main", "run", *map(str, arguments), "--out", str(folder / "run")]
         self.out = folder / "run"
-        self.process = subprocess.Popen(
-            command, stderr=subprocess.PIPE, text=True, env={**environment(), **told}, cwd=folder
-        )
+        notified = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": "2000000"}
+        self.process = begin("run", *arguments, "--out", self.out, cwd=folder, env={**environment(), **notified})
 
     def hear(self, beginning):
-        """The next message that begins so; the test fails if none comes."""
-        while True:
-            message = self.socket.recv(4096).decode()
-            if message.startswith(beginning):
-                return message
+        """The next message that begins with some word; the test fails if none comes."""
+        while not (message := self.socket.recv(4096).decode()).startswith(beginning):
+            pass
+        return message
 
-    def end(self, number=signal.SIGTERM):
+    def end(self):
         """Status and messages; the test fails if it goes on."""
-        self.process.send_signal(number)
+        self.process.terminate()
         _, said = self.process.communicate(timeout=DEADLINE_S)
         return self.process.returncode, said
 
-    def close(self):
-        self.socket.close()
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.communicate()
 
-
-@pytest.fixture(name="start")
-def services(tmp_path):
+@pytest.fixture
+def start(scans, tmp_path):
+    """Start a service on the scans in a loop, and wait until it is ready."""
     made = []
 
-    def start(*arguments, **options):
-        made.append(Service(tmp_path, *arguments, **options))
-        return made[-1]
+    def started(*options, ready=True):
+        options = options or ("--profile", "vlp-16")
+        made.append(Service(tmp_path, f"{scans}?loop=yes", *options))
+        if ready:
+            made[0].hear("READY=1")
+        return made[0]
 
-    yield start
+    yield started
     for service in made:
-        service.close()
+        service.socket.close()
+        service.process.kill()
+        service.process.communicate()
 
 
 def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
@@ -96,18 +89,16 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert described["service"] is True
     assert described["recognition"]["used"] == "as found"
     assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
-    page = "--html", tmp_path / "page.html"
-    report = modt("report", tmp_path / "run", *page, cwd=tmp_path, module="modt.cli.profile")
-    assert report.returncode == 0, report.stderr
-    assert "<h2>Lateness</h2>" in page[1].read_text()
+    page = tmp_path / "page.html"
+    assert here("report", tmp_path / "run", "--html", page, program=modt_profile) == 0
+    assert "<h2>Lateness</h2>" in page.read_text()
     pytest.importorskip("foxglove")
-    exported = modt("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap", cwd=tmp_path)
-    assert exported.returncode == 0, exported.stderr
+    assert here("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap") == 0
     assert (tmp_path / "run.mcap").stat().st_size > 15 * 100_000  # with the points
 
 
-def test_a_reload_before_it_is_ready_does_not_end_it(scans, start):
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
+def test_a_reload_before_it_is_ready_does_not_end_it(start):
+    service = start(ready=False)
     status = Path(f"/proc/{service.process.pid}/status")
     hup, ignored = 1 << (signal.SIGHUP - 1), False
     while not ignored:
@@ -120,36 +111,29 @@ def test_a_reload_before_it_is_ready_does_not_end_it(scans, start):
     assert service.end()[0] == 0
 
 
-def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):
+def test_systemd_is_notified_of_each_state_and_of_a_reload(start, tmp_path):
     own = tmp_path / "robot.yaml"
     own.write_text(profile.to_yaml(profile.dump(profile.load("vlp-16"))))
-    service = start(f"{scans}?loop=yes", "--profile", own)
-    service.hear("READY=1")
+    service = start("--profile", own)
     service.hear("WATCHDOG=1")
     assert "tracks" in service.hear("STATUS=")
-    own.write_text(own.read_text().replace("keep: all", "keep: everything"))
-    service.process.send_signal(signal.SIGHUP)
-    assert "MONOTONIC_USEC=" in service.hear("RELOADING=1")
-    service.hear("READY=1")
-    service.hear("STATUS=")
-    own.write_text(own.read_text().replace("keep: everything", "keep: all"))
-    service.process.send_signal(signal.SIGHUP)
-    service.hear("RELOADING=1")
-    service.hear("READY=1")
-    service.hear("STATUS=")
+    for before, after in (("all", "everything"), ("everything", "all")):
+        own.write_text(own.read_text().replace(f"keep: {before}", f"keep: {after}"))
+        service.process.send_signal(signal.SIGHUP)
+        assert "MONOTONIC_USEC=" in service.hear("RELOADING=1")
+        service.hear("READY=1")
+        service.hear("STATUS=")
     status, said = service.end()
     assert status == 0
     assert service.hear("STOPPING=1")
     assert "keep" in said
-    assert "the profile before stays in use" in said
     loop = json.loads((service.out / "status.json").read_text())["loop"]
     assert (loop["reloads"], loop["refused_reloads"]) == (1, 1)
 
 
 @pytest.mark.parametrize(("options", "hosts"), [([], []), (["--view", ":0"], ["127.0.0.1"])])
-def test_nothing_listens_but_the_page_that_is_asked_for_and_none_beyond_this_machine(scans, start, options, hosts):
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16", *options)
-    service.hear("READY=1")
+def test_nothing_listens_but_the_page_that_is_asked_for_and_none_beyond_this_machine(start, options, hosts):
+    service = start("--profile", "vlp-16", *options)
     process = psutil.Process(service.process.pid)
     assert process.children() == []
     opened = getattr(process, "net_connections", None) or process.connections  # the name before psutil 6
@@ -158,12 +142,11 @@ def test_nothing_listens_but_the_page_that_is_asked_for_and_none_beyond_this_mac
     assert service.end()[0] == 0
 
 
-def test_the_run_is_seen_in_a_browser_while_it_goes_on(scans, start, chromium):
+def test_the_run_is_seen_in_a_browser_while_it_goes_on(start, chromium):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16", "--view", f"127.0.0.1:{port}")
-    service.hear("READY=1")
+    service = start("--profile", "vlp-16", "--view", f"127.0.0.1:{port}")
     with chromium.tab(f"http://127.0.0.1:{port}/", width=390) as tab:
         tab.until("state.at > 3 && state.at === last && drawn.length > 10")
         assert tab.value("new Int32Array(image.data.buffer).some((value) => value !== colours.paperPixel)")
@@ -179,8 +162,7 @@ def test_the_run_is_seen_in_a_browser_while_it_goes_on(scans, start, chromium):
 
 
 def test_a_killed_service_has_lost_no_more_than_a_second_and_starts_again(scans, start, tmp_path):
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
-    service.hear("READY=1")
+    service = start()
     while not (service.out / "tracks.jsonl").exists() or len((service.out / "tracks.jsonl").read_bytes()) < 100_000:
         service.hear("STATUS=")
     service.process.kill()
@@ -193,47 +175,34 @@ def test_a_killed_service_has_lost_no_more_than_a_second_and_starts_again(scans,
 
 
 @pytest.mark.parametrize("source", ["nowhere", "nowhere?loop=maybe", "nowhere?speed=2"])
-def test_a_source_that_cannot_be_is_a_misuse(source, tmp_path):
-    done = modt("run", source, cwd=tmp_path)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) <= 3
-    assert "nowhere" in done.stderr
+def test_a_source_that_cannot_be_is_a_misuse(source, capsys):
+    assert "nowhere" in refusal(capsys, "run", source)
 
 
-def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path):
-    nothing = modt("status", tmp_path / "run", cwd=tmp_path)
-    assert (nothing.returncode, len(nothing.stderr.splitlines())) == (2, 1)
-    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
-    service.hear("READY=1")
+def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path, capsys):
+    assert refusal(capsys, "status", tmp_path / "run")
+    service = start()
     while not (service.out / "status.json").exists():
         service.hear("STATUS=")
     second = modt("run", scans, "--out", service.out, cwd=tmp_path)
     assert second.returncode == 1
     assert "another run of modt records into it; end it" in second.stderr
-    running = modt("status", service.out, cwd=tmp_path)
-    assert running.returncode == 0, running.stderr
-    assert "running for" in running.stdout
-    status = json.loads(modt("status", service.out, "--json", cwd=tmp_path).stdout)
-    assert status["pid"] == service.process.pid
+    assert here("status", service.out) == 0
+    assert "running for" in capsys.readouterr().out
+    assert here("status", service.out, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["pid"] == service.process.pid
     assert service.end()[0] == 0
     path = service.out / "status.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"time_s": time.time() - 60}))
-    ended = modt("status", service.out, cwd=tmp_path)
-    assert (ended.returncode, "NOT running" in ended.stdout) == (1, True)
+    assert here("status", service.out) == 1
+    assert "NOT running" in capsys.readouterr().out
 
 
-def test_check_says_what_is_lacking_here_and_fails_without_a_sensor(scans, tmp_path):
+def test_check_names_each_shortcoming_with_its_remedy_and_fails_without_a_sensor(scans, tmp_path):
     done = modt("check", scans, "--profile", "vlp-16", "--out", tmp_path / "run", cwd=tmp_path)
     lines = done.stdout.splitlines()
     assert done.returncode == 0, done.stdout + done.stderr
-    assert {line.split(":")[0].split()[1] for line in lines} >= {
-        "core",
-        "governor",
-        "meters",
-        "model",
-        "disk",
-        "sensor",
-    }
+    assert {line.split(":")[0].split()[1] for line in lines} >= {"core", "governor", "meters", "model", "sensor"}
     assert all("; " in line for line in lines if line.startswith(("warn", "fail")))
     lost = modt("check", tmp_path / "nowhere", cwd=tmp_path)
     assert lost.returncode == 1
@@ -259,6 +228,4 @@ def test_where_nothing_can_be_recorded_the_loop_goes_on_and_the_end_says_so(scan
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     assert "nothing is recorded, " in done.stderr.splitlines()[-1]
-    assert "lines are lost: cannot be written (Not a directory)" in done.stderr.splitlines()[-1]
-    assert "records in" not in done.stderr
-    assert "recorded before is intact" not in done.stderr
+    assert "Not a directory" in done.stderr.splitlines()[-1]

@@ -43,17 +43,13 @@ def opened(kind, root):
     return {**FILES, **ADDRESSES}[kind](root)
 
 
-@pytest.fixture(params=FILES)
-def make(request):
-    return FILES[request.param]
-
-
 def content(root):
     return {str(p.relative_to(root)): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
 
-def test_a_frame_is_in_the_file_when_write_returns(make, tmp_path):
-    sink = make(tmp_path)
+@pytest.mark.parametrize("kind", FILES)
+def test_a_frame_is_in_the_file_when_write_returns(kind, tmp_path):
+    sink = FILES[kind](tmp_path)
     before = content(tmp_path)
     sink.write(FRAMES[1])
     written = content(tmp_path)

@@ -43,14 +43,14 @@ from modt.sinks.tracks import SCHEMA, frame_line
 from modt.sources.live import live_stream
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PAUSE_S, PacketReader
-from modt.sources.packets.velodyne import STAMP_AT, VelodyneDecoder
+from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Frame
 from modt_desk.reporting.records import read_records
 from tests.crash.failing_calls import Faults
 from tests.results import CAR, result
-from tests.sequences.live_world import HOUR_US, turn
+from tests.sequences.makers import MAKERS
 
 TURNS, TURN_S = 40, 0.1
 BACK_S = 2.0
@@ -151,14 +151,15 @@ class FaultyRun:
             notified.setblocking(False)
             posed, received = odometry.getsockname(), sensor.getsockname()
             reader = PacketReader(sensor, VelodyneDecoder("sensor"), clock=faults.calendar)
-            poses, payloads = PoseSocket(odometry, ProfileConfig().odometry, "odometry"), turn("vlp-16")
+            poses = PoseSocket(odometry, ProfileConfig().odometry, "odometry")
+            maker = MAKERS["velodyne"]
+            payloads = maker.turns()[0]
             plain = socket.socket.__base__.sendto  # type: ignore[union-attr]
 
             def send() -> None:
                 for k, payload in enumerate(payloads):
-                    stamp_us = round((faults.now_s + TURN_S * (k / len(payloads) - 1)) * 1e6) % HOUR_US
-                    stamp = stamp_us.to_bytes(4, "little")
-                    plain(sender, payload[:STAMP_AT] + stamp + payload[STAMP_AT + 4 :], received)
+                    at_s = faults.now_s + TURN_S * (k / len(payloads) - 1)
+                    plain(sender, maker.stamped(payload, at_s), received)
                 pose = {"stamp": faults.now_s + faults.calendar_s, "x": faults.now_s, "y": 0.0, "yaw": 0.0}
                 plain(sender, json.dumps(pose).encode(), posed)
 

@@ -1,6 +1,4 @@
-"""A disk that keeps what was synced, and of the rest as much or as little as a disk may."""
-
-from __future__ import annotations
+"""A disk that keeps what was synced. It may keep or lose the rest."""
 
 import os
 from collections.abc import Iterator

@@ -1,26 +1,17 @@
-"""Full and read-only disks, and descriptors used up, as the system itself has them: lines are lost and counted."""
-
-from __future__ import annotations
+"""Full, read-only, removed and unmounted disks as the system itself has them: lines are lost and counted."""
 
 import json
-import os
-import resource
 import shutil
 import subprocess
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 import pytest
 
 from modt.app.status import SCHEMA as STATUS_SCHEMA
 from modt.cli.status import read
-from modt.config import RecordingConfig
-from modt.sinks.recording import RETRY_S, AtOnce, Recording
-from modt.sinks.run_directory import RunDirectory, status_paths
-from modt.sinks.tracks import SCHEMA
-from modt_desk.reporting.records import read_records
-from tests.crash.test_power_cut import OURS
-from tests.results import CAR, result
-from tests.sinks.test_recording import Time
+from modt.sinks.recording import RETRY_S
+from modt.sinks.run_directory import status_paths
+from tests.sinks.recordings import OURS, Time, begun, frame, frames
 
 
 @pytest.fixture(autouse=True)
@@ -52,39 +43,21 @@ class Service:
     def __init__(self, folder):
         self.time, self.n = Time(), 0
         self.path = folder / "run"
-        config = RecordingConfig(disk_mb=10.0, keep="tracks")
-        self.recording = Recording(RunDirectory(self.path), config, AtOnce(), lambda: OURS, self.time)
-        self.recording.start()
+        self.recording = begun(folder, time=self.time, disk_mb=10.0, keep="tracks")
 
     def run(self, frames):
         for _ in range(frames):
             self.time.now += 0.1
-            self.recording.write(result(self.n, [5, 4], {0: 1, 1: 2}, {1: CAR}))
+            self.recording.write(frame(self.n))
             self.n += 1
             if self.n % 10 == 0:
                 self.recording.state(json.dumps({"schema": STATUS_SCHEMA, "frames": self.n}))
 
     def lost(self):
-        parts = sorted(
-            self.path.parent.glob("run*/tracks.jsonl"), key=lambda part: part.parent.name.replace("~", " ")
-        )
-        kept = [record["frame"] for part in parts for record in read_records(part, SCHEMA)]
+        kept = frames(self.path.parent)
         assert len(kept) == len({*kept})
         assert self.recording.health()["lost_lines"] == self.n - len(kept)
         return sorted({*range(self.n)} - {*kept})
-
-
-def test_a_disk_that_becomes_read_only_costs_the_lines_meanwhile(disk):
-    service = Service(disk)
-    mount("-o", "remount,ro", disk)
-    service.run(50)
-    assert "Read-only" in service.recording.health()["failing"]
-    mount("-o", "remount,rw", disk)
-    service.run(50)
-    service.recording.finish()
-    lost = service.lost()
-    assert lost == list(range(len(lost)))
-    assert 50 <= len(lost) <= 51 + RETRY_S / 0.1
 
 
 def test_removed_records_are_begun_anew_within_a_second_and_their_lines_counted(tmp_path):
@@ -95,7 +68,7 @@ def test_removed_records_are_begun_anew_within_a_second_and_their_lines_counted(
     for name in ("tracks.jsonl", "run.yaml"):
         (service.path / name).unlink()
         service.run(35)
-    service.path.rename(tmp_path / "run-moved")
+    service.path.rename(tmp_path / "run~0")
     service.run(35)
     service.recording.finish()
     lost = service.lost()
@@ -125,7 +98,7 @@ def test_a_disk_that_is_unmounted_costs_the_lines_meanwhile_and_nothing_is_writt
 
 
 @pytest.mark.parametrize("fault", ["full", "read-only", "full at start", "removed folder"])
-def test_the_status_stays_readable(disk, fault):
+def test_the_status_stays_readable_and_the_lines_meanwhile_are_lost(disk, fault):
     def fail():
         if fault == "read-only":
             mount("-o", "remount,ro", disk)
@@ -153,41 +126,12 @@ def test_the_status_stays_readable(disk, fault):
             (disk / name).unlink(missing_ok=True)
         if service.path.is_file():
             service.path.unlink()
+        back = service.n
         service.run(20)
         assert service.recording.health()["failing"] is None
         assert read(service.path)["frames"] == service.n
         service.recording.finish()
+    lost = service.lost()
+    assert lost == list(range(lost[0], lost[-1] + 1))
+    assert back - 1 <= lost[-1] <= back + RETRY_S / 0.1
     assert not status_paths(service.path)[1].exists()
-
-
-@contextmanager
-def no_more_descriptors():
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    taken = [os.open(os.devnull, os.O_RDONLY)]
-    resource.setrlimit(resource.RLIMIT_NOFILE, (max(map(int, os.listdir("/proc/self/fd"))) + 1, hard))
-    with suppress(OSError):
-        while True:  # until the gaps below the limit are filled
-            taken.append(os.dup(taken[0]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-        for number in taken:
-            os.close(number)
-
-
-def test_without_descriptors_open_files_go_on_and_a_new_part_waits(tmp_path):
-    service = Service(tmp_path)
-    service.run(20)
-    with no_more_descriptors():
-        service.run(20)
-        assert service.recording.health()["lost_lines"] == 0
-        service.recording._bytes = 100_000_000  # the part is full
-        service.run(20)
-        assert "Too many open files" in service.recording.health()["failing"]
-    service.run(40)
-    service.recording.finish()
-    assert 20 <= service.recording.health()["lost_lines"] <= 20 + RETRY_S / 0.1
-    kept = [r["frame"] for p in ("run~1", "run") for r in read_records(tmp_path / p / "tracks.jsonl", SCHEMA)]
-    assert kept[:40] == list(range(40))
-    assert kept[-1] == 99

@@ -1,10 +1,10 @@
 """Synthetic drives on disk, and runs on them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from modt.cli.main import main
+from modt_desk.simulation.kitti_raw import DriveWriter
+from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 
 DAY = "2020_01_01/2020_01_01_drive_0000_sync"
 
@@ -19,3 +19,20 @@ def drive_and_run(
     for command in (simulate, replay):
         assert main([str(word) for word in command]) == 0
     return run, folder / DAY
+
+
+def written(root: Path, stream: SyntheticStream) -> DriveWriter:
+    """The writer of a stream as a drive in KITTI's layout."""
+    writer = DriveWriter(root, CAMERA)
+    for frame, truth in stream.sweeps():
+        writer.write(frame, truth)
+    writer.close()
+    return writer
+
+
+def scans(folder: Path, stream: SyntheticStream) -> Path:
+    """A folder with the scans of a stream and nothing else."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for frame in stream:
+        frame.points.tofile(folder / f"{frame.index:06d}.bin")
+    return folder

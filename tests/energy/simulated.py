@@ -1,7 +1,5 @@
 """A simulated machine that draws power. Its clocks advance with its work, and its sysfs files with its clocks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +14,7 @@ class SimulatedMachine:
     """Machine that counts energy in a powercap file as hardware does, in steps and with overflow."""
 
     def __init__(
-        self,
-        sys: Path,
-        *,
-        idle_W: float = 3.0,
-        wrap_uJ: int = 262_143_328_850,
-        step_uJ: float = 61.035,
-        seed: int = 0,
+        self, sys: Path, idle_W: float = 3.0, wrap_uJ: int = 262_143_328_850, step_uJ: float = 61.035, seed: int = 0
     ) -> None:
         self.sys, self.idle_W, self.wrap_uJ, self.step_uJ = sys, idle_W, wrap_uJ, step_uJ
         self.random = np.random.default_rng(seed)

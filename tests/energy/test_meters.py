@@ -2,22 +2,19 @@ import itertools
 import os
 import re
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from modt.energy.meters import meter as meter_module
 from modt.energy.meters.discovery import (
-    Discovery,
     discover,
     find_batteries,
     find_hwmon,
     find_pmic,
     find_powercap,
 )
-from modt.energy.meters.meter import Kind, Meter, MeterLostError, Scope, model_meter
+from modt.energy.meters.meter import Kind, MeterLostError, Scope, model_meter
 from modt.errors import MisuseError
 
 from .simulated import write_files, write_zone
@@ -31,19 +28,16 @@ PMIC = """ 3V7_WL_SW_A current(0)=0.08784000A
 """
 
 
-def model() -> Meter:
-    return model_meter(idle_W=3.0, busy_W=7.0, wall_ns=lambda: 2_000_000_000, cpu_ns=lambda: 500_000_000)
-
-
-def powercap(sys: Path) -> Path:
+def powercap(sys):
     return sys / "class" / "powercap"
 
 
-def look(sys: Path) -> Discovery:
-    return discover(model(), sys, vcgencmd="no-such-command")
+def look(sys):
+    model = model_meter(idle_W=3.0, busy_W=7.0, wall_ns=lambda: 2_000_000_000, cpu_ns=lambda: 500_000_000)
+    return discover(model, sys, vcgencmd="no-such-command")
 
 
-def server(sys: Path) -> None:
+def server(sys):
     """Two sockets with subzones, a memory-mapped twin and the platform counter."""
     write_zone(powercap(sys) / "intel-rapl:0", "package-0", energy_uJ=5_000_000)
     write_zone(powercap(sys) / "intel-rapl:0:0", "core", energy_uJ=3_000_000)
@@ -53,13 +47,11 @@ def server(sys: Path) -> None:
     write_zone(powercap(sys) / "intel-rapl-mmio:0", "package-0", energy_uJ=5_000_001)
 
 
-def test_packages_are_summed_without_overlapping_zones(tmp_path: Path) -> None:
+def test_packages_are_summed_without_overlapping_zones(tmp_path):
     server(tmp_path)
     best = look(tmp_path).best
-    assert [meter.facts.name for meter in best.meters] == [
-        "powercap intel-rapl:0 (package-0)",
-        "powercap intel-rapl:1 (package-1)",
-    ]
+    names = [f"powercap intel-rapl:{n} (package-{n})" for n in (0, 1)]
+    assert [meter.facts.name for meter in best.meters] == names
     assert sum(meter.read() for meter in best.meters) == pytest.approx(12.0)
     assert (best.meters[0].facts.kind, best.meters[0].facts.wrap_J) == (Kind.MEASURED, pytest.approx(262_143.328850))
     why = {c.name: c.why_not for c in find_powercap(tmp_path)}
@@ -69,55 +61,41 @@ def test_packages_are_summed_without_overlapping_zones(tmp_path: Path) -> None:
     assert (platform.facts.scope, platform.read()) == (Scope.BOARD, pytest.approx(20.0))
 
 
-def dies(sys: Path, *energies_uJ: int) -> Discovery:
-    for n, energy_uJ in enumerate(energies_uJ):
-        write_zone(powercap(sys) / f"intel-rapl:{n}", f"package-0-die-{n}", energy_uJ=energy_uJ)
-    return look(sys)
-
-
-@pytest.mark.parametrize(("second_uJ", "sum_J"), [(1_000_000_003, 1000.0), (1_000_090_000, 2000.09)])
-def test_two_zones_that_show_one_counter_count_once(tmp_path: Path, second_uJ: int, sum_J: float) -> None:
-    """Each die of a Threadripper 1950X shows the socket; those of a Cascade Lake-AP have counters of their own."""
-    found = dies(tmp_path, 1_000_000_000, second_uJ)
-    assert sum(meter.read() for meter in found.best.meters) == pytest.approx(sum_J)
-    left = [c.why_not for c in found.candidates if "die-1" in c.name]
-    assert left == ["shows the counter of powercap intel-rapl:0 (package-0-die-0)"][: len(left)]
-
-
 @pytest.mark.parametrize("mirrors", [True, False])
-def test_counters_are_compared_while_they_count(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mirrors: bool
-) -> None:
-    """A mirror is read after the counter itself and shows more. Another counter may be near by chance."""
-    dies(tmp_path, 0, 0)
+def test_counters_are_compared_while_they_count(tmp_path, monkeypatch, mirrors):
+    """Each die of a Threadripper 1950X shows the socket; those of a Cascade Lake-AP have counters of their own.
+
+    A mirror is read after the counter itself and shows more. Another counter may be near by chance.
+    """
+    for n in (0, 1):
+        write_zone(powercap(tmp_path) / f"intel-rapl:{n}", f"package-0-die-{n}")
     true_uJ, own = itertools.count(10**9, 50_000), meter_module.read_number
 
-    def read_number(path: Path) -> float:
+    def read_number(path):
         if path.name != "energy_uj":
             return own(path)
         return float(next(true_uJ)) if mirrors or "rapl:0" in str(path) else 1_000_075_000.0
 
     monkeypatch.setattr(meter_module, "read_number", read_number)
-    assert len(look(tmp_path).best.meters) == 1 + (not mirrors)
-
-
-def test_a_memory_mapped_zone_alone_is_the_package(tmp_path: Path) -> None:
-    write_zone(powercap(tmp_path) / "intel-rapl-mmio:0", "package-0", energy_uJ=5_000_000)
-    best = look(tmp_path).best
-    assert (best.name, [meter.read() for meter in best.meters]) == ("RAPL packages", [pytest.approx(5.0)])
+    found = look(tmp_path)
+    assert len(found.best.meters) == 1 + (not mirrors)
+    left = [c.why_not for c in found.candidates if "die-1" in c.name]
+    assert left == ["shows the counter of powercap intel-rapl:0 (package-0-die-0)"] * mirrors
 
 
 @pytest.mark.parametrize("content", [None, "", "garbage"])
-def test_unreadable_range_means_no_known_wrap(tmp_path: Path, content: str | None) -> None:
-    zone = powercap(tmp_path) / "intel-rapl:0"
-    write_zone(zone, "package-0", wrap_uJ=None)
+def test_a_memory_mapped_zone_alone_is_the_package_and_without_a_range_its_wrap_is_unknown(tmp_path, content):
+    zone = powercap(tmp_path) / "intel-rapl-mmio:0"
+    write_zone(zone, "package-0", wrap_uJ=None, energy_uJ=5_000_000)
     if content is not None:
         (zone / "max_energy_range_uj").write_text(content)
-    assert look(tmp_path).best.meters[0].facts.wrap_J is None
+    best = look(tmp_path).best
+    assert (best.name, best.meters[0].facts.wrap_J) == ("RAPL packages", None)
+    assert best.meters[0].read() == pytest.approx(5.0)
 
 
 @pytest.fixture
-def plain_user() -> Iterator[Path]:
+def plain_user():
     """A tree that an unprivileged user may enter, and such a user's rights."""
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
@@ -127,7 +105,7 @@ def plain_user() -> Iterator[Path]:
             os.seteuid(0)
 
 
-def test_counter_for_root_alone_is_listed_with_its_remedy(plain_user: Path) -> None:
+def test_counter_for_root_alone_is_listed_with_its_remedy(plain_user):
     write_zone(powercap(plain_user) / "intel-rapl:0", "package-0")
     (powercap(plain_user) / "intel-rapl:0" / "energy_uj").chmod(0)
     if os.getuid() == 0:
@@ -137,7 +115,6 @@ def test_counter_for_root_alone_is_listed_with_its_remedy(plain_user: Path) -> N
     assert not rapl.usable
     assert "Permission denied" in rapl.why_not
     assert "CAP_DAC_READ_SEARCH" in rapl.remedy
-    assert found.best.facts is not None
     assert found.best.facts.kind is Kind.ESTIMATED
     with pytest.raises(MisuseError, match="Permission denied"):
         found.choose("rapl")
@@ -157,12 +134,9 @@ CHIP = {"name": "ina226", "in1_input": 5000, "curr1_input": 900}
         ("power_supply/AC", {"type": "Mains", "online": 1}, None),
     ],
 )
-def test_power_is_read_of_what_supplies_the_machine(
-    tmp_path: Path, folder: str, files: dict[str, Any], watts: float | None
-) -> None:
+def test_power_is_read_from_the_sensors_of_the_supply(tmp_path, folder, files, watts):
     write_files(tmp_path / "class" / folder, **files)
     best = look(tmp_path).best
-    assert best.facts is not None
     assert best.facts.kind is (Kind.ESTIMATED if watts is None else Kind.INTEGRATED)
     assert watts is None or best.meters[0].read() == pytest.approx(watts)
 
@@ -173,7 +147,7 @@ NANO = {"POM_5V_IN": (5000, 600), "POM_5V_GPU": (5000, 0), "POM_5V_CPU": (5000, 
 NX = {"VDD_IN": (5000, 1000), "VDD_CPU_GPU_CV": (5000, 300), "VDD_SOC": (5000, 200)}
 
 
-def board(sys: Path, rails: dict[str, tuple[int, int]], model: str = "") -> Discovery:
+def board(sys, rails, model=""):
     """A Jetson with these rails (mV, mA), three on each chip."""
     for n, (label, (mV, mA)) in enumerate(rails.items()):
         k = n % 3 + 1
@@ -184,7 +158,7 @@ def board(sys: Path, rails: dict[str, tuple[int, int]], model: str = "") -> Disc
     return look(sys)
 
 
-def watts_of(found: Discovery, name: str) -> float:
+def watts_of(found, name):
     return sum(meter.read() for meter in found.choose(name).meters)
 
 
@@ -201,9 +175,7 @@ def watts_of(found: Discovery, name: str) -> float:
     ],
 )
 @pytest.mark.parametrize("named", [True, False])
-def test_the_module_of_a_board_by_its_table(
-    tmp_path: Path, rails: dict[str, tuple[int, int]], model: str, module: str, watts: float, best: str, named: bool
-) -> None:
+def test_the_rails_of_a_module_follow_the_table_of_its_board(tmp_path, rails, model, module, watts, best, named):
     found = board(tmp_path, rails, model if named else "")
     chosen = found.choose(module)
     assert watts_of(found, module) == pytest.approx(watts)
@@ -212,7 +184,7 @@ def test_the_module_of_a_board_by_its_table(
     assert found.best.meters[0].facts.scope is Scope.CPU_RAIL
 
 
-def test_rails_beside_a_module_are_listed_and_never_added(tmp_path: Path) -> None:
+def test_rails_beside_a_module_are_listed_and_never_added(tmp_path):
     """VIN_SYS_5V0 feeds the memory's rail, NC is not connected, and VDD_GPU_SOC is switched off."""
     found = board(tmp_path, AGX_ORIN | {"NC": (0, 0), "VDDQ_VDD2_1V8AO": (5000, 200)})
     assert found.choose("hwmon ina3221 VIN_SYS_5V0").meters[0].facts.scope is Scope.RAIL
@@ -224,26 +196,21 @@ def test_rails_beside_a_module_are_listed_and_never_added(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("rails", "model"), [(NX, "Some Carrier"), ({"VDD_IN": (5000, 1000)}, "")])
-def test_rails_of_an_unknown_board_are_of_unknown_extent(
-    tmp_path: Path, rails: dict[str, tuple[int, int]], model: str
-) -> None:
+def test_rails_of_an_unknown_board_are_of_unknown_extent(tmp_path, rails, model):
     found = board(tmp_path, rails, model)
     assert {m.facts.scope for c in found.candidates for m in c.meters} == {Scope.RAIL, Scope.PROCESS}
 
 
-def test_a_module_that_draws_less_than_its_rails_is_refused(tmp_path: Path) -> None:
+def test_a_module_is_usable_without_one_of_its_rails_but_not_if_it_draws_less_than_they_do(tmp_path):
+    board(tmp_path, NX)
+    (tmp_path / "class" / "hwmon" / "hwmon0" / "curr3_input").write_text("none")
+    assert watts_of(look(tmp_path), "VDD_IN") == pytest.approx(5.0)
     found = board(tmp_path, NX | {"VDD_IN": (5000, 400)})
     with pytest.raises(MisuseError, match="less than the rails that it feeds"):
         found.choose("VDD_IN")
 
 
-def test_a_module_is_usable_while_a_rail_that_it_feeds_cannot_be_read(tmp_path: Path) -> None:
-    board(tmp_path, NX)
-    (tmp_path / "class" / "hwmon" / "hwmon0" / "curr3_input").write_text("none")
-    assert watts_of(look(tmp_path), "VDD_IN") == pytest.approx(5.0)
-
-
-def test_two_chips_with_one_label_are_two_rails(tmp_path: Path) -> None:
+def test_two_chips_with_one_label_are_two_rails(tmp_path):
     for n in (0, 1):
         folder = tmp_path / "class" / "hwmon" / f"hwmon{n}"
         write_files(folder, name="ina226", in1_label="motor", in1_input=5000, curr1_input=100 * (n + 1))
@@ -251,14 +218,9 @@ def test_two_chips_with_one_label_are_two_rails(tmp_path: Path) -> None:
     assert readings == [pytest.approx(0.5), pytest.approx(1.0)]
 
 
-def test_battery_counts_only_while_it_discharges(tmp_path: Path) -> None:
-    folder = write_files(
-        tmp_path / "class" / "power_supply" / "BAT0",
-        type="Battery",
-        status="Discharging",
-        voltage_now=11_400_000,
-        current_now=-1_500_000,
-    )
+def test_battery_counts_only_while_it_discharges(tmp_path):
+    files = {"type": "Battery", "status": "Discharging", "voltage_now": 11_400_000, "current_now": -1_500_000}
+    folder = write_files(tmp_path / "class" / "power_supply" / "BAT0", **files)
     (battery,) = find_batteries(tmp_path)
     assert battery.meters[0].read() == pytest.approx(17.1)
     assert battery.meters[0].facts.scope is Scope.ROBOT
@@ -270,24 +232,11 @@ def test_battery_counts_only_while_it_discharges(tmp_path: Path) -> None:
         battery.meters[0].read()
 
 
-def script(folder: Path, body: str) -> str:
+def script(folder, body):
     path = folder / "vcgencmd"
     path.write_text(f"#!/bin/sh\n{body}\n")
     path.chmod(0o755)
     return str(path)
-
-
-def test_pmic_is_read_through_its_command(tmp_path: Path) -> None:
-    (tmp_path / "adc").write_text(PMIC)
-    (pmic,) = find_pmic(script(tmp_path, f"[ $1 = pmic_read_adc ] && cat {tmp_path}/adc"))
-    assert pmic.usable
-    assert pmic.meters[0].read() == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
-    (tmp_path / "adc").write_text("error=2 error_msg=Invalid arguments")
-    with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
-        pmic.meters[0].read()
-    (tmp_path / "adc").unlink()
-    with pytest.raises(MeterLostError):
-        pmic.meters[0].read()
 
 
 @pytest.mark.parametrize(
@@ -299,19 +248,21 @@ def test_pmic_is_read_through_its_command(tmp_path: Path) -> None:
         ("VDD_CORE_V", "VDD_C", "lacks VDD_CORE"),
         ("VDD_CORE_A", "\\377\\376", "lacks VDD_CORE"),
         (PMIC, "", "no rail"),
+        (PMIC, "error=2 error_msg=Invalid arguments", "Raspberry Pi 5"),
     ],
 )
-def test_garbled_pmic_is_lost_for_now(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_pmic_is_read_through_its_command_and_lost_for_now_where_it_is_garbled(tmp_path, old, new, said):
     (tmp_path / "adc").write_text(PMIC)
-    (pmic,) = find_pmic(script(tmp_path, f'printf "$(cat {tmp_path}/adc)\\n"'))
+    (pmic,) = find_pmic(script(tmp_path, f'[ $1 = pmic_read_adc ] && printf "$(cat {tmp_path}/adc)\\n"'))
     assert pmic.usable
+    assert pmic.meters[0].read() == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
     (tmp_path / "adc").write_text(PMIC.replace(old, new))
     with pytest.raises(MeterLostError, match=re.escape(said)):
         pmic.meters[0].read()
 
 
 @pytest.mark.parametrize("content", ["9" * 400, "9" * 5000, "0x10", "1.5", "", "nan"])
-def test_a_file_without_an_integer_is_lost_for_now(tmp_path: Path, content: str) -> None:
+def test_a_file_without_an_integer_is_lost_for_now(tmp_path, content):
     zone = powercap(tmp_path) / "intel-rapl:0"
     write_zone(zone, "package-0")
     meter = look(tmp_path).best.meters[0]
@@ -320,27 +271,23 @@ def test_a_file_without_an_integer_is_lost_for_now(tmp_path: Path, content: str)
         meter.read()
 
 
-def test_failing_pmic_gives_its_message(tmp_path: Path) -> None:
+def test_failing_pmic_gives_its_message(tmp_path):
     (pmic,) = find_pmic(script(tmp_path, "echo 'VCHI initialization failed' >&2; exit 255"))
     assert "VCHI initialization failed" in pmic.why_not
 
 
-def test_without_meters_the_model_is_used(tmp_path: Path) -> None:
+def test_without_meters_the_model_is_used(tmp_path):
     found = look(tmp_path)
     assert found.best.meters[0].read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
-    assert found.best.facts is not None
     assert found.best.facts.kind is Kind.ESTIMATED
     unusable = [c for c in found.candidates if not c.usable]
     assert len(unusable) == 4
     assert all(c.why_not and c.remedy for c in unusable)
-
-
-def test_unknown_meter_is_refused_with_the_names(tmp_path: Path) -> None:
     with pytest.raises(MisuseError, match="model 3 W idle"):
-        look(tmp_path).choose("wattmeter")
+        found.choose("wattmeter")
 
 
-def test_candidates_are_ordered_measured_integrated_estimated(tmp_path: Path) -> None:
+def test_candidates_are_ordered_measured_integrated_estimated(tmp_path):
     server(tmp_path)
     kinds = [c.facts.kind for c in board(tmp_path, NX).candidates if c.usable and c.facts]
     order = [Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED]

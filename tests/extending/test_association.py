@@ -6,8 +6,9 @@ import numpy as np
 
 from modt.app import assembly
 from modt.geometry import FieldOfView, transform
+from modt.geometry.kernels import assign
 from modt.profile import load
-from modt.tracking.association import Matches, assign
+from modt.tracking.association import Matches
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
 from modt.types import NONE

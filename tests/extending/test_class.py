@@ -17,10 +17,10 @@ VALUE = "    CYCLIST = 3\n"
 ROW = '    ObjectClass.CYCLIST: ClassSpec(("Cyclist",)'
 
 
-@pytest.fixture(scope="module", name="source")
-def a_package_with_trucks(tmp_path_factory):
+@pytest.fixture(name="source")
+def a_package_with_trucks(tmp_path):
     """A copy of the package whose table of classes has one row more."""
-    source = tmp_path_factory.mktemp("source")
+    source = tmp_path / "source"
     root, unneeded = Path(__file__).parents[2], shutil.ignore_patterns("__pycache__")
     for package in ("runtime/modt", "tools/modt_desk"):
         shutil.copytree(root / package, source / package, ignore=unneeded)
@@ -37,7 +37,7 @@ def a_package_with_trucks(tmp_path_factory):
     return source
 
 
-@pytest.fixture(scope="module", name="profile")
+@pytest.fixture(name="profile")
 def a_profile_with_a_model_of_five_outputs(source):
     zeros = ", ".join("0" * 15)
     model = onnx.parser.parse_model(f"""
@@ -65,28 +65,23 @@ def run(source, *arguments):
     return subprocess.run(command, cwd=source, env=environment, capture_output=True, text=True, check=True).stdout
 
 
-@pytest.fixture(scope="module", name="drive")
-def a_short_drive(source):
-    out = source / "drive"
-    run(source, "modt", "simulate", "--sensor", "vlp-16", "--seconds", "0.6", "--out", str(out))
-    return next(out.rglob("velodyne_points")).parent
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["conventional", "efficient", "accurate"])
-def test_every_mode_and_sink_knows_the_class(source, profile, drive, mode):
-    out = source / mode
-    options = ["--profile", str(profile), "--mode", mode, "--labels", "--out", str(out)]
-    run(source, "modt", "replay", str(drive), *options)
-    *_, last = map(json.loads, (out / "tracks.jsonl").read_text().splitlines())
-    trucks = [track for track in last["tracks"] if track["viewed"]]
-    assert trucks
-    assert {track["class"] for track in trucks} == {"truck"}
-    assert {len(track["posterior"]) for track in last["tracks"]} == {5}
-    (results,) = (out / "kitti").iterdir()
-    assert " Truck " in results.read_text()
-    labels = np.fromfile(sorted((out / "labels").iterdir())[-1], np.uint32)
-    assert 4 in labels & 0xFFFF
+def test_every_mode_and_sink_knows_the_class(source, profile):
+    run(source, "modt", "simulate", "--sensor", "vlp-16", "--seconds", "0.6", "--out", "drive")
+    drive = next((source / "drive").rglob("velodyne_points")).parent
+    for mode in ("conventional", "efficient", "accurate"):
+        out = source / mode
+        options = ["--profile", str(profile), "--mode", mode, "--labels", "--out", str(out)]
+        run(source, "modt", "replay", str(drive), *options)
+        *_, last = map(json.loads, (out / "tracks.jsonl").read_text().splitlines())
+        trucks = [track for track in last["tracks"] if track["viewed"]]
+        assert trucks
+        assert {track["class"] for track in trucks} == {"truck"}
+        assert {len(track["posterior"]) for track in last["tracks"]} == {5}
+        (results,) = (out / "kitti").iterdir()
+        assert " Truck " in results.read_text()
+        labels = np.fromfile(sorted((out / "labels").iterdir())[-1], np.uint32)
+        assert 4 in labels & 0xFFFF
     assert "frames" in run(source, "modt.cli.profile", "report", str(out))
     judged = json.loads(run(source, "modt", "evaluate", str(out), str(drive), "--json"))
     assert "truck" in json.dumps(judged)

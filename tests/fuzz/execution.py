@@ -1,7 +1,5 @@
 """One input read, within a CPU time and a memory."""
 
-from __future__ import annotations
-
 import resource
 import signal
 import traceback
@@ -17,7 +15,7 @@ CPU_TIME_S = 10.0
 HANG_S = 120.0
 """Wall time after which an input counts as hanging, without CPU time."""
 MEMORY_BYTES = 1 << 30
-"""Beyond what the process has when the reading begins."""
+"""Limit of memory, in addition to what the process has when the reading begins."""
 
 
 class DeadlineError(BaseException):
@@ -26,18 +24,10 @@ class DeadlineError(BaseException):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """An exception that should not have left a reader.
-
-    Attributes:
-        error: its type and message.
-        place: the innermost line of the program that it came through; findings of one place are one.
-        raw: the input.
-        trace: how it came there.
-    """
+    """An exception that should not have left a reader; findings of one place are one."""
 
     error: str
-    place: str
-    raw: bytes
+    place: str  # innermost line of the program
     trace: str
 
 
@@ -54,7 +44,7 @@ def execute(call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Ex
         ours = next((s for s in reversed(steps) if "/modt/" in s.filename), steps[-1])
         place = f"{Path(ours.filename).name}:{ours.lineno}"
         said = f"{type(error).__name__}: {error}"[:200]
-        return Finding(said, place, raw, "".join(traceback.format_exception(error))[-4000:])
+        return Finding(said, place, "".join(traceback.format_exception(error))[-4000:])
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)

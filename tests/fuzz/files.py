@@ -1,7 +1,5 @@
 """Scans and KITTI's files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +10,7 @@ from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import read_scan
 from modt_desk.box_tracking import detections as boxes
-from modt_desk.evaluation.kitti_labels import read_labels, read_tracklets
+from modt_desk.evaluation.kitti_labels import read_labels
 from modt_desk.evaluation.truth_files import open_truth
 from tests.desk.evaluation.test_truth_files import CUBOID, ITEM, LABEL, POSE
 from tests.fuzz.target import Feed, of_file, target
@@ -83,13 +81,6 @@ def oxts_records(folder: Path) -> Feed:
 
 
 @target()
-def oxts_of_drive(folder: Path) -> Feed:
-    drive = layouts.raw_drive(folder)
-    path = drive / "oxts" / "data" / f"{1:010d}.txt"
-    return of_file(path, lambda: open_scans(drive), path.read_bytes())
-
-
-@target()
 def time_stamps(folder: Path) -> Feed:
     """Time stamps of the sweeps, the same for their begin and their end."""
     drive = layouts.raw_drive(folder)
@@ -113,13 +104,6 @@ def times_of_sequence(folder: Path) -> Feed:
 def poses(folder: Path) -> Feed:
     path = folder / "poses.txt"
     return of_file(path, lambda: read_poses(path), "1 0 0 5 0 1 0 0 0 0 1 0\n" * 3)
-
-
-@target()
-def tracklets(folder: Path) -> Feed:
-    path = folder / "tracklet_labels.xml"
-    seed = f"<root><tracklets>{TRACKLETS * 2}</tracklets></root>"
-    return of_file(path, lambda: read_tracklets(path), seed)
 
 
 @target()
@@ -162,9 +146,3 @@ def detections(folder: Path) -> Feed:
             list(sequence.frames())
 
     return of_file(path, read, AB3DMOT * 2, label * 2)
-
-
-TARGETS = (
-    *(scan, pcd, ply, calibration_of_sequence, calibration_of_drive, oxts_records, oxts_of_drive, time_stamps),
-    *(times_of_sequence, poses, tracklets, truth_of_drive, labels_of_frame, truth_of_sequence, cuboids, detections),
-)

@@ -1,7 +1,5 @@
 """Inputs of a running robot: sweeps of any numbers, and requests for its page."""
 
-from __future__ import annotations
-
 import ctypes
 from io import BytesIO
 from pathlib import Path
@@ -66,6 +64,3 @@ def requests(_: Path) -> Feed:
     heads = ("GET / HTTP/1.1", "GET /events HTTP/1.0", "GET /favicon.ico HTTP/1.1", "POST /x HTTP/1.1", "GET /")
     seeds = [f"{head}\r\nHost: localhost:8766\r\nConnection: keep-alive\r\n\r\n".encode() for head in heads]
     return seeds, lambda raw: _Handler(Connection(raw), ("127.0.0.1", 9), server)
-
-
-TARGETS = (sweeps, requests)

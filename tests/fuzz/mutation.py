@@ -1,6 +1,4 @@
-"""Mutations of bytes: every one is one of a few kinds, at random places."""
-
-from __future__ import annotations
+"""Mutations of bytes, of a few kinds and at random places."""
 
 import random
 import re

@@ -1,7 +1,5 @@
 """Profiles, models, and the directories of runs."""
 
-from __future__ import annotations
-
 import json
 from argparse import Namespace
 from collections.abc import Callable
@@ -14,7 +12,6 @@ import numpy as np
 import onnx
 
 from modt import assets, profile
-from modt.app.status import SCHEMA
 from modt.classification.pointnet import PointNet
 from modt.cli import status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
@@ -23,6 +20,7 @@ from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt_desk.cli import profile_report
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.evaluation.truth_files import open_truth
+from tests.cli.test_top import status as status_record
 from tests.desk.evaluation.test_truth_files import tracklets
 from tests.desk.reporting.test_run_report import track, write_run
 from tests.fuzz.target import Feed, of_file, target
@@ -32,7 +30,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
     for before, name in zip("abcdefgh", "bcdefghi", strict=True)
 )
-"""Nine to the ninth words."""
+"""YAML whose aliases expand to nine to the ninth words."""
 DESCRIPTION = "schema: modt.run/1\nstream: {name: street, path: null}\nmode: efficient\nfov: full\nprofile: {}\n"
 DESCRIPTION += "recognition: {used: vlp-16}\n"
 SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.splitlines())}]}}\n"
@@ -135,63 +133,43 @@ def tracks(folder: Path) -> Feed:
     return of_file(path, _report(path.parent), path.read_bytes())
 
 
-@target()
-def judged_run(folder: Path) -> Feed:
-    """Evaluation of a run by its description and its tracks, which a line `---` separates."""
+def _judged(folder: Path) -> tuple[Path, Callable[[], object]]:
+    """A run with labels of points, and its evaluation."""
     truth = open_truth(tracklets(layouts.raw_drive(folder), ("Car", 1, [8, 9])))
     run = folder / "run"
     (run / "labels").mkdir(parents=True)
     for index in range(4):
         (run / "labels" / f"{index:06d}.label").write_bytes(np.full(50, 1 << 16, np.uint32).tobytes())
+    return run, lambda: list(RunRecord.open(run).frames(truth))
+
+
+@target()
+def judged_run(folder: Path) -> Feed:
+    """Evaluation of a run by its description and its tracks, which a line `---` separates."""
+    run, judge = _judged(folder)
     lines = "".join(json.dumps(frame_record(index)) + "\n" for index in range(4))
-    facts = DESCRIPTION.replace("full", "camera")
 
     def call(raw: bytes) -> None:
         about, _, found = raw.partition(b"---\n")
         (run / "run.yaml").write_bytes(about)
         (run / "tracks.jsonl").write_bytes(found)
-        for _ in RunRecord.open(run).frames(truth):
-            pass
+        judge()
 
-    return [f"{facts}---\n{lines}".encode()], call
+    return [f"{DESCRIPTION.replace('full', 'camera')}---\n{lines}".encode()], call
 
 
 @target()
 def labels_of_points(folder: Path) -> Feed:
-    truth = open_truth(tracklets(layouts.raw_drive(folder), ("Car", 1, [8, 9])))
-    run = folder / "run"
-    (run / "labels").mkdir(parents=True)
+    run, judge = _judged(folder)
     (described(run) / "tracks.jsonl").write_text(json.dumps(frame_record(1)) + "\n")
-    seed = np.full(50, 1 << 16, np.uint32).tobytes()
-    return of_file(run / "labels" / "000001.label", lambda: list(RunRecord.open(run).frames(truth)), seed)
+    path = run / "labels" / "000001.label"
+    return of_file(path, judge, path.read_bytes())
 
 
 @target()
 def service_status(folder: Path) -> Feed:
-    times = {"mean": 1.0, "p99": 2.0, "max": 3.0}
-    loop = {
-        **dict.fromkeys(("missed_deadlines", "frames", "shed_sweeps"), 3),
-        **dict.fromkeys(("lateness_ms", "execution_ms", "latency_ms"), times),
-        **{"budget_ms": 20.0, "other_stages_ms": 10.0, "step": "full", "steps_entered": {"full": 1}, "failures": {}},
-    }
-    seed = {
-        **{"schema": SCHEMA, "time_s": 1.0, "up_s": 3.0, "source": "udp://", "mode": "accurate", "profile": "vlp-16"},
-        **{"loop": loop, "sensor": {"received": 3}, "sinks": {"udp": {"sent": 3}}, "host": {"lacking": ["x"]}},
-        **{
-            "power": {"frame_J": 0.1, "watts": 3.0, "kind": "measured"},
-            "recording": {"failing": "", "lines": 3, "lost_lines": 0},
-        },
-        **{"counts": {"rate_hz": 10.0, "tracks": 3, "visible": {"car": 1}}},
-    }
-
     def read() -> None:
         with redirect_stdout(StringIO()):
             status.run(Namespace(directory=folder, json=False))
 
-    return of_file(folder / STATUS, read, json.dumps(seed))
-
-
-TARGETS = (
-    *(profiles, models, model_metadata, run_description, ledger, tracks, judged_run, labels_of_points),
-    *(service_status,),
-)
+    return of_file(folder / STATUS, read, json.dumps(status_record() | {"time_s": 1.0}))

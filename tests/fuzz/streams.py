@@ -1,7 +1,5 @@
 """Captures, packets, recordings and messages of ROS 2, datagrams."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 
@@ -11,10 +9,11 @@ import pytest
 from modt.ros2.cdr import MessageError
 from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
-from modt.sources.packets.capture import Capture, open_capture
+from modt.sources.packets.capture import Capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Reception
@@ -26,7 +25,7 @@ from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
 
 LENGTH = struct.Struct("<Id")
-"""Before a packet in an input: its bytes, and when it was received."""
+"""Header of a packet in an input: its length, and the time of its reception."""
 
 
 @target()
@@ -41,18 +40,7 @@ def pcap(folder: Path) -> Feed:
 
 
 @target()
-def velodyne_capture(folder: Path) -> Feed:
-    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-    path = folder / "a.pcap"
-    write_capture(path, packets("vlp-16", 3)[60:240], 2368)  # more than two turns
-    return of_file(path, lambda: list(open_capture(path, {})), path.read_bytes())
-
-
-@target()
 def velodyne_packets(folder: Path) -> Feed:
-    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-    from modt.sources.packets.velodyne import VelodyneDecoder
-
     return _of_packets(VelodyneDecoder("sensor"), _framed(packets("vlp-16", 3)[60:180]))
 
 
@@ -74,9 +62,6 @@ def hesai_calibration(folder: Path) -> Feed:
 
 @target()
 def velodyne_calibration(folder: Path) -> Feed:
-    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-    from modt.sources.packets.velodyne import VelodyneDecoder
-
     path = folder / "ideal.yaml"
     return of_file(path, lambda: VelodyneDecoder("sensor", None, path), ideal_calibration(LAYOUTS["vlp-16"]))
 
@@ -182,20 +167,3 @@ def _of_packets(decoder: PacketDecoder, seed: bytes) -> Feed:
         fresh.finish(reception)
 
     return [seed], call
-
-
-TARGETS = (
-    *(
-        pcap,
-        velodyne_capture,
-        velodyne_packets,
-        velodyne_calibration,
-        hesai_packets,
-        livox_packets,
-        hesai_calibration,
-        ouster_packets,
-        ouster_metadata,
-        database,
-    ),
-    *(mcap, point_cloud, odometry, transforms, pose_datagram),
-)

@@ -1,7 +1,5 @@
 """Targets of fuzzing: readers, the bytes that they are fed with, and how they may refuse them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,24 +12,23 @@ Feed = tuple[Sequence[bytes], Callable[[bytes], object]]
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A reader.
-
-    Attributes:
-        name: of the target.
-        prepare: its seeds and call, which keeps its files in a folder; skips where an extra is missing.
-        refusals: the errors by which it may refuse an input.
-    """
+    """A reader, and the errors by which it may refuse an input."""
 
     name: str
     prepare: Callable[[Path], Feed]
-    refusals: tuple[type[Exception], ...] = (ModtError,)
+    """Seeds and call, which keeps its files in a folder; skips where an extra is missing."""
+    refusals: tuple[type[Exception], ...]
 
 
-def target(*refusals: type[Exception]) -> Callable[[Callable[[Path], Feed]], Target]:
+TARGETS: dict[str, Target] = {}
+
+
+def target(*refusals: type[Exception]) -> Callable[[Callable[[Path], Feed]], Callable[[Path], Feed]]:
     """Make a target of a function that prepares it, named as the function."""
 
-    def made(prepare: Callable[[Path], Feed]) -> Target:
-        return Target(prepare.__name__, prepare, (ModtError, *refusals))
+    def made(prepare: Callable[[Path], Feed]) -> Callable[[Path], Feed]:
+        TARGETS[prepare.__name__] = Target(prepare.__name__, prepare, (ModtError, *refusals))
+        return prepare
 
     return made
 

@@ -1,25 +1,17 @@
-"""Whatever the bytes: they are read, or refused by an error of ours, in time and within the memory."""
+"""Readers read any bytes, or refuse them with an error of modt, within a time and a memory."""
 
-from __future__ import annotations
-
+import time
 from pathlib import Path
 
 import pytest
 
-from tests.fuzz.execution import Finding, execute, limits
+from tests.fuzz import execution
+from tests.fuzz.execution import execute, limits
 from tests.fuzz.mutation import mutations
 from tests.fuzz.target import Target
 from tests.fuzz.targets import TARGETS
 
 READERS = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
-FEW, MANY = 100, 2000
-
-
-def findings(target: Target, folder: Path, n: int, seed: int) -> list[Finding]:
-    seeds, call = target.prepare(folder)
-    with limits():
-        read = (execute(call, raw, target.refusals) for raw in mutations(seeds, n, seed))
-        return [found for found in read if found is not None]
 
 
 @READERS
@@ -29,11 +21,29 @@ def test_valid_bytes_are_read(target: Target, tmp_path: Path) -> None:
 
 
 @READERS
-def test_broken_bytes_are_refused(target: Target, tmp_path: Path) -> None:
-    assert [f"{f.error} ({f.place})" for f in findings(target, tmp_path, FEW, 1)] == []
+@pytest.mark.parametrize(("n", "seed"), [(50, 1), pytest.param(500, 2, marks=pytest.mark.slow)])
+def test_broken_bytes_are_refused(target: Target, n: int, seed: int, tmp_path: Path) -> None:
+    seeds, call = target.prepare(tmp_path)
+    with limits():
+        findings = [execute(call, raw, target.refusals) for raw in mutations(seeds, n, seed)]
+    assert [f"{f.error} ({f.place})" for f in findings if f is not None] == []
 
 
-@pytest.mark.slow
-@READERS
-def test_many_broken_bytes_are_refused(target: Target, tmp_path: Path) -> None:
-    assert [f"{f.error} ({f.place})" for f in findings(target, tmp_path, MANY, 2)] == []
+def spin(_: bytes) -> None:
+    while True:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("limit", "call", "error"),
+    [
+        ("CPU_TIME_S", spin, "DeadlineError: longer than 0.05 s of CPU time"),
+        ("CPU_TIME_S", lambda _: time.sleep(0.3), None),  # the process does not run
+        ("HANG_S", lambda _: time.sleep(60.0), "DeadlineError: longer than 0.05 s"),
+    ],
+)
+def test_an_input_that_takes_too_long_is_a_finding(limit, call, error, monkeypatch):
+    monkeypatch.setattr(execution, limit, 0.05)
+    with limits():
+        finding = execute(call, b"", ())
+    assert (finding and finding.error) == error

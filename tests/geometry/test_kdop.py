@@ -1,13 +1,32 @@
-"""k-DOPs and their overlap against slow references."""
+"""k-DOPs, their overlap, displacement and costs against slow references."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.geometry.kdop import DIRECTIONS, centres, coverage, kdops, overlapping_pairs, widths
+from modt.geometry.kdop import (
+    AGREE_M,
+    AXES,
+    DIRECTIONS,
+    PairWeights,
+    Shapes,
+    centres,
+    certain_pairs,
+    coverage,
+    kdops,
+    measured,
+    overlapping_pairs,
+    pair_costs,
+    shape_similarity,
+    shift_between,
+    widths,
+)
 from tests.tracking.tracking_scenes import box, frame_of
 
 PAD_M = 0.15
+DISAGREEMENT, DECAY, SOFT_M = 0.3, 0.97, 0.3
+WEIGHTS = PairWeights(size=1.5, overlap=0.8, height=2.0, points=0.5)
 
 
 def random_ends(n, seed, max_length):
@@ -51,11 +70,6 @@ def test_pairs_do_not_depend_on_the_origin_of_the_world():
     np.testing.assert_array_equal(far, near)
 
 
-def test_groups_far_apart_do_not_overlap():
-    a = kdop(*random_ends(90, 1, 9)) + (np.array([2_000.0, 0.0]) @ DIRECTIONS)[:, None]
-    assert not len(overlapping_pairs(a, kdop(*random_ends(70, 2, 9)))[0])
-
-
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_widths_and_centres(n, seed):
     low, high = random_ends(n, seed, 9)
@@ -87,3 +101,158 @@ def test_kdops_are_the_greatest_coordinates_of_the_points():
         along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ DIRECTIONS
         np.testing.assert_allclose(found[:, i], along.max(axis=0), atol=1e-4)
     assert kdops(proposals.take(np.zeros(0, np.int64)), T).shape == (8, 0)
+
+
+def random_kdops(rng, n):
+    """(8, n) k-DOPs, and others that differ from them little or much."""
+    middle, half = rng.uniform(-2, 2, (4, n)), rng.uniform(0.1, 3.0, (4, n))
+    a = np.concatenate([half + middle, half - middle])
+    change = rng.normal(0, 1, (8, n)) * rng.choice([0.02, 0.3], n)
+    return a, a + np.maximum(change, -rng.uniform(0.5, 0.9, (8, n)) * np.tile(half, (2, 1)))  # no width is negative
+
+
+def square(centre, half):
+    """(8, 1) k-DOP that reaches half a width in each direction."""
+    return (np.asarray(centre) @ DIRECTIONS + half)[:, None]
+
+
+def slow_moved(a, b, k):
+    """Displacement along an axis, and from 0 to 1 how little its ends agree."""
+    longest = max(*(a[:4] + a[4:]), *(b[:4] + b[4:]), 1.0)
+    ahead, behind = b[k] - a[k], a[k + 4] - b[k + 4]
+    agree = max(0.0, 1 - ((ahead - behind) * longest / AGREE_M) ** 2) ** 2
+    return agree * (ahead + behind) / 2 + (1 - agree) * min(ahead, behind, key=abs), 1 - agree
+
+
+def slow_measured(a, b, variance, before):
+    """Displacement, covariance and end variances of one pair, axis by axis."""
+    width_a, width_b = a[:4] + a[4:], b[:4] + b[4:]
+    information, weighted, end_variance = np.zeros((2, 2)), np.zeros(2), []
+    for k in range(4):
+        axis, (moved, unlike) = AXES[:, k], slow_moved(a, b, k)
+        new = unlike * (DISAGREEMENT * (width_b[k] - width_a[k])) ** 2
+        end_variance.append(min(max(new, DECAY * before[k]), (DISAGREEMENT * max(width_b)) ** 2))
+        information += np.outer(axis, axis) / (2 * (variance + end_variance[-1]))
+        weighted += axis * moved / (2 * (variance + end_variance[-1]))
+    covariance = np.linalg.inv(information)
+    return covariance @ weighted, covariance, end_variance
+
+
+def slow_similarity(a, b):
+    """Difference of log sizes and overlap of one pair of k-DOPs, number by number."""
+    sizes, squares = [], ([], [], [])
+    for la, ha, lb, hb in zip(-a[4:], a[:4], -b[4:], b[:4], strict=True):
+        sizes.append(abs(np.log(hb - lb + SOFT_M) - np.log(ha - la + SOFT_M)))
+        common = max(min(ha, hb) - max(la, lb) + SOFT_M / 3, 0.0)
+        for side, width in zip(squares, (ha - la + SOFT_M / 3, hb - lb + SOFT_M / 3, common), strict=True):
+            side.append(width)
+    areas_a, areas_b, common = ([s[0] * s[2], s[1] * s[3]] for s in squares)
+    return sum(sizes) / 4, min(c / (p + q - c) for p, q, c in zip(areas_a, areas_b, common, strict=True))
+
+
+def slow_shift(a, b):
+    """Displacement of one pair of k-DOPs, axis by axis."""
+    return sum(AXES[:, k] * slow_moved(a, b, k)[0] for k in range(4)) / 2
+
+
+@given(st.integers(0, 6), st.integers(0, 2**16))
+def test_measured_displacement_matches_the_slow_reference(n, seed):
+    rng = np.random.default_rng(seed)
+    a, b = random_kdops(rng, n)
+    variance, before = rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
+    shift, covariance, end_variance = measured(a, b, variance, before)
+    for k in range(n):
+        slow = slow_measured(a[:, k], b[:, k], variance, before[:, k])
+        for fast, one in zip((shift[k], covariance[k], end_variance[:, k]), slow, strict=True):
+            np.testing.assert_allclose(fast, one, atol=1e-9)
+
+
+@given(st.integers(0, 6), st.integers(0, 2**16))
+def test_shift_and_similarity_match_the_slow_reference(n, seed):
+    a, b = random_kdops(np.random.default_rng(seed), n)
+    shift, (size, overlap) = shift_between(a, b), shape_similarity(a, b)
+    for k in range(n):
+        np.testing.assert_allclose(shift[k], slow_shift(a[:, k], b[:, k]), atol=1e-9)
+        np.testing.assert_allclose((size[k], overlap[k]), slow_similarity(a[:, k], b[:, k]), atol=1e-9)
+
+
+@given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.2, 3))
+def test_the_displacement_of_an_unchanged_shape_is_exact(dx, dy, half):
+    a, b = square((0, 0), half), square((dx, dy), half)
+    size, overlap = shape_similarity(a, b)
+    np.testing.assert_allclose(shift_between(a, b), [[dx, dy]], atol=1e-9)
+    np.testing.assert_allclose(size, 0, atol=1e-9)
+    assert 0 <= overlap[0] <= 1
+
+
+@pytest.mark.parametrize("growth", [[2.0, 1.5, 0, 0, 0, 0, 0, 0], [0, 1.0, 2.0, 1.0, 0, 0, 0, 0]])
+def test_growth_at_one_end_is_no_displacement(growth):
+    before = square((0, 0), 1.0)
+    after = before + np.array(growth)[:, None]
+    np.testing.assert_allclose(shift_between(before, after), 0, atol=1e-9)
+
+
+@given(st.integers(0, 2**16), st.floats(-1, 1), st.floats(-1, 1))
+def test_an_unchanged_shape_has_no_end_variance(seed, dx, dy):
+    a, _ = random_kdops(np.random.default_rng(seed), 5)
+    b = a + (np.array([dx, dy]) @ DIRECTIONS)[:, None]
+    shift, covariance, end_variance = measured(a, b, 0.04, np.zeros((4, 5)))
+    np.testing.assert_allclose(shift, np.tile([dx, dy], (5, 1)), atol=1e-9)
+    np.testing.assert_allclose(shift, shift_between(a, b), atol=1e-9)
+    np.testing.assert_allclose(covariance, np.tile(0.04 * np.eye(2), (5, 1, 1)), atol=1e-9)
+    np.testing.assert_allclose(end_variance, 0, atol=1e-9)
+
+
+def shapes(rng, kdop):
+    n = kdop.shape[1]
+    bottom = rng.uniform(-2, 0, n)
+    return Shapes.of(kdop, bottom, bottom + rng.uniform(0.2, 3, n), rng.integers(1, 500, n))
+
+
+def random_pairs(seed, n):
+    """Two sets of n shapes, covariances, a variance, and some of their pairs."""
+    rng = np.random.default_rng(seed)
+    a, b = (shapes(rng, kdop) for kdop in random_kdops(rng, n))
+    root = rng.normal(size=(n, 2, 2))
+    P = root @ root.transpose(0, 2, 1) + 0.1 * np.eye(2)
+    covariance = np.stack([P[:, 0, 0], P[:, 0, 1], P[:, 1, 1]])
+    pairs = np.divmod(rng.permutation(n * n)[: 2 * n], max(n, 1))
+    return a, b, covariance, rng.uniform(0.01, 1), pairs
+
+
+@given(st.integers(0, 2**16), st.integers(0, 6))
+def test_costs_equal_those_of_pairs_one_by_one(seed, n):
+    a, b, covariance, variance, pairs = random_pairs(seed, n)
+    found = pair_costs(a, b, covariance, variance, pairs, WEIGHTS)
+    for i, j, cost, covered in zip(*pairs, *found, strict=True):
+        ends = [min(b.kdop[k, j] - a.kdop[k, i], a.kdop[k + 4, i] - b.kdop[k + 4, j], key=abs) for k in range(4)]
+        xx, xy, yy = covariance[:, i]
+        shift = AXES @ ends / 2
+        S = np.array([[xx, xy], [xy, yy]]) + variance * np.eye(2)
+        displacement = (shift @ np.linalg.inv(S) @ shift + np.log(np.linalg.det(S / variance))) / 2
+        size, overlap = slow_similarity(a.kdop[:, i], b.kdop[:, j])
+        height = abs(a.top[i] - b.top[j]) + abs(a.bottom[i] - b.bottom[j])
+        count = abs(a.log_count[i] - b.log_count[j])
+        shape = 1.5 * size + 0.8 * (1 - overlap) + 2.0 * height / 2 + 0.5 * count
+        np.testing.assert_allclose(cost, displacement + shape, atol=1e-9)
+        assert overlap - 1e-9 <= covered <= 1
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1))
+def test_the_displacement_of_a_displaced_shape_is_that_of_its_centre(dx, dy, variance_m2):
+    rng, pair, S = np.random.default_rng(0), np.zeros(1, np.int64), variance_m2 + 0.3
+    covariance = np.array([[variance_m2], [0.0], [variance_m2]])
+    given = shapes(rng, square((0, 0), 1.0)), shapes(rng, square((dx, dy), 1.0)), covariance, 0.3, (pair, pair)
+    cost, _ = pair_costs(*given, PairWeights(0.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(cost, (dx**2 + dy**2) / S / 2 + np.log(S / 0.3), atol=1e-9)
+
+
+def test_pairs_without_a_rival_are_certain():
+    rows, columns = np.array([0, 1, 1, 2, 3]), np.array([0, 1, 2, 2, 3])
+    cost = np.array([0.5, 0.1, 0.2, 0.1, 0.9])
+    certain, contested = certain_pairs(rows, columns, cost, 1.0)
+    assert certain.tolist() == [0, 1, 3, 4]
+    assert contested.tolist() == []
+    certain, contested = certain_pairs(rows, columns, np.array([0.5, 0.5, 0.2, 0.3, 0.9]), 1.0)
+    assert certain.tolist() == [0, 4]
+    assert contested.tolist() == [1, 2, 3]

@@ -74,7 +74,7 @@ def test_a_board_alone_goes_with_the_default_sensor():
         ({"a": "sensor: {height_m: 99}\n"}, ["a.yaml:1", "height_m", "out of range"]),
     ],
 )
-def test_what_is_wrong_is_one_line_that_names_the_place(write, texts, parts):
+def test_an_error_is_one_line_that_names_the_place(write, texts, parts):
     write(**texts)
     with pytest.raises(MisuseError) as caught:
         profile.load(["a.yaml", "hdl-64e"])
@@ -90,14 +90,13 @@ def test_profiles_that_do_not_go_together_are_named(write):
         profile.load(["budget.yaml", "board.yaml"])
 
 
-def test_what_is_shown_is_a_profile_and_says_who_set_each_key():
+def test_a_shown_profile_can_be_read_and_says_who_set_each_key():
     found = profile.resolve(["os1-32", "raspberry-pi-5"])
     shown = found.shown()
     assert profile.parse(shown) == found.config
     lines = {line.strip() for line in shown.splitlines()}
     assert "height_m: 1.0 # os1-64" in lines
     assert "elevation_step_deg: 1.45 # os1-32" in lines
-    assert "board: Raspberry Pi 5 # raspberry-pi-5" in lines
     assert "period_s: 0.1 # default" in lines
-    assert shown.endswith("# a third of a person's height is in view from 0.7 m on\n")
+    assert "from 0.7 m on" in shown, "people are in view"
     assert "min_range_m: 2.0 # hdl-64e" in profile.resolve("raspberry-pi-5").shown()

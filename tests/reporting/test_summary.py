@@ -1,10 +1,11 @@
 """The summary's figures from hand-made records."""
 
+import re
 from array import array
 
 import pytest
 
-from modt.reporting.summary import Summary, TrackLives, around, summary_text
+from modt.reporting.summary import Summary, around, summary_text
 from tests.results import CAR, result
 
 
@@ -52,14 +53,6 @@ def test_empty_run_has_no_ratio():
     assert "0 frames" in summary_text(figures)
 
 
-def test_only_tracks_alive_are_held():
-    lives = TrackLives()
-    for i in range(50):
-        lives.add([(i, True, False)])
-    assert len(lives) == 1
-    assert lives.totals(foreground_only=False) == (50, 50)
-
-
 def test_memory_is_bounded_in_a_long_run():
     summary, held = Summary(), []
     for frame in range(3000):
@@ -80,41 +73,25 @@ def entries(thing):
     return entries(vars(thing)) if hasattr(thing, "__dict__") else 0
 
 
-def test_the_text_says_what_is_around_the_robot_before_what_it_cost():
-    lines = summary_text(whole()).splitlines()
-    assert [line.split() for line in lines[3:6]] == [
-        ["car", "1", "nearest", "7.5", "m"],
-        ["pedestrian", "0"],
-        ["cyclist", "0"],
-    ]
-    cost = "\n".join(lines[6:])
-    for figure in ("N_go = 2.3", "beta 42.9 %", "segmentation", "classification"):
-        assert figure in cost
-    assert max(map(len, lines)) <= 100
+def test_the_nearest_return_of_each_class_is_of_the_last_frame():
+    assert around(FRAMES[0].tracks, FRAMES[0].proposals) == {
+        "car": {"count": 1, "nearest_m": 0.0},
+        "background": {"count": 1, "nearest_m": 0.0},
+    }
+    assert whole()["around"] == {"car": {"count": 1, "nearest_m": 7.5}}
 
 
-def test_reading_and_writing_are_not_in_the_sum_of_the_stages():
+def test_the_text_names_objects_costs_and_missed_deadlines_and_sums_the_stages_alone():
     summary = Summary()
     line = ledger_line(0, 3)
     line["stages"]["source"] = dict(line["stages"]["segmentation"], cpu_ns=40 * 10**6)
     summary.add_ledger(line)
     together, source = summary_text(summary.result()).splitlines()[-2:]
     assert together.split()[:2] == ["together", "4.00"]
-    assert source.split()[:4] == ["source", "1", "2", "40.00"]
-
-
-def test_the_nearest_return_of_each_class_is_of_the_last_frame():
-    proposals = FRAMES[-1].proposals
-    assert around(FRAMES[0].tracks, FRAMES[0].proposals) == {
-        "car": {"count": 1, "nearest_m": 0.0},
-        "background": {"count": 1, "nearest_m": 0.0},
-    }
-    assert whole()["around"] == {"car": {"count": 1, "nearest_m": 7.5}}
-    assert proposals.coordinates.shape == (3, 5)
-
-
-@pytest.mark.parametrize("missed", [0, 22])
-def test_missed_deadlines_are_reported(missed):
-    paced = {"rate_hz": 10.0, "missed_deadlines": missed, "max_lateness_ms": 1965.7}
+    assert source.split()[0] == "source"
+    paced = {"rate_hz": 10.0, "missed_deadlines": 22, "max_lateness_ms": 1965.7}
     text = summary_text(whole() | {"run": paced})
-    assert ("missed 22 deadlines at 10 frames/s, the latest frame began 1966 ms late" in text) is (missed > 0)
+    for words in (r"car +1 +nearest 7\.5 m", r"N_go = 2\.3", r"beta 42\.9 %", "missed 22 deadlines"):
+        assert re.search(words, text)
+    assert "missed" not in summary_text(whole() | {"run": paced | {"missed_deadlines": 0}})
+    assert max(map(len, text.splitlines())) <= 100

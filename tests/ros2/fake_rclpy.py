@@ -1,7 +1,5 @@
 """Fake of the parts of rclpy and of the message packages that the node uses. Topics lead back to this process."""
 
-from __future__ import annotations
-
 import sys
 import threading
 from collections import defaultdict

@@ -1,12 +1,10 @@
 """ROS 2 messages encoded and decoded by another implementation, `rosbags`."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
 import numpy as np
-import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 VISION_MSGS_4 = {
     "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
@@ -27,11 +25,10 @@ VISION_MSGS_4 = {
 @cache
 def store() -> Any:
     """Types of ROS 2 Humble and of vision_msgs 4."""
-    typesys = pytest.importorskip("rosbags.typesys")
-    found = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    found = get_typestore(Stores.ROS2_HUMBLE)
     for name, definition in VISION_MSGS_4.items():
         if name not in found.types:
-            found.register(typesys.get_types_from_msg(definition, name))
+            found.register(get_types_from_msg(definition, name))
     return found
 
 
@@ -77,19 +74,12 @@ def placed(kind: str, position: list[float], quaternion: list[float]) -> Any:
     return made("geometry_msgs/Transform", translation=made("geometry_msgs/Vector3", **at), rotation=orientation)
 
 
-def cloud(
-    data: np.ndarray,
-    *,
-    stamp_s: float = 1.0,
-    frame_id: str = "lidar",
-    datatypes: dict[str, int] | None = None,
-    padding: int = 0,
-) -> Any:
+def cloud(data: np.ndarray, *, stamp_s: float = 1.0, frame_id: str = "lidar", padding: int = 0) -> Any:
     """A PointCloud2 of a structured (height, width) array, its rows padded by some bytes."""
     kinds = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
     fields = []
     for name, (kind, offset) in data.dtype.fields.items():
-        datatype = (datatypes or {}).get(name, kinds.get(kind.str[1:], 0))
+        datatype = kinds.get(kind.str[1:], 0)
         fields.append(made("sensor_msgs/PointField", name=name, offset=offset, datatype=datatype, count=1))
     rows = np.frombuffer(data.tobytes(), np.uint8).reshape(len(data), -1)
     rows = np.pad(rows, ((0, 0), (0, padding)))
@@ -126,15 +116,12 @@ def odometry(stamp_s: float, position: list[float], quaternion: list[float], chi
 
 def transforms(*edges: tuple[str, str, list[float], list[float]]) -> Any:
     """A TFMessage of (parent, child, translation, quaternion)."""
-    return made(
-        "tf2_msgs/TFMessage",
-        transforms=[
-            made(
-                "geometry_msgs/TransformStamped",
-                header=header(0.0, parent),
-                child_frame_id=child,
-                transform=placed("Transform", at, turned),
-            )
-            for parent, child, at, turned in edges
-        ],
-    )
+    stamped = []
+    for parent, child, at, turned in edges:
+        values = {
+            "header": header(0.0, parent),
+            "child_frame_id": child,
+            "transform": placed("Transform", at, turned),
+        }
+        stamped.append(made("geometry_msgs/TransformStamped", **values))
+    return made("tf2_msgs/TFMessage", transforms=stamped)

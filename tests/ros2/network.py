@@ -1,7 +1,5 @@
 """Two domains of this process that meet over the loopback interface as two processes do."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 
@@ -17,6 +15,18 @@ LOOPBACK = (
     '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
 DEADLINE_S = 60.0
+
+
+class Scripted:
+    """A subscription that hands over batches of messages, one at a time, all sent at 77 s."""
+
+    def __init__(self, *batches: list[bytes]) -> None:
+        self.batches = list(batches)
+
+    def take(self, timeout_s: float = 0.0) -> list[object]:
+        from modt.ros2.dds import Message
+
+        return [Message(data, 77.0) for data in (self.batches.pop(0) if self.batches else [])]
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ import pytest
 
 from modt.address import parse_address
 from modt.errors import MisuseError
-from modt.ros2.address import domain_of, name_of, topic_of
-from modt.schemes import SENSORS
+from modt.ros2.address import domain_of, topic_of
+from modt.schemes import SENSORS, open_sensor
 
 
 @pytest.mark.parametrize("text", ["ros2:///Lidar/points?domain=3", "ros2://Lidar/points?domain=3"])
@@ -22,14 +22,16 @@ def test_the_environment_states_the_domain_where_the_address_does_not(monkeypatc
     assert domain_of(parse_address("ros2:///points", SENSORS)) == 0
 
 
-@pytest.mark.parametrize("domain", ["-1", "233", "x", "²"])
-def test_a_domain_out_of_bounds_is_refused(domain):
-    with pytest.raises(MisuseError, match="from 0 to 232"):
-        domain_of(parse_address(f"ros2:///points?domain={domain}", SENSORS))
-
-
-def test_an_address_without_a_topic_is_refused():
-    address = parse_address("ros2://", SENSORS)
-    assert not name_of(address)
-    with pytest.raises(MisuseError, match="names no topic"):
-        topic_of(address)
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        *((f"ros2:///points?domain={domain}", "from 0 to 232") for domain in ("-1", "233", "x", "²")),
+        ("ros2://?domain=3", "names no topic"),
+        ("ros2:///points?reliability=perfect", "reliability 'perfect' is unknown"),
+        ("ros2:///points?colour=red", "option 'colour' is unknown"),
+    ],
+)
+def test_an_invalid_address_of_a_topic_is_refused(text, cause):
+    pytest.importorskip("cyclonedds")
+    with pytest.raises(MisuseError, match=cause):
+        open_sensor(text)

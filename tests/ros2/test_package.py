@@ -1,7 +1,5 @@
 """The files of the package modt_ros agree with modt, and its node exchanges messages by a fake rclpy."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import re
@@ -24,6 +22,7 @@ from modt.errors import MisuseError
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.schemes import POSES, SENSORS, SINKS, open_poses, open_sensor, open_sink
+from modt.sinks.foxglove_sinks import FIGURES
 from modt.sinks.messages import PREFIX, topics
 from tests.results import CAR, result
 from tests.ros2 import fake_rclpy
@@ -32,18 +31,6 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "ros2" / "modt_ros"
 FRAME = result(3, [5, 4], {0: 1, 1: 12}, {1: CAR})
 PUBLISHED = {topic.name: topic.type for topic in topics(PREFIX, world_frame_id="world", points=True)}
-
-
-def figures():
-    """Topics of energy and CPU time."""
-    pytest.importorskip("foxglove")
-    from modt.sinks.foxglove_sinks import FIGURES
-
-    return {f"/{PREFIX}/{name}" for name in FIGURES}
-
-
-def named(text):
-    return set(re.findall(rf"/{PREFIX}/\w+(?:/\w+)?", text))
 
 
 def test_the_manifest_has_the_version_of_modt_and_the_setup_holds_every_file():
@@ -67,11 +54,11 @@ def test_rviz_shows_topics_of_modt_with_their_types():
 
 def test_the_layout_of_foxglove_shows_topics_of_modt():
     text = (PACKAGE / "config" / "foxglove.json").read_text()
-    layout = json.loads(text)
     panels = set(re.findall(r'"(?:first|second)": "([^"]+)"', text))
-    assert panels == layout["configById"].keys()
-    assert named(text) <= PUBLISHED.keys() | figures()
-    assert {"/modt/markers", "/modt/points", "/modt/detections"} <= named(text)
+    assert panels == json.loads(text)["configById"].keys()
+    named = set(re.findall(rf"/{PREFIX}/\w+(?:/\w+)?", text))
+    assert named <= PUBLISHED.keys() | {f"/{PREFIX}/{name}" for name in FIGURES}  # of energy and CPU time
+    assert {"/modt/markers", "/modt/points", "/modt/detections"} <= named
 
 
 @pytest.fixture(name="launched")

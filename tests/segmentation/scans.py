@@ -2,6 +2,10 @@
 
 import numpy as np
 
+from modt.config import SegmentationConfig, SensorConfig
+from modt.geometry import FieldOfView
+from modt.segmentation.segmenter import Segmenter
+
 HDL_64E = np.deg2rad(np.linspace(-24.8, 2.0, 64))
 VLP_16 = np.deg2rad(np.linspace(-15.0, 15.0, 16))
 
@@ -47,3 +51,12 @@ def scan(boxes=(), height_m=1.73, elevation=HDL_64E, azimuth_deg=(-180.0, 180.0)
     points = np.zeros((seen.sum(), 4), np.float32)
     points[:, :3] = direction[seen] * (nearest[seen] + noise)[:, None]
     return points, np.argmin(ranges, axis=0)[seen]
+
+
+def owners(boxes, seed=0, step_deg=0.17, stage=None):
+    """Points of each proposal of a scene ahead by the box that they lie on."""
+    points, on = scan(boxes, step_deg=step_deg, azimuth_deg=(-40, 40), seed=seed)
+    stage = stage or Segmenter(SegmentationConfig(), SensorConfig(azimuth_step_deg=step_deg), FieldOfView())
+    found = stage.segment(points)
+    ends = zip(found.offsets, found.offsets[1:], strict=False)
+    return [np.bincount(on[found.members[a:b]], minlength=len(boxes) + 1)[1:] for a, b in ends]

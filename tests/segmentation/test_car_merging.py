@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,11 +8,10 @@ from hypothesis import strategies as st
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.clustering import StripMerger
-from modt.segmentation.clusters import ClusterSizes
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.strips import CarLimits, ViewBounds, pairs
+from modt.segmentation.strips import CarLimits, ViewBounds
 from tests.segmentation import reference, scans
 
 BEAM = np.tan(np.deg2rad(SensorConfig().elevation_step_deg))
@@ -53,22 +54,6 @@ def test_targets_equal_those_of_pairs_one_by_one(seed, n):
     np.testing.assert_array_equal(merger().targets(bounds), reference.car_targets(bounds, BEAM, CarLimits()))
 
 
-def test_random_strips_are_merged():
-    """The comparison above covers pairs, chains and refusals."""
-    merged = chained = refused = 0
-    for seed in range(60):
-        bounds = strips(np.random.default_rng(seed), 24)
-        stage = merger()
-        target = stage.targets(bounds)
-        merged += np.count_nonzero(target != np.arange(24))
-        chained += np.count_nonzero(np.bincount(target, minlength=24) > 2)
-        front, back = pairs(bounds, np.full(24, BEAM, np.float32), stage.limits)
-        refused += np.count_nonzero(target[front] != target[back])
-    assert merged > 40
-    assert chained > 5
-    assert refused > 0
-
-
 @given(bearing=st.floats(-1.4, 4.5), range_m=st.floats(20.0, 70.0), width_m=st.floats(0.3, 5.0))
 def test_bounds_are_in_metres(bearing, range_m, width_m):
     angle = bearing + np.linspace(-0.5, 0.5, 9) * width_m / range_m
@@ -84,28 +69,21 @@ def test_bounds_are_in_metres(bearing, range_m, width_m):
     assert bounds.max[1:, 0] == pytest.approx([range_m, 1.2, -0.3 / range_m], rel=1e-4)
 
 
-def owners(boxes, seed=0, merge=True):
-    """Points of each proposal of a scene by the box that they lie on."""
-    points, on = scans.scan(boxes, step_deg=0.17, azimuth_deg=(-40, 40), seed=seed)
+def unmerged():
+    """A segmenter that merges no strips."""
     stage = Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView())
-    if not merge:
-        stage.clusterer.merger.candidates = lambda sizes: np.zeros(len(sizes), np.bool_)
-    found = stage.segment(points)
-    ends = zip(found.offsets, found.offsets[1:], strict=False)
-    return [np.bincount(on[found.members[a:b]], minlength=len(boxes) + 1)[1:] for a, b in ends]
-
-
-def rear_and_roof(x, y):
-    return [(x, y, 0.4, 1.7, 0.3, 0.9), (x + 2.2, y, 1.6, 1.5, 0.8, 1.5)]
+    stage.clusterer.merger.candidates = lambda sizes: np.zeros(len(sizes), np.bool_)
+    return stage
 
 
 @pytest.mark.parametrize(("x", "y"), [(28.0, 0.0), (34.0, -9.0), (40.0, 6.0)])
 def test_rear_and_roof_are_one_car(x, y):
     apart = 0
     for seed in range(6):
-        car = rear_and_roof(x + 0.3 * seed, y)
-        apart += all(min(own) == 0 for own in owners(car, seed, merge=False))
-        found = owners(car, seed)
+        rear_m = x + 0.3 * seed
+        car = [(rear_m, y, 0.4, 1.7, 0.3, 0.9), (rear_m + 2.2, y, 1.6, 1.5, 0.8, 1.5)]
+        apart += all(min(own) == 0 for own in scans.owners(car, seed, stage=unmerged()))
+        found = scans.owners(car, seed)
         largest = max(found, key=sum)
         assert min(largest) > 0
         assert sum(largest) > 0.9 * sum(map(sum, found))
@@ -126,28 +104,21 @@ def test_rear_and_roof_are_one_car(x, y):
 def test_two_objects_stay_two(pair):
     for seed in range(4):
         moved = [(x, y + 0.05 * seed, *rest) for x, y, *rest in pair]
-        assert all(min(own) == 0 for own in owners(moved, seed))
-
-
-def test_near_clusters_are_not_merged():
-    stage = merger()
-    size, points = np.ones(3, np.float32), np.full(3, 50.0)
-    range_m = np.array([10.0, 24.0, 27.0], np.float32)
-    beam_m = range_m * np.float32(BEAM)
-    sizes = ClusterSizes(points, size, 0 * size, size, np.sqrt(range_m), np.arange(3), beam_m, np.zeros(3, np.bool_))
-    assert stage.candidates(sizes).tolist() == [False, False, True]
+        assert all(min(own) == 0 for own in scans.owners(moved, seed))
 
 
 def test_merged_cars_stay_within_the_size_of_an_object():
-    larger = 0
-    for seed in range(20):
+    """The random strips make pairs and chains, some of them longer than the lower limit."""
+    larger = chained = 0
+    for seed, limit_m in itertools.product(range(20), (2.0, 6.0)):
         bounds = strips(np.random.default_rng(seed), 24)
-        for limit_m in (2.0, 6.0):
-            target = merger(limit_m).targets(bounds)
-            merged = [np.flatnonzero(target == first) for first in np.unique(target) if np.sum(target == first) > 1]
-            for own in merged:
-                car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))
-                diagonal_m = float(np.sqrt(car.diagonal_m2[0]))
-                assert diagonal_m < limit_m
-                larger += diagonal_m > 2.0
+        target = merger(limit_m).targets(bounds)
+        for first in np.flatnonzero(np.bincount(target) > 1):
+            own = np.flatnonzero(target == first)
+            car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))
+            diagonal_m = float(np.sqrt(car.diagonal_m2[0]))
+            assert diagonal_m < limit_m
+            larger += diagonal_m > 2.0
+            chained += len(own) > 2
     assert larger > 5
+    assert chained > 2

@@ -8,7 +8,7 @@ import pytest
 from modt.config import SegmentationConfig
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.segmentation.ceiling import below_ceiling_m
+from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m
 from modt.segmentation.segmenter import Segmenter
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
@@ -24,25 +24,41 @@ def heights(ceiling_m, n):
 @pytest.mark.parametrize("ceiling_m", [2.3, 2.4, 2.5, 2.62])
 def test_a_ceiling_is_cut_just_below(ceiling_m):
     limit_m = below_ceiling_m(heights(ceiling_m, 4000))
-    assert ceiling_m - 0.25 < limit_m < ceiling_m - 0.05
+    assert ceiling_m - 0.35 < limit_m < ceiling_m - 0.14  # some of its returns lie 0.1 m below it
 
 
 @pytest.mark.parametrize(("ceiling_m", "n"), [(2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000)])
 def test_few_returns_doors_and_what_is_higher_are_no_ceiling(ceiling_m, n):
     assert below_ceiling_m(heights(ceiling_m, n)) is None
-
-
-def test_no_returns_are_no_ceiling():
     assert below_ceiling_m(np.zeros(0, np.float32)) is None
+
+
+@pytest.mark.parametrize("ceiling_m", [2.55, 2.65, 2.75, 2.85])
+def test_a_ceiling_about_the_greatest_height_used_is_cut_well_below(ceiling_m):
+    level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, 4000)]).astype(np.float32)
+    assert 2.3 < below_grazed_m(level[::SAMPLED], 2.6) < 2.5
+
+
+@pytest.mark.parametrize(("ceiling_m", "n"), [(3.2, 4000), (2.65, 100), (2.65, 0)])
+def test_a_high_ceiling_or_few_returns_about_the_greatest_height_used_are_none(ceiling_m, n):
+    level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, n)]).astype(np.float32)
+    assert below_grazed_m(level[::SAMPLED], 2.6) is None
+
+
+def test_the_lowest_returns_of_a_ceiling_above_the_greatest_height_used_join_nobody():
+    """The ceiling is 2.65 to 2.7 m high, and some of its returns are lower than 2.6 m, over a walking person too."""
+    stage = Segmenter(load("mid-360").segmentation, load("mid-360").sensor, FieldOfView())
+    stage.sensor = replace(stage.sensor, height_m=0.3)
+    for frame in SyntheticStream("hall", "mid-360", 4.0, 2101, height_m=0.3).between(8, 10):
+        assert stage.above_ground(frame.points)[2].max() < 2.5
 
 
 def found_of(scene, sensor, height_m, config):
     """People of 20 points or more, and those that a proposal shares more than half of the points with."""
     stage, people, found = Segmenter(config, load(sensor).sensor, FieldOfView()), 0, 0
     stage.sensor = replace(stage.sensor, height_m=height_m)
-    for frame, truth in SyntheticStream(scene, sensor, 3.0, 901, height_m=height_m).sweeps():
-        if frame.index % 6:
-            continue
+    simulator = SyntheticStream(scene, sensor, 3.0, 901, height_m=height_m).simulator
+    for frame, truth in (simulator.sweep(6 * k) for k in range(5)):
         proposals = stage.segment(frame.points)
         label = proposals.label(len(frame.points))
         for body in truth.bodies[truth.points >= 20].tolist():

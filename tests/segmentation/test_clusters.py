@@ -7,7 +7,6 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.clustering import MAX_GAP_BEAMS, MAX_GAP_M, Clusterer
 from modt.segmentation.clusters import connect, occupied_cells
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
-from modt.types import NONE
 from tests.segmentation import reference
 
 STEP = 0.03
@@ -74,45 +73,6 @@ def test_points_of_one_index_share_a_cell(seed, n):
     assert np.array_equal(place[sample][cell], place)
     assert len(np.unique(place)) == len(sample)
     assert (grid.occupied(place)[1] == cell).all(), "the grid is empty again"
-
-
-def test_the_clustering_distance_grows_with_range():
-    stage = clusterer(min_points=1, min_height_m=0.0)
-
-    def parts(range_m, gap_m):
-        y = np.repeat([-gap_m / 2, gap_m / 2], 10)
-        points = np.stack([np.full(20, range_m), y, np.tile(np.linspace(-1.4, 0.0, 10), 2)], axis=1)
-        return stage.cluster(
-            PointColumns.from_array(points.astype(np.float32)), np.tile(np.linspace(0.3, 1.7, 10), 2)
-        ).n
-
-    assert parts(5.0, 0.35) == 2
-    assert parts(50.0, 0.2) == 1
-    assert parts(50.0, 1.2) == 2
-
-
-def test_an_overhanging_object_is_a_cluster_of_its_own():
-    height = np.concatenate([np.linspace(0.3, 1.0, 30), np.linspace(2.0, 2.5, 30)]).astype(np.float32)
-    points = np.stack([np.full(60, 8.0), np.zeros(60), height - 1.7], axis=1).astype(np.float32)
-    points[30:, 1] += 0.2
-    clusters = clusterer().cluster(PointColumns.from_array(points), height)
-    label = clusters.of_cell[clusters.cell]
-    assert set(label[:30]).isdisjoint(label[30:])
-
-
-def test_a_person_close_to_a_long_wall_is_a_cluster_of_its_own():
-    rng = np.random.default_rng(0)
-    wall = np.stack([np.full(6000, 12.0), rng.uniform(-10, 10, 6000), rng.uniform(-1.4, 0.8, 6000)], axis=1)
-    person = rng.normal([11.55, 1.0, -0.7], [0.08, 0.12, 0.4], (200, 3))
-    points = np.concatenate([wall, person]).astype(np.float32)
-    height = points[:, 2] + np.float32(1.73)
-    clusters = clusterer().cluster(PointColumns.from_array(points), height)
-    label = clusters.of_cell[clusters.cell]
-    mine = np.bincount(label[6000:] + 1)
-    assert mine.argmax() > 0
-    assert mine.max() > 180
-    assert (label[:6000] == mine.argmax() - 1).sum() < 20
-    assert (label[:6000] == NONE).sum() > 5000, "the wall is too long to be an object"
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])

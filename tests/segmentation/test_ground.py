@@ -10,7 +10,6 @@ from tests.segmentation import reference, scans
 
 HEIGHT_M = 1.73
 MAX_SLOPE_DEG = SegmentationConfig().max_slope_deg
-NO_POINTS = PointColumns.from_array(np.zeros((0, 4), np.float32))
 PROFILES = {
     "flat": lambda x, y: np.full_like(x, -HEIGHT_M),
     "tilted sensor": lambda x, y: -HEIGHT_M + 0.1 * x,
@@ -27,65 +26,84 @@ def ground(**sensor):
     return GroundEstimator(SensorConfig(**sensor), MAX_SLOPE_DEG)
 
 
+def on_floor(profile, **rays):
+    """(n, 4) points of a sweep over a floor of this profile."""
+    direction = scans.rays(**{"step_deg": 1.0, **rays})
+    hit = scans.floor_ranges(direction, profile)
+    seen = np.isfinite(hit)
+    return (direction[seen] * hit[seen, None]).astype(np.float32)
+
+
+def heights(points, estimator=None, height_m=HEIGHT_M):
+    return (estimator or ground()).height_above(PointColumns.from_array(points), height_m)
+
+
 @pytest.mark.parametrize("name", PROFILES)
 def test_ground_of_each_profile_is_found(name):
-    direction = scans.rays(step_deg=1.0)
-    hit = scans.floor_ranges(direction, PROFILES[name])
-    seen = np.isfinite(hit)
-    points = (direction[seen] * hit[seen, None]).astype(np.float32)
-    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
-    assert (np.abs(height) < 0.25).mean() > 0.97
+    assert (np.abs(heights(on_floor(PROFILES[name]))) < 0.25).mean() > 0.97
 
 
 @pytest.mark.parametrize(("max_slope_deg", "is_ground"), [(6.0, False), (14.0, True), (20.0, True)])
 def test_the_steepest_ground_is_a_key(max_slope_deg, is_ground):
-    direction = scans.rays(step_deg=1.0)
-    hit = scans.floor_ranges(direction, lambda x, y: -HEIGHT_M + np.tan(np.deg2rad(13)) * np.clip(x - 5, 0, 10))
-    seen = np.isfinite(hit)
-    points = (direction[seen] * hit[seen, None]).astype(np.float32)
-    height = GroundEstimator(SensorConfig(), max_slope_deg).height_above(PointColumns.from_array(points), HEIGHT_M)
-    on_ramp = points[:, 0] > 7
-    assert ((np.abs(height[on_ramp]) < 0.25).mean() > 0.95) == is_ground
+    points = on_floor(lambda x, y: -HEIGHT_M + np.tan(np.deg2rad(13)) * np.clip(x - 5, 0, 10))
+    height = heights(points, GroundEstimator(SensorConfig(), max_slope_deg))
+    assert ((np.abs(height[points[:, 0] > 7]) < 0.25).mean() > 0.95) == is_ground
 
 
-def test_heights_of_people_on_a_ramp_are_above_the_ramp():
-    slope = 0.268
-    direction = scans.rays(scans.VLP_16, step_deg=0.2)
-    hit = scans.floor_ranges(direction, lambda x, y: -0.8 + slope * np.clip(x - 4, 0, 10))
-    person = scans.box_ranges(direction, (8.75, -0.25, -0.8 + 4.75 * slope), (9.25, 0.25, 2.2))
-    points = (direction * np.minimum(hit, person)[:, None])[np.isfinite(np.minimum(hit, person))].astype(np.float32)
-    on = (person < hit)[np.isfinite(np.minimum(hit, person))]
-    height = ground(height_m=0.8, min_range_m=0.4).height_above(PointColumns.from_array(points), 0.8)
-    assert on.sum() > 50
-    assert np.allclose(height[on], points[on, 2] + 0.8 - 5 * slope, atol=0.25)
-
-
-def test_the_ground_behind_a_person_on_a_ramp_is_that_beside_them():
-    slope, direction = 0.268, scans.rays(np.deg2rad(np.linspace(-22.5, 22.5, 64)), step_deg=0.35)
-    hit = scans.floor_ranges(direction, lambda x, y: -0.5 + slope * np.clip(x - 4, 0, 10))
-    person = scans.box_ranges(direction, (10.75, -0.3, -0.5 + 6.75 * slope), (11.25, 0.3, -0.5 + 7 * slope + 1.7))
+@pytest.mark.parametrize(
+    ("elevation", "step_deg", "height_m", "x"),
+    [(scans.VLP_16, 0.2, 0.8, 8.75), (np.deg2rad(np.linspace(-22.5, 22.5, 64)), 0.35, 0.5, 10.75)],
+)
+def test_heights_of_a_person_on_a_ramp_are_above_the_ramp(elevation, step_deg, height_m, x):
+    """The ground that the person hides is that beside them."""
+    slope, direction = 0.268, scans.rays(elevation, step_deg=step_deg)
+    hit = scans.floor_ranges(direction, lambda x, y: -height_m + slope * np.clip(x - 4, 0, 10))
+    foot_m = slope * (x - 4) - height_m
+    person = scans.box_ranges(direction, (x, -0.3, foot_m), (x + 0.5, 0.3, foot_m + 1.75))
     nearest = np.minimum(hit, person)
     points = (direction * nearest[:, None])[np.isfinite(nearest)].astype(np.float32)
     on = (person < hit)[np.isfinite(nearest)]
-    height = ground(height_m=0.5, min_range_m=0.4).height_above(PointColumns.from_array(points), 0.5)
-    error = height[on] - (points[on, 2] + 0.5 - 6.75 * slope)
+    height = heights(points, ground(height_m=height_m, min_range_m=0.4), height_m)
     assert on.sum() > 50
-    assert np.abs(np.median(error)) < 0.15
+    assert np.abs(np.median(height[on] - (points[on, 2] - foot_m))) < 0.15
 
 
 def test_a_kerb_is_ground_and_a_wall_is_not():
     points, on = scans.scan([(20.0, 8.0, 50.0, 4.0, 0.0, 0.12), (20.0, 12.0, 50.0, 1.0, 0.0, 2.0)], step_deg=0.5)
-    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
+    height = heights(points)
     assert (height[on == 0] < 0.15).mean() > 0.99
     assert (height[on == 1] < 0.25).mean() > 0.95
     wall = (on == 2) & (points[:, 2] > -HEIGHT_M + 0.5)
     assert (height[wall] > 0.25).mean() > 0.97
 
 
-def test_heights_of_points_on_objects():
-    points, on = scans.scan([(15.0, 0.0, 4.0, 1.8, 0.0, 1.5), (25.0, 6.0, 0.5, 0.5, 0.0, 1.7)])
-    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
-    assert np.allclose(height[on > 0], points[on > 0, 2] + HEIGHT_M, atol=0.15)
+FEW_LOW_BEAMS = np.deg2rad([-25.0, -19.0, -14.0, -12.0, -10.0, -8.0, *np.arange(-6.0, 2.0, 0.17)])
+SMALL_ROBOT = {"height_m": 0.3, "min_range_m": 0.3, "max_range_m": 30.0}
+ROOM = [(3.0, 0.0, 0.4, 0.4, 0.0, 1.7), (0.0, 4.0, 8.0, 0.2, 0.0, 2.5)]
+FAR = {"step_deg": 0.17, "azimuth_deg": (-60, 60)}
+
+
+def two_cars(beside_m):
+    return [(0.0, beside_m + gap_m, 4.5, 1.8, 0.2, 1.5) for gap_m in (0.9, 6.0)]
+
+
+@pytest.mark.parametrize(
+    ("boxes", "sensor", "scan", "atol"),
+    [
+        ([(15.0, 0.0, 4.0, 1.8, 0.0, 1.5), (25.0, 6.0, 0.5, 0.5, 0.0, 1.7)], {}, {}, 0.15),
+        *(([(x, y, 1.8, w, 0.3, 1.6)], {}, FAR, 0.1) for x, y, w in [(53, 1, 3.0), (50, 12, 3.0), (47, 20, 4.6)]),
+        *((two_cars(y), {"height_m": 2.13}, {"elevation": FEW_LOW_BEAMS}, 0.2) for y in (2.0, 3.0, 4.0)),
+        ([(21.0, 0.0, 1.8, 4.5, 0.2, 1.5)], {"height_m": 0.8, "min_range_m": 0.4}, {"elevation": scans.VLP_16}, 0.15),
+        (ROOM, SMALL_ROBOT, {"elevation": np.deg2rad(np.linspace(-25, 15, 32))}, 0.1),
+    ],
+)
+def test_sides_of_objects_are_not_ground(boxes, sensor, scan, atol):
+    """Near and far cars, cars that few low beams meet, a person and a wall before a small robot."""
+    height_m = sensor.get("height_m", HEIGHT_M)
+    points, on = scans.scan(boxes, height_m, **scan)
+    height = heights(points, ground(**sensor), height_m)
+    assert np.allclose(height[on > 0], points[on > 0, 2] + height_m, atol=atol)
+    assert (np.abs(height[on == 0]) < 0.1).mean() > 0.98
 
 
 def test_reflections_below_the_ground_do_not_lower_it():
@@ -94,63 +112,13 @@ def test_reflections_below_the_ground_do_not_lower_it():
     row = rng.choice(len(points), 300, replace=False)
     points[row, 2] -= rng.uniform(0.5, 3.0, 300).astype(np.float32)
     kept = np.setdiff1d(np.arange(len(points)), row)
-    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
-    assert (np.abs(height[kept]) < 0.15).mean() > 0.99
-
-
-@pytest.mark.parametrize(("x", "y", "width"), [(53.0, 1.0, 3.0), (50.0, 12.0, 3.0), (47.0, 20.0, 4.6)])
-def test_the_side_of_a_far_car_is_not_ground(x, y, width):
-    points, on = scans.scan([(x, y, 1.8, width, 0.3, 1.6)], step_deg=0.17, azimuth_deg=(-60, 60))
-    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
-    assert np.allclose(height[on == 1], points[on == 1, 2] + HEIGHT_M, atol=0.1)
-
-
-@pytest.mark.parametrize("beside_m", [2.0, 3.0, 4.0])
-def test_the_flank_of_a_car_beside_a_sensor_with_few_low_beams_is_not_ground(beside_m):
-    elevation = np.deg2rad([-25.0, -19.0, -14.0, -12.0, -10.0, -8.0, *np.arange(-6.0, 2.0, 0.17)])
-    car = (0.0, beside_m + 0.9, 4.5, 1.8, 0.2, 1.5)
-    points, on = scans.scan([car, (0.0, beside_m + 6.0, 4.5, 1.8, 0.2, 1.5)], 2.13, elevation)
-    height = ground(height_m=2.13).height_above(PointColumns.from_array(points), 2.13)
-    assert np.allclose(height[on > 0], points[on > 0, 2] + 2.13, atol=0.2)
-
-
-def test_the_flank_of_a_car_that_two_beams_meet_is_not_ground():
-    elevation = np.deg2rad(np.arange(-15.0, 16.0, 2.0))
-    points, on = scans.scan([(21.0, 0.0, 1.8, 4.5, 0.2, 1.5)], 0.8, elevation)
-    height = ground(height_m=0.8, min_range_m=0.4).height_above(PointColumns.from_array(points), 0.8)
-    assert np.allclose(height[on > 0], points[on > 0, 2] + 0.8, atol=0.15)
+    assert (np.abs(heights(points)[kept]) < 0.15).mean() > 0.99
 
 
 def test_ground_that_begins_again_lower_behind_a_crest_is_found():
-    def crest(x, y):
-        return -HEIGHT_M - 0.06 * np.clip(np.hypot(x, y) - 10, 0, None)
-
-    direction = scans.rays(step_deg=1.0)
-    hit = scans.floor_ranges(direction, crest)
-    hidden = (hit * np.hypot(direction[:, 0], direction[:, 1]) > 12.0) & (
-        hit * np.hypot(direction[:, 0], direction[:, 1]) < 25.0
-    )
-    seen = np.isfinite(hit) & ~hidden
-    points = (direction[seen] * hit[seen, None]).astype(np.float32)
-    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
-    assert (np.abs(height) < 0.25).mean() > 0.97
-
-
-def test_floor_of_a_small_robot():
-    points, on = scans.scan(
-        [(3.0, 0.0, 0.4, 0.4, 0.0, 1.7), (0.0, 4.0, 8.0, 0.2, 0.0, 2.5)], 0.3, np.deg2rad(np.linspace(-25, 15, 32))
-    )
-    near = SensorConfig(height_m=0.3, min_range_m=0.3, max_range_m=30.0)
-    height = GroundEstimator(near, MAX_SLOPE_DEG).height_above(PointColumns.from_array(points), 0.3)
-    assert (np.abs(height[on == 0]) < 0.1).mean() > 0.98
-    assert np.allclose(height[on > 0], points[on > 0, 2] + 0.3, atol=0.1)
-
-
-def test_the_order_of_the_points_does_not_matter():
-    points, _ = scans.scan([(15.0, 0.0, 4.0, 1.8, 0.0, 1.5)])
-    order = np.random.default_rng(1).permutation(len(points))
-    straight = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
-    assert np.array_equal(ground().height_above(PointColumns.from_array(points[order]), HEIGHT_M), straight[order])
+    points = on_floor(lambda x, y: -HEIGHT_M - 0.06 * np.clip(np.hypot(x, y) - 10, 0, None))
+    range_m = np.hypot(points[:, 0], points[:, 1])
+    assert (np.abs(heights(points[(range_m <= 12.0) | (range_m >= 25.0)])) < 0.25).mean() > 0.97
 
 
 @given(seed=st.integers(0, 1000))
@@ -191,24 +159,20 @@ def test_the_sensor_height_is_estimated(true_m):
     assert height.height_m(points) == pytest.approx(true_m, abs=0.05)
 
 
-def test_walls_alone_give_the_default_height():
-    walls = [
-        (x, y, *((3.0, 0.2) if y else (0.2, 3.0)), -1.0, 3.0) for x, y in [(1.2, 0), (-1.4, 0), (0, 1.3), (0, -1.5)]
-    ]
-    points, on = scans.scan(walls, 0.8, scans.VLP_16, step_deg=0.2)
-    assert (on > 0).all()
+@pytest.mark.parametrize(
+    ("walls", "bottom_m", "true_m", "floor", "found_m"),
+    [
+        ([(1.2, 0), (-1.4, 0), (0, 1.3), (0, -1.5)], -1.0, 0.8, (-1.0, 0.0), DEFAULT_HEIGHT_M),
+        ([(1.9, 0), (-1.7, 0), (0, 1.8), (0, -2.0)], 0.0, 0.36, (0.05, 0.2), 0.36),
+    ],
+    ids=["walls alone", "floor mostly hidden by walls"],
+)
+def test_the_sensor_height_between_near_walls(walls, bottom_m, true_m, floor, found_m):
+    boxes = [(x, y, *((4.0, 0.2) if y else (0.2, 4.0)), bottom_m, 3.0) for x, y in walls]
+    points, on = scans.scan(boxes, true_m, scans.VLP_16, step_deg=0.2)
+    assert floor[0] < (on == 0).mean() <= floor[1]
     sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
-    assert HeightEstimator(sensor).height_m(points) == DEFAULT_HEIGHT_M
-
-
-def test_a_floor_mostly_hidden_by_walls_is_found():
-    walls = [
-        (x, y, *((4.0, 0.2) if y else (0.2, 4.0)), 0.0, 3.0) for x, y in [(1.9, 0), (-1.7, 0), (0, 1.8), (0, -2.0)]
-    ]
-    points, on = scans.scan(walls, 0.36, scans.VLP_16, step_deg=0.2)
-    assert 0.05 < (on == 0).mean() < 0.2
-    sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
-    assert HeightEstimator(sensor).height_m(points) == pytest.approx(0.36, abs=0.03)
+    assert HeightEstimator(sensor).height_m(points) == pytest.approx(found_m, abs=0.03)
 
 
 def test_no_floor_gives_the_default_height():

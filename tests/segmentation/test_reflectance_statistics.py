@@ -20,40 +20,23 @@ from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import scans
 
-ONE = st.floats(0, 1, width=32)
-VALUES = st.lists(st.lists(ONE, min_size=1, max_size=9), min_size=1, max_size=6)
-SOME = st.lists(st.lists(ONE | st.just(UNRECORDED), min_size=1, max_size=9), min_size=1, max_size=6)
+GROUPS = st.lists(
+    st.lists(st.floats(0, 1, width=32) | st.just(UNRECORDED), min_size=1, max_size=9), min_size=1, max_size=6
+)
 
 
-def statistics(values, offsets):
-    points = np.zeros((len(values), 4), np.float32)
-    points[:, 3] = values
-    return reflectance_statistics(*reflectance_sums(points, np.arange(len(values)), offsets))
-
-
-@given(VALUES)
-def test_statistics_of_each_group(groups: list[list[float]]) -> None:
-    values = np.array([v for group in groups for v in group], np.float32)
+@given(GROUPS)
+def test_statistics_of_each_group_are_of_the_returns_with_reflectance(groups: list[list[float]]) -> None:
+    points = np.zeros((sum(map(len, groups)), 4), np.float32)
+    points[:, 3] = [value for group in groups for value in group]
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
-    found = statistics(values, offsets)
+    found = reflectance_statistics(*reflectance_sums(points, np.arange(len(points)), offsets))
     assert found.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(found, groups, strict=True):
-        own = np.array(group, np.float32)
-        expected = [own.mean(), own.std(), own.max(), (own > BRIGHT).mean(), (own < DARK).mean()]
-        np.testing.assert_allclose(row, expected, atol=2e-3)
-
-
-@given(SOME)
-def test_returns_without_reflectance_are_ignored(groups: list[list[float]]) -> None:
-    values = np.array([v for group in groups for v in group], np.float32)
-    found = statistics(values, np.append(0, np.cumsum([len(group) for group in groups])))
-    assert found.shape == (len(groups), N_REFLECTANCE)
-    for row, group in zip(found, groups, strict=True):
-        own = np.array([v for v in group if v != UNRECORDED], np.float32)
-        expected = np.full(N_REFLECTANCE, np.nan)
+        own, expected = np.array([v for v in group if v != UNRECORDED], np.float32), [np.nan] * N_REFLECTANCE
         if len(own):
-            expected = statistics(own, np.array([0, len(own)]))[0]
-        np.testing.assert_allclose(row, expected, atol=1e-6)
+            expected = [own.mean(), own.std(), own.max(), (own > BRIGHT).mean(), (own < DARK).mean()]
+        np.testing.assert_allclose(row, expected, atol=2e-3)
 
 
 @pytest.mark.parametrize("fov", [FieldOfView(), FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))], ids=["full", "left"])
@@ -85,17 +68,12 @@ def test_proposals_have_statistics_where_the_profile_names_a_scale() -> None:
     owner = on[proposals.members[proposals.offsets[:-1]]]
     np.testing.assert_allclose(proposals.reflectance[:, 0], np.where(owner == 1, 0.25, 0.5))
     assert Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView()).segment(points).reflectance is None
+    points[:, 3] = np.where(on == 1, 0.0, 0.3)
+    dark = stage.segment(points)
+    assert dark.reflectance is not None
+    np.testing.assert_array_equal(dark.reflectance[owner == 1][0], [0, 0, 0, 0, 1])
     points[:, 3] = 0.0
     assert stage.segment(points).reflectance is None
-
-
-def test_dark_objects_in_a_bright_sweep_have_statistics() -> None:
-    points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8)])
-    points[:, 3] = np.where(on == 1, 0.0, 0.3)
-    stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), FieldOfView())
-    found = stage.segment(points).reflectance
-    assert found is not None
-    np.testing.assert_array_equal(found[0], [0, 0, 0, 0, 1])
 
 
 @given(st.integers(1, 5000), st.floats(0, 1, width=32))

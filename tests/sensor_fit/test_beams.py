@@ -1,15 +1,19 @@
-"""Beams from points, against those of simulated and real sensors."""
+"""Beams from points, against those of simulated and real sensors; their filters, against SciPy's."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import ndimage
+from scipy.signal import find_peaks
 
 from modt.geometry import rotation_zyx
-from modt.sensor_fit.beams import COARSE_ORIGINS_M, find_beams
+from modt.sensor_fit.beams import find_beams, gaussian, prominent_peaks, running_mean, running_median
 from modt.sources.scan_file import read_scan
 from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording
 
-SENSORS = ("vlp-16", "vlp-32c", "hdl-32e", "hdl-64e", "os1-64", "pandar64", "xt-32", "solid-state")
+SENSORS = ("vlp-16", "vlp-32c", "hdl-64e", "os1-64", "pandar64", "solid-state")
 
 
 def agree(found_deg, true_deg) -> None:
@@ -25,12 +29,6 @@ def test_beams_of_a_sensor_are_found(name):
     found, model = find_beams(recording(name).sweeps), sensor(name)
     agree(found.elevations_deg, np.rad2deg(model.elevation_rad))
     assert found.azimuth_step_deg == pytest.approx(np.rad2deg(np.diff(model.azimuth_rad).mean()), rel=0.02)
-
-
-@pytest.mark.parametrize("name", ["hdl-64e", "pandar64"])
-def test_a_single_sweep_and_few_origins_tell_as_much(name):
-    found = find_beams(recording(name).sweeps[:1], COARSE_ORIGINS_M)
-    agree(found.elevations_deg, np.rad2deg(sensor(name).elevation_rad))
 
 
 def test_beams_are_found_in_sweeps_that_are_blurred_by_compensation_for_motion():
@@ -57,12 +55,6 @@ def test_few_points_tell_nothing():
 
 
 @pytest.mark.kitti
-def test_beams_of_kitti(drive_0005):
-    files = sorted((drive_0005 / "velodyne_points" / "data").glob("*.bin"))
-    agree(find_beams([read_scan(f)[0] for f in files[:150:15]]).elevations_deg, rings_deg(read_scan(files[0])[0]))
-
-
-@pytest.mark.kitti
 def test_beams_of_a_pandar64_on_the_road(kitti_root):
     calibration = kitti_root / "packets" / "calibration" / "Pandar64.csv"
     true_deg = np.loadtxt(calibration, delimiter=",", skiprows=1)[:, 1]
@@ -70,11 +62,24 @@ def test_beams_of_a_pandar64_on_the_road(kitti_root):
     agree(find_beams([read_scan(scan)[0] for scan in scans]).elevations_deg, true_deg)
 
 
-def rings_deg(points):
-    """Elevation of each ring of a KITTI scan, which lists them one by one, from straight ahead to the left."""
-    azimuth = np.arctan2(points[:, 1], points[:, 0])
-    start = (azimuth[1:] >= 0) & (azimuth[:-1] < 0) & (np.diff(azimuth) < 1)
-    ring = np.append(0, np.cumsum(start))
-    lines = [np.hypot(*points[ring == k, :2].T) for k in range(ring[-1] + 1)]
-    slopes = [np.polyfit(r, points[ring == k, 2], 1)[0] for k, r in enumerate(lines)]
-    return np.rad2deg(np.arctan(slopes))
+ROWS = st.lists(st.integers(0, 5000), min_size=1, max_size=600).map(np.array)
+
+
+@given(ROWS, st.sampled_from([0.7, 1.0, 2.0]), st.integers(1, 260), st.sampled_from([1, 3, 7]))
+def test_filters_are_those_of_scipy(values, deviation, width, odd):
+    padded = np.pad(values, odd // 2, "symmetric")  # SciPy of Python 3.10 fails where the window is the longer one
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, odd), axis=1)
+    np.testing.assert_array_equal(running_median(values, odd), median)
+    values, near = values / 7, {"rtol": 1e-9, "atol": 1e-9}
+    np.testing.assert_allclose(gaussian(values, deviation), ndimage.gaussian_filter1d(values, deviation), **near)
+    np.testing.assert_allclose(running_mean(values, width), ndimage.uniform_filter1d(values, width), **near)
+
+
+@pytest.mark.parametrize("smooth", [0, 2, 10])
+@given(st.lists(st.integers(0, 20), min_size=1, max_size=500))
+def test_peaks_and_prominences_are_those_of_scipy(smooth, count):
+    count = ndimage.gaussian_filter1d(np.array(count, float), smooth) if smooth else np.array(count, float)
+    peaks, prominence = prominent_peaks(count)
+    expected, shape = find_peaks(count, prominence=0)
+    np.testing.assert_array_equal(peaks, expected)
+    np.testing.assert_allclose(prominence, shape["prominences"])

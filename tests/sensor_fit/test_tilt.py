@@ -24,22 +24,18 @@ def stream(scene, sensor, mount_deg, seed=3):
     return SyntheticStream(scene, sensor, 2.0, seed, height_m=HEIGHTS_M[sensor], mount_deg=mount_deg)
 
 
-def degrees_between(a, b):
-    return float(np.rad2deg(np.arccos(np.clip(a @ b, -1, 1))))
-
-
 @pytest.mark.parametrize("mount_deg", MOUNTS)
-@pytest.mark.parametrize("sensor", HEIGHTS_M)
-@pytest.mark.parametrize("scene", ["yard", "corridor", "hall"])
+@pytest.mark.parametrize(("scene", "sensor"), [("yard", "vlp-16"), ("corridor", "os1-64"), ("hall", "mid-360")])
 def test_the_floor_tells_the_mount_to_half_a_degree(scene, sensor, mount_deg):
     frame = next(iter(stream(scene, sensor, mount_deg)))
     floor = find_floor(frame.points, HEIGHTS_M[sensor])
-    assert degrees_between(floor.up, frame.T_world_sensor[2, :3]) < 0.5
+    off_deg = np.rad2deg(np.arccos(np.clip(floor.up @ frame.T_world_sensor[2, :3], -1, 1)))
+    assert off_deg < 0.5
     assert floor.depth_m == pytest.approx(HEIGHTS_M[sensor], abs=0.05)
 
 
 @pytest.mark.parametrize("sensor", ["vlp-16", "os1-64", "hdl-64e"])
-@pytest.mark.parametrize("seed", range(900, 904))
+@pytest.mark.parametrize("seed", [900, 901])
 def test_a_level_sensor_in_a_street_stays_as_it_is(sensor, seed):
     frame = next(iter(SyntheticStream("street", sensor, 0.1, seed)))
     assert find_floor(frame.points).tilt_deg < MIN_TILT_DEG
@@ -64,12 +60,12 @@ def test_any_cloud_has_a_floor_or_none(seed, n, rise_m):
     assert floor is None or np.linalg.norm(floor.up) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("mount_deg", "said"), [((0.0, 15.0), "is tilted"), ((180.0, 0.0), "hangs upside down")])
-def test_a_tilt_that_a_profile_leaves_open_is_said_once_and_applied(mount_deg, said, caplog):
+@pytest.mark.parametrize(("mount_deg", "named"), [((0.0, 15.0), "tilted"), ((180.0, 0.0), "upside down")])
+def test_a_tilt_that_a_profile_leaves_open_is_named_once_and_applied(mount_deg, named, caplog):
     tilted = stream("yard", "vlp-16", mount_deg)
     with caplog.at_level(logging.WARNING):
         chosen = choose("vlp-16", next(iter(tilted)), tilted.info)
-    assert [said in record.message for record in caplog.records] == [True]
+    assert [named in record.message for record in caplog.records] == [True]
     assert chosen.recognition.differences == ()  # the height above all
     sensor = chosen.config.sensor
     # beside the mount the sensor was levelled by eye, to half a degree or so
@@ -77,7 +73,7 @@ def test_a_tilt_that_a_profile_leaves_open_is_said_once_and_applied(mount_deg, s
     assert sensor.pitch_deg == pytest.approx(mount_deg[1], abs=1.5)
 
 
-def test_a_mount_that_a_profile_states_is_kept():
+def test_a_mount_that_a_profile_states_is_kept_and_another_one_named():
     frame, base = next(iter(stream("yard", "vlp-16", (0.0, 15.0)))), profile.load("vlp-16")
     stated = profile.parse("sensor: {roll_deg: 0, pitch_deg: 15.5}\nextends: vlp-16", "test")
     found = recognise(frame.points, stated)
@@ -85,10 +81,6 @@ def test_a_mount_that_a_profile_states_is_kept():
     assert found.differences == ()
     assert found.mounted(stated) == stated
     assert recognise(frame.points, base).mounted(base).sensor.pitch_deg == pytest.approx(15.5, abs=0.7)
-
-
-def test_another_tilt_than_a_profile_states_is_said():
-    frame = next(iter(stream("yard", "vlp-16", (0.0, 15.0))))
     found = recognise(frame.points, profile.parse("sensor: {roll_deg: 0, pitch_deg: 0}\nextends: vlp-16", "test"))
     assert any("pitched by 15" in difference for difference in found.differences)
 
@@ -97,11 +89,8 @@ def test_a_fitted_profile_has_the_mount_and_the_height_of_a_level_sensor():
     tilted = stream("yard", "vlp-16", (10.0, 12.0))
     frames = [tilted.simulator.sweep(5 * k)[0] for k in range(4)]
     config, _ = fit(Recording([frame.points for frame in frames], [frame.stamp_s for frame in frames]))
+    level, _ = fit(recording("vlp-16", "yard"))
+    assert level.sensor.roll_deg == level.sensor.pitch_deg == 0.0
     assert config.sensor.roll_deg == pytest.approx(10.0, abs=1.0)
     assert config.sensor.pitch_deg == pytest.approx(12.5, abs=1.0)
     assert config.sensor.height_m == pytest.approx(0.8, abs=0.05)
-
-
-def test_a_level_sensor_is_fitted_as_level():
-    config, _ = fit(recording("vlp-16", "yard"))
-    assert config.sensor.roll_deg == config.sensor.pitch_deg == 0.0

@@ -8,11 +8,12 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from modt.sources.packets.velodyne import AZIMUTHS, IDENTITY_AT, RETURN_AT
-from tests.sequences.live_world import LiveWorld, cpu_s, turn
+from tests.sequences.live_world import LiveWorld, cpu_s, turns
+from tests.sequences.makers import usable
 
 SEED = st.integers(0, 9)
 ROS = importlib.util.find_spec("cyclonedds") is not None
+SOURCES = [*usable(), *["ros2"] * ROS]
 STEPS_S = st.sampled_from([-1e9, -3600.0, -1.0, -0.5, -0.05, 0.05, 0.3, 0.7, 0.95, 1.05, 3600.0, 1e9]) | st.floats(
     -5, 5
 )
@@ -24,14 +25,14 @@ class LiveSequences(RuleBasedStateMachine):
     """A robot that lives through anything."""
 
     @initialize(
-        source=st.sampled_from(["velodyne", "velodyne", "ros2"] if ROS else ["velodyne"]),
+        source=st.deferred(lambda: st.sampled_from(SOURCES)),
         odometry=st.sampled_from(["datagrams", "topic"] if ROS else ["datagrams"]),
         others=st.sampled_from([0, 0, 20]),
     )
     def begin(self, source, odometry, others) -> None:
         self.world = LiveWorld(source, odometry)
         self._cpu_s, self._messages = cpu_s(), 0
-        for payload in turn("hdl-64e")[: others if source == "velodyne" else 0]:
+        for payload in turns(source)[-1][:others] if self.world.maker else ():
             self.world.packet(self.world.stamped(payload))
 
     def check(self) -> None:
@@ -54,8 +55,8 @@ class LiveSequences(RuleBasedStateMachine):
     def the_process_is_stopped(self, seconds, half_s) -> None:
         world = self.world
         world.drive(1)
-        if world.source == "velodyne":
-            for payload in turn(world.model)[: round(half_s * 750)]:
+        if world.maker is not None:
+            for payload in world.payloads[: round(half_s * 750)]:
                 world.packet(world.stamped(payload))
         else:
             world.cloud(world.calendar_s, np.full((10, 4), 5.0, np.float32))
@@ -75,7 +76,7 @@ class LiveSequences(RuleBasedStateMachine):
         self.world.drive(turns)
         self.check()
 
-    @precondition(lambda self: self.world.source == "velodyne")
+    @precondition(lambda self: self.world.maker is not None)
     @rule(seed=SEED, share=st.sampled_from([0.01, 0.3, 0.9]), turns=st.sampled_from([1, 5]))
     def packets_are_lost_doubled_and_overtaken(self, seed, share, turns) -> None:
         rng = np.random.default_rng(seed)
@@ -89,64 +90,80 @@ class LiveSequences(RuleBasedStateMachine):
         self.world.drive(turns, faults=faults)
         self.check()
 
-    @precondition(lambda self: self.world.source == "velodyne")
+    @precondition(lambda self: self.world.maker is not None)
     @rule(
         seed=SEED,
         scale_s=st.sampled_from([0.0, 1e-6, 0.001, 0.05, 0.3, 3.0, 3600.0]),
         ahead=st.sampled_from([0.0, 0.5]),
-        n=st.sampled_from([1, 30, 1000]),
+        n=st.sampled_from([1, 30, 4000]),
+        stands=st.booleans(),
     )
-    def valid_packets_of_any_time(self, seed, scale_s, ahead, n) -> None:
+    def valid_packets_of_any_time(self, seed, scale_s, ahead, n, stands) -> None:
         rng, world = np.random.default_rng(seed), self.world
-        payloads = turn(world.model)
-        for _ in range(n):
-            world.packet(world.stamped(payloads[rng.integers(len(payloads))], scale_s * rng.uniform(-1, ahead)))
+        payloads = world.payloads[:1] if stands else world.payloads
+        ahead_s = scale_s * rng.uniform(-1, ahead, n)
+        for k, by_s in zip(rng.integers(len(payloads), size=n), np.sort(ahead_s) if stands else ahead_s, strict=True):
+            world.packet(world.stamped(payloads[k], by_s))
         world.take()
         self.check()
 
-    @precondition(lambda self: self.world.source == "velodyne")
+    @precondition(lambda self: self.world.maker is not None and self.world.maker.turned is not None)
     @rule(seed=SEED, azimuth=st.sampled_from([None, 0, 17_999, 18_000, 35_999]), n=st.sampled_from([5, 200]))
     def heads_that_stand_or_leap(self, seed, azimuth, n) -> None:
         rng, world = np.random.default_rng(seed), self.world
         for k in range(n):
-            payload = bytearray(turn(world.model)[k % 70])
             chosen = rng.integers(0, 36_000, 12) if azimuth is None else np.full(12, azimuth)
-            for block, degrees in enumerate(chosen.tolist()):
-                payload[100 * block + 2 : 100 * block + 4] = degrees.to_bytes(2, "little")
-            assert len(AZIMUTHS.unpack_from(payload)) == 12
+            payload = world.maker.turned(world.payloads[k % len(world.payloads)], chosen.tolist())
             world.now_s += 0.0013
-            world.packet(world.stamped(bytes(payload)))
+            world.packet(world.stamped(payload))
         world.take()
         self.check()
 
-    @precondition(lambda self: self.world.source == "velodyne")
-    @rule(model=st.sampled_from(["vlp-16", "hdl-64e"]), n=st.sampled_from([1, 19, 20, 60]))
+    @precondition(lambda self: self.world.maker is not None)
+    @rule(model=st.integers(0, 1), n=st.sampled_from([1, 19, 20, 60]))
     def packets_of_some_model(self, model, n) -> None:
-        for k in range(n):
+        models = turns(self.world.source)
+        for payload in models[model % len(models)][:n]:
             self.world.now_s += 0.0005
-            self.world.packet(self.world.stamped(turn(model)[k % 70]))
+            self.world.packet(self.world.stamped(payload))
         self.check()
 
-    @precondition(lambda self: self.world.source == "velodyne")
+    @precondition(lambda self: self.world.maker is not None)
     @rule(
-        at=st.sampled_from([0, 1, IDENTITY_AT, RETURN_AT]),
-        value=st.sampled_from([0, 0x21, 0x22, 0x28, 0x37, 0x39, 0xA1, 0xFF]),
+        at=st.integers(0, 5),
+        value=st.sampled_from([0, 1, 2, 3, 6, 0x10, 0x21, 0x22, 0x28, 0x37, 0x39, 0x3D, 0xA1, 0xEE, 0xFF]),
         n=st.sampled_from([1, 40]),
     )
-    def factory_bytes(self, at, value, n) -> None:
-        for payload in turn(self.world.model)[:n]:
-            changed = bytearray(payload)
-            changed[at] = value
+    def fields_that_decide(self, at, value, n) -> None:
+        fields = self.world.maker.fields
+        for payload in self.world.payloads[:n]:
+            changed = bytearray(self.world.stamped(payload))
+            changed[fields[at % len(fields)]] = value
             self.world.now_s += 0.0013
-            self.world.packet(self.world.stamped(bytes(changed)))
+            self.world.packet(bytes(changed))
         self.check()
 
-    @precondition(lambda self: self.world.source == "velodyne")
-    @rule(seed=SEED, length=st.sampled_from([0, 1205, 1206, 65_000]), n=st.sampled_from([1, 50]))
+    @precondition(lambda self: self.world.maker is not None)
+    @rule(seed=SEED, at_ns=st.integers(0, 2**64 - 1), n=st.sampled_from([1, 50]))
+    def bytes_of_packets_change(self, seed, at_ns, n) -> None:
+        rng, world = np.random.default_rng(seed), self.world
+        for payload in world.payloads[:n]:
+            changed = bytearray(world.stamped(payload))
+            for _ in range(int(rng.integers(1, 4))):
+                start = int(rng.integers(0, min(len(changed), 64)))
+                changed[start : start + 8] = at_ns.to_bytes(8, "little")[: len(changed[start : start + 8])]
+            world.packet(bytes(changed))
+        world.take()
+        self.check()
+
+    @precondition(lambda self: self.world.maker is not None)
+    @rule(seed=SEED, length=st.sampled_from([0, 1, 35, 36, 1205, 1206, 65_000]), n=st.sampled_from([1, 50]))
     def garbage(self, seed, length, n) -> None:
         rng = np.random.default_rng(seed)
         for _ in range(n):
             self.world.packet(rng.bytes(length))
+        for payload in self.world.payloads[:n]:
+            self.world.packet(payload[: -1 - length % 7] if seed % 2 else payload + rng.bytes(1 + length % 80))
         self.check()
 
     @precondition(lambda self: self.world.source == "ros2")

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import logging
-import struct
 import time
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any
 
@@ -18,20 +17,16 @@ from modt.config import OdometryConfig
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.packets.turn_decoder import RECOGNISED_BY
-from modt.sources.packets.velodyne import STAMP_AT, VelodyneDecoder, azimuths
 from modt.sources.pose_socket import read_datagram
 from modt.sources.pose_topic import PoseTopic
 from modt.sources.received_poses import CAPACITY, MAX_AGE_S, POSITION_NOISE_M, ReceivedPoses
 from modt.sources.stream import MAX_KEPT_FAULTS, Reception, StreamInfo, Sweep
 from modt.types import Float64, Frame
-from tests.sources.packets.simulated import packets
+from tests.sequences.makers import MAKERS, TURN_S, is_bounded
 
 CONFIG = OdometryConfig()
 SPEED_MPS = 5.0
-TURN_S = 0.1
 POSES_A_TURN = 5
-HOUR_US = 3_600_000_000
 REACH_M = POSITION_NOISE_M + 2 * CONFIG.max_speed_mps * MAX_AGE_S
 """No pose of a frame is farther from every pose that was sent."""
 MOST_KINDS, MOST_REASONS = 60, 40
@@ -40,12 +35,9 @@ MESSAGE_CPU_S, SLACK_CPU_S = 0.004, 1.0
 
 
 @cache
-def turn(model: str) -> tuple[bytes, ...]:
-    """The packets of one turn."""
-    payloads = [payload for _, payload in packets(model, 3)]
-    phases = np.array([(azimuths(p)[0] + 18_000) % 36_000 for p in payloads])
-    first, end = (np.flatnonzero(np.diff(phases) < 0) + 1)[:2]
-    return tuple(payloads[first:end])
+def turns(maker: str) -> Sequence[Sequence[bytes]]:
+    """The packets of one turn of each model of a maker."""
+    return MAKERS[maker].turns()
 
 
 class Datagrams(ReceivedPoses):
@@ -111,14 +103,15 @@ class LiveWorld:
 
     def __init__(self, source: str, odometry: str) -> None:
         self.now_s, self.set_s, self.sensor_s, self.origin_m = 100.0, 1.6e9, 0.0, np.zeros(2)
-        self.source, self.model = source, "vlp-16"
+        self.source, self.maker = source, MAKERS.get(source)
+        self.payloads = turns(source)[0] if self.maker else ()
+        self.decoder = self.maker.decoder() if self.maker else None
         self.reader: Any = Reader()
         if source == "ros2":
             from modt.sources.live.ros2 import DEPTH, PointCloudReader
 
             self.clouds = Held(DEPTH)
             self.reader = PointCloudReader(self.clouds, "points")  # type: ignore[arg-type]
-        self.decoder = VelodyneDecoder("sensor")
         info = StreamInfo("sensor", "test", 0, None, TURN_S, None, has_poses=False)
         self.stream = LiveStream(info, self.reader, clock=lambda: self.now_s)
         self.messages, self.frames = 0, list[Frame]()
@@ -145,8 +138,7 @@ class LiveWorld:
 
     def stamped(self, payload: bytes, ahead_s: float = 0.0) -> bytes:
         """A packet with the time of the sensor's clock."""
-        stamp_us = round((self.now_s + self.sensor_s + ahead_s) * 1e6) % HOUR_US
-        return payload[:STAMP_AT] + struct.pack("<I", stamp_us) + payload[STAMP_AT + 4 :]
+        return self.maker.stamped(payload, self.now_s + self.sensor_s + ahead_s)
 
     def cloud(self, stamp_s: float, points: Any, frame_id: str = "lidar") -> None:
         """The topic receives a sweep."""
@@ -159,7 +151,8 @@ class LiveWorld:
 
     def pause(self) -> None:
         """Let a moment pass in which nothing arrives."""
-        self._put(self.decoder.pause(self.reader.reception))
+        if self.decoder is not None:
+            self._put(self.decoder.pause(self.reader.reception))
 
     def _put(self, sweeps: Iterable[Sweep]) -> None:
         for sweep in sweeps:
@@ -209,11 +202,11 @@ class LiveWorld:
     def drive(self, turns: int, *, posed: bool = True, sensing: bool = True, faults: Any = None) -> None:
         """All that comes and is taken in some turns of the sensor; `faults` may change a turn's packets."""
         for _ in range(turns):
-            payloads = list(turn(self.model))
-            packets_ = [(k / len(payloads) * TURN_S, payload, 0.0) for k, payload in enumerate(payloads)]
+            n = len(self.payloads)
+            packets_ = [(k / n * TURN_S, payload, 0.0) for k, payload in enumerate(self.payloads)]
             packets_ = packets_ if faults is None else faults(packets_)
             began_s, due = self.now_s, 0
-            for at_s, payload, ahead_s in packets_ if sensing and self.source == "velodyne" else []:
+            for at_s, payload, ahead_s in packets_ if sensing else []:
                 self.now_s = max(self.now_s, began_s + at_s)
                 self.packet(self.stamped(payload, ahead_s))
                 if posed and at_s >= due / POSES_A_TURN * TURN_S:
@@ -250,12 +243,8 @@ class LiveWorld:
         return counts | {"faults": self.stream.faults.count}
 
     def _bounded(self) -> None:
-        decoder, poses = self.decoder, self.poses._poses
-        most = decoder._most + 200
-        assert len(decoder._turn.entries) <= most
-        assert len(decoder._ending.entries) <= most
-        assert len(decoder._first or []) <= RECOGNISED_BY
-        assert len(decoder._others) <= RECOGNISED_BY
+        poses = self.poses._poses
+        assert is_bounded(self.decoder)
         assert max(len(poses.believed), len(poses._doubted)) <= CAPACITY
         assert len(self.stream.faults.first) <= MAX_KEPT_FAULTS
 

@@ -13,7 +13,7 @@ LIMIT_S = 60.0
 
 
 class Slow:
-    """A writer that a test lets go on, and that fails when told to."""
+    """A writer that waits for the test, and fails with the error that the test sets."""
 
     def __init__(self):
         self.items, self.closed, self.failure = [], threading.Event(), None
@@ -28,16 +28,6 @@ class Slow:
 
     def close(self):
         self.closed.set()
-
-
-class Records(Slow):
-    """A writer that counts, and takes lines of the ledger too."""
-
-    def health(self):
-        return {"unsent": 2, "written": 100}
-
-    def ledger(self, record):
-        self.write(record)
 
 
 def settled(background, **expected):
@@ -58,29 +48,19 @@ def slow():
         writer.released.release()
 
 
-def test_items_are_written_in_their_order_and_the_writer_is_closed(slow):
-    background = Background("test", slow, 10)
-    for n in range(5):
-        background.write(n)
-        slow.released.release()
-    background.close()
-    assert slow.items == [0, 1, 2, 3, 4]
-    assert slow.closed.wait(LIMIT_S)
-    assert background.health() == {"written": 5, "dropped": 0, "failed": 0, "waiting": 0, "state": "ok"}
-
-
-def test_a_full_queue_drops_its_oldest(slow):
+def test_items_are_written_in_their_order_and_a_full_queue_drops_its_oldest(slow):
     background = Background("test", slow, 3)
     background.write("in work")
     assert slow.entered.acquire(timeout=LIMIT_S)
     for n in range(5):
         background.write(n)
-    assert background.health()["dropped"] == 2
-    assert background.health()["waiting"] == 3
+    assert background.health() == {"written": 0, "dropped": 2, "failed": 0, "waiting": 3, "state": "ok"}
     for _ in range(4):
         slow.released.release()
     background.close()
     assert slow.items == ["in work", 2, 3, 4]
+    assert slow.closed.wait(LIMIT_S)
+    assert background.health() == {"written": 4, "dropped": 2, "failed": 0, "waiting": 0, "state": "ok"}
 
 
 @pytest.mark.parametrize(
@@ -104,9 +84,9 @@ def test_a_failure_is_logged_once_counted_and_tried_again(error, said, slow, cap
     assert settled(background, written=1, state="ok")
     background.close()
     failed, again = caplog.records
-    assert failed.getMessage().startswith(f"test: {said}; tried again")
+    assert said in failed.getMessage()
     assert bool(failed.exc_info) == isinstance(error, KeyError)  # a traceback of what is no failure of the system
-    assert again.getMessage().startswith("test: written again")
+    assert "written again" in again.getMessage()
     assert slow.items == ["again"]
 
 
@@ -125,7 +105,7 @@ def test_the_end_does_not_wait_for_a_writer_that_hangs(slow, caplog):
     assert background.health()["dropped"] == 3
 
 
-def test_the_thread_of_a_loop_of_real_time_is_not(slow):
+def test_a_real_time_loop_starts_its_writer_without_real_time_priority(slow):
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
@@ -142,15 +122,16 @@ def test_the_thread_of_a_loop_of_real_time_is_not(slow):
     assert policies == [os.SCHED_OTHER]
 
 
-@pytest.mark.parametrize(("writer", "expected"), [(Slow(), ["frame"]), (Records(), ["frame", {"frame": 1}])])
-def test_lines_of_the_ledger_go_to_a_writer_that_takes_them(writer, expected):
-    background = Background("test", writer, 10)
+@pytest.mark.parametrize("takes", [False, True])
+def test_lines_of_the_ledger_go_to_a_writer_that_takes_them(takes, slow):
+    slow.health = lambda: {"unsent": 2, "written": 100}
+    if takes:
+        slow.ledger = slow.write
+    background = Background("test", slow, 10)
     assert isinstance(background, LedgerSink)
-    assert background.health().get("unsent", 2) == 2
-    assert background.health()["written"] == 0
-    background.write("frame")
-    background.ledger({"frame": 1})
-    for _ in expected:
-        writer.released.release()
+    assert background.health() == {"unsent": 2, "written": 0, "dropped": 0, "failed": 0, "waiting": 0, "state": "ok"}
+    for write, item in ((background.write, "frame"), (background.ledger, {"frame": 1})):
+        write(item)
+        slow.released.release()
     background.close()
-    assert writer.items == expected
+    assert slow.items == (["frame", {"frame": 1}] if takes else ["frame"])

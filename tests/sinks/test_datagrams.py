@@ -19,39 +19,35 @@ def many(n):
 
 @pytest.fixture(params=["udp", "unix"])
 def receiver(request, tmp_path):
+    """A function that sends frames, and returns the datagrams that a receiver gets."""
     family = socket.AF_INET if request.param == "udp" else socket.AF_UNIX
     with socket.socket(family, socket.SOCK_DGRAM) as bound:
         bound.settimeout(60.0)
-        if request.param == "udp":
-            bound.bind(("127.0.0.1", 0))
-            yield bound, f"udp://127.0.0.1:{bound.getsockname()[1]}"
-        else:
-            bound.bind(str(tmp_path / "lines.sock"))
-            yield bound, f"unix://{tmp_path}/lines.sock"
+        bound.bind(("127.0.0.1", 0) if request.param == "udp" else str(tmp_path / "lines.sock"))
+        name = bound.getsockname()
+        sink = open_sink(f"unix://{name}" if isinstance(name, str) else "udp://{}:{}".format(*name))
+
+        def received(frame):
+            sink.write(frame)
+            assert sink.health() == {"written": 1, "dropped": 0, "failed": 0, "state": "ok"}
+            first = bound.recv(1 << 17).decode()
+            return [first, *(bound.recv(1 << 17) for _ in range(json.loads(first).get("parts", 1) - 1))]
+
+        yield received
+        sink.close()
 
 
 def test_a_frame_is_a_datagram(receiver):
-    bound, address = receiver
-    sink = open_sink(address)
-    sink.write(FRAME)
-    sink.close()
-    assert bound.recv(1 << 17).decode() == frame_line(FRAME)
-    assert sink.health() == {"written": 1, "dropped": 0, "failed": 0, "state": "ok"}
+    assert receiver(FRAME) == [frame_line(FRAME)]
 
 
 def test_a_line_longer_than_a_datagram_comes_in_parts(receiver):
-    bound, address = receiver
     frame = many(300)
-    sink = open_sink(address)
-    sink.write(frame)
-    sink.close()
-    parts = [json.loads(bound.recv(1 << 17))]
-    parts += [json.loads(bound.recv(1 << 17)) for _ in range(parts[0]["parts"] - 1)]
+    parts = [json.loads(datagram) for datagram in receiver(frame)]
     assert [part["part"] for part in parts] == list(range(len(parts)))
     whole = {key: value for key, value in parts[0].items() if key not in ("part", "parts")}
     whole["tracks"] = [track for part in parts for track in part["tracks"]]
     assert whole == frame_record(frame)
-    assert sink.health()["written"] == 1
 
 
 @pytest.mark.parametrize(("n", "max_bytes"), [(0, 10), (1, 10), (300, MAX_BYTES), (300, 2000), (300, 600)])

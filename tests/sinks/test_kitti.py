@@ -21,10 +21,8 @@ def written(tmp_path, frame_result, camera):
 
 
 def test_only_tracks_of_a_class_with_a_proposal_are_written(tmp_path):
-    rows = written(tmp_path, result(4, [5, 5], {0: 1, 1: 2}, {1: CAR, 3: CAR}, lost=(3,)), forward_camera())
-    assert len(rows) == 1
-    assert rows[0][:3] == ["4", "1", "Car"]
-    assert len(rows[0]) == 18
+    (row,) = written(tmp_path, result(4, [5, 5], {0: 1, 1: 2}, {1: CAR, 3: CAR}, lost=(3,)), forward_camera())
+    assert (row[:3], len(row)) == (["4", "1", "Car"], 18)
 
 
 @given(

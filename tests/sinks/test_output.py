@@ -2,6 +2,8 @@
 
 import threading
 
+import pytest
+
 from modt.sinks.output import close_together, replace_file
 
 
@@ -16,18 +18,13 @@ def test_sinks_that_hang_are_closed_together():
     assert not meeting.broken
 
 
-def test_a_file_is_replaced_without_following_a_planted_link(tmp_path):
-    victim = tmp_path / "victim"
+@pytest.mark.parametrize("left", ["a link", "half a file"])
+def test_a_file_is_replaced_whatever_was_left_in_its_place(tmp_path, left):
+    victim, part = tmp_path / "victim", tmp_path / ".run.yaml.part"
     victim.write_text("kept")
-    (tmp_path / ".run.yaml.part").symlink_to(victim)
-    replace_file(tmp_path / "run.yaml", "new")
+    part.symlink_to(victim) if left == "a link" else part.write_text("half")
+    replace_file(tmp_path / "run.yaml", "new", lasting=True)
     assert victim.read_text() == "kept"
     assert (tmp_path / "run.yaml").read_text() == "new"
     assert not (tmp_path / "run.yaml").is_symlink()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.yaml", "victim"]
-
-
-def test_a_partial_file_of_a_crash_is_replaced(tmp_path):
-    (tmp_path / ".run.yaml.part").write_text("half")
-    replace_file(tmp_path / "run.yaml", "new", lasting=True)
-    assert [path.name for path in tmp_path.iterdir()] == ["run.yaml"]

@@ -1,7 +1,5 @@
 """Results on topics of ROS 2, over loopback."""
 
-from __future__ import annotations
-
 import pytest
 
 from modt.address import parse_address
@@ -21,7 +19,7 @@ def opened(options):
     return open_ros2(parse_address(f"ros2:///robot?domain={NEAR}{options}", SINKS))
 
 
-def test_a_frame_is_published_to_whom_has_subscribed(loopback):
+def test_a_frame_is_published_to_its_subscribers(loopback):
     sink = opened("&frame_id=velodyne&world_frame_id=map&tracks=all")
     assert [topic.name for topic, _ in sink.topics] == [
         "/robot/detections",

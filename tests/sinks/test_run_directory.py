@@ -6,9 +6,8 @@ from contextlib import ExitStack
 import pytest
 
 from modt.errors import MisuseError, ModtError
-from modt.sinks.run_directory import MARK, STATUS, RunDirectory
-
-OURS = f"schema: modt.run/1\n{MARK}\n"
+from modt.sinks.run_directory import STATUS, RunDirectory
+from tests.sinks.recordings import OURS
 
 
 def begun(path, limit_bytes=1e9):
@@ -39,20 +38,14 @@ def test_a_half_made_directory_is_made_anew(tmp_path, left):
     assert (run / "run.yaml").read_text() == OURS
 
 
-def test_each_part_is_kept_under_the_next_number(tmp_path):
-    for k in range(4):
-        directory = begun(tmp_path / "run")
+def test_each_part_is_kept_under_the_next_number_and_the_oldest_go_first(tmp_path):
+    for k in range(13):
+        directory = begun(tmp_path / "run", 2500)
         assert directory.before == (tmp_path / f"run~{k}" if k else None)
-        fill(directory.path, 10 + k)
-    assert names(tmp_path) == ["run", "run~1", "run~2", "run~3"]
-    assert (tmp_path / "run~1" / "tracks.jsonl").stat().st_size == 10
-    assert not (tmp_path / "run~1" / STATUS).exists()
-
-
-def test_the_oldest_parts_go_first_and_numbers_go_on(tmp_path):
-    for _ in range(13):
-        fill(begun(tmp_path / "run", 2500).path)
+        fill(directory.path, 1000 + k)
     assert names(tmp_path) == ["run", "run~11", "run~12"]
+    assert (tmp_path / "run~11" / "tracks.jsonl").stat().st_size == 1010
+    assert not (tmp_path / "run~11" / STATUS).exists()
 
 
 def test_nothing_but_records_of_a_service_is_deleted(tmp_path):
@@ -75,23 +68,6 @@ def test_a_path_that_is_no_run_is_refused(tmp_path):
     for out in (tmp_path, tmp_path / "thesis.tex"):
         with pytest.raises(MisuseError):
             RunDirectory(out)
-
-
-def test_a_directory_that_cannot_be_made_is_an_error_of_the_disk(tmp_path):
-    (tmp_path / "file").write_text("")
-    directory = RunDirectory(tmp_path / "file" / "run")
-    with pytest.raises(ModtError, match="cannot be written"):
-        directory.begin(OURS, 1e9)
-
-
-def test_two_services_do_not_share_a_directory(tmp_path):
-    out = tmp_path / "state" / "run"
-    with RunDirectory(out).locked():
-        second = RunDirectory(out).locked()
-        with pytest.raises(ModtError, match="another run of modt records into it"):
-            second.__enter__()
-    with RunDirectory(out).locked(), RunDirectory(tmp_path / "other").locked():
-        pass
 
 
 @pytest.mark.parametrize("first", ["the run that is in", "another one"])
@@ -117,7 +93,8 @@ def test_the_lock_outlasts_the_removal_of_the_folder_around_the_run(tmp_path, fi
             other.locked().__enter__()
 
 
-def test_where_no_lock_can_be_written_the_service_goes_on(tmp_path):
+def test_where_no_lock_can_be_written_the_service_goes_on_and_the_disk_is_to_blame(tmp_path):
     (tmp_path / "file").write_text("")
-    with RunDirectory(tmp_path / "file" / "run").locked():
-        pass
+    directory = RunDirectory(tmp_path / "file" / "run")
+    with directory.locked(), pytest.raises(ModtError, match="cannot be written"):
+        directory.begin(OURS, 1e9)

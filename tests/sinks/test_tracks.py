@@ -2,46 +2,32 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.geometry import rotation_zyx, se3
-from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
-from modt.sinks.records import BROKEN, line
+from modt.sinks.records import line
 from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
 from modt.types import NONE, Cut
 from modt_desk.evaluation.recorded_result import recorded_pose
 from tests.results import CAR, PEDESTRIAN, frame_record, result
 
 
-def test_a_record_has_the_documented_fields():
+def test_a_record_describes_the_frame_and_its_tracks():
     record = frame_record(result(3, [7, 5], {0: 11, 1: 12}, {11: CAR}, lost=(9,), classified=2))
     assert record["schema"] == SCHEMA
     assert (record["frame"], record["stamp_s"], record["proposals"]) == (3, 0.3, 2)
     assert (record["classifications"], record["deferred"]) == (2, 0)
-    assert record["T_world_sensor"] == np.eye(4)[:3].ravel().tolist()
     seen, unsure, lost = record["tracks"]
-    assert seen == {
-        "id": 11,
-        "state": "tracked",
-        "class": "car",
-        "posterior": CAR,
-        "witness": [0.0] * 4,
-        "viewed": False,
-        "final": False,
-        "uncertain": None,
-        "proposal": 0,
-        "points": 0,
-        "age": 0,
-        "missed": 0,
-        "box": {"x": 10.0, "y": 0.0, "z": -1.0, "l": 4.0, "w": 2.0, "h": 1.5, "yaw": 0.0},
-        "world": {"x": 0.0, "y": 0.0, "heading": 0.0, "speed_mps": 0.0},
-    }
+    assert (seen["id"], seen["state"], seen["class"], seen["proposal"]) == (11, "tracked", "car", 0)
+    assert seen["posterior"] == CAR
+    assert seen["box"] == {"x": 10.0, "y": 0.0, "z": -1.0, "l": 4.0, "w": 2.0, "h": 1.5, "yaw": 0.0}
+    assert seen["size"] == [0.0] * 3
+    assert seen["world"] == {"x": 0.0, "y": 0.0, "heading": 0.0, "speed_mps": 0.0}
     assert unsure["class"] == "background"
-    assert unsure["posterior"] == [0.25] * 4
     assert (lost["proposal"], lost["box"], lost["state"]) == (None, None, "lost")
 
 
@@ -55,7 +41,7 @@ def test_a_record_has_the_documented_fields():
         ((0.5, 0.4, 0.5), Cut.TOP, {11: PEDESTRIAN}, None),
     ],
 )
-def test_what_may_be_a_person_too_near_to_be_known_is_said_to_be_uncertain(size, cut, posteriors, said):
+def test_a_possible_person_too_near_to_be_recognised_is_reported_as_uncertain(size, cut, posteriors, said):
     r = result(3, [7, 5], {0: 11}, posteriors, lost=(9,))
     r.proposals.box[0, 3:6], r.proposals.cut[0] = size, cut
     assert [track["uncertain"] for track in frame_record(r)["tracks"]] == [said, None]
@@ -77,15 +63,7 @@ def test_the_pose_of_the_sensor_is_recorded_and_read_back():
     np.testing.assert_allclose(recorded_pose(record), T, rtol=0, atol=5.1e-7)
 
 
-@pytest.mark.parametrize("pose", [[1.0] * 11, ["a"] * 12, None, [np.nan] * 12])
-def test_what_is_no_pose_is_a_broken_record(pose):
-    with pytest.raises(BROKEN):
-        recorded_pose({"T_world_sensor": pose})
-    with pytest.raises(BROKEN):
-        recorded_pose({})
-
-
-NUMBERS = st.one_of(st.floats(-200, 200), st.sampled_from([0.0, -0.0, 0.0005, 1e8, -1e17, 5e-324]))
+NUMBERS = st.floats(-200, 200) | st.floats(-1e7, 1e7) | st.sampled_from([0.0, -0.0, 0.0005, 1e8, -1e17, 5e-324])
 LIKELIHOODS = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 1.0, 1e-6, 1.2e-5, 1 + 1e-9, -1e-9]))
 COUNTS = st.integers(0, 10**12)
 
@@ -98,7 +76,12 @@ def results(draw):
     t = r.tracks
     for column in (t.points, t.age, t.missed):
         column[:] = draw(arrays(np.int64, column.shape, elements=COUNTS))
-    for column, elements in ((t.x, NUMBERS), (r.proposals.box, NUMBERS), (t.posterior, LIKELIHOODS)):
+    for column, elements in (
+        (t.x, NUMBERS),
+        (t.size_m, NUMBERS),
+        (r.proposals.box, NUMBERS),
+        (t.posterior, LIKELIHOODS),
+    ):
         column[:] = draw(arrays(np.float64, column.shape, elements=elements))
     t.final[:] = draw(arrays(np.bool_, len(t)))
     r.proposals.cut[:] = draw(arrays(np.int64, tracked, elements=st.sampled_from([0, Cut.TOP])))
@@ -129,31 +112,22 @@ def tracks_one_by_one(r):
             "age": int(t.age[k]),
             "missed": int(t.missed[k]),
             "box": box and dict(zip(BOX_KEYS, box, strict=True)),
+            "size": np.round(t.size_m[k], 3).tolist(),
             "world": dict(zip(WORLD_KEYS, np.round(t.x[k], 3).tolist(), strict=True)),
         }
 
 
+@settings(max_examples=60)
 @given(results())
-def test_a_line_is_what_json_makes_of_the_tracks_one_by_one(r):
+def test_a_line_equals_the_json_of_its_tracks_one_by_one(r):
     record = frame_record(r)
     assert frame_line(r) == line(record | {"tracks": list(tracks_one_by_one(r))})
 
 
-@given(st.integers(0, 2**32))
-def test_numbers_are_written_like_repr(seed):
-    rng = np.random.default_rng(seed)
-    lengths, likely = rng.normal(0, 10.0 ** rng.integers(-4, 7), 200), rng.random(200) ** rng.integers(1, 12)
-    for text, rounded in (
-        (rounded_to_3(lengths), np.round(lengths, 3)),
-        (probabilities(likely), np.round(likely, 6)),
-    ):
-        assert decode(join_columns(200, text, ",")) == "".join(f"{v!r}," for v in rounded.tolist())
-
-
+@pytest.mark.parametrize("column", ["x", "posterior"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_numbers_that_are_not_finite_are_refused(bad):
-    for column in ("x", "posterior"):
-        r = result(0, [3], {0: 1})
-        getattr(r.tracks, column)[0, 1] = bad
-        with pytest.raises(ValueError, match="JSON"):
-            frame_line(r)
+def test_numbers_that_are_not_finite_are_refused(column, bad):
+    r = result(0, [3], {0: 1})
+    getattr(r.tracks, column)[0, 1] = bad
+    with pytest.raises(ValueError, match="JSON"):
+        frame_line(r)

@@ -1,11 +1,10 @@
 """Small recordings of ROS 2, for tests."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 
-import pytest
+from mcap.writer import Writer as McapWriter
+from rosbags import rosbag2
 
 from tests.ros2 import messages
 
@@ -18,7 +17,6 @@ Recorded = list[tuple[str, str, float, bytes]]
 
 def write_rosbag2(path: Path, recorded: Recorded, compressed: str | None = None) -> Path:
     """A folder; compressed with zstd as a "file" or by "message"."""
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
     writer = rosbag2.Writer(path, version=8)
     if compressed is not None:
         writer.set_compression(rosbag2.CompressionMode[compressed.upper()], rosbag2.CompressionFormat.ZSTD)
@@ -32,10 +30,9 @@ def write_rosbag2(path: Path, recorded: Recorded, compressed: str | None = None)
 
 
 def write_mcap(path: Path, recorded: Recorded, **options: object) -> Path:
-    writing = pytest.importorskip("mcap.writer")
     path = path.with_suffix(".mcap")
     with path.open("wb") as file:
-        writer = writing.Writer(file, **options)
+        writer = McapWriter(file, **options)
         writer.start("ros2")
         channels = {}
         for topic, kind, recorded_s, data in recorded:
@@ -55,7 +52,7 @@ def clouds(n: int = 4, topic: str = "/points") -> Recorded:
 
 
 def poses(child: str = "lidar", topic: str = "/odom") -> Recorded:
-    """A metre a second along x, fifty poses a second, from 0.2 s before the first sweep on."""
+    """Poses at 50 Hz of a sensor that moves along x at 1 m/s, from 0.2 s before the first sweep."""
     stamps = [BEGAN_S + k / 50 - 0.21 for k in range(40)]
     made = [messages.odometry(s, [10.0 + s - BEGAN_S, 0.0, 0.0], UP, child) for s in stamps]
     return [(topic, ODOMETRY, s + 0.001, messages.encode(m)) for s, m in zip(stamps, made, strict=True)]

@@ -1,7 +1,5 @@
 """Point-cloud files for tests."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

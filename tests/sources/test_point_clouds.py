@@ -35,15 +35,6 @@ def form(request, tmp_path):
     return lambda rows: read(tmp_path / f"scan.{write.__name__}", write(rows, data))
 
 
-def test_points_of_every_form(form):
-    rows = table(x="f4", y="f4", z="f4", intensity="u1")
-    points, flaws = form(rows)
-    np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
-    np.testing.assert_allclose(points[:, 3], rows["intensity"] / 255, atol=1e-7)
-    assert points.dtype == np.float32
-    assert not flaws
-
-
 def test_an_ascii_ply_may_have_lists_before_and_after_its_numbers(tmp_path):
     text = """ply
 format ascii 1.0
@@ -87,7 +78,8 @@ def test_a_pcd_of_padded_memory_is_read(tmp_path):
 
 
 def test_columns_of_any_order_and_type(form):
-    points, _ = form(table(ring="u2", z="f8", time="f4", reflectivity="u2", x="f8", intensity="f4", y="f4"))
+    points, flaws = form(table(ring="u2", z="f8", time="f4", reflectivity="u2", x="f8", intensity="f4", y="f4"))
+    assert (points.dtype, flaws) == (np.float32, [])
     np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [4, 6, 1])
     np.testing.assert_allclose(points[:, 3], (50 * np.arange(5) + 3) / 255, atol=1e-7)
 
@@ -108,28 +100,16 @@ def test_reflectance_is_scaled(form, kind, values, reflectance):
     np.testing.assert_allclose(form(rows)[0][:, 3], reflectance, atol=1e-6)
 
 
-NAMES = (
-    "Intensity",
-    "I",
-    "scalar_Intensity",
-    "Scalar_field_intensity",
-    "scalar_Scalar_field_Reflectance",
-    "Remission",
-)
-NAMES += ("scalar_reflectivity", "remissions", "scalar_Scalar_field_Intensity")
+NAMES = [("I",), ("Scalar_field_intensity",), ("scalar_Scalar_field_Reflectance",), ("remissions",)]
+NAMES += [("scalar_Intensity", "scalar_Reflectance")]  # a calibrated one goes before an intensity
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_reflectance_is_known_by_the_names_of_the_field_s_tools(form, name):
-    rows = table(**{"x": "f4", "y": "f4", "z": "f4", "scalar_Time": "f4", name: "u1"})
-    np.testing.assert_allclose(form(rows)[0][:, 3], rows[name] / 255, atol=1e-6)
+@pytest.mark.parametrize("names", NAMES)
+def test_reflectance_is_recognised_by_its_usual_names(form, names):
+    rows = table(**{"x": "f4", "y": "f4", "z": "f4", "scalar_Time": "f4", **dict.fromkeys(names, "u1")})
     cloud = read_cloud(messages.encode(messages.cloud(rows[None])))
-    np.testing.assert_allclose(cloud.points[:, 3], rows[name] / 255, atol=1e-6)
-
-
-def test_a_calibrated_reflectance_goes_before_an_intensity(form):
-    rows = table(x="f4", y="f4", z="f4", scalar_Intensity="u1", scalar_Reflectance="u1")
-    np.testing.assert_allclose(form(rows)[0][:, 3], rows["scalar_Reflectance"] / 255, atol=1e-6)
+    for points in (form(rows)[0], cloud.points):
+        np.testing.assert_allclose(points[:, 3], rows[names[-1]] / 255, atol=1e-6)
 
 
 def test_fields_of_no_numbers_hold_no_bytes(tmp_path):
@@ -146,26 +126,6 @@ def test_without_reflectance_none_is_recorded(form):
     assert (form(table(x="f4", y="f4", z="f4"))[0][:, 3] == UNRECORDED).all()
 
 
-def test_repeated_names_and_several_numbers_a_field(tmp_path):
-    rows = table(x="f4", y="f4", z="f4", a="u1", b="u1")
-    points, _ = read(tmp_path / "scan.pcd", pcd(rows, FIELDS="x y z _ _"))
-    np.testing.assert_allclose(points[:, 2], np.arange(5) + 2)
-    rows = np.zeros(3, [("normal", "f4", 3), ("x", "f4"), ("y", "f4"), ("z", "f4")])
-    rows["z"] = [1, 2, 3]
-    flat = table(x="f4", y="f4", z="f4")
-    head = pcd(flat, FIELDS="normal x y z", SIZE="4 4 4 4", TYPE="F F F F", COUNT="3 1 1 1", WIDTH=3, POINTS=3)
-    points, _ = read(tmp_path / "scan.pcd", head[: head.index(b"binary\n") + 7] + rows.tobytes())
-    assert points[:, 2].tolist() == [1, 2, 3]
-
-
-def test_elements_before_the_vertices_are_passed_over(tmp_path):
-    rows = table(x="f4", y="f4", z="f4")
-    raw = ply(rows, before="element camera 2\nproperty float a\nproperty uchar b\n")
-    at = raw.index(b"end_header\n") + 11
-    points, _ = read(tmp_path / "scan.ply", raw[:at] + bytes(10) + raw[at:])
-    np.testing.assert_allclose(points[:, 0], np.arange(5))
-
-
 ROWS = table(x="f4", y="f4", z="f4", i="u1")
 
 
@@ -174,31 +134,19 @@ ROWS = table(x="f4", y="f4", z="f4", i="u1")
     [
         ("a.pcd", b"nothing", "no header"),
         ("a.pcd", pcd(ROWS, POINTS=10**18), "1000000000000000000 points"),
-        ("a.pcd", pcd(ROWS, POINTS=-1), "promises"),
         ("a.pcd", pcd(ROWS, COUNT="1 1 1 1000000000"), "i of COUNT 1000000000"),
         ("a.pcd", pcd(ROWS, COUNT="0 1 1 1"), "no column x"),
-        ("a.pcd", pcd(ROWS, COUNT="0 0 0 0", POINTS=9_000_000), "promises"),
-        ("a.pcd", pcd(ROWS, COUNT="1 1 1"), "promises"),
         ("a.pcd", pcd(ROWS, SIZE="4 4 4 3"), "lacks a line, or one is broken"),
-        ("a.pcd", pcd(ROWS, TYPE="F F F X"), "lacks a line, or one is broken"),
-        ("a.pcd", pcd(ROWS, FIELDS=None), "lacks a line, or one is broken"),
-        ("a.pcd", pcd(ROWS, POINTS="many"), "lacks a line, or one is broken"),
         ("a.pcd", pcd(ROWS, "zipped"), "DATA 'zipped' is unknown"),
-        ("a.pcd", pcd(ROWS, FIELDS="a b c d"), "no column x, y, z"),
         ("a.pcd", pcd(ROWS)[:-1], "truncated: 64 bytes for 5 points"),
         ("a.pcd", pcd(ROWS, "ascii")[:-6], "truncated: 19 numbers"),
         ("a.pcd", pcd(ROWS, "ascii").replace(b"4.0", b"4.o"), "no number"),
-        ("a.pcd", pcd(ROWS, "binary_compressed")[:-1], "truncated"),
         ("a.pcd", pcd(ROWS, "binary_compressed", POINTS=4_000_000), "of another size"),
         ("a.ply", b"nothing", "no header"),
         ("a.ply", ply(ROWS, n=10**15), "promises"),
-        ("a.ply", ply(ROWS, n=-1), "promises"),
         ("a.ply", ply(ROWS, "binary"), "cannot be read"),
         ("a.ply", ply(ROWS, before="element face 1\nproperty list uchar int n\n"), "lists"),
-        ("a.ply", ply(ROWS, before="element many 10000000000\nproperty uchar n\n"), "promises"),
-        ("a.ply", ply(ROWS).replace(b"element vertex", b"element point"), "cannot be read"),
         ("a.ply", ply(ROWS)[:-1], "truncated"),
-        ("a.ply", ply(ROWS, "ascii")[:-6], "truncated"),
     ],
 )
 def test_a_hostile_or_broken_file_is_one_clear_error(tmp_path, name, raw, cause):
@@ -221,13 +169,3 @@ def test_lzf_repeats():
 def test_broken_lzf_is_refused_without_growing(data, length):
     out = decompress(data, length)
     assert out is None or len(out) == length
-
-
-@pytest.mark.kitti
-def test_real_clouds(kitti_root):
-    clouds = sorted((kitti_root / "packets").glob("*/*.pcd"))
-    assert len(clouds) == 10
-    for cloud in clouds:
-        points, flaws = read_scan(cloud)
-        assert len(points) > 10_000
-        assert not flaws

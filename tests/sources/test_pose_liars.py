@@ -1,44 +1,41 @@
-"""Odometry that lies: single datagrams cost nothing that lasts, a sequence that goes on is followed."""
+"""Odometry with wrong poses: single ones cost no frame its pose, a new sequence of poses is followed."""
 
 import json
 import socket
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from modt.config import OdometryConfig
 from modt.sources.pose_socket import PoseSocket
-from modt.sources.received_poses import MAX_AGE_S, POSITION_NOISE_M
 from modt.types import Frame
 
 CONFIG = OdometryConfig()
 EMPTY = np.zeros((0, 4), np.float32)
 PERIOD_S = 0.1
 SPEED_MPS = 12.0
-KINDS = {  # of lies, by a scale, and the reason that they are refused for
-    "far ahead": (lambda t, x, k=1.0: (t + 59.0 * k, x, 0.0), "early"),
-    "beyond any lead": (lambda t, x, k=1.0: (t + 3e5 * k, x, 0.0), "ahead"),
-    "ahead": (lambda t, x, k=1.0: (t + 1.5 * k, x, 0.0), "early"),
-    "a little ahead": (lambda t, x, k=1.0: (t + 0.2 * k, x, 0.0), "leap"),
-    "behind": (lambda t, x, k=1.0: (t - 0.15 * k, x, 0.0), "out_of_order"),
-    "far behind": (lambda t, x, k=1.0: (t - 100.0 * k, x, 0.0), "stale"),
-    "teleported": (lambda t, x, k=1.0: (t, x + 80.0 * k, 0.0), "leap"),
-    "teleported a little": (lambda t, x, k=1.0: (t, x - 2.0 * k, 0.0), "leap"),
-    "turned": (lambda t, x, k=1.0: (t, x, 2.0 * k), "leap"),
+KINDS = {  # lies, and the reason that they are refused for
+    "far ahead": (lambda t, x: (t + 59.0, x, 0.0), "early"),
+    "beyond any lead": (lambda t, x: (t + 3e5, x, 0.0), "ahead"),
+    "ahead": (lambda t, x: (t + 1.5, x, 0.0), "early"),
+    "a little ahead": (lambda t, x: (t + 0.2, x, 0.0), "leap"),
+    "behind": (lambda t, x: (t - 0.15, x, 0.0), "out_of_order"),
+    "far behind": (lambda t, x: (t - 100.0, x, 0.0), "stale"),
+    "teleported": (lambda t, x: (t, x + 80.0, 0.0), "leap"),
+    "teleported a little": (lambda t, x: (t, x - 2.0, 0.0), "leap"),
+    "turned": (lambda t, x: (t, x, 2.0), "leap"),
 }
 
 
 class Robot:
-    """A robot on a straight way, whose sender and sensor stamp by clocks of their own; time is the test's."""
+    """A robot that drives straight on. Its sender and its sensor have clocks of their own; the test sets the time."""
 
     def __init__(self, rate_hz=50.0):
         self.there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.there.setblocking(False)
         self.odometry = PoseSocket(here, CONFIG, "test")
         self.interval_s, self.time_s, self.sent = 1.0 / rate_hz, 0.0, 0
-        self.sender_s = self.sensor_s = self.world_m = 0.0  # what they are off
+        self.sender_s = self.sensor_s = 0.0  # what they are off
 
     def close(self):
         self.there.close()
@@ -48,29 +45,28 @@ class Robot:
         """The next pose, or a lie in its place."""
         self.sent += 1
         self.time_s = self.sent * self.interval_s
-        told = (self.time_s + self.sender_s, SPEED_MPS * self.time_s + self.world_m, 0.0)
-        stamp_s, x, yaw = lie(*told[:2]) if lie else told
+        true = self.time_s + self.sender_s, SPEED_MPS * self.time_s
+        stamp_s, x, yaw = lie(*true) if lie else (*true, 0.0)
         self.there.send(json.dumps({"stamp": stamp_s, "x": x, "y": 0.0, "yaw": yaw}).encode())
         self.odometry._empty()  # the kernel's queue of a pair of sockets is short
 
     def frame_error_m(self):
-        """Of the pose at a frame now; None without one."""
-        placed = self.odometry.place(Frame(0, self.time_s + 0.003 + self.sensor_s, EMPTY))
-        if placed.T_world_sensor is None:
-            return None
-        off = placed.T_world_sensor[:3, 3] - [SPEED_MPS * (self.time_s + 0.003) + self.world_m, 0.0, 0.0]
-        turn = np.arctan2(placed.T_world_sensor[1, 0], placed.T_world_sensor[0, 0])
-        return float(np.linalg.norm(off)) + abs(float(turn)) * 5
+        """Error of the pose at a frame now, NaN without one; a turn counts at a distance of 5 m."""
+        T = self.odometry.place(Frame(0, self.time_s + 0.003 + self.sensor_s, EMPTY)).T_world_sensor
+        if T is None:
+            return np.nan
+        off = T[:3, 3] - [SPEED_MPS * (self.time_s + 0.003), 0.0, 0.0]
+        return np.linalg.norm(off) + 5 * abs(np.arctan2(T[1, 0], T[0, 0]))
 
-    def drive(self, seconds, lies=lambda: None):
-        """Errors of the frames, of NaN without a pose."""
-        errors, frames = [], round(seconds / PERIOD_S)
-        for _ in range(frames):
+    def drive(self, seconds):
+        """Errors of the frames [m], NaN without a pose."""
+        errors = []
+        for _ in range(round(seconds / PERIOD_S)):
             until = self.time_s + PERIOD_S - 1e-9
             while self.time_s < until:
-                self.send(lies())
+                self.send()
             errors.append(self.frame_error_m())
-        return np.array([np.nan if e is None else e for e in errors])
+        return np.array(errors)
 
 
 @pytest.fixture(name="robot", params=[20.0, 50.0, 400.0], ids="{:.0f} Hz".format)
@@ -137,7 +133,7 @@ def test_a_source_that_fails_costs_poses_and_recovers(robot, broken, monkeypatch
         (1.7e9, 1e-3, "the sensor's seem to be in milliseconds; give seconds"),
     ],
 )
-def test_stamps_in_another_unit_are_said_to_be(clock_s, factor, cause, caplog):
+def test_the_unit_of_stamps_that_are_no_seconds_is_named(clock_s, factor, cause, caplog):
     robot = Robot()
     robot.sent = round(clock_s / robot.interval_s)
     for _ in range(10):
@@ -146,15 +142,6 @@ def test_stamps_in_another_unit_are_said_to_be(clock_s, factor, cause, caplog):
     robot.close()
     assert robot.odometry.refused["unit"] == 10
     assert caplog.text.count(cause) == 1
-
-
-def test_no_pose_is_farther_from_the_last_than_the_robot_can_be():
-    robot = Robot()
-    for stamp_s, x_m in ((1.0, 0.0), (1.000001, 0.4)):  # within their noise
-        robot.send(lambda t, x, told=(stamp_s, x_m, 0.0): told)
-    placed = robot.odometry.place(Frame(0, 1.2, EMPTY))
-    robot.close()
-    assert placed.T_world_sensor is None
 
 
 @pytest.mark.parametrize("step_s", [-30.0, -0.5, -0.15, 0.15, 0.5, 30.0])
@@ -166,7 +153,7 @@ def test_a_step_of_the_clock_of_both_is_followed(robot, step_s):
     assert robot.odometry.restarts == 0
 
 
-def test_a_step_of_the_senders_clock_is_followed_but_gives_no_pose_where_it_is_not_the_streams(robot):
+def test_a_step_of_the_senders_clock_alone_is_followed_but_gives_no_pose(robot):
     robot.drive(1.0)
     robot.sender_s = 5.0
     assert np.isnan(robot.drive(2.0)[5:]).all()
@@ -183,29 +170,3 @@ def test_silence_of_the_sender_is_no_lie(robot):
     robot.sent += round(5.0 / robot.interval_s)
     assert np.nanmax(robot.drive(1.0)) < 0.01
     assert sum(robot.odometry.refused.values()) == 0
-
-
-@pytest.mark.slow
-@settings(max_examples=40)
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    share=st.floats(0.0, 0.3),
-    rate_hz=st.sampled_from([20.0, 50.0, 100.0, 400.0]),
-    kinds=st.sets(st.sampled_from(sorted(KINDS)), min_size=1),
-)
-def test_while_most_datagrams_are_honest_no_pose_is_far_off(seed, share, rate_hz, kinds):
-    rng, robot = np.random.default_rng(seed), Robot(rate_hz)
-    chosen = [KINDS[kind][0] for kind in sorted(kinds)]
-
-    def lies():
-        lie, scale = chosen[rng.integers(len(chosen))], rng.uniform(-1.5, 1.5)
-        return (lambda t, x: lie(t, x, scale)) if rng.random() < share else None
-
-    robot.drive(0.5)  # of the first poses nobody can say which one lies
-    errors = robot.drive(5.0, lies)
-    after = robot.drive(1.5)
-    robot.close()
-    assert np.nanmax(errors) < POSITION_NOISE_M + CONFIG.max_speed_mps * MAX_AGE_S
-    assert np.nanmedian(errors) < 2 * POSITION_NOISE_M
-    assert after[9:].max() < 0.01
-    assert np.isnan(errors).mean() < 0.3

@@ -3,6 +3,8 @@
 import json
 import logging
 import socket
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from modt.schemes import POSES, open_poses
 from modt.sources.pose_socket import PoseSocket, open_socket, read_datagram
 from modt.sources.received_poses import MAX_AGE_S, PoseBuffer, interpolate
 from modt.types import Frame
+from tests.fuzz.mutation import mutations
 
 CONFIG = OdometryConfig()
 EMPTY = np.zeros((0, 4), np.float32)
@@ -39,62 +42,58 @@ def matrix(T):
     return se3(rotation_zyx(0, 0, T[2]), np.array([T[0], T[1], 0.0]))
 
 
-@pytest.fixture(name="pair")
-def a_pair():
+@contextmanager
+def connected():
     """A sender and the pose source that receives from it."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    there.setblocking(False)
     odometry = PoseSocket(here, CONFIG, "test")
     yield there, odometry
     there.close()
     odometry.close()
 
 
-numbers = st.one_of(
-    st.floats(allow_nan=True, allow_infinity=True), st.integers(-(10**400), 10**400), st.booleans(), st.none()
-)
-keys = st.sampled_from(["stamp", "x", "y", "yaw", "pose", "other"])
-nearly = st.dictionaries(keys, st.one_of(numbers, st.lists(numbers, max_size=17), st.text(max_size=3)))
+@pytest.fixture
+def pair():
+    with connected() as made:
+        yield made
+
+
+def send_to(address, *payloads):
+    """Send datagrams to a path or to a port of this machine, each when there is room."""
+    local = isinstance(address, Path)
+    with socket.socket(socket.AF_UNIX if local else socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.settimeout(60)
+        for payload in payloads:
+            sender.sendto(payload, str(address) if local else ("127.0.0.1", address))
+
+
+BROKEN = [*mutations([planar(1.5, 1.0, 2.0, 0.5), b'{"stamp": 1.5, "pose": [1,0,0,5,0,1,0,0,0,0,1,0]}'], 500, seed=1)]
 payload = st.one_of(
     st.binary(max_size=200),
-    st.builds(lambda d: json.dumps(d).encode(), nearly),
-    st.builds(lambda n: b"[" * n, st.integers(0, 5000)),
+    st.sampled_from(BROKEN),
     st.builds(planar, st.floats(-5, 5), st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)),
     st.builds(planar, st.floats(), st.floats(), st.floats(), st.floats()),
 )
 
 
-@given(payload)
-def test_any_bytes_are_a_pose_or_refused(raw):
-    reason = None
-    try:
-        stamp_s, T = read_datagram(raw)
-    except MessageError as error:
-        reason = error.reason
-    if reason is None:
-        assert np.isfinite(stamp_s)
-        np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=0.02)
-        np.testing.assert_array_equal(T[3], [0, 0, 0, 1])
-    assert reason in (None, *PoseSocket.REASONS)
-
-
 @given(st.lists(st.one_of(payload, st.floats(0, 3)), max_size=30))
-def test_counters_add_up(events):
+def test_any_datagrams_are_counted_once_and_a_pose_is_finite(events):
     """Events are datagrams or stamps of frames."""
-    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    odometry, sent, frames = PoseSocket(here, CONFIG, "test"), 0, 0
-    for event in [*events, 3.0]:
-        if isinstance(event, bytes):
-            there.send(event)
-            sent += 1
-        else:
-            T = pose_of(odometry, frame(event))
-            frames += 1
-            assert T is None or np.isfinite(T).all()
-    report = odometry.report()
+    with connected() as (there, odometry):
+        sent = frames = 0
+        for event in [*events, 3.0]:
+            if isinstance(event, bytes):
+                there.send(event)
+                sent += 1
+            else:
+                T = pose_of(odometry, frame(event))
+                frames += 1
+                assert T is None or np.isfinite(T).all()
+                np.testing.assert_allclose(np.eye(3) if T is None else T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=0.02)
+        report = odometry.report()
     assert report["received"] == sent == report["used"] + sum(report["refused"].values())
     assert report["frames_posed"] + report["frames_unposed"] == frames
-    there.close()
-    odometry.close()
 
 
 def test_both_forms_give_the_same_pose():
@@ -111,15 +110,10 @@ def test_both_forms_give_the_same_pose():
     ("raw", "reason", "cause"),
     [
         (b"", "malformed", "no JSON"),
-        (b"\xff\xfe", "malformed", "no JSON"),
-        (b"[1]", "malformed", "no JSON object"),
         (b'{"stamp": 1}', "malformed", "neither"),
-        (b'{"stamp": 1, "x": 0, "pose": []}', "malformed", "or both"),
-        (b'{"x": 0, "y": 0, "yaw": 0}', "malformed", "no stamp"),
         (b'{"stamp": 1, "x": 0, "yaw": 0}', "malformed", "no y"),
-        (b'{"stamp": true, "x": 0, "y": 0, "yaw": 0}', "malformed", "stamp is no number"),
         (b'{"stamp": 1, "x": NaN, "y": 0, "yaw": 0}', "non_finite", "x is not finite"),
-        (b'{"stamp": 1e999, "x": 0, "y": 0, "yaw": 0}', "non_finite", "stamp"),
+        (b'{"stamp": 1, "x": 1%s, "y": 0, "yaw": 0}' % (b"0" * 400), "non_finite", "x is not finite"),
         (b'{"stamp": 1, "x": 6e8, "y": 0, "yaw": 0}', "malformed", "100000 km"),
         (b'{"stamp": 1, "pose": [1, 2]}', "malformed", "12 or 16"),
         (b'{"stamp": 1, "pose": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}', "malformed", "no rotation"),
@@ -169,17 +163,10 @@ def test_each_reason_is_counted_and_logged_once(pair, caplog):
         for raw in [planar(10.0), *bad, *bad]:
             there.send(raw)
         pose_of(odometry, frame(10.0))
-    assert odometry.report() == {
-        "source": "test",
-        "received": 11,
-        "overflowed": 0,
-        "used": 1,
-        "refused": dict.fromkeys(PoseSocket.REASONS, 0)
-        | {"malformed": 2, "non_finite": 2, "stale": 2, "repeated": 2, "ahead": 2},
-        "restarts": 0,
-        "frames_posed": 1,
-        "frames_unposed": 0,
-    }
+    report = odometry.report()
+    counts = {reason: n for reason, n in report["refused"].items() if n}
+    assert counts == dict.fromkeys(("malformed", "non_finite", "stale", "repeated", "ahead"), 2)
+    assert (report["received"], report["used"], report["frames_posed"], report["frames_unposed"]) == (11, 1, 1, 0)
     assert len(caplog.records) == 5
     assert "is it the stream's clock?" in caplog.text
 
@@ -207,54 +194,46 @@ def test_a_restarted_sender_is_detected_by_poses_that_go_on_after_a_leap(pair, c
 
 @given(st.lists(st.tuples(st.floats(0.001, 2), st.floats(-1, 1), st.floats(-1, 1)), max_size=40))
 def test_no_motion_below_the_speed_limit_is_a_restart(steps):
-    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    odometry, stamp_s, x, y = PoseSocket(here, CONFIG, "test"), 0.0, 0.0, 0.0
-    there.send(planar(0.0))
-    for dt_s, ahead, left in steps:  # up to the speed allowed, and noise
-        stamp_s += dt_s
-        x += ahead * CONFIG.max_speed_mps * dt_s / 2
-        y += left * CONFIG.max_speed_mps * dt_s / 2
-        there.send(planar(stamp_s, x + 0.15 * left, y + 0.15 * ahead))
-        assert odometry.place(frame(stamp_s)).restarts == 0
-    there.close()
-    odometry.close()
+    stamp_s = x = y = 0.0
+    with connected() as (there, odometry):
+        there.send(planar(0.0))
+        for dt_s, ahead, left in steps:  # up to the speed allowed, and noise
+            stamp_s += dt_s
+            x += ahead * CONFIG.max_speed_mps * dt_s / 2
+            y += left * CONFIG.max_speed_mps * dt_s / 2
+            there.send(planar(stamp_s, x + 0.15 * left, y + 0.15 * ahead))
+            assert odometry.place(frame(stamp_s)).restarts == 0
 
 
-def test_of_a_flood_the_newest_are_kept(monkeypatch):
+def test_the_newest_poses_of_a_flood_are_kept(monkeypatch):
     monkeypatch.setattr("modt.sources.pose_socket.CAPACITY", 4)
-    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    there.setblocking(False)
-    odometry = PoseSocket(here, CONFIG, "test")
-    for k in range(6):
-        there.send(planar(0.1 * k, 1.0 * k))
-    assert pose_of(odometry, frame(0.5))[0, 3] == 5.0
-    report = odometry.report()
+    with connected() as (there, odometry):
+        for k in range(6):
+            there.send(planar(0.1 * k, 1.0 * k))
+        assert pose_of(odometry, frame(0.5))[0, 3] == 5.0
+        report = odometry.report()
     assert (report["received"], report["used"], report["refused"]["crowded_out"]) == (6, 4, 2)
-    there.close()
-    odometry.close()
 
 
 def test_a_unix_socket_is_emptied_between_two_frames(tmp_path):
     """The kernel holds ten datagrams: a sender that waits for room gets through a hundred without a frame."""
-    path = tmp_path / "odometry.sock"
-    odometry = open_poses(f"unix://{path}", CONFIG)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
-        sender.settimeout(60)
-        for k in range(100):
-            sender.sendto(planar(0.0025 * k, 0.02 * k), str(path))
+    odometry = open_poses(f"unix://{tmp_path}/s", CONFIG)
+    send_to(tmp_path / "s", *(planar(0.0025 * k, 0.02 * k) for k in range(100)))
     assert pose_of(odometry, frame(0.2475))[0, 3] == pytest.approx(1.98)
     assert odometry.report()["used"] == 100
     odometry.close()
 
 
-def test_what_the_kernel_drops_is_counted(free_port):
-    url = f"udp://127.0.0.1:{free_port}"
-    odometry = open_poses(url, CONFIG)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        for k in range(4000):
-            sender.sendto(planar(0.001 * k) + b" " * 2000, ("127.0.0.1", free_port))
-        pose_of(odometry, frame(4.0))
-        sender.sendto(planar(4.1), ("127.0.0.1", free_port))  # datagrams report what was dropped before them
+def test_what_the_kernel_drops_is_counted():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    odometry = open_poses(f"udp://127.0.0.1:{port}", CONFIG)
+    with pytest.raises(MisuseError, match="cannot be bound"):
+        open_poses(f"udp://127.0.0.1:{port}", CONFIG)
+    send_to(port, *(planar(0.001 * k) + b" " * 2000 for k in range(4000)))
+    pose_of(odometry, frame(4.0))
+    send_to(port, planar(4.1))  # datagrams report what was dropped before them
     pose_of(odometry, frame(4.1))
     report = odometry.report()
     assert 200 < report["received"] < 4001
@@ -263,18 +242,23 @@ def test_what_the_kernel_drops_is_counted(free_port):
     odometry.close()
 
 
+FAR_M = st.sampled_from([0.0, 458_000.0, 5_430_000.0])
+
+
 @given(
+    FAR_M,
     st.tuples(*[st.floats(-50, 50)] * 2, st.floats(-3, 3)),
     st.tuples(*[st.floats(-50, 50)] * 2, st.floats(-3, 3)),
     st.floats(-1, 2),
 )
-def test_planar_interpolation_equals_the_closed_form(a, b, share):
+def test_planar_interpolation_equals_the_closed_form(origin_m, a, b, share):
     """Reference: each coordinate by itself, the angle along the shorter arc."""
     turn = (b[2] - a[2] + np.pi) % (2 * np.pi) - np.pi
     if abs(abs(turn) - np.pi) < 1e-6:
         return  # both ways round are as short
+    a, b = ((origin_m + x, origin_m + y, yaw) for x, y, yaw in (a, b))
     expected = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * turn]
-    np.testing.assert_allclose(interpolate(matrix(a), matrix(b), share), matrix(expected), atol=1e-6)
+    np.testing.assert_allclose(interpolate(matrix(a), matrix(b), share), matrix(expected), rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("path", ["", "127.0.0.1", "127.0.0.1:99999", "127.0.0.1:x", "[::1:5"])
@@ -293,17 +277,6 @@ def test_a_path_that_cannot_be_bound_is_refused_and_a_file_there_kept(path, tmp_
     assert mine.read_text() == "mine"
 
 
-def test_a_udp_socket_receives_and_stays_bound(free_port):
-    url = f"udp://127.0.0.1:{free_port}"
-    odometry = open_poses(url, CONFIG)
-    with pytest.raises(MisuseError, match="cannot be bound"):
-        open_poses(url, CONFIG)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(planar(1.0, 4.0), ("127.0.0.1", free_port))
-    assert pose_of(odometry, frame(1.0))[0, 3] == 4.0
-    odometry.close()
-
-
 def test_a_unix_socket_is_removed_on_close_and_a_stale_one_replaced(tmp_path):
     path = tmp_path / "odometry.sock"
     killed = open_socket(parse_address(f"unix://{path}", POSES))
@@ -312,24 +285,7 @@ def test_a_unix_socket_is_removed_on_close_and_a_stale_one_replaced(tmp_path):
     killed.close()
     assert path.exists()
     odometry = open_poses(f"unix://{path}", CONFIG)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
-        sender.sendto(planar(1.0, 4.0), str(path))
+    send_to(path, planar(1.0, 4.0))
     assert pose_of(odometry, frame(1.0))[0, 3] == 4.0
     odometry.close()
     assert not path.exists()
-
-
-@pytest.fixture(name="free_port")
-def a_free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def test_poses_far_from_their_origin_are_used(pair):
-    there, odometry = pair
-    for k in range(3):
-        there.send(planar(1.0 + 0.1 * k, 458_000.0 + k, 5_430_000.0))
-    T = pose_of(odometry, frame(1.15))
-    np.testing.assert_allclose(T[:3, 3], [458_001.5, 5_430_000.0, 0.0], rtol=0, atol=1e-6)
-    assert odometry.used == 3

@@ -1,7 +1,5 @@
 """Poses of an Odometry topic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,24 +7,13 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.types import Frame
-from tests.ros2.network import FAR, NEAR, until
+from tests.ros2.network import FAR, NEAR, Scripted, until
 
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds, odometry
 from modt.ros2.odometry import write_odometry
 from modt.schemes import open_poses
 from modt.sources.pose_topic import PoseTopic
-
-
-class Scripted:
-    """A subscription that holds what the test says."""
-
-    def __init__(self):
-        self.held = []
-
-    def take(self):
-        held, self.held = self.held, []
-        return [dds.Message(data, 0.0) for data in held]
 
 
 def frame(stamp_s):
@@ -38,21 +25,18 @@ def pose(stamp_s, x_m, yaw=0.0):
 
 
 def test_a_frame_has_the_pose_of_the_sensor_at_its_stamp():
-    held = Scripted()
+    held = Scripted([pose(10.0, 3.0), pose(10.1, 4.0)], [pose(10.2, 5.0, 0.05)])
     topic = PoseTopic(held, OdometryConfig(), "odom", se3(np.eye(3), np.array([1.0, 0.0, 2.0])))
-    held.held = [pose(10.0, 3.0), pose(10.1, 4.0)]
     T = topic.place(frame(10.05)).T_world_sensor
     np.testing.assert_allclose(T[:3, 3], [4.5, 0.0, 2.0])
-    held.held = [pose(10.2, 5.0, 0.05)]
     expected = [5.0 + np.cos(0.05), np.sin(0.05), 2.0]
     np.testing.assert_allclose(topic.place(frame(10.2)).T_world_sensor[:3, 3], expected, atol=1e-9)
     assert topic.report()["used"] == 3
 
 
-def test_what_cannot_be_used_is_counted_by_its_reason():
-    held = Scripted()
-    topic = PoseTopic(held, OdometryConfig(), "odom", np.eye(4))
-    held.held = [pose(10.0, 3.0), pose(10.0, 3.0), pose(9.0, 3.0), pose(10.02, np.nan), pose(10.03, 1e9), b"\0"]
+def test_unusable_poses_are_counted_by_their_reason():
+    bad = [pose(10.0, 3.0), pose(9.0, 3.0), pose(10.02, np.nan), pose(10.03, 1e9), b"\0"]
+    topic = PoseTopic(Scripted([pose(10.0, 3.0), *bad]), OdometryConfig(), "odom", np.eye(4))
     assert topic.place(frame(10.0)).T_world_sensor is not None
     report = topic.report()
     assert (report["received"], report["used"]) == (6, 1)

@@ -1,5 +1,6 @@
 """Scan files, valid and invalid."""
 
+import os
 import re
 
 import numpy as np
@@ -84,8 +85,8 @@ def test_an_invalid_scan_is_refused_with_its_cause(tmp_path, content, cause):
 @pytest.mark.slow
 def test_a_file_that_no_sweep_fills_is_refused_unread(tmp_path):
     path = tmp_path / "0.bin"
-    with path.open("wb") as file:
-        file.truncate(2**40)
+    path.touch()
+    os.truncate(path, 2**40)
     with pytest.raises(ScanError, match="larger than 256 MiB"):
         read_scan(path)
 
@@ -105,7 +106,7 @@ def test_any_bytes_are_finite_points_or_an_error(tmp_path_factory, content):
     assert ((points[:, 3] >= 0) | (points[:, 3] == UNRECORDED)).mean() >= 0.98
 
 
-def test_a_scan_of_nuscenes_has_a_fifth_column(tmp_path):
+def test_the_fifth_column_of_nuscenes_is_ignored(tmp_path):
     rows = np.array([[1, 2, 3, 51, 7], [4, 5, 6, 255, 31]] * 8, np.float32)
     path = tmp_path / "n015__LIDAR_TOP__1532402927647951.pcd.bin"
     path.write_bytes(rows.tobytes())  # 16 rows of 5, which would be 20 rows of 4

@@ -10,11 +10,13 @@ from modt.sources.stamp_check import StampCheck
 
 PERIOD_S = 0.1
 MOST_LOST = 10
-"""Sweeps of a second."""
+"""Greatest number of sweeps that are lost when a clock is set: a second of them."""
+AT = st.integers(1, 58)
+STEP_S = st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2)
 
 
 def believed(stamps, arrivals):
-    """Numbers of the messages believed, their corrected stamps, and the check."""
+    """Indices of the accepted messages, their corrected stamps, and the check."""
     check, kept = StampCheck(), []
     for k, (stamp_s, arrived_s) in enumerate(zip(stamps, arrivals, strict=True)):
         if not check.doubt(stamp_s, arrived_s):
@@ -26,7 +28,7 @@ def even(n, begin=0.0):
     return [begin + k * PERIOD_S for k in range(n)]
 
 
-@given(st.integers(1, 58), st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2))
+@given(AT, STEP_S)
 def test_a_clock_that_is_set_costs_less_than_a_second_and_stamps_go_on(at, step_s):
     stamps = [s + (step_s if k >= at else 0.0) for k, s in enumerate(even(60, 1.7e9))]
     numbers, corrected, check = believed(stamps, even(60))
@@ -36,7 +38,7 @@ def test_a_clock_that_is_set_costs_less_than_a_second_and_stamps_go_on(at, step_
     assert check.steps == (len(numbers) > at)
 
 
-@given(st.integers(1, 58), st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2))
+@given(AT, STEP_S)
 def test_one_stamp_that_lies_costs_its_sweep_alone(at, step_s):
     stamps = [s + (step_s if k == at else 0.0) for k, s in enumerate(even(60))]
     numbers, corrected, check = believed(stamps, even(60))
@@ -45,7 +47,7 @@ def test_one_stamp_that_lies_costs_its_sweep_alone(at, step_s):
     assert check.steps == 0
 
 
-@given(st.integers(1, 58), st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2))
+@given(AT, STEP_S)
 def test_a_clock_that_stamps_and_arrivals_share_costs_nothing_when_it_is_set_back(at, step_s):
     both = [s + (-abs(step_s) if k >= at else 0.0) for k, s in enumerate(even(60))]
     numbers, corrected, _ = believed(both, both)

@@ -1,7 +1,5 @@
 """The table of commands, and each command's options."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 
@@ -13,7 +11,7 @@ from tools.__main__ import ROOT, commands, main
 COMMANDS = dict(commands())
 
 
-def test_the_table_has_a_summary_of_each_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_table_has_a_summary_of_each_command(capsys):
     main()
     lines = capsys.readouterr().out.splitlines()
     assert "tools.train.build_models" in COMMANDS
@@ -22,9 +20,7 @@ def test_the_table_has_a_summary_of_each_command(capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize("module", COMMANDS)
-def test_a_command_has_help_and_is_named_by_its_usage(
-    module: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_has_help_and_is_named_by_its_usage(module, monkeypatch, capsys):
     source = (ROOT.parent / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
     usages = [line.split()[2] for line in source.splitlines() if line.startswith("    python -m tools.")]
     assert set(usages) <= {module}

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import linear_sum_assignment
 
-from modt.tracking.association import assign
+from modt.geometry.kernels import assign
 
 
 def assigned(cost, limit):

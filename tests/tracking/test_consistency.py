@@ -41,13 +41,3 @@ def test_normalised_errors_are_as_large_as_they_should_be(speed):
             all_.append(normalised(error, P))
     assert 0.7 * 2 < np.mean(place) < 1.3 * 2
     assert 0.6 * 4 < np.median(all_) / chi2(4).median() * 4 < 1.4 * 4
-
-
-def test_a_walk_straight_ahead_is_known_after_a_second():
-    x, P = np.zeros((4, 1)), np.diag([0.01, 0.01, np.pi**2, 25.0])[:, :, None]
-    for i in range(1, 11):
-        z = np.array([[0.0], [-0.14 * i]])
-        x, P = kalman.predict(x, P, DT_S, 1.0, 0.3)
-        x, P = kalman.face(x, P, np.arctan2(z[1] - x[1], z[0] - x[0])) if i == 1 else (x, P)
-        x, P = kalman.turn_about(*kalman.update(x, P, z, 0.01 * np.eye(2)[:, :, None]))
-    np.testing.assert_allclose(x[2:, 0], [-np.pi / 2, 1.4], atol=0.15)

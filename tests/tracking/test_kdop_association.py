@@ -44,9 +44,11 @@ def test_a_lost_track_does_not_take_the_proposal_of_a_track_that_is_expected_the
     assert matched(tracks, person)[0] == [(0, 0)]
 
 
-@pytest.mark.parametrize(("x", "pairs"), [(10.1, [(0, 0)]), (11.4, [])])
-def test_a_pair_too_far_apart_is_not_matched(x, pairs):
-    assert matched(tracks_at([box(10, 0, 0.6, 0.6)]), observed([box(x, 0, 0.6, 0.6)]))[0] == pairs
+@pytest.mark.parametrize(
+    ("x", "columns", "pairs"), [(10.1, {}, [(0, 0)]), (11.4, {}, []), (12.0, {"P": 4 * np.eye(4)}, [(0, 0)])]
+)
+def test_a_pair_further_apart_than_the_filter_is_uncertain_is_not_matched(x, columns, pairs):
+    assert matched(tracks_at([box(10, 0, 0.6, 0.6)], **columns), observed([box(x, 0, 0.6, 0.6)]))[0] == pairs
 
 
 @pytest.mark.parametrize(("x", "pairs"), [(9.0, [(0, 0)]), (7.4, [])])
@@ -54,12 +56,6 @@ def test_what_changed_its_shape_is_matched_by_coverage(x, pairs):
     """A car of which most disappeared costs more than a pair may."""
     tracks, part = tracks_at([box(10, 3)], points=3000), observed([box(x, 3, 0.3, 0.3, 0.3, z=-1.6)], points=6)
     assert matched(tracks, part)[0] == pairs
-
-
-def test_pairs_are_sought_as_far_as_the_filter_is_uncertain():
-    person = observed([box(12, 0, 0.6, 0.6)])
-    assert matched(tracks_at([box(10, 0, 0.6, 0.6)]), person)[0] == []
-    assert matched(tracks_at([box(10, 0, 0.6, 0.6)], P=4 * np.eye(4)), person)[0] == [(0, 0)]
 
 
 def test_a_stationary_car_that_comes_into_view_has_no_speed():
@@ -81,10 +77,3 @@ def test_a_lost_track_is_matched_along_its_prediction():
     tracks = follow(Follower(), moving, CAR)
     assert tracks.id.tolist() == [0]
     assert tracks.missed[0] == 0
-
-
-@pytest.mark.parametrize("n", [0, 3])
-def test_an_empty_frame_or_table_has_no_matches(n):
-    boxes = [box(10 * k, 0) for k in range(1, n + 1)]
-    assert matched(tracks_at(boxes), observed([]))[0] == []
-    assert matched(tracks_at([]), observed(boxes))[0] == []

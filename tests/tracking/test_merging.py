@@ -22,9 +22,9 @@ from tests.tracking.tracking_scenes import (
     tracks_at,
 )
 
-BACKGROUND, CAR, PEDESTRIAN = ObjectClass.BACKGROUND, ObjectClass.CAR, ObjectClass.PEDESTRIAN
+BACKGROUND, CAR, PEDESTRIAN, CYCLIST = ObjectClass
 WHOLE, REAR, FRONT = (box(x, 3, length, 1.8, 1.5) for x, length in ((10, 4.2), (8.6, 1.4), (11.1, 2.0)))
-AHEAD = box(15, 3, 4.2, 1.8, 1.5)
+AHEAD, SLIM = box(15, 3, 4.2, 1.8, 1.5), box(11.1, 3, 0.6, 0.6, 1.5)
 POINTS = 80
 
 
@@ -51,12 +51,11 @@ def merged(tracks, boxes, rows):
     return groups, after
 
 
-def test_the_parts_of_a_car_become_one_proposal():
+def test_the_parts_of_a_car_become_one_proposal_with_its_box():
     groups, after = merged(tracks_at([WHOLE], CAR), [REAR, FRONT], [0])
     assert groups == [[0, 1]]
     np.testing.assert_allclose(after.proposals.box[0], WHOLE, atol=0.05)
     np.testing.assert_allclose(after.observations.box[0], WHOLE, atol=0.05)
-    assert (after.matches.rows.tolist(), after.matches.proposals.tolist()) == ([0], [0])
 
 
 def test_the_match_of_a_part_is_dropped_and_proposals_are_renumbered():
@@ -67,118 +66,62 @@ def test_the_match_of_a_part_is_dropped_and_proposals_are_renumbered():
 
 
 @pytest.mark.parametrize(
-    ("object_class", "columns", "why"),
+    ("known", "classes", "seen", "columns", "is_part"),
     [
-        (PEDESTRIAN, {}, "it is no car"),
-        (BACKGROUND, {"hits": 3}, "it was seen too few times"),
-        (CAR, {"hits": 3}, "it was seen too few times"),
+        ([WHOLE], [PEDESTRIAN], [REAR, FRONT], {}, False),
+        ([WHOLE], [CAR], [REAR, FRONT], {"hits": 3}, False),  # seen too few times
+        ([WHOLE], [BACKGROUND], [REAR, FRONT], {"hits": 3}, False),
+        ([WHOLE], [CAR], [REAR, box(13.0, 3, 1.5, 1.8, 1.5)], {}, False),  # ahead of the car
+        ([WHOLE], [CAR], [REAR, box(11.1, 4.2, 2.0, 1.8, 1.5)], {}, False),  # reaches beyond its side
+        ([WHOLE], [CAR], [FRONT, box(13.0, 3, 2.0, 1.8, 1.5)], {}, False),  # both as long as the car, most ahead
+        ([WHOLE], [CAR], [REAR, box(11.65, 3, 2.6, 1.8, 1.5)], {}, False),  # most within, both longer than the car
+        ([WHOLE, FRONT], [CAR, PEDESTRIAN], [REAR, FRONT], {}, False),
+        ([WHOLE, FRONT], [CAR, CYCLIST], [REAR, FRONT], {}, False),
+        ([WHOLE, FRONT], [CAR, BACKGROUND], [REAR, FRONT], {}, True),
+        ([WHOLE], [BACKGROUND], [REAR, FRONT], {}, True),
+        ([box(10, 3, 7.0, 1.8, 1.5)], [BACKGROUND], [REAR, FRONT], {}, False),  # longer than a car
+        ([WHOLE, FRONT], [BACKGROUND, BACKGROUND], [REAR, FRONT], {}, True),
+        ([WHOLE, FRONT], [BACKGROUND, CAR], [REAR, FRONT], {}, False),
+        ([WHOLE, FRONT], [BACKGROUND, PEDESTRIAN], [REAR, FRONT], {}, False),
+        ([FRONT, WHOLE], [BACKGROUND, BACKGROUND], [FRONT, REAR], {}, False),  # the other is older
+        ([WHOLE], [CAR], [REAR, SLIM], {}, True),  # may be a person
+        ([WHOLE], [BACKGROUND], [REAR, SLIM], {}, False),
     ],
 )
-def test_only_established_cars_merge(object_class, columns, why):
-    groups, _ = merged(tracks_at([WHOLE], object_class, **columns), [REAR, FRONT], [0])
-    assert groups == [[0], [1]], why
-
-
-@pytest.mark.parametrize(
-    ("own", "part", "why"),
-    [
-        (REAR, box(13.0, 3, 1.5, 1.8, 1.5), "it lies ahead of the car"),
-        (REAR, box(11.1, 4.2, 2.0, 1.8, 1.5), "it reaches beyond its side"),
-        (FRONT, box(13.0, 3, 2.0, 1.8, 1.5), "most of it lies ahead, though both are no longer than the car"),
-        (REAR, box(11.65, 3, 2.6, 1.8, 1.5), "both are longer than the car, though most of it lies within"),
-    ],
-)
-def test_what_exceeds_the_known_extent_is_no_part(own, part, why):
-    tracks = tracks_at([WHOLE], CAR)
-    assert len(merging(tracks, frame_at_rest(tracks, [own, part], 0)).proposals) == 2, why
-
-
-@pytest.mark.parametrize(
-    ("object_class", "groups"),
-    [(PEDESTRIAN, [[0], [1]]), (ObjectClass.CYCLIST, [[0], [1]]), (BACKGROUND, [[0, 1]])],
-)
-def test_a_person_is_no_part(object_class, groups):
-    tracks = tracks_at([WHOLE, FRONT], CAR, object_class)
-    assert merged(tracks, [REAR, FRONT], [0, 1])[0] == groups
-
-
-@pytest.mark.parametrize(("length_m", "groups"), [(4.2, [[0, 1]]), (7.0, [[0], [1]])])
-def test_background_no_longer_than_a_car_is_made_whole(length_m, groups):
-    assert merged(tracks_at([box(10, 3, length_m, 1.8, 1.5)]), [REAR, FRONT], [0])[0] == groups
-
-
-@pytest.mark.parametrize(
-    ("classes", "groups"),
-    [
-        ((BACKGROUND, BACKGROUND), [[0, 1]]),
-        ((BACKGROUND, CAR), [[0], [1]]),
-        ((BACKGROUND, PEDESTRIAN), [[0], [1]]),
-    ],
-)
-def test_background_takes_from_younger_background_alone(classes, groups):
-    assert merged(tracks_at([WHOLE, FRONT], *classes), [REAR, FRONT], [0, 1])[0] == groups
-
-
-def test_background_takes_nothing_from_what_is_older():
-    assert merged(tracks_at([FRONT, WHOLE]), [FRONT, REAR], [0, 1])[0] == [[0], [1]]
-
-
-@pytest.mark.parametrize(("object_class", "groups"), [(CAR, [[0, 1]]), (BACKGROUND, [[0], [1]])])
-def test_what_may_be_a_person_becomes_a_part_of_known_cars_alone(object_class, groups):
-    part = box(11.1, 3, 0.6, 0.6, 1.5)
-    assert merged(tracks_at([WHOLE], object_class), [REAR, part], [0])[0] == groups
+def test_what_is_a_part(known, classes, seen, columns, is_part):
+    groups, _ = merged(tracks_at(known, *classes, **columns), seen, range(len(known)))
+    assert groups == ([[0, 1]] if is_part else [[0], [1]])
 
 
 def test_a_car_takes_all_its_parts():
-    lorry = box(10, 3, 9.0, 1.8, 1.5)
     parts = [box(7.0, 3, 2.0, 1.8, 1.5), box(9.4, 3, 2.0, 1.8, 1.5), box(12.5, 3, 3.0, 1.8, 1.5)]
-    tracks = tracks_at([lorry], CAR)
-    assert len(merging(tracks, frame_at_rest(tracks, parts, 0)).proposals) == 1
+    assert merged(tracks_at([box(10, 3, 9.0, 1.8, 1.5)], CAR), parts, [0])[0] == [[0, 1, 2]]
 
 
-def two_cars(ahead_m=0.0, behind_m=0.0):
-    """An older car whose known extent is longer ahead, and a younger one's, longer behind."""
+@pytest.mark.parametrize(
+    ("ahead_m", "behind_m", "seen", "groups"),
+    [
+        (0.0, 5.5, [WHOLE, AHEAD], [[0], [1]]),  # the proposal of an older car is no part
+        (6.5, 0.0, [WHOLE, AHEAD], [[0, 1]]),
+        (3.5, 3.5, [WHOLE, AHEAD, box(12.5, 3, 0.5, 1.8, 1.5)], [[0, 2], [1]]),  # both know it: the older takes it
+        (0.0, 3.5, [WHOLE, AHEAD, box(12.5, 3, 0.5, 1.8, 1.5)], [[0], [1, 2]]),
+        # the near one is a part of the older car, but for the one that it gains itself
+        (3.5, 0.0, [WHOLE, box(14.2, 3, 2.6, 1.8, 1.5), box(16.4, 3, 1.3, 1.8, 1.5)], [[0], [1, 2]]),
+    ],
+)
+def test_of_two_cars_the_older_takes_parts_and_proposals_of_the_younger(ahead_m, behind_m, seen, groups):
+    """The known extent of the older car reaches further ahead, that of the younger one further behind."""
     tracks = tracks_at([WHOLE, AHEAD], CAR, CAR)
     tracks.envelope[0] += np.maximum(DIRECTIONS[0], 0) * ahead_m
     tracks.envelope[1] += np.maximum(-DIRECTIONS[0], 0) * behind_m
-    return tracks
-
-
-def test_the_proposal_of_an_older_car_is_no_part():
-    assert merged(two_cars(behind_m=5.5), [WHOLE, AHEAD], [0, 1])[0] == [[0], [1]]
-
-
-def test_the_proposal_of_a_younger_car_is_a_part():
-    """The younger track then has none."""
-    groups, after = merged(two_cars(ahead_m=6.5), [WHOLE, AHEAD], [0, 1])
-    assert groups == [[0, 1]]
-    assert after.matches.rows.tolist() == [0]
-
-
-def test_a_part_of_two_cars_goes_to_the_older():
-    part = box(12.5, 3, 0.5, 1.8, 1.5)
-    assert merged(two_cars(ahead_m=3.5, behind_m=3.5), [WHOLE, AHEAD, part], [0, 1])[0] == [[0, 2], [1]]
-    assert merged(two_cars(behind_m=3.5), [WHOLE, AHEAD, part], [0, 1])[0] == [[0], [1, 2]]
-
-
-def test_a_proposal_that_gains_a_part_is_no_part_itself():
-    near, far = box(14.2, 3, 2.6, 1.8, 1.5), box(16.4, 3, 1.3, 1.8, 1.5)
-    tracks = two_cars(ahead_m=3.5)
-    after = merging(tracks, frame_at_rest(tracks, [WHOLE, near, far], 0, 1))
-    assert after.proposals.count.tolist() == [POINTS, 2 * POINTS]
+    assert merged(tracks, seen, [0, 1])[0] == groups
 
 
 def test_the_reflectance_is_that_of_the_matched_proposal():
-    tracks = tracks_at([WHOLE], CAR)
+    tracks, reflectance = tracks_at([WHOLE], CAR), np.arange(10.0).reshape(2, 5)
     frame = frame_at_rest(tracks, [FRONT, REAR], 0)
-    reflectance = np.arange(10.0).reshape(2, 5)
     after = merging(tracks, replace(frame, proposals=replace(frame.proposals, reflectance=reflectance)))
     np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
-
-
-def test_a_frame_without_parts_is_returned_as_it_is():
-    frame = associated(frame_of([WHOLE, AHEAD])[1], [0])
-    assert merging(tracks_at([WHOLE], CAR), frame) is frame
 
 
 KNOWN = 6
@@ -219,11 +162,7 @@ def test_without_extensions_the_tracker_takes_proposals_as_they_are():
 
 @pytest.mark.parametrize(
     ("object_class", "length_m", "known_m"),
-    [
-        (CAR, 5.8, 5.8),
-        (CAR, 6.4, 5.0),  # longer than any car
-        (BACKGROUND, 6.4, 6.4),
-    ],
+    [(CAR, 5.8, 5.8), (CAR, 6.4, 5.0), (BACKGROUND, 6.4, 6.4)],  # no car is longer than 6 m
 )
 def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length_m, known_m):
     follower = Follower()

@@ -25,9 +25,9 @@ def follow(frames: list[np.ndarray]) -> TrackTable:
     tracks = TrackTable.blank(1)
     for k, corners in enumerate(frames):
         tracks.kdop[:] = kdop(corners)
-        tracks.envelope[:] = np.maximum(tracks.envelope, tracks.kdop)
+        tracks.box[:, 3:5] = np.ptp(corners, axis=0)
         if not k:
-            tracks.lagged_kdop[:] = tracks.kdop
+            tracks.lagged_kdop[:], tracks.size_m[:] = tracks.kdop, tracks.box[:, 3:6]
         tracks.observe_motion(ROW, PERIOD_S * (k > 0))
     return tracks
 
@@ -43,7 +43,14 @@ def test_a_steady_walk_tends_to_speed_times_lag(bearing_rad: float) -> None:
 def test_a_wall_whose_visible_part_grows_stays() -> None:
     tracks = follow([box(0, 0, 1.0 + 0.1 * k, 0.3) for k in range(40)])
     assert tracks.moved_m[0] < 0.01
-    assert tracks.length_m[0] == pytest.approx(4.9)
+    assert tracks.size_m[0, 0] == pytest.approx(4.9, abs=0.2)
+
+
+def test_the_size_is_that_of_the_whole_object_while_most_of_it_is_hidden() -> None:
+    seen = [box(0, 0, 4.3, 1.8)] * 10
+    hidden = follow([*seen, *[box(0, 0, 1.8, 0.6)] * 30]).size_m[0]
+    assert hidden[0] > 3.0
+    assert follow([*seen, box(0, 0, 6.0, 1.8), *seen]).size_m[0, 0] < 5.2  # merged with something for once
 
 
 def test_a_door_that_turns_about_its_hinge_goes_less_than_its_end() -> None:

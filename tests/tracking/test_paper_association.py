@@ -44,25 +44,17 @@ def test_no_pair_costs_less_than_one_of_equals(shift, length, points):
     assert cost(box(10, 0), box(10 + shift, 0, l=length), points) >= cost(box(10, 0), box(10, 0)) - 1e-9
 
 
-def test_boxes_are_compared_about_their_centroids_whatever_side_is_seen():
-    """Boxes as long as they were at centroids that stay overlap wholly, wherever their middles are."""
-    tracks, observations = pair(box(10, 0), box(10, 0))
-    tracks.box[0, :2] += 3.0
-    matches = PaperAssociation(PaperAssociationConfig()).match(tracks, observations)
-    assert matches.rows.tolist() == [0]
+@pytest.mark.parametrize(("x", "t_da", "n"), [(11, 0.95, 1), (12, 0.95, 0), (12, 2.0, 1)])
+def test_pairs_above_the_threshold_are_not_matched(x, t_da, n):
+    association = PaperAssociation(PaperAssociationConfig(t_da=t_da))
+    assert len(association.match(*pair(box(10, 0), box(x, 0))).rows) == n
 
 
-def test_pairs_above_the_threshold_are_not_matched():
-    match = PaperAssociation(PaperAssociationConfig()).match
-    assert len(match(*pair(box(10, 0), box(11, 0))).rows) == 1
-    assert len(match(*pair(box(10, 0), box(12, 0))).rows) == 0
-    lenient = PaperAssociation(PaperAssociationConfig(t_da=2.0))
-    assert len(lenient.match(*pair(box(10, 0), box(12, 0))).rows) == 1
-
-
-def test_the_last_box_is_compared_where_the_filter_expects_it():
+def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it():
+    """Whatever side is seen: boxes of one length at one centroid overlap wholly, wherever their middles are."""
     tracks, observations = pair(box(10, 0), box(12, 0))
     tracks.x[0, 0] += 2.0
+    tracks.box[0, :2] += 3.0
     matches = PaperAssociation(PaperAssociationConfig()).match(tracks, observations)
     assert matches.rows.tolist() == [0]
     np.testing.assert_allclose(matches.position, observations.centroid)

@@ -1,7 +1,5 @@
 """Control of a Chromium without a window, by its DevTools protocol through a pipe."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os
@@ -43,12 +41,7 @@ class Browser:
         self.events: list[dict[str, Any]] = []
 
     def call(self, method: str, session: str | None = None, **params: Any) -> dict[str, Any]:
-        """Send a command and return its result. Events that come before it are kept.
-
-        Raises:
-            RuntimeError: the browser refuses it.
-            TimeoutError: the browser does not answer.
-        """
+        """Send a command and return its result. Events that come before it are kept."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": params} | (
             {"sessionId": session} if session else {}
@@ -97,26 +90,18 @@ class Tab:
         return self._browser.call(method, self._session, **params)
 
     def value(self, expression: str) -> Any:
-        """Value of an expression or of its promise.
-
-        Raises:
-            RuntimeError: the expression throws.
-        """
+        """Value of an expression or of its promise."""
         found = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         if "exceptionDetails" in found:
             raise RuntimeError(found["exceptionDetails"]["exception"].get("description", "it throws"))
         return found["result"].get("value")
 
-    def until(self, condition: str, within_s: float = WAIT_S) -> None:
-        """Wait for a condition.
-
-        Raises:
-            TimeoutError: the condition does not hold in time.
-        """
-        end_s = time.monotonic() + within_s
+    def until(self, condition: str) -> None:
+        """Wait for a condition."""
+        end_s = time.monotonic() + WAIT_S
         while not self.value(f"(() => {{ try {{ return Boolean({condition}) }} catch {{ return false }} }})()"):
             if time.monotonic() > end_s:
-                raise TimeoutError(f"{condition} does not hold within {within_s:g} s; {self.failures()}")
+                raise TimeoutError(f"{condition} does not hold in time; {self.failures()}")
             time.sleep(0.02)
 
     def failures(self) -> list[str]:
@@ -135,11 +120,9 @@ class Tab:
                 found.append(f"{params['entry']['text']} {params['entry'].get('url', '')}")
         return found
 
-    def point(self, x: float, y: float, *, click: bool = False) -> None:
-        """Move the mouse to a place [CSS pixels], and click there on request."""
-        for kind in ("mouseMoved", *(("mousePressed", "mouseReleased") if click else ())):
-            button = {} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **button)
+    def point(self, x: float, y: float) -> None:
+        """Move the mouse to a place [CSS pixels]."""
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
 
     def press(self, key: str) -> None:
         """Press and release a key, named as in JavaScript."""

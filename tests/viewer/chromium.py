@@ -1,7 +1,5 @@
 """Pages of `modt view` in a real browser."""
 
-from __future__ import annotations
-
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -12,7 +10,7 @@ from tests.viewer.browser import Browser, Tab, browser, find
 RECORD = """
 const drawn = [];
 let image = null;
-for (const name of ["fillText", "fill", "arc", "putImageData"]) {
+for (const name of ["fillText", "fill", "putImageData"]) {
   const real = CanvasRenderingContext2D.prototype[name];
   CanvasRenderingContext2D.prototype[name] = function (...given) {
     if (name === "putImageData") [image, drawn.length] = [given[0], 0];
@@ -48,7 +46,7 @@ class Chromium:
         self._browser = started
 
     def opened(self, page: Path, *actions: str, width: int = 1280, height: int = 800, dark: bool = False):
-        """Contents of a page after actions: slide:K, key:NAME, hover:X,Y or click:X,Y [m, sensor frame]."""
+        """Contents of a page after actions: slide:K, key:NAME or hover:X,Y [m, sensor frame]."""
         with self.tab(page.resolve().as_uri(), width=width, height=height, dark=dark) as tab:
             for action in actions:
                 act(tab, *action.split(":"))
@@ -74,7 +72,7 @@ def act(tab: Tab, kind: str, what: str) -> None:
     else:
         box = "canvas.getBoundingClientRect()"
         x, y = tab.value(f"(() => {{ const [x, y] = screen({what}); return [x + {box}.left, y + {box}.top] }})()")
-        tab.point(x, y, click=kind == "click")
+        tab.point(x, y)
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,5 @@
 """Pages of `modt view`, read back."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

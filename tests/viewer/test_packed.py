@@ -1,27 +1,13 @@
 import numpy as np
 
-from modt.viewer.packed import SIDE, Cells, packed_cells, packed_table
+from modt.viewer.packed import Cells, packed_table
 
 from . import pages
-
-
-def test_cells_come_back():
-    random = np.random.default_rng(3)
-    cell = np.unique(np.append(random.integers(0, SIDE**2, 500), [0, SIDE**2 - 1]))
-    cells = Cells(cell, random.integers(0, 64, len(cell)))
-    number, level = pages.cells(packed_cells(cells))
-    np.testing.assert_array_equal(number, cells.cell)
-    np.testing.assert_array_equal(level, cells.level)
 
 
 def test_a_table_comes_back_with_numbers_of_either_sign():
     table = np.array([[0, -1, 2**31 - 1], [5, -70000, -(2**31)], [3, 9, 0]])
     np.testing.assert_array_equal(pages.table(packed_table(table), 3), table)
-
-
-def test_nothing_is_packed_too():
-    none = np.zeros(0, np.int64)
-    assert [len(part) for part in pages.cells(packed_cells(Cells(none, none)))] == [0, 0]
 
 
 def test_thinned_cells_lose_ground_first():

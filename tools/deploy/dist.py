@@ -15,6 +15,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import modt
@@ -53,7 +54,7 @@ def page(files: list[Path], digests: dict[str, str]) -> str:
     lines = [f"# modt {modt.__version__}", "", "Choose the file of your machine, check it, and install it:", ""]
     lines += [f"    sha256sum --check --ignore-missing {SUMS}", "    python3 -m venv /opt/modt"]
     lines += [f"    /opt/modt/bin/pip install --require-hashes -r {LOCK}   # the libraries as they were tested"]
-    lines += [f"    /opt/modt/bin/pip install --no-deps ./{name}" for name in wheels]
+    lines += [f"    /opt/modt/bin/pip install --no-deps ./{name}   # of your machine" for name in wheels]
     lines += [f"    sudo apt install ./{name}   # instead of the environment" for name in debs]
     lines += ["    /opt/modt/bin/modt replay", "", "## Changes", ""]
     lines += [changes((ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), modt.__version__), "", "## Files", ""]
@@ -69,6 +70,9 @@ def main(arguments: list[str] | None = None) -> int:
     options.add_argument("--target", action="append", choices=[*TARGETS, NATIVE], help=targets)
     options.add_argument("--deb", action="append", default=[], metavar="VERSION", help="Python of a Debian package")
     given = options.parse_args(arguments)
+    missing = [name for name in ("build", "hatchling", "ziglang") if find_spec(name) is None]
+    if missing and given.target != [NATIVE]:
+        raise SystemExit(f"dist: {', '.join(missing)} not installed; pip install '.[wheels]'")
     out: Path = given.out
     out.mkdir(parents=True, exist_ok=True)
     files = []

@@ -1,14 +1,16 @@
 """Send a sensor's packets to a UDP address at the sensor's pace.
 
     python -m tools.send.packets 127.0.0.1:2368 CAPTURE.pcap [--metadata FILE.json] [--once] [--seconds S]
+    python -m tools.send.packets 127.0.0.1:2368 BAG --write FILE.pcap
     python -m tools.send.packets 127.0.0.1:2368 [STREAM] --as hdl-64e --calibration FILE.yaml [--frames A:B]
     ... --loss P --duplicates P --reordering P --garbage P --seed N
     ... --write FILE.pcap
 
 The whole turns of a capture are repeated as if the sensor went on, until --seconds are over; --once sends the capture
-unchanged. A STREAM of scans (a KITTI drive; default: the synthetic street) is turned into the packets of an ideal
-sensor, whose calibration is written to FILE.yaml for the receiver. Faults are shares of the packets; the seed
-determines them. With --write the packets go to a file instead.
+unchanged. A BAG is a ROS 2 recording (.db3) of a driver's packets, which are sent once. A STREAM of scans (a KITTI
+drive; default: the synthetic street) is turned into the packets of an ideal sensor, whose calibration is written to
+FILE.yaml for the receiver. Faults are shares of the packets; the seed determines them. With --write the packets go to
+a file instead.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from tools.options import parser
 from tools.send.faults import PacketFaults, Timed
 from tools.send.ideal_packets import LAYOUTS, MODELS, ideal_calibration, packets_of
 from tools.send.loops import endless, ouster_loop
+from tools.send.packet_bag import packets_of_bag
 from tools.send.pcap_writer import write_capture
 
 SYNTHETIC_S = 5.0
@@ -98,10 +101,13 @@ def main() -> None:
 def run(arguments: argparse.Namespace) -> None:
     host, _, port = arguments.address.rpartition(":")
     packets: Iterable[Timed]
-    if arguments.path is not None and arguments.path.suffix in CAPTURES:
-        packets = captured(arguments.path, arguments.metadata, once=arguments.once)
+    path = arguments.path
+    if path is not None and (path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3")))):
+        packets = packets_of_bag(path)
+    elif path is not None and path.suffix in CAPTURES:
+        packets = captured(path, arguments.metadata, once=arguments.once)
     else:
-        packets = made(arguments.path, arguments.model, arguments.calibration, arguments.frames)
+        packets = made(path, arguments.model, arguments.calibration, arguments.frames)
         if not arguments.once:
             packets = endless([payload for _, payload in packets])
     faults = PacketFaults(

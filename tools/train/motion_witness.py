@@ -24,12 +24,14 @@ WEIGHT, MOST = 0.5, 1.5
 """Weight of the witness beside network and box; its greatest absolute logarithm."""
 SMOOTHING = 200
 """Counts of a class over all lengths that are added to those of one length."""
+FRAGMENTS = 0
+"""Length for which the length itself is evidence: hardly any object is never seen longer."""
 SCENES, SEEDS, SECONDS = ("street", "crossing"), range(800, 806), 8.0
 """Drives that are counted, by every sensor; the seeds are not those of any published figure."""
 
 
 def counted(drive: Drive, number: int) -> Int:
-    """(3, CELLS, 4) tracks of a drive, frame by frame, by length, cell and true class."""
+    """(4, CELLS, 4) tracks of a drive, frame by frame, by length, cell and true class."""
     mode = assembly.MODES["accurate"]
     pipeline, budget = assembly.pipeline(mode, drive.profile, drive.fov), mode.budget(drive.profile)
     results = [pipeline.step(frame, budget) for frame, _ in drive.frames]
@@ -40,16 +42,17 @@ def counted(drive: Drive, number: int) -> Int:
         tracks = result.tracks
         found = rows[(rows["frame"] == result.frame.index) & rows["to_classify"]]
         of = np.searchsorted(tracks.id, found["track"])
-        length, cell = cells(tracks.moved_m[of], tracks.observed_s[of], tracks.length_m[of])
+        length, cell = cells(tracks.moved_m[of], tracks.observed_s[of], tracks.size_m[of, 0])
         np.add.at(counts, (length, cell, found["label"]), 1)
     return counts
 
 
 def log_likelihood_ratio(counts: Int) -> Float64:
-    """(3, 3, CELLS) by length and class but background, of counts (3, CELLS, 4)."""
+    """(4, 3, CELLS) by length and class but background, of counts (4, CELLS, 4)."""
     overall = (counts.sum(axis=0) + 1.0) / (counts.sum(axis=0) + 1.0).sum(axis=0)
     smooth = counts + SMOOTHING * overall
     log = np.log(smooth / smooth.sum(axis=1, keepdims=True))
+    log[FRAGMENTS] += np.log(smooth[FRAGMENTS].sum(axis=0) / smooth.sum(axis=(0, 1)))
     ratio = WEIGHT * (log[:, :, 1:] - log[:, :, :1])
     limited: Float64 = np.clip(ratio, -MOST, MOST).transpose(0, 2, 1)
     return limited

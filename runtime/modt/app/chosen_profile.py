@@ -59,7 +59,8 @@ def choose(asked_for: profile.Names | ProfileConfig, first: Frame | None, info: 
         recognition = _compared(first, asked.config, asked.sensor, replaced=False)
         return ChosenProfile(recognition.mounted(asked.config), asked.sensor, asked.used(""), recognition)
     base = info.profile if info and info.profile else profile.DEFAULT
-    recognition = _compared(first, _with_beams(asked.over(profile.load(base)), info), base, replaced=True)
+    name = base if info and info.profile else f"{base} (the default)"
+    recognition = _compared(first, _with_beams(asked.over(profile.load(base)), info), name, replaced=True)
     sensor = FOUND if recognition.differences else base
     config = _with_beams(asked.over(recognition.fitted), info)
     return ChosenProfile(config, sensor, asked.used(sensor), recognition)

@@ -114,7 +114,7 @@ def status_text(status: dict[str, Any], now_s: float) -> str:
         f"  recording   {recording['failing'] or 'on'}, {recording['lines']} lines, {recording['lost_lines']} lost",
         *(f"  sink        {name}: {_counts(health)}" for name, health in status["sinks"].items()),
         *(f"  failures    {kind}: {n}" for kind, n in loop["failures"].items()),
-        *(f"  lacking     {what}" for what in status["host"]["lacking"]),
+        *(f"  warning     {what}" for what in status["host"]["lacking"]),
     ]
     return "\n".join("".join(c if c.isprintable() else "?" for c in line) for line in lines)
 

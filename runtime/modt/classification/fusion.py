@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.class_sizes import IS_PERSON
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.motion_witness import log_likelihood
 from modt.classification.pool import pooled_prior
@@ -43,6 +44,11 @@ REVIEW_GROWTH, REVIEW_FRAMES = 2.0, 10
 """A certain object is classified again at REVIEW_GROWTH times its age at the last view, and REVIEW_FRAMES later."""
 UNSURE_GROWTH, UNSURE_FRAMES = 1.3, 2
 """The same of an uncertain track. With longer intervals, fewer calls are made and cars are recognised later."""
+LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
+"""Posterior from which an uncertain track is probably background, and UNSURE_GROWTH of such a track."""
+MAYBE_PERSON, PERSON_FRAMES = 0.25, 3
+"""Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
+a view of a few points says little, and many of them are right."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
@@ -132,9 +138,9 @@ class FusedTracks:
         prior = self.prior.probability(proposals)[tracks.proposal[rows]]
         tracks.prior[rows] = prior
         evidence, known = _log(prior) - self._log_frequency, tracks.box_evidence.take(rows, axis=0)
-        gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING)[:, None]
+        gain = (np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows])[:, None]
         tracks.box_evidence[rows] = known + gain * (evidence - known)
-        tracks.witness[rows] = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.length_m[rows])
+        tracks.witness[rows] = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m[rows])
         self._conclude(tracks, rows)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
@@ -176,7 +182,8 @@ class FirstViews(FusedTracks):
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
     minimum number of observations, since spurious proposals do not last. A track that is uncertain is classified
-    again once it shows clearly more points. Background is as final as an object here, and as certain.
+    again once it shows clearly more points, and every few frames where it may be a person. Background is as final as
+    an object here, and as certain.
     """
 
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
@@ -185,8 +192,8 @@ class FirstViews(FusedTracks):
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
-        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS)
-        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks))
+        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
+        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks) | _person_waits(tracks))
 
 
 class FurtherViews(FusedTracks):
@@ -194,7 +201,8 @@ class FurtherViews(FusedTracks):
 
     A track, a remembered place too, is classified as soon as its box may be an object's. An uncertain one is
     classified again where it shows clearly more points, and at growing intervals, as is a certain object. Certain
-    background is only where it shows far more points and may be an object by its box.
+    background is only where it shows far more points and may be an object by its box. A person is not while the view
+    cuts off more than half.
     """
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
@@ -204,9 +212,11 @@ class FurtherViews(FusedTracks):
         object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
         review = object_ & (tracks.age >= REVIEW_GROWTH * tracks.key_age + REVIEW_FRAMES)
         review |= first & _shows_more(tracks, FAR_MORE_POINTS)
-        unsure = _shows_more(tracks) | (tracks.age >= UNSURE_GROWTH * tracks.key_age + UNSURE_FRAMES)
+        likely_background = tracks.posterior[:, ObjectClass.BACKGROUND] > LIKELY_BACKGROUND
+        growth = np.where(likely_background, BACKGROUND_GROWTH, UNSURE_GROWTH)
+        unsure = _shows_more(tracks) | (tracks.age >= growth * tracks.key_age + UNSURE_FRAMES) | _person_waits(tracks)
         further = np.where(self.certain(tracks.posterior), review, unsure)
-        asks: Bool = (tracks.proposal != NONE) & np.where(tracks.viewed, further, first)
+        asks: Bool = (tracks.proposal != NONE) & ~tracks.hidden & np.where(tracks.viewed, further, first)
         return asks
 
 
@@ -214,6 +224,12 @@ def _log(probability: Float64) -> Float64:
     """Logarithm, of MIN_PROBABILITY at least."""
     logarithm: Float64 = np.log(np.maximum(probability, MIN_PROBABILITY))
     return logarithm
+
+
+def _person_waits(tracks: Tracks) -> Bool:
+    """(M,) tracks that may be people and were last classified PERSON_FRAMES ago."""
+    waits: Bool = tracks.posterior[:, IS_PERSON].sum(axis=1) > MAYBE_PERSON
+    return waits & (tracks.age >= tracks.key_age + PERSON_FRAMES)
 
 
 def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:

@@ -1,4 +1,4 @@
-"""The witness of a track's motion: P(how far it went | class, how long it is), an expert beside network and box.
+"""The witness of a track: P(how far it went, how large it is | class), an expert beside network and box.
 
 It is a state, not a view: it replaces itself in every frame and is never multiplied twice. A track went as far as
 both of its ends did (`modt.tracking.track_table`): where a changing part of a wall is seen, one of them moves.
@@ -8,18 +8,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import N_CLASSES
+from modt.class_sizes import MAX_SIZE_M
+from modt.classes import N_CLASSES, ObjectClass
 from modt.types import Float64, Int
 
 YOUNG_S = 0.5, 1.5
 """Ages [s] that part tracks which stay where they are."""
 MOVED_M = 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0
 """Displacements [m] that part the others."""
-LENGTH_M = 1.3, 2.6
-"""Greatest lengths [m] that part the tables."""
+LENGTH_M = 0.4, 1.3, 2.6
+"""Lengths [m] that part the tables. What is never seen longer than the first is a fragment."""
+TOO_LARGE = 3.0
+"""Log-likelihood that a cyclist loses where the track is larger than one; less: hidden cars are cyclists."""
+CYCLIST_M: Float64 = 1.1 * MAX_SIZE_M[ObjectClass.CYCLIST]
+"""Greatest length and width of a cyclist, who may once be seen together with something else [m]."""
 LOG_LIKELIHOOD_RATIO: Float64 = (
     np.array(
         [
+            [
+                [-15, -15, -15, -15, -15, -15, -15, -15, -4, 15],
+                [-10, -11, -15, -12, -9, -10, -12, -15, -15, -2],
+                [-15, -15, -15, -15, -15, -9, -1, 6, 14, 15],
+            ],
             [
                 [-2, 2, 0, 2, 0, -1, -3, 6, 15, 15],
                 [-11, -6, -3, -1, 5, 15, 15, -6, -15, -15],
@@ -39,9 +49,10 @@ LOG_LIKELIHOOD_RATIO: Float64 = (
     )
     / 10.0
 )
-"""(3, 3, 10) log P(cell | class, length) / P(cell | background, length) by length, of car, pedestrian and cyclist.
+"""(4, 3, 10) log P(cell | class, length) / P(cell | background, length) by length, of car, pedestrian and cyclist.
 
-Halved, since box and motion are not independent, and within 1.5; by `python -m tools.train.motion_witness`.
+That of fragments is of P(cell, length | class). Halved, since box and motion are not independent, and within 1.5; by
+`python -m tools.train.motion_witness`.
 """
 
 
@@ -51,16 +62,23 @@ def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int
     Args:
         moved_m: (R,) displacement within about the last two seconds [m].
         observed_s: (R,) time since the first proposal [s].
-        length_m: (R,) greatest length seen [m].
+        length_m: (R,) of the track [m].
     """
     still = np.searchsorted(YOUNG_S, observed_s, side="right")
     gone = np.searchsorted(MOVED_M, moved_m, side="right") + len(YOUNG_S)
     return np.searchsorted(LENGTH_M, length_m, side="right"), np.where(moved_m < MOVED_M[0], still, gone)
 
 
-def log_likelihood(moved_m: Float64, observed_s: Float64, length_m: Float64) -> Float64:
-    """(R, 4) log P(motion | class) over that of background, 0 of a class without a table; arguments as of `cells`."""
-    length, cell = cells(moved_m, observed_s, length_m)
+def log_likelihood(moved_m: Float64, observed_s: Float64, size_m: Float64) -> Float64:
+    """(R, 4) log P(motion, size | class) over that of background, 0 of a class without a table.
+
+    Args:
+        moved_m: (R,) displacement within about the last two seconds [m].
+        observed_s: (R,) time since the first proposal [s].
+        size_m: (R, 3) length, width and height of the track [m].
+    """
+    length, cell = cells(moved_m, observed_s, size_m[:, 0])
     out = np.zeros((len(cell), N_CLASSES))
     out[:, 1 : 1 + LOG_LIKELIHOOD_RATIO.shape[1]] = LOG_LIKELIHOOD_RATIO[length, :, cell]
+    out[:, ObjectClass.CYCLIST] -= TOO_LARGE * (size_m[:, :2] > CYCLIST_M).any(axis=1)
     return out

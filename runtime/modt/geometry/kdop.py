@@ -22,7 +22,7 @@ AXES = np.stack([np.cos(_BEARINGS_RAD), np.sin(_BEARINGS_RAD)])
 """(2, 4) unit vectors of the axes, world frame."""
 DIRECTIONS = np.concatenate([AXES, -AXES], axis=1)
 """(2, 8) the directions: each axis forth, then each axis back."""
-_PAD_M = 0.15
+END_PAD_M = 0.15
 """Jitter of the ends of k-DOPs."""
 
 
@@ -66,8 +66,8 @@ def centres(kdop: Float64) -> Float64:
 
 def coverage(kdop: Float64, other: Float64) -> Float64:
     """(n,) part of each k-DOP (8, n) that the other (8, n) covers: the lesser for the two rectangles around it."""
-    common = np.maximum(widths(np.minimum(kdop, other + _PAD_M)), 0.0)
-    part = common / np.maximum(widths(kdop), _PAD_M)
+    common = np.maximum(widths(np.minimum(kdop, other + END_PAD_M)), 0.0)
+    part = common / np.maximum(widths(kdop), END_PAD_M)
     least: Float64 = np.minimum(part[0] * part[2], part[1] * part[3])
     return least
 
@@ -80,6 +80,23 @@ def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
     pair = near.ravel().nonzero()[0]
     one = pair // near.shape[1]
     return one, pair - one * near.shape[1]
+
+
+def covering_pairs(known: Float64, expected: Float64, seen: Float64) -> tuple[Int, Int, Float64, Float64]:
+    """Pairs, in order, of k-DOPs that overlap, and how much of one lies within the other.
+
+    Args:
+        known: (8, n) of them.
+        expected: (8, n) within which more of each is expected now.
+        seen: (8, k) others.
+
+    Returns:
+        two arrays (K,) of indices of known and seen ones, (K,) coverage of the seen one by the known one, and of the
+        expected one by the seen one.
+    """
+    one, other = overlapping_pairs(known, seen)
+    there = seen.take(other, axis=1)
+    return one, other, coverage(there, known.take(one, axis=1)), coverage(expected.take(one, axis=1), there)
 
 
 HALF_ROOT = float(np.sqrt(0.5))

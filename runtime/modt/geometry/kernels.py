@@ -2,11 +2,48 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 
 from modt.geometry.boxes import upright_boxes
-from modt.geometry.kdop import certain_pairs, kdop_ends, overlapping_pairs, pair_costs
-from modt.types import Bool, Float32, Float64, Int, copy_runs
+from modt.geometry.kdop import certain_pairs, covering_pairs, kdop_ends, overlapping_pairs, pair_costs
+from modt.types import Float32, Float64, Int, copy_runs, regrouped
+
+
+def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
+    """Indices, ascending, of the candidate pairs that a least-cost assignment keeps.
+
+    Most pairs are certain; the assignment decides among the others.
+
+    Args:
+        rows: (K,) first index of each candidate pair.
+        columns: (K,) second index; no pair occurs twice.
+        cost: (K,) of each, below limit.
+        limit: cost of leaving a row or a column without a partner.
+
+    Raises:
+        ValueError: every assignment has an infinite cost.
+    """
+    certain, contested = certain_pairs(rows, columns, cost, limit)
+    if not len(contested):
+        return certain
+    from scipy.optimize import linear_sum_assignment  # large, and the compiled kernels do without
+
+    i, n = _compact(rows[contested])
+    j, k = _compact(columns[contested])
+    matrix, chosen = np.full((n, k), limit), np.zeros((n, k), np.bool_)
+    matrix[i, j] = cost[contested]
+    chosen[linear_sum_assignment(matrix)] = True
+    pairs: Int = np.concatenate([certain, contested[chosen[i, j]]])
+    pairs.sort()
+    return pairs
+
+
+def _compact(index: Int) -> tuple[Int, int]:
+    """Indices renumbered without gaps, and how many there are."""
+    number = (np.bincount(index) > 0).cumsum()
+    return number[index] - 1, int(number[-1])
 
 
 class GeometryKernels:
@@ -16,29 +53,21 @@ class GeometryKernels:
     precision numbers is exact in any order, unless one of them is 2^29 times smaller than another.
     """
 
+    library: ctypes.CDLL | None = None
+    """Where compiled passes are."""
     upright_boxes = staticmethod(upright_boxes)
     kdop_ends = staticmethod(kdop_ends)
     copy_runs = staticmethod(copy_runs)
+    regrouped = staticmethod(regrouped)
     overlapping_pairs = staticmethod(overlapping_pairs)
+    covering_pairs = staticmethod(covering_pairs)
     pair_costs = staticmethod(pair_costs)
-    certain_pairs = staticmethod(certain_pairs)
+    assign = staticmethod(assign)
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""
         total: Float64 = np.add.reduceat(values, offsets[:-1], axis=1, dtype=np.float64)
         return total
-
-    def least_cost_assignment(self, cost: Float64) -> Bool:
-        """(R, C) pairs of the assignment of least cost, one in each row or one in each column.
-
-        Raises:
-            ValueError: every assignment has an infinite cost.
-        """
-        from scipy.optimize import linear_sum_assignment  # large, and the compiled kernels do without
-
-        chosen = np.zeros(cost.shape, np.bool_)
-        chosen[linear_sum_assignment(cost)] = True
-        return chosen
 
 
 NUMPY_GEOMETRY = GeometryKernels()

@@ -7,21 +7,23 @@ from array import array
 
 import numpy as np
 
-from modt.geometry.kdop import HALF_ROOT, PAD_M, PairWeights, Shapes
+from modt.geometry.kdop import END_PAD_M, HALF_ROOT, PAD_M, PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT64, INT64, Signatures, address, at, declare, pointers
-from modt.types import Bool, Float32, Float64, Int
+from modt.native.library import FLOAT32, FLOAT64, INT64, Own, Signatures, declare, pointers, structure
+from modt.types import Float32, Float64, Int
 
-_D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
+_D, _L = ctypes.c_double, ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_upright_boxes": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _D, _P)),
-    "modt_kdop_ends": (None, (_P, _P, _P, _P, _L, _P, _P)),
-    "modt_group_sums": (None, (_P, _L, _L, _P, _L, _P)),
-    "modt_copy_runs": (None, (_P, _P, _P, _L, _P)),
-    "modt_overlapping_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
-    "modt_pair_costs": (None, (_P, _P, _P, _D, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
-    "modt_least_cost_assignment": (ctypes.c_int, (_P, _L, _L, _P)),
-    "modt_certain_pairs": (None, (_P, _P, _L, _D, _P, _P, _P, _P)),
+    "modt_upright_boxes": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT64, Own, Own, _D, Own)),
+    "modt_kdop_ends": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT32, Own)),
+    "modt_group_sums": (None, (FLOAT32, _L, _L, INT64, _L, Own)),
+    "modt_copy_runs": (None, (Own, INT64, INT64, _L, Own)),
+    "modt_overlapping_pairs": (_L, (FLOAT64, _L, FLOAT64, _L, Own, _L, Own, Own)),
+    "modt_pair_costs": (None, (Own, Own, FLOAT64, _D, INT64, INT64, _L, Own, _D, _D, Own, Own, Own)),
+    "modt_coverages": (None, (FLOAT64, FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _D, Own, Own)),
+    "modt_certain_pairs": (None, (Own, FLOAT64, _L, _D, Own, Own, Own, Own)),
+    "modt_settle_pairs": (ctypes.c_int, (Own, FLOAT64, _L, _D, Own, Own, Own, Own, Own)),
+    "modt_regrouped": (None, (Own, INT64, INT64, _L, _L, Own, Own, Own)),
 }
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
@@ -36,28 +38,25 @@ class NativeGeometryKernels(GeometryKernels):
 
     def __init__(self, library: ctypes.CDLL) -> None:
         declare(library, _SIGNATURES)
-        self._library = library
+        self.library: ctypes.CDLL = library
 
     def upright_boxes(self, xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
         """(G, 7) boxes at (G,) headings, or across them, about groups of (3, K) points."""
-        box, cosine, sine = np.empty((len(yaw), 7)), np.cos(yaw), np.sin(yaw)
-        headings = at(yaw, FLOAT64), address(cosine), address(sine)
-        given = *map(at, xyz), at(offsets, INT64), len(yaw)
-        self._library.modt_upright_boxes(*given, *headings, np.pi / 2, address(box))
+        box = np.empty((len(yaw), 7))
+        self.library.modt_upright_boxes(*xyz, offsets, len(yaw), yaw, np.cos(yaw), np.sin(yaw), np.pi / 2, box)
         return box
 
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
         """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
         n = len(offsets) - 1
         ends = np.empty((8, n), np.float32)
-        self._library.modt_kdop_ends(*map(at, xyz), at(offsets, INT64), n, at(axes), address(ends))
+        self.library.modt_kdop_ends(*xyz, offsets, n, axes, ends)
         return ends
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""
         sums = np.empty((len(values), len(offsets) - 1), np.float64)
-        given = at(values), *values.shape, at(offsets, INT64), sums.shape[1]
-        self._library.modt_group_sums(*given, at(sums, FLOAT64))
+        self.library.modt_group_sums(values, *values.shape, offsets, sums.shape[1], sums)
         return sums
 
     def copy_runs(self, members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:
@@ -65,17 +64,16 @@ class NativeGeometryKernels(GeometryKernels):
         (begin, end), n = runs, int((runs[1] - runs[0]).sum())
         rows, xyz = np.empty(n, np.int64), np.empty((3, n), np.float32)
         given, out = pointers(members, coordinates), pointers(rows, xyz)
-        self._library.modt_copy_runs(address(given), at(begin, INT64), at(end, INT64), len(begin), address(out))
+        self.library.modt_copy_runs(given, begin, end, len(begin), out)
         return rows, xyz
 
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
         """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""
         a, b, n, k = np.ascontiguousarray(a), np.ascontiguousarray(b), a.shape[1], b.shape[1]
         least, limit = np.empty(4 * (k + 15)), _PAIRS_EACH * (n + k)
-        given = at(a, FLOAT64), n, at(b, FLOAT64), k, address(least)
         while True:
             one, other = np.empty((2, limit), np.int64)
-            count = self._library.modt_overlapping_pairs(*given, limit, address(one), address(other))
+            count = self.library.modt_overlapping_pairs(a, n, b, k, least, limit, one, other)
             if count <= limit:
                 return one[:count], other[:count]
             limit = count
@@ -90,42 +88,41 @@ class NativeGeometryKernels(GeometryKernels):
         weights: PairWeights,
     ) -> tuple[Float64, Float64]:
         """(K,) cost and coverage of pairs of shapes."""
-        rows, columns = pairs
-        spread, cost, coverage = out = np.empty((3, len(rows)))
-        tracks, proposals, weighted = self._shapes(a), self._shapes(b), array("d", weights)
-        self._library.modt_pair_costs(
-            address(tracks), address(proposals), at(covariance, FLOAT64), variance,
-            at(rows, INT64), at(columns, INT64), len(rows), address(weighted), HALF_ROOT, PAD_M,
-            *map(address, out),
-        )  # fmt: skip
+        n, weighted = len(pairs[0]), array("d", weights)
+        spread, cost, coverage = np.empty((3, n))
+        tracks, proposals = (structure(s.kdop, s.log_width, s.bottom, s.top, s.log_count, len(s)) for s in (a, b))
+        given = tracks, proposals, covariance, variance, *pairs, n, weighted, HALF_ROOT, PAD_M
+        self.library.modt_pair_costs(*given, spread, cost, coverage)
         return cost + np.log(spread) / 2, coverage
 
-    def certain_pairs(self, rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
-        """Pairs that a least-cost assignment keeps for certain, and those that it must decide among."""
-        sizes = array("q", (int(rows.max(initial=-1)) + 1, int(columns.max(initial=-1)) + 1))
-        n, most = len(rows), max(sizes)
-        best, following, state = np.empty((2, most), np.int64), np.empty((2, most)), np.empty(n, np.uint8)
-        index, scratch = array("Q", (at(rows, INT64), at(columns, INT64))), (pointers(best), pointers(following))
-        self._library.modt_certain_pairs(
-            address(index), at(cost, FLOAT64), n, limit, address(sizes), *map(address, scratch), address(state)
-        )
-        return (state == 1).nonzero()[0], (state == 2).nonzero()[0]
+    def covering_pairs(self, known: Float64, expected: Float64, seen: Float64) -> tuple[Int, Int, Float64, Float64]:
+        """Pairs of known and seen k-DOPs that overlap, and (K,) how much of the seen and the expected is covered."""
+        one, other = self.overlapping_pairs(known, seen)
+        within, around = np.empty((2, len(one)))
+        shapes = known, expected, known.shape[1], seen, seen.shape[1]
+        self.library.modt_coverages(*shapes, one, other, len(one), END_PAD_M, within, around)
+        return one, other, within, around
 
-    def least_cost_assignment(self, cost: Float64) -> Bool:
-        """(R, C) pairs of the assignment of least cost, one in each row or one in each column."""
-        chosen = np.zeros(cost.shape, np.bool_)
-        wide, pairs = (cost, chosen) if cost.shape[0] <= cost.shape[1] else (cost.T, chosen.T)
-        n, k = wide.shape
-        column_of = np.empty(n, np.int64)
-        potentials, distance, (row_of, before, remaining) = np.empty(n), np.empty((2, k)), np.empty((3, k), np.int64)
-        scratch = pointers(potentials, distance, column_of, row_of, before, remaining)
-        dense = np.ascontiguousarray(wide)
-        if not self._library.modt_least_cost_assignment(at(dense, FLOAT64), n, k, address(scratch)):
-            raise ValueError("no assignment has a finite cost")
-        pairs[np.arange(n), column_of] = True
-        return chosen
+    def assign(self, rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
+        """Indices, ascending, of the candidate pairs that a least-cost assignment keeps."""
+        n, sizes = len(rows), array("q", (int(rows.max(initial=-1)) + 1, int(columns.max(initial=-1)) + 1))
+        number, following = np.empty((2, max(sizes)), np.int64), np.empty((2, max(sizes)))
+        given, numbers, state = (structure(rows, columns), cost, n, limit), pointers(number), np.empty(n, np.uint8)
+        self.library.modt_certain_pairs(*given, sizes, numbers, pointers(following), state)
+        if sizes[0]:
+            few, many = sorted(sizes)
+            potentials, distance, matrix = np.empty(few), np.empty((2, many)), np.empty(few * many)
+            column_of, others = np.empty(few, np.int64), np.empty((3, many), np.int64)
+            scratch = pointers(potentials, distance, column_of, others)
+            if not self.library.modt_settle_pairs(*given, numbers, sizes, matrix, scratch, state):
+                raise ValueError("no assignment has a finite cost")
+        return state.nonzero()[0]
 
-    @staticmethod
-    def _shapes(shapes: Shapes) -> array[int]:
-        columns = shapes.kdop, shapes.log_width, shapes.bottom, shapes.top, shapes.log_count
-        return array("Q", (*(at(column, FLOAT64) for column in columns), len(shapes)))
+    def regrouped(
+        self, members: Int, coordinates: Float32, piece: Int, number: Int, n: int
+    ) -> tuple[Int, Float32, Int]:
+        """Members and (3, K) coordinates in n groups, given the piece of each and the group of each piece."""
+        rows, xyz, (following, count) = np.empty_like(members), np.empty_like(coordinates), np.empty((2, n), np.int64)
+        given, out = pointers(members, coordinates), pointers(rows, xyz)
+        self.library.modt_regrouped(given, piece, number, len(members), n, following, count, out)
+        return rows, xyz, count

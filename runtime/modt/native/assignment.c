@@ -9,7 +9,7 @@ typedef struct {
 /* least_cost_assignment: the column of each row, with at least as many columns as rows; 0 where there is none of finite
  * cost, else 1. Shortest augmenting paths, with the steps of SciPy, its choice among equal costs included. Scratch: the
  * rest of `a`. */
-EXPORT int modt_least_cost_assignment(const double *cost, i64 rows, i64 columns, const Assignment *a)
+static int least_cost_assignment(const double *cost, i64 rows, i64 columns, const Assignment *a)
 {
     for (i64 i = 0; i < rows; i++)
         a->u[i] = 0.0, a->column_of[i] = NONE;
@@ -53,5 +53,25 @@ EXPORT int modt_least_cost_assignment(const double *cost, i64 rows, i64 columns,
             a->column_of[row] = column, column = former;
         }
     }
+    return 1;
+}
+
+/* assign: whether each contested of n pairs is kept (1) or not (0), given their rows and columns, numbered, and how many
+ * there are. Scratch: `matrix` of all pairs of these, and `a`; 0 where no assignment has a finite cost. */
+EXPORT int modt_settle_pairs(const i64 *index[2], const double *cost, i64 n, double limit, i64 *const number[2],
+                             const i64 sizes[2], double *matrix, const Assignment *a, uint8_t *state)
+{
+    int across = sizes[0] > sizes[1]; /* at least as many columns as rows */
+    i64 rows = sizes[across], columns = sizes[!across];
+    for (i64 k = 0; k < rows * columns; k++)
+        matrix[k] = limit;
+    for (i64 pair = 0; pair < n; pair++)
+        if (state[pair] == 2)
+            matrix[number[across][index[across][pair]] * columns + number[!across][index[!across][pair]]] = cost[pair];
+    if (!least_cost_assignment(matrix, rows, columns, a))
+        return 0;
+    for (i64 pair = 0; pair < n; pair++)
+        if (state[pair] == 2)
+            state[pair] = a->column_of[number[across][index[across][pair]]] == number[!across][index[!across][pair]];
     return 1;
 }

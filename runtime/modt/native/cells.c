@@ -13,26 +13,33 @@ typedef struct {
 
 enum { BLOCK = 128 }; /* points whose cells are fetched into the cache together */
 
+/* Place of a cell in a table of a grid whose side is a multiple of four: neighbours mostly share a cache line. */
+static ALWAYS_INLINE i32 place_of(i32 row, i32 column, i32 side)
+{
+    return (row >> 2) * (4 * side) + (column >> 2) * 16 + (row & 3) * 4 + (column & 3);
+}
+
 /* occupied_cells: cells of n points in the order of their last points, of a grid of cells 1 / `scale` wide. `number` is
  * a table of side * side, NONE throughout before and after. Returns how many; they are the last of the n places of
  * `sample`, `sampled` and `cells`. */
 EXPORT i64 modt_occupied_cells(const Samples *points, const float *height, i64 n, float scale, i32 centre, i32 side,
                                i32 *number, i64 *sample, Samples *sampled, i64 *cell, Cells *cells)
 {
-    i32 first = (i32)n, row[BLOCK], column[BLOCK];
+    i32 first = (i32)n, row[BLOCK], column[BLOCK], place[BLOCK];
     for (i64 end = n; end > 0; end -= BLOCK) { /* backwards: the last point of a cell comes first */
         i64 start = end > BLOCK ? end - BLOCK : 0;
         for (i64 i = start; i < end; i++) { /* SqrtRangeGrid.row_column */
             float here = scale / points->sqrt_range[i];
             row[i - start] = (i32)(points->x[i] * here + (float)centre);
             column[i - start] = (i32)(points->y[i] * here + (float)centre);
+            place[i - start] = place_of(row[i - start], column[i - start], side);
         }
         for (i64 i = 0; i < end - start; i++) {
             PROVEN(row[i] >= 0 && row[i] < side && column[i] >= 0 && column[i] < side);
-            __builtin_prefetch(&number[row[i] * side + column[i]], 1);
+            __builtin_prefetch(&number[place[i]], 1);
         }
         for (i64 i = end - 1; i >= start; i--) {
-            i32 *here = &number[row[i - start] * side + column[i - start]], c = *here;
+            i32 *here = &number[place[i - start]], c = *here;
             if (c == NONE) {
                 c = *here = --first;
                 sample[c] = i;
@@ -55,7 +62,7 @@ EXPORT i64 modt_occupied_cells(const Samples *points, const float *height, i64 n
     for (i64 i = 0; i < n; i++)
         cell[i] -= first;
     for (i64 c = first; c < n; c++)
-        number[cells->row[c] * side + cells->column[c]] = NONE;
+        number[place_of(cells->row[c], cells->column[c], side)] = NONE;
     return n - first;
 }
 
@@ -116,7 +123,7 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
         while (span[above].place < place - side - 1)
             above++;
         for (i32 a = above; span[a].place <= place - side + 1; a++) /* ends at k */
-            if (near(&span[a], &span[k]))
+            if (parent[a] != parent[k] && near(&span[a], &span[k]))
                 join(parent, a, k);
     }
     for (i32 k = 0; k < n; k++)
@@ -125,11 +132,12 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
 
 /* connect and connect_coarse: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
  * used lies, NONE for the others; in the order of the first of their wide cells, those in the order of their last
- * cells. Scratch: `next` of side, `scratch` of 5 n_cells, `span` of n_cells. */
+ * cells. Scratch: `next`, of side + 9 n_cells. */
 EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift,
-                         i32 side, i32 *next, i32 *scratch, Span *span, i64 *component)
+                         i32 side, i32 *next, i64 *component)
 {
-    i32 *order = scratch, *parent = scratch + n_cells, *wide = scratch + 2 * n_cells, *last = scratch + 3 * n_cells;
+    Span *span = (Span *)(next + side);
+    i32 *scratch = next + side + 4 * n_cells, *order = scratch, *parent = scratch + n_cells, *wide = scratch + 2 * n_cells, *last = scratch + 3 * n_cells;
     i32 used = 0, n = 0, count = 0, before = NONE;
     for (i64 i = 0; i < n_cells; i++) {
         PROVEN(cells->row[i] >= 0 && cells->row[i] >> shift < side && cells->column[i] >> shift > 0 &&

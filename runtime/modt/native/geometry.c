@@ -70,6 +70,31 @@ EXPORT void modt_upright_boxes(const float *x, const float *y, const float *z, c
     }
 }
 
+/* coverage of one k-DOP by another: the numbers of either are `n` and `k` apart */
+static double coverage(const double *kdop, i64 n, const double *other, i64 k, double pad_m)
+{
+    double part[4];
+    for (int side = 0; side < 4; side++) {
+        double ahead = other[side * k] + pad_m, back = other[(side + 4) * k] + pad_m;
+        double one = kdop[side * n], one_back = kdop[(side + 4) * n], width = one + one_back;
+        double common = (one < ahead ? one : ahead) + (one_back < back ? one_back : back);
+        part[side] = (common > 0.0 ? common : 0.0) / (width > pad_m ? width : pad_m);
+    }
+    return part[0] * part[2] < part[1] * part[3] ? part[0] * part[2] : part[1] * part[3];
+}
+
+/* covering_pairs: of pairs (i, j) of known (8, n) and seen (8, k) k-DOPs, the part of the seen one that the known one
+ * covers, and of the expected one (8, n) that the seen one does. */
+EXPORT void modt_coverages(const double *known, const double *expected, i64 n, const double *seen, i64 k,
+                           const i64 *one, const i64 *other, i64 pairs, double pad_m, double *within, double *around)
+{
+    for (i64 pair = 0; pair < pairs; pair++) {
+        i64 i = one[pair], j = other[pair];
+        within[pair] = coverage(seen + j, k, known + i, n, pad_m);
+        around[pair] = coverage(expected + i, n, seen + j, k, pad_m);
+    }
+}
+
 /* overlapping_pairs: pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y. Returns how many there are;
  * no more than `limit` are written. Scratch: `least`, 64 numbers for each sixteen of b. */
 EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, d4 (*least)[4][4], i64 limit,
@@ -156,9 +181,10 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
     }
 }
 
-/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. Scratch: `best` of the
- * greatest index + 1, `next` likewise, for rows, and for columns. */
-EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, double limit, const i64 sizes[2],
+/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. The rows and columns of contested
+ * pairs are numbered in `best`, and counted in `sizes`, which held the greatest index + 1, the length of `best` and of
+ * the scratch `next`. */
+EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, double limit, i64 sizes[2],
                                i64 *best[2], double *next[2], uint8_t *state)
 {
     for (int side = 0; side < 2; side++) {
@@ -182,4 +208,16 @@ EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, d
     for (i64 pair = 0; pair < n; pair++)
         if (state[best[0][index[0][pair]]] != 1 && state[best[1][index[1][pair]]] != 1)
             state[pair] = 2;
+    for (int side = 0; side < 2; side++) {
+        i64 number = 0;
+        for (i64 k = 0; k < sizes[side]; k++)
+            best[side][k] = NONE;
+        for (i64 pair = 0; pair < n; pair++)
+            if (state[pair] == 2)
+                best[side][index[side][pair]] = 0;
+        for (i64 k = 0; k < sizes[side]; k++)
+            if (best[side][k] != NONE)
+                best[side][k] = number++;
+        sizes[side] = number;
+    }
 }

@@ -44,6 +44,33 @@ EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i
         }
 }
 
+/* regrouped: rows sorted by `number[piece]`, a group below n, in their order within a group, and the count of each.
+ * Scratch: `next` of n. */
+EXPORT void modt_regrouped(const Rows *rows, const i64 *piece, const i64 *number, i64 n_rows, i64 n, i64 *next,
+                           i64 *count, Rows *sorted)
+{
+    i64 end, total = 0;
+    for (i64 g = 0; g < n; g++)
+        count[g] = 0;
+    for (i64 i = 0; i < n_rows; i = end) { /* a run of rows of one piece at a time */
+        for (end = i + 1; end < n_rows && piece[end] == piece[i];)
+            end++;
+        PROVEN(number[piece[i]] >= 0 && number[piece[i]] < n);
+        count[number[piece[i]]] += end - i;
+    }
+    for (i64 g = 0; g < n; total += count[g], g++)
+        next[g] = total;
+    for (i64 i = 0; i < n_rows; i = end) {
+        i64 *to = &next[number[piece[i]]], first = *to - i;
+        for (end = i; end < n_rows && piece[end] == piece[i]; end++)
+            sorted->index[first + end] = rows->index[end];
+        for (int v = 0; v < 3; v++)
+            for (i64 k = i; k < end; k++)
+                sorted->xyz[v][first + k] = rows->xyz[v][k];
+        *to += end - i;
+    }
+}
+
 typedef struct {
     const float *x, *y, *z, *height;
     const i64 *index;

@@ -16,7 +16,8 @@ from modt.native import build
 
 Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
 """Result and arguments of every function."""
-FLOAT32, FLOAT64, INT32, INT64, BOOL = map(np.dtype, (np.float32, np.float64, np.int32, np.int64, np.bool_))
+_start: Any = (ctypes.c_char * 0).from_buffer
+"""Start of a contiguous, writable array: several times faster than what NumPy offers for it."""
 
 
 def declare(library: ctypes.CDLL, signatures: Signatures) -> None:
@@ -26,30 +27,49 @@ def declare(library: ctypes.CDLL, signatures: Signatures) -> None:
         function.restype, function.argtypes = result, arguments
 
 
-def at(numbers: NDArray[Any], kind: np.dtype[Any] = FLOAT32) -> int:
-    """Address of a contiguous array of this kind.
+class Given:
+    """An argument that is a contiguous array of one kind; another one is a ctypes.ArgumentError."""
 
-    Raises:
-        TypeError: it is not.
-    """
-    if numbers.dtype is not kind and numbers.dtype != kind:
-        raise TypeError(f"a contiguous array of {kind} is needed, not of {numbers.dtype}")
-    return address(numbers)
+    def __init__(self, kind: type) -> None:
+        self._kind = np.dtype(kind)
+
+    def from_param(self, numbers: NDArray[Any]) -> Any:
+        """The array as ctypes passes it."""
+        if numbers.dtype is not self._kind and numbers.dtype != self._kind:
+            raise TypeError(f"a contiguous array of {self._kind} is needed, not of {numbers.dtype}")
+        try:
+            return _start(numbers)
+        except (TypeError, ValueError):
+            return ctypes.c_void_p(address(numbers))
+
+
+class Own:
+    """An argument that is an array made for the call: result, scratch, or a structure."""
+
+    from_param = staticmethod(_start)
+
+
+FLOAT32, FLOAT64, INT32, INT64, BOOL = map(Given, (np.float32, np.float64, np.int32, np.int64, np.bool_))
 
 
 def address(numbers: Any) -> int:
-    """Address of a contiguous array; `from_buffer` is several times faster than what NumPy offers for it.
+    """Address of a contiguous array.
 
     Raises:
         TypeError: it is not contiguous.
     """
     try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(numbers))
-    except (TypeError, ValueError):  # read-only, empty, or not contiguous
+        return ctypes.addressof(_start(numbers))
+    except (TypeError, ValueError):  # read-only, or not contiguous
         if not numbers.flags.c_contiguous:
             raise TypeError("a contiguous array is needed") from None
         data: int = numbers.__array_interface__["data"][0]
         return data
+
+
+def structure(*fields: NDArray[Any] | int) -> array[int]:
+    """A C structure of pointers to contiguous arrays, and of 64-bit numbers."""
+    return array("Q", [field if isinstance(field, int) else address(field) for field in fields])
 
 
 def pointers(*arrays: NDArray[Any]) -> array[int]:
@@ -57,8 +77,8 @@ def pointers(*arrays: NDArray[Any]) -> array[int]:
     addresses: list[int] = []
     for numbers in arrays:
         first, rows = address(numbers), 1 if numbers.ndim == 1 else len(numbers)
-        step = numbers.strides[0]
-        addresses += [first + i * step for i in range(rows)]
+        step = numbers.strides[0] or 1  # of an empty one
+        addresses += range(first, first + rows * step, step)
     return array("Q", addresses)
 
 

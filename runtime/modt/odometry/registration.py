@@ -29,9 +29,6 @@ class Landmarks:
     kdop: Float64
     established: Bool
 
-    def __len__(self) -> int:
-        return len(self.established)
-
 
 ESTABLISHED_FRAMES = 3
 """Frames at rest from which the mean is the landmark's position."""

@@ -155,7 +155,9 @@ def summary_text(summary: dict[str, Any]) -> str:
     lines.append(f"  {'together':<16}{'':>8}{'':>9}{cpu_ms:>9.2f}{wall_ms:>9.2f}   without reading and writing")
     lines += [*(_stage_line(name, stage) for name, stage in outside.items()), ""]
     if "frames_per_s" in run:
-        lines.append(f"  {run['frames_per_s']:.1f} frames/s in all, {run['real_time_factor']:.1f} x real time")
+        lines.append(
+            f"  {run['frames_per_s']:.1f} frames/s with all of it, {run['real_time_factor']:.1f} x real time"
+        )
     if run.get("missed_deadlines"):
         lines.append(
             f"  missed {run['missed_deadlines']} deadlines at {run['rate_hz']:g} frames/s, the latest frame began "

@@ -14,8 +14,13 @@ BIN_M = 0.05
 """Width of a bin of the histogram of heights; two neighbouring bins hold a ceiling."""
 MIN_RETURNS, MIN_SHARE = 50, 0.5
 """Returns above ABOVE_M in a room, and share of them that are on the ceiling."""
-EDGE_SHARE, CLEARANCE_M = 0.05, 0.05
+EDGE_SHARE, CLEARANCE_M = 0.05, 0.15
 """Share of its returns from which the bin below belongs to it too; distance below it up to which objects reach."""
+SAMPLED = 8
+"""One return of so many is looked at for a ceiling that begins above the greatest height used."""
+GRAZED_M, GRAZED_CLEARANCE_M = (-0.1, 0.3), 0.2
+"""Bounds of such a ceiling above the greatest height used, and distance below that height up to which objects reach:
+the lowest returns of a ceiling there are within it, over people's heads."""
 
 
 def below_ceiling_m(height: Float32) -> float | None:
@@ -34,3 +39,18 @@ def below_ceiling_m(height: Float32) -> float | None:
         return None
     begins = first - 1 if first and count[first - 1] > EDGE_SHARE * pair[first] else first
     return ABOVE_M + BIN_M * begins - CLEARANCE_M
+
+
+def below_grazed_m(level: Float32, max_height_m: float) -> float | None:
+    """Height [m] up to which objects reach under a ceiling that begins about max_height_m; None without one.
+
+    Args:
+        level: (N,) heights of all returns above the floor under the sensor, one of SAMPLED [m].
+        max_height_m: greatest height used above ground.
+    """
+    upper = level[level > np.float32(ABOVE_M)]
+    low, high = (np.float32(max_height_m + bound) for bound in GRAZED_M)
+    on_ceiling = np.count_nonzero((upper > low) & (upper < high))
+    if SAMPLED * len(upper) < MIN_RETURNS or on_ceiling < MIN_SHARE * len(upper):
+        return None
+    return max_height_m - GRAZED_CLEARANCE_M

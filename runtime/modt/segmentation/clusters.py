@@ -108,7 +108,7 @@ class ClusterSizes:
         """Sizes of clusters, given (C,) a point of each cell and the vertical distance of beams there [m]."""
         return cls(
             points=bounds.points,
-            extent_m=np.hypot(bounds.max_x - bounds.min_x, bounds.max_y - bounds.min_y),
+            extent_m=np.sqrt(np.square(bounds.max_x - bounds.min_x) + np.square(bounds.max_y - bounds.min_y)),
             bottom_m=bounds.bottom,
             top_m=bounds.top,
             sqrt_range=points.sqrt_range.take(bounds.cell),

@@ -11,7 +11,7 @@ import numpy as np
 
 from modt.class_sizes import STRIP_PERSON
 from modt.geometry.native_kernels import NativeGeometryKernels
-from modt.native.library import BOOL, FLOAT32, FLOAT64, INT32, INT64, Signatures, address, at, declare, pointers
+from modt.native.library import BOOL, FLOAT32, INT32, INT64, Own, Signatures, declare, pointers, structure
 from modt.segmentation.clusters import Cells, ClusterBounds, Clusters, Members
 from modt.segmentation.grids import FAR_M, RING_STEP, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, NOISE_M, SLOPE_GAIN, GroundEstimator
@@ -20,18 +20,18 @@ from modt.segmentation.kernels import Kernels
 from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
 from modt.types import NONE, Bool, Float32, Float64, Int
 
-_F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
+_F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
-    "modt_occupied_cells": (_L, (_P, _P, _L, _F, _I, _I, _P, _P, _P, _P, _P)),
-    "modt_connect": (None, (_P, _P, _P, _L, _I, _I, _P, _P, _P, _P)),
-    "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
-    "modt_view_bounds": (None, (_P, _P, _P, _P, _P, _L, _P, _L, _P, _P)),
-    "modt_merge_strips": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
-    "modt_group": (_L, (_P, _L, _L, _P, _P)),
-    "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
-    "modt_best_headings": (None, (_P, _P, _P, _P, _L, _L, _P, _P, _I, _F, _P)),
-    "modt_reflectance_sums": (None, (_P, _L, _P, _P, _L, _F, _F, _P, _P)),
+    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, _L, Own, Own, FLOAT32, Own, Own)),
+    "modt_occupied_cells": (_L, (Own, FLOAT32, _L, _F, _I, _I, INT32, Own, Own, Own, Own)),
+    "modt_connect": (None, (Own, FLOAT32, BOOL, _L, _I, _I, Own, Own)),
+    "modt_cluster_bounds": (None, (Own, FLOAT32, FLOAT32, INT64, _L, _L, Own)),
+    "modt_view_bounds": (None, (Own, Own, FLOAT32, INT64, INT64, _L, INT64, _L, Own, Own)),
+    "modt_merge_strips": (None, (Own, Own, FLOAT32, FLOAT32, _L, INT64, Own, Own, Own)),
+    "modt_group": (_L, (INT64, _L, _L, Own, Own)),
+    "modt_members": (None, (Own, INT64, _L, INT64, INT64, _L, _L, Own)),
+    "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, Own)),
+    "modt_reflectance_sums": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, Own, Own)),
 }
 
 
@@ -99,6 +99,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         super().__init__(library)
         declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
+        self._last_cells: tuple[Cells | None, array[int]] = None, array("Q")
         self._work = np.empty(1, np.int32)
         self._strips: dict[CarLimits, Any] = {}
         self._ground: dict[GroundEstimator, _GroundBuffers] = {}
@@ -112,10 +113,9 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         n, width = points.shape
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
         scratch, out = buffers.scratch(n), pointers(kept)
-        k = self._library.modt_above_ground(
-            ctypes.addressof(buffers.constants), at(ground.grid.range_m), at(buffers.flat_m), sensor_height_m,
-            at(points), n, width, address(scratch), at(buffers.rays), at(bounds), at(rows, INT64),
-            address(out),
+        k = self.library.modt_above_ground(
+            buffers.constants, ground.grid.range_m, buffers.flat_m, sensor_height_m, points, n, width, scratch,
+            buffers.rays, bounds, rows, out,
         )  # fmt: skip
         x, y, z, sqrt_range, height = kept[:, :k]
         return rows[:k], PointColumns(x, y, z, sqrt_range), height
@@ -129,9 +129,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         heights, sampled = np.empty((2, k), np.float32), np.empty((4, k), np.float32)
         sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
         given, out, columns = self._columns(points), pointers(places, heights, entries), pointers(sampled)
-        n = self._library.modt_occupied_cells(
-            address(given), at(height), k, 1 / grid.step, grid.centre, grid.side, at(grid.number, INT32),
-            at(sample, INT64), address(columns), at(cell, INT64), address(out),
+        n = self.library.modt_occupied_cells(
+            given, height, k, 1 / grid.step, grid.centre, grid.side, grid.number, sample, columns, cell, out,
         )  # fmt: skip
         (row, column), (low, high) = places[:, k - n :], heights[:, k - n :]
         cells = Cells(row, column, low, high, entries[k - n :])
@@ -147,38 +146,26 @@ class NativeKernels(NativeGeometryKernels, Kernels):
 
     def _connected(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool, shift: int) -> Int:
         """(C,) connected component of the cell of the grid, 2^shift times as wide, in which each cell used lies."""
-        component, own = np.empty(len(cells), np.int64), self._cells(cells)
-        self._library.modt_connect(
-            address(own), at(max_gap_m), at(use, BOOL), len(cells), shift, grid.side,
-            *self._scratch(grid, len(cells)), at(component, INT64),
-        )  # fmt: skip
-        return component
-
-    def _scratch(self, grid: SqrtRangeGrid, n: int) -> tuple[int, int, int]:
-        """Addresses of scratch for `modt_connect`: next, scratch and span."""
+        n, component = len(cells), np.empty(len(cells), np.int64)
         if len(self._work) < grid.side + 9 * n:
             self._work = np.empty(grid.side + 9 * n, np.int32)
-        following = address(self._work)
-        return following, following + 4 * (grid.side + 4 * n), following + 4 * grid.side
+        self.library.modt_connect(self._cells(cells), max_gap_m, use, n, shift, grid.side, self._work, component)
+        return component
 
     def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
         """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
         bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
-        own, out = self._cells(cells), pointers(bounds, counts)
-        self._library.modt_cluster_bounds(
-            address(own), at(points.x), at(points.y), at(cluster, INT64), len(cells), n,
-            address(out),
-        )  # fmt: skip
+        out = pointers(bounds, counts)
+        self.library.modt_cluster_bounds(self._cells(cells), points.x, points.y, cluster, len(cells), n, out)
         return ClusterBounds(*bounds, *counts)
 
     def view_bounds(self, clusters: Clusters, number: Int, n: int) -> ViewBounds:
         """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
         bounds, scale_m = np.empty((8, n), np.float32), np.empty(n, np.float32)
         cells, sampled, out = self._cells(clusters.cells), self._columns(clusters.sampled), pointers(bounds)
-        self._library.modt_view_bounds(
-            address(cells), address(sampled), at(clusters.height), at(clusters.sample, INT64),
-            at(clusters.of_cell, INT64), len(clusters.sample), at(number, INT64), n, address(out),
-            at(scale_m),
+        self.library.modt_view_bounds(
+            cells, sampled, clusters.height, clusters.sample, clusters.of_cell, len(clusters.sample), number, n, out,
+            scale_m,
         )  # fmt: skip
         return ViewBounds(bounds[:4], bounds[4:], scale_m)
 
@@ -191,56 +178,44 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         order, target = bounds.min[DIRECTION].argsort(kind="stable"), np.empty(n, np.int64)
         parent, united = np.empty(n, np.int32), np.empty((8, n), np.float32)
         given, out = pointers(bounds.min, bounds.max), pointers(united)
-        self._library.modt_merge_strips(
-            ctypes.addressof(strips), address(given), at(bounds.scale_m), at(beam_rad), n,
-            at(order, INT64), address(parent), address(out), at(target, INT64),
-        )  # fmt: skip
+        self.library.modt_merge_strips(strips, given, bounds.scale_m, beam_rad, n, order, parent, out, target)
         return target
 
     def group(self, labels: Int, n: int) -> Groups:
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
         rows, offsets = np.empty(len(labels), np.int64), np.empty(n + 1, np.int64)
-        given = at(labels, INT64), len(labels), n, at(rows, INT64), at(offsets, INT64)
-        return Groups(rows[: self._library.modt_group(*given)], offsets)
+        return Groups(rows[: self.library.modt_group(labels, len(labels), n, rows, offsets)], offsets)
 
     def members_of(self, clusters: Clusters, index: Int) -> Members:
         """Points of each cluster, given (K,) the row of each point in the sweep."""
         points, cells, of_cell = clusters.points, clusters.cells, clusters.of_cell
         m = int(cells.entries.sum(where=of_cell != NONE))
         offsets, rows, own = np.empty(clusters.n + 1, np.int64), np.empty(m, np.int64), np.empty((4, m), np.float32)
-        columns = [at(column) for column in (points.x, points.y, points.z, clusters.height)]
-        given, out = array("Q", (*columns, at(index, INT64))), pointers(offsets, rows, own)
-        self._library.modt_members(
-            address(given), at(clusters.cell, INT64), len(index), at(of_cell, INT64),
-            at(cells.entries, INT64), len(cells), clusters.n, address(out),
-        )  # fmt: skip
+        given, out = structure(points.x, points.y, points.z, clusters.height, index), pointers(offsets, rows, own)
+        sizes = len(index), of_cell, cells.entries, len(cells), clusters.n
+        self.library.modt_members(given, clusters.cell, *sizes, out)
         return Members(offsets, rows, own)
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
         best = np.empty(len(groups), np.int64)
-        self._library.modt_best_headings(
-            at(x), at(y), at(groups.rows, INT64), at(groups.offsets, INT64), len(groups), limit,
-            at(AXES[0]), at(AXES[1]), len(HEADINGS), noise_m, at(best, INT64),
-        )  # fmt: skip
+        given = x, y, groups.rows, groups.offsets, len(groups), limit
+        self.library.modt_best_headings(*given, *AXES, len(HEADINGS), noise_m, best)
         return best
 
     def reflectance_sums(self, points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
         """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
         points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
         sums, greatest = np.empty((5, n), np.float64), np.empty(n, np.float32)
-        self._library.modt_reflectance_sums(
-            at(points), points.shape[1], at(index, INT64), at(offsets, INT64), n, BRIGHT, DARK,
-            at(sums, FLOAT64), at(greatest),
-        )  # fmt: skip
+        given = points, points.shape[1], index, offsets, n
+        self.library.modt_reflectance_sums(*given, BRIGHT, DARK, sums, greatest)
         return sums, greatest
 
     @staticmethod
     def _columns(points: PointColumns) -> array[int]:
-        return array("Q", map(at, (points.x, points.y, points.z, points.sqrt_range)))
+        return structure(points.x, points.y, points.z, points.sqrt_range)
 
-    @staticmethod
-    def _cells(cells: Cells) -> array[int]:
-        for column, kind in ((cells.row, INT32), (cells.low, FLOAT32), (cells.entries, INT64)):
-            at(column, kind)
-        return pointers(cells.row, cells.column, cells.low, cells.high, cells.entries)
+    def _cells(self, cells: Cells) -> array[int]:
+        if self._last_cells[0] is not cells:
+            self._last_cells = cells, structure(cells.row, cells.column, cells.low, cells.high, cells.entries)
+        return self._last_cells[1]

@@ -7,7 +7,7 @@ import numpy as np
 from modt.class_sizes import SPLIT_PERSON
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.ceiling import below_ceiling_m
+from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns
@@ -69,10 +69,11 @@ class Segmenter:
 
         With them come those points and their (K,) heights above ground [m].
         """
-        rows, above, height = self.kernels.above_ground(
-            self.ground, points, self.sensor_height_m(points), self.bounds
-        )
+        sensor_height_m = self.sensor_height_m(points)
+        rows, above, height = self.kernels.above_ground(self.ground, points, sensor_height_m, self.bounds)
         limit_m = below_ceiling_m(height)
+        if limit_m is None:
+            limit_m = below_grazed_m(points[::SAMPLED, 2] + sensor_height_m, self.config.max_height_m)
         if limit_m is None:
             return rows, above, height
         kept = np.flatnonzero(height < np.float32(limit_m))

@@ -10,6 +10,8 @@ from modt.types import Cut, Float32, Float64, Int
 
 _STEPS, _NEAR_M = 0.75, 0.1
 """A proposal is cut this near to the outermost beam [beam spacings], beyond which none passes, and range used [m]."""
+_TILTED_M = 8.0
+"""A tilt makes the beams end on people as far away as this [m]; the models of what is cut know none farther away."""
 
 
 class ViewEnds:
@@ -29,10 +31,12 @@ class ViewEnds:
         self._blind_m = sensor.blind_range_m * bool(len(sectors))
         self._reach_m, self._tangents = max(self._near_m, self._blind_m), np.array([-np.inf, np.inf])
         if sensor.span_deg is not None:
-            ends, outward = np.tan(np.deg2rad(sensor.span_deg)), np.array([-1.0, 1.0])
-            mount_m = sensor.height_m or 0.0
-            reach_m = np.array([mount_m, max_height_m - mount_m]) / np.maximum(outward * ends, 1e-3)
-            self._reach_m = max(self._reach_m, *reach_m.tolist())
+            span, outward = np.deg2rad(sensor.span_deg), np.array([-1.0, 1.0])
+            ends, mount_m = np.tan(span), sensor.height_m or 0.0
+            tilt = 0.0 if R_level_sensor is None else np.arccos(abs(R_level_sensor[2, 2]))
+            beyond_m = np.array([mount_m, max_height_m - mount_m])
+            reach_m, tilted_m = (beyond_m / np.maximum(np.tan(outward * span - by), 1e-3) for by in (0.0, tilt))
+            self._reach_m = max(self._reach_m, *reach_m, *np.minimum(tilted_m, _TILTED_M))
             self._tangents = ends - outward * _STEPS * sensor.beams.step_rad(ends.astype(np.float32))
 
     def cut(self, coordinates: Float32, offsets: Int, box: Float64) -> Int:

@@ -120,6 +120,7 @@ def _rows(result: FrameResult) -> list[str]:
         "age": tracks.age.tolist(),
         "missed": tracks.missed.tolist(),
         "box": [None if proposal == NONE else boxes[proposal] for proposal in tracks.proposal],
+        "size": np.round(tracks.size_m, 3).tolist(),
         "world": [dict(zip(WORLD_KEYS, x, strict=True)) for x in np.round(tracks.x, 3).tolist()],
     }
     return [line(dict(zip(columns, row, strict=True)))[:-1] for row in zip(*columns.values(), strict=True)]
@@ -135,7 +136,9 @@ NULL = text.encode("null")[0]
 def _in_tables(result: FrameResult) -> bool:
     """Whether the tables of text hold every number; false for numbers that are not finite."""
     tracks, boxes = result.tracks, result.proposals.box
-    lengths = all((np.abs(values) < text.LIMIT - 1).all() for values in (tracks.x, tracks.witness, boxes))
+    lengths = all(
+        (np.abs(values) < text.LIMIT - 1).all() for values in (tracks.x, tracks.witness, tracks.size_m, boxes)
+    )
     counts = all((values < text.LIMIT).all() for values in (tracks.id, tracks.points, tracks.age, tracks.missed))
     return bool(len(boxes) and lengths and counts and (np.abs(tracks.posterior - 0.5) <= 0.5).all())
 
@@ -163,6 +166,7 @@ def _by_columns(result: FrameResult) -> str:
         "age": age,
         "missed": missed,
         "box": box,
+        "size": _lists(text.rounded_to_3(tracks.size_m)),
         "world": _objects(WORLD_KEYS, text.rounded_to_3(tracks.x)),
     }
     keyed = [part for key, column in columns.items() for part in (f',"{key}":', column)]

@@ -19,7 +19,7 @@ _TO_ROWS = "[:, :4].astype('f4').tofile('scans/000000.bin'), columns x, y, z, re
 _TEXT = ("is a table of text", f"convert it: numpy.loadtxt(FILE){_TO_ROWS}")
 _LIVOX = ("is a recording of Livox Viewer", "record the packets instead: tcpdump -w FILE.pcap udp port 56301")
 FOREIGN = {
-    ".bag": ("is a recording of ROS 1", "convert it: pip install rosbags, then rosbags-convert"),
+    ".bag": ("is a recording of ROS 1", "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDER"),
     ".las": _LAS,
     ".laz": _LAS,
     ".npy": ("is an array of NumPy", f"convert it: numpy.load(FILE){_TO_ROWS}"),

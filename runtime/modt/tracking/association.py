@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Float64, Int
@@ -73,36 +72,3 @@ class Association(Protocol):
     def initial_position(self, observations: Observations) -> Float64:
         """(P, 2) position of a track that begins with each observation [m, world]."""
         ...
-
-
-def assign(rows: Int, columns: Int, cost: Float64, limit: float, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Int:
-    """Indices, ascending, of the candidate pairs that a least-cost assignment keeps.
-
-    Most pairs are certain; `least_cost_assignment` decides among the others.
-
-    Args:
-        rows: (K,) first index of each candidate pair.
-        columns: (K,) second index; no pair occurs twice.
-        cost: (K,) of each, below limit.
-        limit: cost of leaving a row or a column without a partner.
-        kernels: passes over pairs.
-    """
-    if len(rows) < 2:
-        return np.arange(len(rows))
-    certain, contested = kernels.certain_pairs(rows, columns, cost, limit)
-    if not len(contested):
-        return certain
-    i, n = _compact(rows[contested])
-    j, k = _compact(columns[contested])
-    matrix = np.full((n, k), limit)
-    matrix[i, j] = cost[contested]
-    chosen = kernels.least_cost_assignment(matrix)
-    pairs: Int = np.concatenate([certain, contested[chosen[i, j]]])
-    pairs.sort()
-    return pairs
-
-
-def _compact(index: Int) -> tuple[Int, int]:
-    """Indices renumbered without gaps, and how many there are."""
-    number = (np.bincount(index) > 0).cumsum()
-    return number[index] - 1, int(number[-1])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.geometry.kdop import coverage
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
@@ -42,7 +41,6 @@ class BackgroundMap:
             place = np.concatenate([self._kdop, tracks.known_kdops(rows)], axis=1)
             top = np.concatenate([self._top, tracks.top[rows]])
             kdop = observations.kdop.take(which, axis=1)
-            i, j = self._kernels.overlapping_pairs(kdop, place)
-            within = coverage(kdop.take(i, axis=1), place.take(j, axis=1)) >= MIN_COVERAGE
-            known[i[within & (observations.top[which[i]] < top[j] + RISE_M)]] = True
+            j, i, within, _ = self._kernels.covering_pairs(place, place, kdop)
+            known[i[(within >= MIN_COVERAGE) & (observations.top[which[i]] < top[j] + RISE_M)]] = True
         return known

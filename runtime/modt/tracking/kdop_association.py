@@ -7,7 +7,7 @@ import numpy as np
 from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes, measured
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
-from modt.tracking.association import Matches, assign
+from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
 from modt.types import Bool, Float64, Int
 
@@ -50,10 +50,10 @@ class KdopAssociation:
             WEIGHTS,
         )
         first = (cost < MAX_COST).nonzero()[0]
-        first = first[assign(rows[first], columns[first], cost[first], MAX_COST, self._kernels)]
+        first = first[self._kernels.assign(rows[first], columns[first], cost[first], MAX_COST)]
         free = _free(rows, rows[first], len(tracks)) & _free(columns, columns[first], len(observations))
         second = (free & (coverage > MIN_OVERLAP)).nonzero()[0]
-        second = second[assign(rows[second], columns[second], 1 - coverage[second], 1.0, self._kernels)]
+        second = second[self._kernels.assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
         kept = np.concatenate([first, second])
         rows, columns = rows[kept], columns[kept]
         x = tracks.x.take(rows, axis=0)[:, :2]

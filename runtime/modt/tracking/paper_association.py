@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import PaperAssociationConfig
+from modt.geometry.kernels import assign
 from modt.observations import Observations
-from modt.tracking.association import Matches, assign
+from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
 from modt.types import Float64, Int
 

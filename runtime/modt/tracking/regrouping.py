@@ -15,6 +15,8 @@ The risk: a person who steps close to a parked car, and is not classified yet, b
 
 from __future__ import annotations
 
+import ctypes
+from array import array
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +26,7 @@ from modt.classes import ObjectClass
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
+from modt.native.library import FLOAT64, Own, Signatures, declare, structure
 from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
@@ -42,6 +45,14 @@ MIN_POINTS, MIN_SHARE = 8, 0.4
 """Least number of points that are split off and that remain; least share of the points last seen."""
 MAX_DROP_M = 0.4
 """Greatest distance of the top of a part below the expected top [m]."""
+_LIMITS = (
+    *(MIN_COVERAGE, MIN_PART_COVERAGE, LONGER_M, MAX_CAR_M, PART_PERSON.max_extent_m, PART_PERSON.min_height_m),
+    *(ESTABLISHED_HITS, ObjectClass.CAR.value),
+)
+"""Limits of regrouping.c."""
+_SIGNATURES: Signatures = {
+    "modt_take_and_join": (None, (*[Own] * 4, FLOAT64, *[Own] * 3, ctypes.c_int64, *[Own] * 3))
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +76,24 @@ class Pairs:
 
     Attributes:
         rows, proposals: (K,) of each pair.
-        known: (8, K) known extent of the track, as a k-DOP [m].
+        extent: (K,) index of the known extent of the track.
+        known: (8, R) known extents as k-DOPs [m].
+        rank: (M,) seniority of the tracks, 0 the highest.
+        whole: (M,) tracks whose parts are joined: of a hidden person the legs are left, one object.
         within: (K,) part of the proposal that lies within the known extent.
-        free: (K,) the track may take the proposal, and most of one lies within the other.
+        around: (K,) part of the track that is expected within the proposal.
+        headings: (2, M) cosine and sine of the boxes of the tracks, and (2, P) of the proposals.
     """
 
     rows: Int
     proposals: Int
+    extent: Int
     known: Float64
+    rank: Int
+    whole: Bool
     within: Float64
-    free: Bool
+    around: Float64
+    headings: tuple[Float64, Float64]
 
 
 class Regrouping:
@@ -86,6 +105,8 @@ class Regrouping:
 
     def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
         self._kernels = kernels
+        if kernels.library is not None:
+            declare(kernels.library, _SIGNATURES)
 
     def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
         """The frame in a better grouping; every point stays in one proposal.
@@ -100,9 +121,8 @@ class Regrouping:
             return frame
         own, owner = np.full(len(tracks), NONE), np.full(n, NONE)  # proposal of each track, track of each proposal
         own[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
-        pairs, before = self._pairs(tracks, frame, owner), own.copy()
-        _take_larger(tracks, observations, pairs, own, owner)
-        into = _join(tracks, observations, pairs, own, owner)
+        pairs, before = self._pairs(tracks, observations), own.copy()
+        into = self._take_and_join(tracks, observations, pairs, own, owner)
         joined = (into != np.arange(n)).nonzero()[0]
         rows, hosts, piece = _split(tracks, frame, placement, pairs, own)
         measured = np.ones(len(tracks) + 1, np.bool_)  # the last is that of NONE
@@ -124,8 +144,9 @@ class Regrouping:
         number = (kept.cumsum() - 1)[into]
         renewed = np.zeros(len(into), np.bool_)
         renewed[whole] = renewed[hosts] = renewed[n:] = True
-        label = number.take(piece)
-        proposals, observations = self._regrouped(frame, placement, label, source[kept], renewed[kept], yaw[kept])
+        proposals, observations = self._regrouped(
+            frame, placement, piece, number, source[kept], renewed[kept], yaw[kept]
+        )
         new = number[n:]
         if proposals.reflectance is not None:
             proposals.reflectance[new] = np.nan
@@ -136,40 +157,62 @@ class Regrouping:
             proposals, observations, matches.take(np.arange(len(matches.rows)), number[matches.proposals])
         )
 
-    def _pairs(self, tracks: TrackTable, frame: Associated, owner: Int) -> Pairs:
+    def _pairs(self, tracks: TrackTable, observations: Observations) -> Pairs:
         """Pairs of tracks observed twice and proposals that overlap their known extents."""
         order = (-tracks.hits * tracks.points).argsort(kind="stable")
         rank = np.empty_like(order)
         rank[order] = np.arange(len(order))
         rows = order[tracks.hits[order] > 1]
-        known = tracks.known_kdops(rows)
-        k, part = self._kernels.overlapping_pairs(known, frame.observations.kdop)
-        rows, known, kdop = rows[k], known.take(k, axis=1), frame.observations.kdop.take(part, axis=1)
-        other = owner[part]
-        a, b = tracks.last_class[rows], tracks.last_class[other]
-        one_class = (a == b) | ~(IS_PERSON[a] | IS_PERSON[b])  # background and cars are easily confused
-        free = (other == NONE) | (other == rows) | (rank[other] > rank[rows]) & one_class
-        within, around = coverage(kdop, known), coverage(tracks.predicted_kdops(rows), kdop)
-        free &= np.maximum(within, around) > MIN_COVERAGE
-        return Pairs(rows, part, known, within, free)
+        known, expected = tracks.known_kdops(rows), tracks.predicted_kdops(rows)
+        extent, part, within, around = self._kernels.covering_pairs(known, expected, observations.kdop)
+        headings = _headings(tracks.box), _headings(observations.box)
+        whole = ~IS_PERSON[tracks.last_class] | tracks.hidden
+        return Pairs(rows[extent], part, extent, known, rank, whole, within, around, headings)
+
+    def _take_and_join(
+        self, tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int
+    ) -> Int:
+        """(P,) proposal into which each is joined, itself where it is not; writes own (M,) and owner (P,)."""
+        library = self._kernels.library
+        if library is None:
+            free = _free(tracks, pairs, owner)
+            _take_larger(tracks, observations, pairs, free, own, owner)
+            return _join(tracks, observations, pairs, free, own, owner)
+        n, m, k, into = len(owner), len(own), len(pairs.rows), np.arange(len(owner))
+        ours = pairs.known, tracks.box, *pairs.headings[0], tracks.x, tracks.anchor, pairs.rank, tracks.hits
+        theirs = observations.kdop, observations.box, *pairs.headings[1], observations.bottom, observations.top
+        listed = pairs.rows, pairs.proposals, pairs.extent, pairs.within, pairs.around
+        library.modt_take_and_join(
+            structure(*ours, tracks.last_class, pairs.known.shape[1]), structure(*theirs, observations.count, n),
+            structure(*listed, k), array("d", _LIMITS), MAX_SIZE_M, IS_PERSON, pairs.whole,
+            np.empty(k + max(n, m), np.uint8), m, own, owner, into,
+        )  # fmt: skip
+        return into
 
     def _regrouped(
-        self, frame: Associated, placement: Placement, label: Int, source: Int, renewed: Bool, yaw: Float64
+        self,
+        frame: Associated,
+        placement: Placement,
+        piece: Int,
+        number: Int,
+        source: Int,
+        renewed: Bool,
+        yaw: Float64,
     ) -> tuple[Proposals, Observations]:
         """Proposals and observations in another grouping.
 
         Args:
             frame: the grouping before.
             placement: of the frame in the world.
-            label: (K,) proposal of each member.
+            piece: (K,) of each member.
+            number: proposal of each piece.
             source: (Q,) former proposal whose columns each takes over.
             renewed: (Q,) those whose members changed: box and k-DOP come from their points.
             yaw: (Q,) heading of their boxes [rad, sensor frame].
         """
         old, changed, kernels = frame.proposals, renewed.nonzero()[0], self._kernels
-        # Sixteen bits hold every number of a proposal, and are sorted by radix.
-        order, count = label.astype(np.uint16).argsort(kind="stable"), np.bincount(label, minlength=len(source))
-        proposals = old.regrouped(old.members.take(order), old.coordinates.take(order, axis=1), count, source)
+        members, coordinates, count = kernels.regrouped(old.members, old.coordinates, piece, number, len(source))
+        proposals = old.regrouped(members, coordinates, count, source)
         runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
         copied = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
         few = proposals.regrouped(*copied, count[changed], changed)
@@ -182,14 +225,27 @@ class Regrouping:
         return proposals, observations
 
 
-def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> None:
+def _free(tracks: TrackTable, pairs: Pairs, owner: Int) -> Bool:
+    """(K,) pairs of which the track may take the proposal, and most of one lies within the other."""
+    rows, other = pairs.rows, owner[pairs.proposals]
+    a, b = tracks.last_class[rows], tracks.last_class[other]
+    one_class = (a == b) | pairs.whole[rows] & ~IS_PERSON[b]  # background and cars are easily confused
+    free: Bool = (other == NONE) | (other == rows) | (pairs.rank[other] > pairs.rank[rows]) & one_class
+    free &= np.maximum(pairs.within, pairs.around) > MIN_COVERAGE
+    return free
+
+
+def _take_larger(
+    tracks: TrackTable, observations: Observations, pairs: Pairs, free: Bool, own: Int, owner: Int
+) -> None:
     """Let senior tracks take larger parts of their objects: writes own (M,) and owner (P,), each track once."""
     size = np.where(own == NONE, 0, observations.count[own])
-    larger = (pairs.free & (observations.count[pairs.proposals] > size[pairs.rows])).nonzero()[0]
+    larger = (free & (observations.count[pairs.proposals] > size[pairs.rows])).nonzero()[0]
     rows, parts = pairs.rows[larger], pairs.proposals[larger]
     box = tracks.box.take(rows, axis=0)
     box[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
-    fits = _fit_together(box, observations.box.take(parts, axis=0), MAX_SIZE_M[tracks.last_class[rows]])
+    headings = pairs.headings[0].take(rows, axis=1), pairs.headings[1].take(parts, axis=1)
+    fits = _fit_together(box, observations.box.take(parts, axis=0), headings, MAX_SIZE_M[tracks.last_class[rows]])
     changed: set[int] = set()
     for row, part in zip(rows[fits].tolist(), parts[fits].tolist(), strict=True):
         former, left = int(owner[part]), int(own[row])
@@ -204,14 +260,14 @@ def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, o
             owner[left] = former
 
 
-def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> Int:
+def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, free: Bool, own: Int, owner: Int) -> Int:
     """(P,) proposal into which each is joined, itself where it is not; the most senior track is served first."""
     into, car = np.arange(len(owner)), tracks.last_class == ObjectClass.CAR.value
     host = own[pairs.rows]
-    joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
-    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & ~IS_PERSON[tracks.last_class[pairs.rows]]
+    joins = free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
+    joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & pairs.whole[pairs.rows]
     k = joins.nonzero()[0]
-    rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(k, axis=1), host[k]
+    rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(pairs.extent[k], axis=1), host[k]
     part = observations.kdop.take(parts, axis=1)
     person = PART_PERSON.fits(
         widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts]
@@ -241,6 +297,8 @@ def _split(
     lost = (own == NONE) & (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
     lost &= tracks.last_class != ObjectClass.BACKGROUND.value
     k = lost[pairs.rows].nonzero()[0]
+    if not len(k):
+        return k, k, label
     rows, hosts = pairs.rows[k], pairs.proposals[k]
     expected, kdop = tracks.predicted_kdops(rows), observations.kdop.take(hosts, axis=1)
     covered = coverage(expected, kdop)
@@ -275,20 +333,28 @@ def _split(
     return rows[splits], hosts[splits], label
 
 
-def _fit_together(a: Float64, b: Float64, size: Float64) -> Bool:
-    """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer."""
-    yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
-    c, s = np.cos(yaw), np.sin(yaw)
+def _headings(boxes: Float64) -> Float64:
+    """(2, n) cosine and sine of the headings of boxes (n, 7)."""
+    return np.array((np.cos(boxes[:, 6]), np.sin(boxes[:, 6])))
+
+
+def _fit_together(a: Float64, b: Float64, headings: tuple[Float64, Float64], size: Float64) -> Bool:
+    """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer.
+
+    The headings are given as (2, k) cosines and sines.
+    """
+    along = np.where(a[:, 3] > b[:, 3], *headings)
+    c, s = along
     x, y = (b[:, :2] - a[:, :2]).T
     offset = np.array((x * c + y * s, y * c - x * s))
-    half_a, half_b = (_half_widths(box, yaw) for box in (a, b))
+    half_a, half_b = (_half_widths(box, own, along) for box, own in zip((a, b), headings, strict=True))
     span = np.maximum(half_a, offset + half_b) - np.minimum(-half_a, offset - half_b)
     fit: Bool = (np.maximum(*span) < size[:, 0]) & (np.minimum(*span) < size[:, 1])
     return fit
 
 
-def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
-    """(2, k) half extent of each box (k, 7) along a heading yaw and across it [m]."""
-    (length, width), turn = boxes[:, 3:5].T / 2, yaw - boxes[:, 6]
-    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+def _half_widths(boxes: Float64, own: Float64, along: Float64) -> Float64:
+    """(2, k) half extent of each box (k, 7) along a heading and across it [m], cosines and sines (2, k) given."""
+    (length, width), (c0, s0), (c1, s1) = boxes[:, 3:5].T / 2, own, along
+    c, s = np.abs(c1 * c0 + s1 * s0), np.abs(s1 * c0 - c1 * s0)
     return np.array((length * c + width * s, length * s + width * c))

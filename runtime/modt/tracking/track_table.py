@@ -7,13 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.geometry.kdop import DIRECTIONS, widths
+from modt.geometry.kdop import DIRECTIONS
 from modt.types import Bool, Float64, Int, Tracks, column
 
 ESTABLISHED_HITS = 4
 """Frames in which a track was observed, from which its velocity and class change proposals."""
 LAG_S = 1.5
 """Time constant of the place that a displacement is measured from."""
+GROWTH, SHRINKAGE = 0.5, 0.02
+"""Weight of a larger and of a smaller box in the size of a track: a part that is hidden was seen before."""
 
 
 @dataclass(slots=True)
@@ -44,7 +46,7 @@ class TrackTable(Tracks):
         return kdop
 
     def observe_motion(self, rows: Int, dt_s: float) -> None:
-        """Write displacement, time of observation and length of the rows, seen dt_s after the frame before.
+        """Write displacement, time of observation and size of the rows, seen dt_s after the frame before.
 
         The place that a track comes from follows its k-DOP with a lag: at a constant speed v the displacement tends
         to v * LAG_S. Along each axis it is that of the end that moved less, and nothing where the ends moved apart:
@@ -56,5 +58,7 @@ class TrackTable(Tracks):
         together = np.where(ahead * behind > 0, np.minimum(np.abs(ahead), np.abs(behind)), 0.0)
         self.moved_m[rows] = together.max(axis=1, initial=0.0)
         self.observed_s[rows] += dt_s
-        self.length_m[rows] = widths(self.envelope.take(rows, axis=0).T).max(axis=0, initial=0.0)
+        known = self.size_m.take(rows, axis=0)
+        change = self.box.take(rows, axis=0)[:, 3:6] - known
+        self.size_m[rows] = known + np.where(change > 0, GROWTH, SHRINKAGE) * change
         self.lagged_kdop[rows] = lagged + (1.0 - math.exp(-dt_s / LAG_S)) * shift

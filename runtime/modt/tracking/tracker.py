@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_SIZE_M
-from modt.classes import ObjectClass
+from modt.classes import PERSON_M, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kdop import AGREE_M, DIRECTIONS, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
-from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
-from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
+from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.states import Event, StateMachine
@@ -68,6 +67,7 @@ class Tracker:
         self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0)
         self._period_s = period_s
         self._regrouping = Regrouping(kernels)
+        self._filter = filter_of(kernels, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS)
         position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
         self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
         self._tracks = TrackTable.blank()
@@ -129,8 +129,10 @@ class Tracker:
         self._keep_top(frame, known)
         self._observe_rest(frame.matches.rows)
         self._coast(frame.matches.rows)
-        self._withdraw()
-        self._renew(self._expire(), frame.matches, frame.observations)
+        near = self._near_rest()
+        self._withdraw(near)
+        at_rest = self._background(near)
+        self._renew(self._expire(at_rest), at_rest, frame.matches, frame.observations)
         t = self._tracks
         return TrackedFrame(t, frame.proposals, self.machine.wants_class[t.state] & (t.proposal != NONE))
 
@@ -165,7 +167,7 @@ class Tracker:
         t, lapse_s, most_s = self._tracks, self._lapse_s(stamp_s), self._coasting_s(1.5)
         gone = t.unseen_s + lapse_s > most_s
         if gone.any():
-            self.background_map.add(t, (gone & self._background_at_rest()).nonzero()[0])
+            self.background_map.add(t, (gone & self._background(self._near_rest())).nonzero()[0])
             self._tracks = t.renewed((~gone).nonzero()[0], 0)
         if lapse_s > most_s:
             self.background_map.clear()
@@ -178,20 +180,13 @@ class Tracker:
         creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
         t.unseen_s += self._period_s if creeps else dt_s
         t.last_class = t.object_class
-        x, P = components_first(t.x, t.P)
-        t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS))
+        self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
     def _update(self, matches: Matches, observations: Observations) -> None:
         """Equation 1's filter on the matched positions; the proposals take over the standing of their tracks."""
         t, rows = self._tracks, matches.rows
-        x, P = components_first(t.x.take(rows, axis=0), t.P.take(rows, axis=0))
-        z, R = components_first(matches.position, matches.covariance)
-        slow = np.abs(x[SPEED]) < np.sqrt(P[SPEED, SPEED])
-        step_x, step_y = z - x[:2]
-        heading = np.where(slow, np.arctan2(step_y, step_x), x[HEADING])
-        x, P = kalman.update(*kalman.face(x, P, heading), z, R)
-        t.x[rows], t.P[rows] = tracks_first(*kalman.turn_about(x, P))
+        self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         self._advance(rows, Event.ASSOCIATED)
         t.state[rows] = self.machine.joined(t.state[rows])
         t.missed[rows], t.unseen_s[rows] = 0, 0.0
@@ -211,7 +206,12 @@ class Tracker:
         """A person cut above is as high as in (R, 7) the boxes known before the frame: writes track and proposal."""
         t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
         hidden_m = (known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2)
-        kept = IS_PERSON[t.last_class[rows]] & (frame.proposals.cut[own] & Cut.TOP > 0) & (hidden_m > 0)
+        kept = IS_PERSON[t.last_class[rows]] & (hidden_m > 0)
+        if kept.any():
+            kept &= frame.proposals.cut[own] & Cut.TOP > 0
+        t.hidden[rows] = kept & (t.box[rows, 5] < PERSON_M / 2)
+        if not kept.any():
+            return
         for boxes, index in ((t.box, rows[kept]), (frame.proposals.box, own[kept])):
             boxes[index, 2:6:3] += np.outer(hidden_m[kept], (0.5, 1.0))  # z of the middle, and height
 
@@ -237,9 +237,7 @@ class Tracker:
         t.stationary[rows] = near & (hits > 2)
         t.rest_position[rows] = position + REST_GAIN * near[:, None] * step
         if self._extended:
-            still = rows[near]
-            x, P = components_first(t.x.take(still, axis=0), t.P.take(still, axis=0))
-            t.x[still], t.P[still] = tracks_first(*kalman.observe_speed(x, P, 0.0, STATIONARY_SIGMA_MPS))
+            self._filter.observe_speed(t.x, t.P, rows[near], 0.0, STATIONARY_SIGMA_MPS)
 
     def _coast(self, matched: Int) -> None:
         """Tracks without a proposal go on as predicted."""
@@ -258,33 +256,32 @@ class Tracker:
         near: Bool = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
         return near
 
-    def _background_at_rest(self) -> Bool:
+    def _background(self, near: Bool) -> Bool:
         """(M,) tracks that are finally background, and near their rest position."""
         background: Bool = self._tracks.last_class == ObjectClass.BACKGROUND.value
-        return self._tracks.final & background & self._near_rest()
+        return self._tracks.final & background & near
 
-    def _withdraw(self) -> None:
+    def _withdraw(self, near: Bool) -> None:
         """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
         t = self._tracks
-        rows = (t.inherited & (t.proposal != NONE) & ~self._near_rest()).nonzero()[0]
+        rows = (t.inherited & (t.proposal != NONE) & ~near).nonzero()[0]
         if len(rows):
             self._advance(rows, Event.WITHDRAWN)
 
-    def _expire(self) -> Int:
+    def _expire(self, at_rest: Bool) -> Int:
         """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
         t = self._tracks
         expired: Bool = (t.proposal == NONE) & (t.unseen_s > self._coasting_s(0.5))
-        self.background_map.add(t, (expired & self._background_at_rest()).nonzero()[0])
+        self.background_map.add(t, (expired & at_rest).nonzero()[0])
         self._advance(expired.nonzero()[0], Event.EXPIRED)
         return (~expired).nonzero()[0]
 
-    def _renew(self, kept: Int, matches: Matches, observations: Observations) -> None:
+    def _renew(self, kept: Int, at_rest: Bool, matches: Matches, observations: Observations) -> None:
         """The rows kept, and a track for every proposal without one: a2, or a1 and a5 (a6) at a remembered place."""
         unclaimed = np.ones(len(observations), np.bool_)
         unclaimed[matches.proposals] = False
         proposals = unclaimed.nonzero()[0]
-        at_rest = kept[self._background_at_rest()[kept]]
-        known = self.background_map.recall(self._tracks, at_rest, observations, proposals)
+        known = self.background_map.recall(self._tracks, kept[at_rest[kept]], observations, proposals)
         t = self._tracks = self._tracks.renewed(kept, len(proposals))
         new = np.arange(len(kept), len(t))
         t.id[new] = self.next_id + np.arange(len(new))
@@ -297,7 +294,7 @@ class Tracker:
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
         t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
-        t.lagged_kdop[new] = t.kdop[new]
+        t.lagged_kdop[new], t.size_m[new] = t.kdop[new], t.box[new, 3:6]
         t.observe_motion(new, 0.0)
 
 

@@ -2,13 +2,10 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
-from modt_desk.box_tracking.detections import boxes_from_kitti, boxes_to_kitti, files, read
+from modt_desk.box_tracking.detections import files, read
 
 AB3DMOT = "0,2,298.3,165.2,458.2,293.4,8.3,1.96,1.81,4.75,-4.57,1.84,13.53,-2.11,-1.79\n"
 LABEL = "0 7 Car 0 0 -1.79 298.3 165.2 458.2 293.4 1.96 1.81 4.75 -4.57 1.84 13.53 -2.11 8.3\n"
@@ -35,15 +32,12 @@ def test_both_formats_give_the_same_detections(tmp_path):
     np.testing.assert_allclose(a.box[0, :6], [13.53, 4.57, 1.96 / 2 - 1.84, 4.75, 1.81, 1.96])
 
 
-def test_frames_without_detections_are_kept(tmp_path):
+def test_frames_without_detections_are_kept_and_other_types_ignored(tmp_path):
+    assert len(one(write(tmp_path, LABEL.replace("Car", "DontCare")))) == 0
+    assert one(write(tmp_path, "")).n_frames == 0
     later = AB3DMOT.replace("0,2,", "3,2,", 1)
     found = one(write(tmp_path, later + AB3DMOT + AB3DMOT))
     assert [rows.stop - rows.start for _, rows in found.frames()] == [2, 0, 0, 1]
-
-
-def test_other_types_are_ignored(tmp_path):
-    assert len(one(write(tmp_path, LABEL.replace("Car", "DontCare")))) == 0
-    assert one(write(tmp_path, "")).n_frames == 0
 
 
 @pytest.mark.parametrize(
@@ -54,20 +48,18 @@ def test_an_invalid_line_is_refused_by_number(tmp_path, text):
         one(write(tmp_path, AB3DMOT + text))
 
 
-def test_missing_files_are_refused(tmp_path):
+def test_files_of_a_folder_are_regular_ones_and_missing_ones_refused(tmp_path):
+    os.mkfifo(tmp_path / "0002.txt")
     with pytest.raises(MisuseError, match=r"no \.txt"):
         files(tmp_path)
+    write(tmp_path, "")
+    assert [file.name for file in files(tmp_path)] == ["0000.txt"]
     with pytest.raises(MisuseError, match="cannot be read"):
         one(tmp_path / "none.txt")
 
 
-@given(arrays(np.float64, (3, 7), elements=st.floats(-3, 3)))
-def test_box_conversions_are_inverse(boxes):
-    np.testing.assert_allclose(boxes_from_kitti(boxes_to_kitti(boxes)), boxes, atol=1e-9)
-
-
 def scored(path, *scores):
-    """A file with a detection a frame, of these scores."""
+    """A file with a detection of these scores in each frame."""
     path.write_text("".join(f"{i},2,0,0,9,9,{score},1.5,1.6,4,0,1.5,9,0,0\n" for i, score in enumerate(scores)))
     return path
 
@@ -87,9 +79,3 @@ def test_all_files_of_a_detector_share_a_scale(tmp_path):
     assert one(quiet).score.tolist() != [0.25]
     assert [d.score.tolist() for d in read([quiet, busy])] == [[0.25], [0.5, 7.0]]
     assert [d.name for d in read([quiet, busy])] == ["0", "1"]
-
-
-def test_a_folder_s_files_are_regular_ones(tmp_path):
-    (tmp_path / "0001.txt").write_text("")
-    os.mkfifo(tmp_path / "0002.txt")
-    assert [file.name for file in files(tmp_path)] == ["0001.txt"]

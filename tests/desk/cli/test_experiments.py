@@ -1,10 +1,8 @@
-from __future__ import annotations
-
 import csv
 
 import pytest
 
-from modt.cli.main import main
+from tests.cli.commands import here, refusal
 
 pytestmark = pytest.mark.command
 
@@ -16,36 +14,24 @@ def results(tmp_path_factory):
     other = out / "other.yaml"
     other.write_text("fusion:\n  start_frame: 1\n")
     words = ["evaluate", "--experiment", "table4", "fig12", "--simulated", "2", "--seconds", "0.2"]
-    assert main([*words, "--beside", str(other), "--out", str(out)]) == 0
+    assert here(*words, "--beside", other, "--out", out) == 0
     return out
 
 
-def table(folder):
-    with (folder / "results.csv").open() as file:
-        return list(csv.DictReader(file))
-
-
 def test_results_are_written_as_a_table_and_a_document(results):
-    swept = {row["at"] for row in table(results) if row["experiment"] == "fig12" and row["quantity"] == "beta"}
+    with (results / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    swept = {row["at"] for row in rows if row["experiment"] == "fig12" and row["quantity"] == "beta"}
     assert swept == {f"{metres}.0" for metres in range(10, 80, 10)}
+    assert {(row["kind"], row["paper"]) for row in rows} == {("simulated", "")}, "beside no figure of the paper"
+    assert [row["profile"] for row in rows].count("default") == len(rows) / 2
     page = (results / "results.md").read_text()
     assert "## Table IV" in page
     assert "## Fig. 12" in page
 
 
-def test_simulated_drives_stand_apart_and_beside_no_figure_of_the_paper(results):
-    found = table(results)
-    assert {row["kind"] for row in found} == {"simulated"}
-    assert {row["paper"] for row in found} == {""}
-
-
-def test_another_profile_stands_beside_the_first(results):
-    rows = table(results)
-    assert [row["profile"] for row in rows].count("default") == len(rows) / 2
-
-
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "named"),
     [
         (["--experiment", "table9", "--simulated", "1"], "table3"),
         (["--experiment", "table4"], "no drives"),
@@ -54,6 +40,5 @@ def test_another_profile_stands_beside_the_first(results):
         (["--experiment", "table4", "--simulated", "1", "--further", "table.csv"], "--further"),
     ],
 )
-def test_misuse_is_told(words, said, capsys, tmp_path):
-    assert main(["evaluate", *words, "--out", str(tmp_path)]) == 2
-    assert said in capsys.readouterr().err
+def test_misuse_is_one_line(words, named, capsys, tmp_path):
+    assert named in refusal(capsys, "evaluate", *words, "--out", tmp_path)

@@ -10,20 +10,20 @@ import pytest
 import yaml
 
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
-from modt.cli.main import main
 from modt.sinks.tracks import SCHEMA
 from modt_desk.reporting.records import read_records
+from tests.cli.commands import here, refusal
 from tests.desk.recorded import drive_and_run
+
+
+def export(run, *arguments):
+    return here("export", run, *arguments)
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A run on a synthetic drive, and the drive."""
     return drive_and_run(tmp_path_factory.mktemp("recorded"), seconds=0.6)
-
-
-def export(run, *arguments):
-    return main(["export", str(run), *map(str, arguments)])
 
 
 def records(run):
@@ -68,19 +68,7 @@ def test_mcap_holds_points_tracks_and_energy_of_every_frame(recorded, tmp_path):
         assert (points.reshape(-1, 4)[:, :3] == scan.reshape(-1, 4)[:, :3]).all()
 
 
-def test_mcap_without_points_needs_no_source(recorded, tmp_path):
-    pytest.importorskip("foxglove")
-    reader = pytest.importorskip("mcap.reader")
-    run = moved(recorded[0], tmp_path)
-    assert export(run, "--mcap", tmp_path / "a.mcap", "--no-points", "--frames", "2:4") == 0
-    with (tmp_path / "a.mcap").open("rb") as file:
-        messages = [(c.topic, m.log_time) for _, c, m in reader.make_reader(file).iter_messages()]
-    stamps = [round(1e9 * record["stamp_s"]) for record in records(run)[2:4]]
-    assert [stamp for topic, stamp in messages if topic == "/modt/detections"] == stamps
-    assert "/modt/points" not in dict(messages)
-
-
-def test_kitti_results_are_those_of_the_replay(recorded, tmp_path):
+def test_kitti_results_equal_those_of_the_replay(recorded, tmp_path):
     run, _ = recorded
     assert export(run, "--kitti", tmp_path / "a.txt") == 0
     own, found = (
@@ -142,59 +130,61 @@ def test_parquet_is_the_table_of_csv(recorded, tmp_path):
     assert table["id"] == [track["id"] for track in tracks]
     assert table["box_x_m"] == [track["box"] and track["box"]["x"] for track in tracks]
     assert table["class"] == [track["class"] for track in tracks]
-    assert [path.name for path in tmp_path.iterdir()] == ["a.parquet"]
 
 
 def test_parquet_names_the_extra_that_it_needs(recorded, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert export(recorded[0], "--parquet", tmp_path / "a.parquet") == 2
-    assert "pip install '.[parquet]'" in capsys.readouterr().err
+    line = refusal(capsys, "export", recorded[0], "--parquet", tmp_path / "a.parquet")
+    assert "pip install '.[parquet]'" in line
     assert not list(tmp_path.iterdir())
 
 
-def moved(run, folder):
-    """The run, whose source is gone."""
-    copy = shutil.copytree(run, folder / "moved")
-    text = (copy / "run.yaml").read_text()
-    (copy / "run.yaml").write_text(text.replace("drive_0000_sync\n", "drive_0000_gone\n"))
-    return copy
-
-
-def test_misuse_is_one_line_with_the_remedy(recorded, tmp_path, capsys):
+@pytest.fixture
+def copies(recorded, tmp_path):
+    """Copies of the run: without its source, its labels, a record, its poses, and as of a service."""
     run, _ = recorded
-    gone = moved(run, tmp_path)
-    bare, odd, old, live = (shutil.copytree(run, tmp_path / name) for name in ("bare", "odd", "old", "live"))
-    shutil.rmtree(bare / "labels")
-    lines = (run / "tracks.jsonl").read_text().splitlines(keepends=True)
-    (odd / "tracks.jsonl").write_text(lines[0] + json.dumps({"schema": SCHEMA, "frame": 1, "tracks": [{}]}) + "\n")
-    unplaced = [{k: v for k, v in record.items() if k != "T_world_sensor"} for record in records(run)]
-    (old / "tracks.jsonl").write_text("".join(json.dumps(record) + "\n" for record in unplaced))
-    described = yaml.safe_load((live / "run.yaml").read_text())
+    names = ("gone", "bare", "odd", "old", "live")
+    made = {name: shutil.copytree(run, tmp_path / "copies" / name) for name in names}
+    described = yaml.safe_load((run / "run.yaml").read_text())
+    described["stream"]["path"] += "_gone"
+    (made["gone"] / "run.yaml").write_text(yaml.safe_dump(described))
     described["stream"]["path"], described["service"] = None, True
-    (live / "run.yaml").write_text(yaml.safe_dump(described))
-    cases = [
-        (bare, "--semantickitti", "modt replay --labels"),
-        (odd, "--csv", "tracks.jsonl:2: no record of a frame"),
-        (odd, "--semantickitti", "tracks.jsonl:2: no record of a frame"),
-        (old, "--kitti", "tracks.jsonl:1: no record of a frame (KeyError('T_world_sensor'))"),
-        (gone, "--kitti", "no such file or directory"),
-        (tmp_path, "--csv", "describes no run"),
-    ]
-    for number, (path, form, message) in enumerate(cases):
-        assert export(path, form, tmp_path / f"out{number}") == 2
-        said = capsys.readouterr().err
-        assert message in said
-        assert said.count("\n") == 1
-    assert not [path for path in tmp_path.iterdir() if path.name.startswith(("out", "."))]
+    (made["live"] / "run.yaml").write_text(yaml.safe_dump(described))
+    shutil.rmtree(made["bare"] / "labels")
+    (made["odd"] / "tracks.jsonl").write_text(json.dumps({"schema": SCHEMA, "frame": 1, "tracks": [{}]}) + "\n")
+    unplaced = [{k: v for k, v in record.items() if k != "T_world_sensor"} for record in records(run)]
+    (made["old"] / "tracks.jsonl").write_text("".join(json.dumps(record) + "\n" for record in unplaced))
+    return made
+
+
+def test_without_its_source_a_run_is_exported_without_points(copies, tmp_path, capsys):
+    pytest.importorskip("foxglove")
+    reader = pytest.importorskip("mcap.reader")
+    assert "give --no-points" in refusal(capsys, "export", copies["live"], "--mcap", tmp_path / "live.mcap")
+    assert export(copies["gone"], "--mcap", tmp_path / "a.mcap", "--no-points", "--frames", "2:4") == 0
+    with (tmp_path / "a.mcap").open("rb") as file:
+        messages = [(c.topic, m.log_time) for _, c, m in reader.make_reader(file).iter_messages()]
+    stamps = [round(1e9 * record["stamp_s"]) for record in records(copies["gone"])[2:4]]
+    assert [stamp for topic, stamp in messages if topic == "/modt/detections"] == stamps
+    assert "/modt/points" not in dict(messages)
+    assert export(copies["live"], "--kitti", tmp_path / "live.txt") == 0
+    assert (tmp_path / "live.txt").read_text().split()[6:10] == ["-1.00"] * 4, "no camera, no box in its image"
+
+
+def test_misuse_is_one_line_with_the_remedy(recorded, copies, tmp_path, capsys):
+    run, _ = recorded
+    (tmp_path / "there").write_text("")
+    for path, form, out, message in (
+        (copies["bare"], "--semantickitti", "a", "modt replay --labels"),
+        (copies["odd"], "--csv", "b", "tracks.jsonl:1: no record of a frame"),
+        (copies["odd"], "--semantickitti", "c", "tracks.jsonl:1: no record of a frame"),
+        (copies["old"], "--kitti", "d", "T_world_sensor"),
+        (copies["gone"], "--kitti", "e", "no such file or directory"),
+        (tmp_path, "--csv", "f", "describes no run"),
+        (run, "--csv", "there", "exists already"),
+    ):
+        assert message in refusal(capsys, "export", path, form, tmp_path / out)
+    assert "holds none of" in refusal(capsys, "export", run, "--csv", tmp_path / "g", "--frames", "100:")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["copies", "there"]
     assert export(run, "--csv", run / "run.yaml" / "a.csv") == 1
     assert "cannot be written" in capsys.readouterr().err
-    assert export(run, "--csv", run) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert export(run, "--csv", tmp_path / "none", "--frames", "100:") == 2
-    assert "holds none of these frames" in capsys.readouterr().err
-    assert export(live, "--kitti", tmp_path / "live.txt") == 0
-    assert (tmp_path / "live.txt").read_text().split()[6:10] == ["-1.00"] * 4
-    pytest.importorskip("foxglove")
-    assert export(live, "--mcap", tmp_path / "live.mcap") == 2
-    assert not (tmp_path / "live.mcap").exists()
-    assert "give --no-points" in capsys.readouterr().err

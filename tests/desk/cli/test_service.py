@@ -6,6 +6,7 @@ import pytest
 
 from modt.cli.main import main
 from modt_desk.cli.service import drop_ins
+from tests.cli.commands import refusal
 
 PREFIX = ("--prefix", "/opt/modt")
 """Where the tests run may be a folder that a service cannot see."""
@@ -62,12 +63,6 @@ def test_the_unit_starts_the_environment_that_is_given_and_names_no_file_of_anot
     assert "Documentation=" not in unit
 
 
-def test_an_environment_that_the_service_cannot_see_is_refused(tmp_path, capsys):
-    assert main(["service", "install", "--root", str(tmp_path), "--prefix", "/home/me/modt/.venv"]) == 2
-    assert "cannot see" in capsys.readouterr().err
-    assert content(tmp_path) == {}
-
-
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_without_the_permission_the_remedy_is_root(tmp_path, capsys):
     tmp_path.chmod(0o500)
@@ -75,6 +70,11 @@ def test_without_the_permission_the_remedy_is_root(tmp_path, capsys):
     assert "run it as root" in capsys.readouterr().err
 
 
-def test_an_unknown_drop_in_is_refused(tmp_path):
-    with pytest.raises(SystemExit):
-        service("install", tmp_path, "--with", "nothing")
+@pytest.mark.parametrize(
+    ("options", "named"), [(("--prefix", "/home/me/modt/.venv"), "cannot see"), (("--with", "nothing"), "--with")]
+)
+def test_an_environment_that_the_service_cannot_see_and_an_unknown_drop_in_are_refused(
+    options, named, tmp_path, capsys
+):
+    assert named in refusal(capsys, "service", "install", "--root", tmp_path, *options)
+    assert content(tmp_path) == {}

@@ -1,23 +1,13 @@
-import argparse
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt_desk.box_tracking.detections import T_LEVEL_CAMERA, Detections, boxes_to_kitti, read
 from modt_desk.box_tracking.sequences import follow
-from modt_desk.cli import track
-
-
-def run(*arguments):
-    parser = argparse.ArgumentParser()
-    track.add_parser(parser.add_subparsers())
-    parsed = parser.parse_args(["track", *map(str, arguments)])
-    return parsed.run(parsed)
+from tests.cli.commands import here, refusal
 
 
 def parked(n, T_world_level):
@@ -32,6 +22,10 @@ def write(path, n=20, T_world_level=lambda i: np.eye(4), score=9):
         for i, boxes in enumerate(parked(n, T_world_level)):
             for d in boxes_to_kitti(boxes):
                 print(i, 2, 100, 100, 200, 200, score, *d, 0, sep=",", file=out)
+
+
+def run(*arguments):
+    return here("track", *arguments)
 
 
 def turning(i):
@@ -61,35 +55,6 @@ def test_poses_place_detections_in_the_world(tmp_path):
     np.testing.assert_allclose(world[:, :2], [[20, 3], [29, -3]], atol=0.2)
 
 
-def test_two_runs_are_identical(tmp_path):
-    write(tmp_path / "a.txt", T_world_level=turning)
-    for out in ("one", "two"):
-        run(tmp_path / "a.txt", "--out", tmp_path / out, "--quiet")
-    assert (tmp_path / "one/a.txt").read_bytes() == (tmp_path / "two/a.txt").read_bytes()
-
-
-def test_tracks_of_low_confidence_are_written_on_request(tmp_path, caplog):
-    write(tmp_path / "a.txt", score=1.5)
-    run(tmp_path / "a.txt", "--out", tmp_path / "none", "--quiet")
-    assert (tmp_path / "none/a.txt").read_text() == ""
-    assert "lower --sure" in caplog.text
-    run(tmp_path / "a.txt", "--out", tmp_path / "all", "--quiet", "--sure", "-1000")
-    assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
-
-
-def test_a_track_is_judged_whole_but_online_frame_by_frame(tmp_path):
-    with (tmp_path / "a.txt").open("w") as out:
-        for i, boxes in enumerate(parked(20, lambda i: np.eye(4))):
-            for d in boxes_to_kitti(boxes[:1]):
-                print(i, 2, 100, 100, 200, 200, 6 if i < 5 else 11, *d, 0, sep=",", file=out)
-    lines = {}
-    for name, option in (("whole", []), ("online", ["--online"])):
-        run(tmp_path / "a.txt", "--out", tmp_path / name, "--quiet", "--sure", "10", *option)
-        lines[name] = [int(line.split()[0]) for line in (tmp_path / name / "a.txt").read_text().splitlines()]
-    assert lines["whole"] == list(range(20))
-    assert lines["online"] == list(range(5, 20))
-
-
 @given(
     st.lists(st.lists(st.tuples(st.floats(-20, 20), st.floats(-2, 12)), max_size=4), min_size=2, max_size=9),
     st.data(),
@@ -106,25 +71,39 @@ def test_online_the_results_of_a_frame_do_not_depend_on_later_frames(scene, data
     assert follow(whole.take(frame <= until), None, 0.1, online=True)[0].splitlines() == early
 
 
+def test_tracks_of_low_confidence_are_written_on_request(tmp_path, caplog):
+    write(tmp_path / "a.txt", score=1.5)
+    run(tmp_path / "a.txt", "--out", tmp_path / "none", "--quiet")
+    assert (tmp_path / "none/a.txt").read_text() == ""
+    assert "lower --sure" in caplog.text
+    run(tmp_path / "a.txt", "--out", tmp_path / "all", "--quiet", "--sure", "-1000")
+    assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
+
+
+@pytest.mark.parametrize(("options", "first"), [((), 0), (("--online",), 5)])
+def test_a_track_is_judged_whole_but_online_frame_by_frame(tmp_path, options, first):
+    write(tmp_path / "a.txt")
+    lines = (tmp_path / "a.txt").read_text().splitlines()[::2]
+    scored = [line.replace(",9,", f",{6 if i < 5 else 11},", 1) for i, line in enumerate(lines)]
+    (tmp_path / "a.txt").write_text("\n".join(scored) + "\n")
+    run(tmp_path / "a.txt", "--out", tmp_path / "out", "--quiet", "--sure", "10", *options)
+    frames = [int(line.split()[0]) for line in (tmp_path / "out" / "a.txt").read_text().splitlines()]
+    assert frames == list(range(first, 20))
+
+
 @pytest.mark.parametrize(
-    ("options", "cause"),
+    ("options", "named"),
     [
-        (["--poses", "absent.txt"], "is missing"),
-        (["--poses", "short.txt"], "1 poses for 20 frames"),
-        (["--poses", "bad.txt"], r"bad.txt:1: 3 numbers"),
+        (("--poses", "absent.txt"), "is missing"),
+        (("--poses", "short.txt"), "1 poses for 20 frames"),
+        (("--poses", "bad.txt"), "bad.txt:1: 3 numbers"),
+        (("--period", "0"), "--period"),
+        (("--sure", "nan"), "--sure"),
     ],
 )
-def test_invalid_arguments_are_refused(tmp_path, monkeypatch, options, cause):
+def test_misuse_is_one_line(tmp_path, monkeypatch, capsys, options, named):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "a.txt")
     np.savetxt("short.txt", np.eye(4)[:3].reshape(1, 12))
     (tmp_path / "bad.txt").write_text("1 2 3\n")
-    with pytest.raises(MisuseError, match=cause):
-        run(tmp_path / "a.txt", "--out", tmp_path / "out", *options)
-
-
-@pytest.mark.parametrize("option", [("--period", "0"), ("--sure", "nan"), ("--sure", "-1001")])
-def test_numbers_out_of_range_are_refused(tmp_path, option, capsys):
-    with pytest.raises(SystemExit):
-        run(tmp_path, "--out", tmp_path / "out", *option)
-    assert "from" in capsys.readouterr().err
+    assert named in refusal(capsys, "track", "a.txt", "--out", "out", *options)

@@ -1,5 +1,3 @@
-import re
-import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +9,8 @@ from modt.energy.meters.meter import Conditions, Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
 from modt.types import UNLIMITED, Frame
 from modt_desk.comparison.compare_report import Basis, compare_tree
-from modt_desk.comparison.compare_view import compare_document, compare_plots
+from modt_desk.comparison.compare_view import compare_document
 from modt_desk.comparison.comparison import ModeRun, interleave
-from modt_desk.reporting.document import document_page
 from modt_desk.reporting.energy_plots import stage_energy_mJ
 from modt_desk.reporting.quantity import to_json
 from tests.desk.reporting.test_run_report import KINDS, figures
@@ -22,64 +19,53 @@ from tests.results import CAR, result
 MODES = ("conventional", "efficient", "accurate")
 FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(40)]
 EVERY = {"conventional": 1, "efficient": 20, "accurate": 5, "varied": 2}
-"""A mode_run classifies both proposals every so many frames."""
+"""Both proposals are classified every so many frames, by mode."""
 BUSY_W = 5.0
 
 
-class Board:
-    """Clocks and a counter that advance with the work."""
+FACTS = Facts(name="board", unit="J", resolution=1e-6, max_W=100.0, scope=Scope.CPU, kind=Kind.MEASURED)
 
-    def __init__(self):
-        self.now_ns = self.cpu_ns = 0
-        self.energy_J = 0.0
-        self.facts = Facts(
-            name="board",
-            unit="J",
-            resolution=1e-6,
-            max_W=100.0,
-            scope=Scope.CPU,
-            kind=Kind.MEASURED,
-        )
+
+class Board:
+    """A pipeline whose work moves the clocks and the counter of a board.
+
+    It segments in 10 ms or a little more, tracks in 2, and classifies in 1 and 1 for each proposal.
+    """
+
+    facts = FACTS
+
+    def __init__(self, every):
+        self.every, self.now_ns = every, 0
+        self.ledger = Ledger(self.clock, self.clock)
+
+    def clock(self):
+        return self.now_ns
 
     def read(self):
-        return self.energy_J
+        return BUSY_W * self.now_ns / 1e9
 
     def work(self, ms, value=None):
         self.now_ns += round(ms * 1e6)
-        self.cpu_ns += round(ms * 1e6)
-        self.energy_J += BUSY_W * ms / 1e3
         return value
-
-    def clocks(self):
-        return Clocks(lambda: self.now_ns, lambda: self.now_ns, lambda: self.cpu_ns)
-
-
-class Steps:
-    """Segments in 10 ms, tracks in 2, classifies in 1 and 1 a proposal."""
-
-    def __init__(self, board, ledger, every):
-        self.board, self.ledger, self.every = board, ledger, every
 
     def step(self, frame, budget=UNLIMITED):
         run, asked = self.ledger.run, frame.index % self.every == 0
         found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR})
-        found = replace(found, classified=np.array([7, 8] * asked, np.int64))
-        run("segmentation", self.board.work, 10.0 + frame.index % 3)
-        run("tracking", self.board.work, 2.0)
+        run("segmentation", self.work, 10.0 + frame.index % 3)
+        run("tracking", self.work, 2.0)
         if asked:
-            run("classification", self.board.work, 3.0, np.tile(CAR, (2, 1)))
-        return found
+            run("classification", self.work, 3.0, np.tile(CAR, (2, 1)))
+        return replace(found, classified=np.array([7, 8] * asked, np.int64))
 
 
 def mode_run(name, metered):
-    board = Board()
-    ledger = Ledger(lambda: board.now_ns, lambda: board.cpu_ns)
-    windows = Windows([board], board.clocks(), Conditions(), min_s=0.1) if metered else None
-    for _ in range(2 if windows else 0):  # its power is known
-        board.work(100)
-        windows.close()
-    steps = Steps(board, ledger, EVERY[name])
-    return ModeRun(steps, ledger, lambda index: UNLIMITED, windows)
+    board, windows = Board(EVERY[name]), None
+    if metered:
+        windows = Windows([board], Clocks(board.clock, board.clock, board.clock), Conditions(), min_s=0.1)
+        for _ in range(2):  # its power is known
+            board.work(100)
+            windows.close()
+    return ModeRun(board, board.ledger, lambda index: UNLIMITED, windows)
 
 
 def tree_of(metered, coefficients=None):
@@ -88,7 +74,7 @@ def tree_of(metered, coefficients=None):
     kind = Kind.MEASURED if metered else Kind.ESTIMATED
     seg_J, class_J, point_J = coefficients or (None, None, None)
     config = EnergyConfig(idle_W=1.0, busy_W=4.0, seg_J=seg_J, class_J=class_J, point_J=point_J)
-    basis = Basis(config, replace(Board().facts, kind=kind), period_s=0.1)
+    basis = Basis(config, replace(FACTS, kind=kind), period_s=0.1)
     about = {
         "stream": "street", "frames": len(FRAMES), "fov": "full", "repeat": 1, "turn": 1, "basis": "at 10 Hz",
         "board": "test", "conditions": {"governor": None, "frequency_MHz": None, "core": 0},
@@ -110,74 +96,38 @@ MEAN_MS = {"conventional": 10.975 + 2 + 3, "efficient": 10.975 + 2 + 3 / 20, "ac
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_estimated_energy_is_watts_times_cpu_time(estimated, mode):
-    found = estimated["modes"][mode]
+def test_estimated_energy_is_watts_times_cpu_time_and_measured_energy_that_of_the_meter(estimated, measured, mode):
+    found, metered = estimated["modes"][mode], measured["modes"][mode]
     assert found["cpu_ms"].value == pytest.approx(MEAN_MS[mode])
     assert found["net_J"].value == pytest.approx(3.0 * MEAN_MS[mode] / 1e3)
     assert found["gross_J"].value == pytest.approx(0.1 + 3.0 * MEAN_MS[mode] / 1e3)
-    assert found["net_J"].kind is Kind.ESTIMATED
-    assert sum(s["energy_J"].value for s in found["stages"].values()) == pytest.approx(found["net_J"].value)
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_measured_energy_is_that_of_the_meter(measured, mode):
-    found = measured["modes"][mode]
-    assert found["gross_J"].value == pytest.approx(BUSY_W * MEAN_MS[mode] / 1e3)
-    assert found["net_J"].value == pytest.approx((BUSY_W - 1.0) * MEAN_MS[mode] / 1e3)
-    assert found["gross_J"].kind is Kind.MEASURED
-    assert found["gross_J"].low <= found["gross_J"].value <= found["gross_J"].high
-
-
-def test_energy_of_the_stages_is_the_meters(measured):
-    for mode in MODES:
-        found, shown = measured["modes"][mode], stage_energy_mJ(measured["series"][mode])
-        assert sum(s["energy_J"].value for s in found["stages"].values()) == pytest.approx(found["net_J"].value)
-        for stage, mJ in shown.items():
-            assert mJ.mean() == pytest.approx(1e3 * found["stages"][stage]["energy_J"].value)
-    assert measured["unit_costs"]["E_seg"].value == pytest.approx((BUSY_W - 1.0) * 10.975e-3)
+    assert metered["gross_J"].value == pytest.approx(BUSY_W * MEAN_MS[mode] / 1e3)
+    assert metered["net_J"].value == pytest.approx((BUSY_W - 1.0) * MEAN_MS[mode] / 1e3)
+    assert metered["gross_J"].low <= metered["gross_J"].value <= metered["gross_J"].high
+    assert (found["gross_J"].kind, metered["gross_J"].kind) == (Kind.ESTIMATED, Kind.MEASURED)
+    for each in (found, metered):
+        assert sum(s["energy_J"].value for s in each["stages"].values()) == pytest.approx(each["net_J"].value)
+    for stage, mJ in stage_energy_mJ(measured["series"][mode]).items():
+        assert mJ.mean() == pytest.approx(1e3 * metered["stages"][stage]["energy_J"].value)
 
 
 @pytest.mark.parametrize("mode", MODES[1:])
 def test_known_costs_are_reconciled(estimated, mode):
-    saving = estimated["savings"][mode]
-    assert saving["gamma_measured_cpu"].value == pytest.approx(MEAN_MS["conventional"] / MEAN_MS[mode])
+    saving, expected = estimated["savings"][mode], MEAN_MS["conventional"] / MEAN_MS[mode]
+    assert saving["gamma_measured_cpu"].value == pytest.approx(expected)
     assert saving["deviation"].value == pytest.approx(0.0, abs=1e-6)
-    assert saving["gamma_net"].value == pytest.approx(saving["gamma_measured_cpu"].value)
+    assert saving["gamma_net"].value == pytest.approx(expected)
     assert 1.0 < saving["gamma_gross"].value < saving["gamma_net"].value
+    calibrated = tree_of(False, coefficients=(3.0 * 10.975e-3, 3.0 * 1.5e-3, 0.0))["savings"][mode]
+    assert calibrated["gamma_calibrated"].value == pytest.approx(expected)
 
 
-def said(tree):
-    """The report's words, however its lines are broken."""
-    return " ".join(compare_document(tree).text().split())
-
-
-def test_gamma_by_calibrated_joules():
-    seg_J = 3.0 * 10.975e-3
-    tree = tree_of(False, coefficients=(seg_J, 3.0 * 1.5e-3, 0.0))
-    for mode, saving in tree["savings"].items():
-        assert saving["gamma_calibrated"].value == pytest.approx(MEAN_MS["conventional"] / MEAN_MS[mode])
-    assert "by calibrated joules" in said(tree)
-
-
-def test_report_states_what_it_tests(estimated, measured):
-    assert "not the physics" in said(estimated)
-    assert "not the physics" not in said(measured)
-    assert "against the meter" in said(measured)
-    assert "against the meter" not in said(estimated)
-    assert said(estimated).count("reconciliation closes within 5 %") == 2
+def test_the_report_says_whether_it_tests_the_physics(estimated, measured):
+    tests = [" ".join(compare_document(tree).text().split()) for tree in (estimated, measured)]
+    assert ["not the physics" in text for text in tests] == [True, False]
+    assert ["against the meter" in text for text in tests] == [False, True]
 
 
 def test_every_figure_carries_its_kind(measured):
     found = [f for f in figures(to_json(measured)) if f.get("bare") is None]
-    assert len(found) > 100
     assert all(f["kind"] in KINDS for f in found)
-
-
-def test_page_contains_its_plots(estimated):
-    page = document_page(compare_document(estimated), compare_plots(estimated))
-    plots = re.findall(r"<svg.*?</svg>", page, re.S)
-    assert len(plots) == 8
-    for plot in plots:
-        assert ElementTree.fromstring(plot).attrib["role"] == "img"
-        assert not re.search(r"nan|inf\b", plot)
-    assert not re.search(r"(src|href)=|url\(|https?://", page)

@@ -27,11 +27,10 @@ class Scripted:
     """A pipeline that classifies what the script says."""
 
     def __init__(self, name, ledger, log):
-        self.name, self.ledger, self.log, self.budgets = name, ledger, log, []
+        self.name, self.ledger, self.log = name, ledger, log
 
     def step(self, frame, budget=UNLIMITED):
-        self.log.append((self.name, frame.index))
-        self.budgets.append(budget)
+        self.log.append((self.name, (frame.index, budget.calls)))
         classified = np.array(CLASSIFIED[frame.index], np.int64)
         if len(classified):
             self.ledger.run("classification", np.tile, CAR, (len(classified), 1))
@@ -74,18 +73,12 @@ def test_lives_are_frames_with_a_proposal(one):
 @pytest.mark.parametrize(
     ("turn", "order"), [(1, "ab ba ab ba ab ba"), (2, "aabb bbaa aabb"), (10**9, "aaaaaabbbbbb")]
 )
-def test_every_run_has_every_frame_and_the_first_rotates(turn, order):
+def test_every_run_has_every_frame_with_its_budget_and_the_first_rotates(turn, order):
     log = []
-    interleave(iter(FRAMES), [mode_run("a", log), mode_run("b", log)], turn)
+    interleave(iter(FRAMES), [mode_run(name, log, lambda index: Budget(calls=index)) for name in "ab"], turn)
     assert "".join(name for name, _ in log) == order.replace(" ", "")
     for name in "ab":
-        assert [index for who, index in log if who == name] == list(range(6))
-
-
-def test_each_frame_has_the_budget_of_its_index():
-    made = mode_run("a", [], budget=lambda index: Budget(calls=index))
-    interleave(FRAMES, [made], turn=2)
-    assert [b.calls for b in made.pipeline.budgets] == list(range(6))
+        assert [(index, calls) for who, (index, calls) in log if who == name] == [(k, k) for k in range(6)]
 
 
 def test_meters_are_read_at_the_ends_of_turns():
@@ -96,14 +89,8 @@ def test_meters_are_read_at_the_ends_of_turns():
         return now[0]
 
     clocks = Clocks(tick, tick, tick)
-    made = [
-        mode_run(
-            name,
-            [],
-            windows=Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), min_s=1e9),
-        )
-        for name in "ab"
-    ]
+    metered = [Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), min_s=1e9) for _ in "ab"]
+    made = [mode_run(name, [], windows=windows) for name, windows in zip("ab", metered, strict=True)]
     interleave(FRAMES, made, turn=3)
     for each in made:
         assert [line["frames"][2] for line in each.energy_lines] == [3, 3]

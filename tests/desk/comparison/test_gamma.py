@@ -1,38 +1,31 @@
 import numpy as np
 import pytest
 
-from modt.energy.meters.meter import Kind
 from modt.pipeline import STAGES
-from modt_desk.comparison.comparison import COUNTS
-from modt_desk.comparison.gamma import RunCosts, estimate_gamma, unit_costs
+from modt_desk.comparison.gamma import RunCosts, estimate_gamma
 from modt_desk.energy.savings import UnitCosts
-from modt_desk.reporting.quantity import Quantity, quantity, to_json
+
+from .test_prediction import run_costs
 
 TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
 FRAMES, N = 120, 50
 
 
 def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> RunCosts:
-    """A run of known costs: so many of the 50 proposals classified in each frame."""
-    random = np.random.default_rng(seed)
-    counts = np.zeros((len(classified), len(COUNTS)), np.int64)
-    counts[:, COUNTS.index("proposals")] = N
-    counts[:, COUNTS.index("tracks")] = 2
-    counts[:, COUNTS.index("classified_tracks")] = 2
-    counts[:, COUNTS.index("classified")] = classified
-    counts[:, COUNTS.index("points")] = classified * random.integers(50, 200, len(classified))
-    counts[:, COUNTS.index("calls")] = classified > 0
-    cost = np.zeros((len(classified), len(STAGES)))
-    for stage, value in (
-        ("segmentation", TRUE.seg),
-        ("tracking", TRUE.track),
-        ("scheduling", 1e-4),
-        ("fusion", 2e-4),
-    ):
-        cost[:, STAGES.index(stage)] = value
-    used = counts[:, [COUNTS.index(name) for name in ("calls", "classified", "points")]]
-    cost[:, STAGES.index("classification")] = used @ [TRUE.class_call, TRUE.class_item, TRUE.class_point]
-    return RunCosts(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
+    """A run of known costs that classifies so many of the 50 proposals in each frame."""
+    random, every = np.random.default_rng(seed), np.ones(len(classified))
+    points = classified * random.integers(50, 200, len(classified))
+    counts = {"proposals": N * every, "tracks": 2 * every, "classified_tracks": 2 * every, "classified": classified}
+    counts |= {"points": points, "calls": classified > 0}
+    network = np.column_stack([classified > 0, classified, points])
+    costs = {
+        "segmentation": TRUE.seg * every,
+        "tracking": TRUE.track * every,
+        "scheduling": 1e-4 * every,
+        "fusion": 2e-4 * every,
+        "classification": network @ [TRUE.class_call, TRUE.class_item, TRUE.class_point],
+    }
+    return run_costs(counts, costs, random, noise)
 
 
 def varied(noise: float = 0.0) -> RunCosts:
@@ -41,19 +34,6 @@ def varied(noise: float = 0.0) -> RunCosts:
 
 EVERY = np.full(FRAMES, N)
 FEW = np.full(FRAMES, 2)
-
-
-def test_unit_costs_are_found_from_varied_load() -> None:
-    found = unit_costs(varied())
-    for name in ("seg", "track", "class_call", "class_item", "class_point"):
-        assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
-
-
-def test_reconciliation_equals_measurement_at_constant_unit_costs() -> None:
-    found = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
-    assert found.reconciled.value == pytest.approx(found.measured.value)
-    assert found.deviation.value == pytest.approx(0.0, abs=1e-9)
-    assert found.reconciliation.explain(found.measured.value)[-1].change == pytest.approx(0.0, abs=1e-6)
 
 
 def test_intervals_cover_the_truth_with_noise() -> None:
@@ -95,20 +75,3 @@ def test_counts_and_costs_are_of_the_same_repetition() -> None:
     np.testing.assert_array_equal(middle.cost, passes[2].cpu_s())
     disturbed = RunCosts.median([Repeated(3), Repeated(3, slower=9.0), Repeated(3, slower=1.1)])
     np.testing.assert_allclose(disturbed.cost, 1.1 * passes[1].cpu_s())
-
-
-def test_quantity_without_a_value_is_unavailable() -> None:
-    assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
-    assert quantity(float("nan")).value is None
-    assert quantity(float("inf")).text() == "unavailable"
-    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "~1.00 J (0.500 to 1.50)"
-    assert quantity(440.0, "mJ", interval=(439.9, 440.1)).text() == "440 mJ"
-
-
-def test_trees_of_quantities_become_plain_data() -> None:
-    tree = {"a": [quantity(1.0)], "b": {"c": Quantity(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
-    assert to_json(tree) == {
-        "a": [{"value": 1.0, "unit": "", "kind": "measured"}],
-        "b": {"c": {"value": 2.0, "unit": "J", "kind": "integrated", "low": 1.0, "high": 3.0}},
-        "d": "text",
-    }

@@ -8,25 +8,26 @@ from scipy import optimize
 from modt.energy.meters.discovery import find_powercap
 from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Windows
-from modt_desk.energy.board_fit import CLASS, SEG, Fit, FitError, fit, nonnegative_fit, unit_energy_J
+from modt_desk.energy.board_fit import CLASS, SEG, FitError, fit, nonnegative_fit, unit_energy_J
 from tests.energy.simulated import SimulatedMachine, line_of
 
 TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
 NOISE = 0.1
 
 
-def drive(machine: SimulatedMachine, windows: int, noise: float, faults: bool) -> list[dict[str, Any]]:
+def drive(machine: SimulatedMachine, windows: int) -> list[dict[str, Any]]:
+    """Windows of a calibration with noise, during which the meter comes and goes."""
     random = machine.random
     ledger = machine.ledger()
     recorder = Windows(find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys))
     lines = []
     for _ in range(windows):
-        if faults and not machine.zone.is_dir():
+        if not machine.zone.is_dir():
             machine.appear()
-        elif faults and random.random() < 0.1:
+        elif random.random() < 0.1:
             machine.vanish()
         frames, load = int(random.integers(1, 9)), int(random.integers(0, 60))
-        luck = 1 + noise * random.standard_normal()
+        luck = 1 + NOISE * random.standard_normal()
         for _ in range(frames):
             ledger.run("segmentation", machine.work, 0.01, luck * TRUE["seg_J"])
             items, points = load, load * int(random.integers(20, 400))
@@ -42,43 +43,25 @@ def drive(machine: SimulatedMachine, windows: int, noise: float, faults: bool) -
     return lines
 
 
-def covered(result: Fit) -> dict[str, bool]:
-    return {c.name: c.low <= TRUE[c.name] <= c.high for c in result.coefficients}
-
-
-def trial(sys: Path, seed: int, windows: int = 40) -> tuple[Fit, list[dict[str, Any]]]:
-    """A calibration whose counter passes its range on the way."""
-    machine = SimulatedMachine(sys, idle_W=0.0, wrap_uJ=2_500_000_000, step_uJ=61.035, seed=seed)
-    machine.true_J = 2450.0
-    machine.wait(0.0)
-    lines = drive(machine, windows, NOISE, faults=True)
-    return fit(lines, np.random.default_rng(seed)), lines
-
-
-def test_noiseless_windows_give_the_coefficients_back(tmp_path: Path) -> None:
-    machine = SimulatedMachine(tmp_path, idle_W=0.0, wrap_uJ=10_000_000_000)
-    result = fit(drive(machine, 40, noise=0.0, faults=False), np.random.default_rng(0))
-    for coefficient in result.coefficients:
-        assert coefficient.value == pytest.approx(TRUE[coefficient.name], rel=1e-3)
-    assert result.explained > 0.99999
-    assert (result.windows, result.dropped) == (39, 1)  # nothing is known of a counter's power in the first one
-
-
 @pytest.mark.slow
 def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: Path) -> None:
+    """The counter passes its range on the way."""
     hits = dict.fromkeys(TRUE, 0)
-    wraps = lost = 0
-    for seed in range(100):
-        result, lines = trial(tmp_path / str(seed), seed)
-        wraps += sum("wrap" in line["marks"] for line in lines)
-        lost += sum("lost" in line["marks"] for line in lines)
+    marks: list[str] = []
+    for seed in range(50):
+        machine = SimulatedMachine(tmp_path / str(seed), idle_W=0.0, wrap_uJ=2_500_000_000, step_uJ=61.035, seed=seed)
+        machine.true_J = 2450.0
+        machine.wait(0.0)
+        lines = drive(machine, 40)
+        result = fit(lines, np.random.default_rng(seed))
+        marks += [mark for line in lines for mark in line["marks"]]
         assert result.windows + result.dropped == len(lines)
         for c in result.coefficients:
             hits[c.name] += c.low <= TRUE[c.name] <= c.high
             assert 0.0 <= c.low <= c.value <= c.high
-    assert min(hits.values()) >= 90
-    assert wraps > 40
-    assert lost > 100
+    assert min(hits.values()) >= 45
+    assert marks.count("wrap") > 10
+    assert marks.count("lost") > 50
 
 
 @pytest.mark.parametrize(
@@ -142,8 +125,3 @@ def test_it_is_the_bounded_solution_of_the_whole_problem(true: list[float]) -> N
     found = nonnegative_fit(X.T @ X, X.T @ y)
     np.testing.assert_allclose(found, optimize.nnls(X, y)[0], rtol=1e-6, atol=1e-9)
     assert (found >= 0).all()
-
-
-def test_what_was_never_counted_costs_nothing() -> None:
-    X = np.array([[1.0, 0.0], [2.0, 0.0]])
-    np.testing.assert_allclose(nonnegative_fit(X.T @ X, X.T @ [3.0, 6.0]), [3.0, 0.0])

@@ -1,7 +1,5 @@
 """Small frames with known answers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from modt.classes import CLASS_NAMES

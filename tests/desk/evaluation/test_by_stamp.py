@@ -28,11 +28,8 @@ def test_frames_have_the_labels_and_the_scan_of_their_stamp(origin_s):
     )
     assert {number: labels.id.tolist() for number, labels in found.frames.items()} == {7: [0]}
     assert [(scan.index, scan.path.name) for scan in found.scans.scans] == [(7, "0.bin"), (8, "2.bin")]
-
-
-def test_without_scans_there_are_no_stamps():
     bare = Truth({}, None, KITTI_RULES)
-    assert by_stamp(bare, {0: 0.0}) is bare
+    assert by_stamp(bare, {0: origin_s}) is bare, "without scans there are no stamps"
 
 
 def test_frames_are_found_and_those_between_passed_over():

@@ -17,7 +17,7 @@ def posterior(car):
     return [1 - car, car, 0.0, 0.0]
 
 
-def test_average_precision_and_what_is_said():
+def test_average_precision_precision_and_recall():
     blobs = [(blob(30, x), k) for k, x in enumerate((10, 18, 26, 34))]
     tracks = [(k, k, name) for k, name in enumerate(("car", "background", "car", "background"))]
     scene = frame(cars(10, 18, 42), blobs, tracks, posteriors=np.array([posterior(p) for p in (0.9, 0.5, 0.7, 0.2)]))
@@ -53,10 +53,7 @@ def test_calibration():
     assert top_calibration_error(sure, np.array([1, 0, 0])) == pytest.approx(1 / 3)
 
 
-@given(
-    st.lists(st.tuples(st.integers(0, 3), st.floats(0, 1)), min_size=1, max_size=40),
-    st.integers(0, 5),
-)
+@given(st.lists(st.tuples(st.integers(0, 3), st.floats(0, 1)), min_size=1, max_size=40), st.integers(0, 5))
 def test_average_precision_agrees_with_the_definition(rows, missed):
     label = np.array([r[0] for r in rows])
     value = np.array([r[1] for r in rows])

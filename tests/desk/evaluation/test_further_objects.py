@@ -1,11 +1,7 @@
 """Objects that the labels leave out."""
 
-from contextlib import suppress
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
@@ -56,14 +52,9 @@ def test_further_objects_count_for_their_class_alone(tmp_path):
     assert more.ranges["all"].segmentation == bare.ranges["all"].segmentation
     assert after.segmentable == before.segmentable == 1
     assert more.tracks == bare.tracks
+    association = judge(frame(further(tmp_path, CAR_AT_20), blobs, tracks), KITTI_RULES)[2][0]
+    assert (association.truth.tolist(), association.track.tolist()) == ([0], [7]), "the metrics leave them out"
     assert (more.further_objects, more.further_labels, bare.further_objects) == (1, 1, 0)
-
-
-def test_further_objects_are_neither_for_nor_against_in_the_metrics_of_tracks(tmp_path):
-    blobs = [(blob(40, 10), 0), (blob(40, 20), 1)]
-    scene = frame(further(tmp_path, CAR_AT_20), blobs, [(7, 0, "car"), (8, 1, "car")])
-    association = judge(scene, KITTI_RULES)[2][0]
-    assert (association.truth.tolist(), association.track.tolist()) == ([0], [7])
 
 
 @pytest.mark.parametrize(("n", "rules", "counts"), [(7, KITTI_RULES, 0), (8, KITTI_RULES, 1), (19, CUBOID_RULES, 0)])
@@ -100,29 +91,17 @@ def test_parked_cars_count_neither_for_nor_against(tmp_path):
         (HEAD + CAR_AT_20 + "0,6,Car,x,0,-1.7,4,2,1.5,0\n", r"further\.csv:3: no object"),
         (HEAD + "0,5,Car,nan,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: no object"),
         (HEAD + "0,5,Car,20,0,-1.7,4,0,1.5,0\n", r"further\.csv:2: no object"),
-        (HEAD + "-1,5,Car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: no object"),
-        (HEAD + "0,5,car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: 'car' is no type of an object; write one of Car"),
-        (HEAD + "1,5,Car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: frame 1 is not in the truth, which has 1 frames"),
+        (HEAD + "0,5,car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: 'car' .* write one of Car"),
+        (HEAD + "1,5,Car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: frame 1 is not in the truth"),
         (HEAD + 2 * CAR_AT_20, r"further\.csv:3: object 5 is in frame 0 twice"),
         (HEAD.replace("yaw", "turn") + CAR_AT_20, r"further\.csv:1: has no column yaw; begin with the line frame"),
-        ("", r"further\.csv:1: has no column frame, object"),
         (HEAD, r"further\.csv: holds no objects"),
         ("\udcff", r"further\.csv: cannot be read"),
-        (None, r"further\.csv: cannot be read"),
     ],
 )
 def test_broken_tables(tmp_path, text, message):
     path = tmp_path / "further.csv"
-    if text is not None:
-        path.write_bytes(text.encode(errors="surrogateescape"))
+    path.write_bytes(text.encode(errors="surrogateescape"))
     with pytest.raises(MisuseError, match=message) as error:
         with_further(Truth({0: cars(10.0)}, None, KITTI_RULES), path, KITTI_TYPES)
     assert "\n" not in str(error.value)
-
-
-@given(st.binary(max_size=80))
-def test_any_bytes_are_a_table_or_misuse(tmp_path_factory, data):
-    path = tmp_path_factory.getbasetemp() / "any.csv"
-    path.write_bytes(HEAD.encode() + CAR_AT_20.encode() + data)
-    with suppress(MisuseError):
-        with_further(Truth({0: cars(10.0)}, None, KITTI_RULES), path, KITTI_TYPES)

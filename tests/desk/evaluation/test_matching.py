@@ -23,6 +23,15 @@ def counting(*what):
     return dataclasses.replace(KITTI_RULES, ignored=KITTI_RULES.ignored - set(what))
 
 
+ONE, TWO = [(7, 0, "car")], [(7, 0, "car"), (8, 1, "car")]
+OBJECT, PROPOSAL = ["to_segment", "to_classify", "to_follow"], ["to_classify", "to_report", "to_associate"]
+
+
+def judged(truth, blobs, tracks=ONE, rules=KITTI_RULES, **more):
+    """Objects and proposals of a frame."""
+    return judge(frame(truth, blobs, tracks, **more), rules)[:2]
+
+
 @pytest.mark.parametrize(
     ("blobs", "outcome"),
     [
@@ -35,7 +44,7 @@ def counting(*what):
     ],
 )
 def test_outcomes_of_segmentation(blobs, outcome):
-    objects, _, _ = judge(frame(cars(10.0), blobs, []), KITTI_RULES)
+    objects, _ = judged(cars(10.0), blobs, [])
     assert objects["to_segment"].all()
     assert objects["outcome"].tolist() == [outcome]
 
@@ -43,101 +52,86 @@ def test_outcomes_of_segmentation(blobs, outcome):
 def test_points_near_the_ground_are_of_the_box_but_not_of_the_object():
     low = blob(30, 10)
     low[:, 2] = -1.6  # 0.1 m above the foot
-    objects, proposals, _ = judge(
-        frame(cars(10.0), [(blob(40, 10), 0), (low, 1)], [(7, 0, "car"), (8, 1, "car")]), KITTI_RULES
-    )
+    objects, proposals = judged(cars(10.0), [(blob(40, 10), 0), (low, 1)], TWO)
     assert objects["outcome"].tolist() == [Outcome.DETECTED]
     assert proposals["label"].tolist() == [CAR, BACKGROUND]
     assert proposals["owner"].tolist() == [CAR, CAR]
 
 
-def test_half_of_each_other_or_iou():
-    scene = frame(cars(10.0), [(blob(28, 10), 0), (blob(12, 10), NONE), (blob(27, 10, 5), 0)], [(7, 0, "car")])
-    assert judge(scene, KITTI_RULES)[1]["label"].tolist() == [CAR]
-    assert judge(scene, CUBOID_RULES)[1]["label"].tolist() == [BACKGROUND]
+@pytest.mark.parametrize(("rules", "label"), [(KITTI_RULES, CAR), (CUBOID_RULES, BACKGROUND)])
+def test_half_of_each_other_or_iou(rules, label):
+    blobs = [(blob(28, 10), 0), (blob(12, 10), NONE), (blob(27, 10, 5), 0)]
+    assert judged(cars(10.0), blobs, rules=rules)[1]["label"].tolist() == [label]
 
 
 def test_objects_of_few_points():
-    scene = frame(cars(10.0), [(blob(9, 10), 0)], [(7, 0, "car")])
-    objects, proposals, _ = judge(scene, KITTI_RULES)
-    assert not objects[["to_segment", "to_classify", "to_follow"]].tolist()[0][0]
+    few = cars(10.0), [(blob(9, 10), 0)]
+    objects, proposals = judged(*few)
+    assert objects[OBJECT].tolist() == [(False, False, False)]
     assert not proposals["to_classify"][0]
-    assert judge(scene, counting("few"))[1]["to_classify"][0]
-    between = judge(frame(cars(10.0), [(blob(15, 10), 0)], [(7, 0, "car")]), KITTI_RULES)[0]
-    assert (between["to_segment"][0], between["to_follow"][0]) == (False, True)
+    assert judged(*few, rules=counting("few"))[1]["to_classify"][0]
+    assert judged(cars(10.0), [(blob(15, 10), 0)])[0][["to_segment", "to_follow"]].tolist() == [(False, True)]
 
 
 def test_objects_cut_by_the_view():
     left = FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))
-    blobs = [(blob(30, 10, -0.4), 0), (blob(20, 10, 0.4), 0)]
-    scene = frame(cars(10.0), blobs, [(7, 0, "car")], fov=left)
-    objects, proposals, _ = judge(scene, KITTI_RULES)
-    assert not objects["in_view"][0]
-    assert not objects["to_segment"][0]
-    assert not objects["to_classify"][0]
-    assert objects["to_follow"][0]
+    cut = cars(10.0), [(blob(30, 10, -0.4), 0), (blob(20, 10, 0.4), 0)]
+    objects, proposals = judged(*cut, fov=left)
+    assert objects[["in_view", *OBJECT]].tolist() == [(False, False, False, True)]
     assert not proposals["to_classify"][0]
-    counted, rows, _ = judge(scene, counting("cut"))
-    assert counted["to_segment"][0]
-    assert counted["to_classify"][0]
+    counted, rows = judged(*cut, fov=left, rules=counting("cut"))
+    assert counted[OBJECT].tolist() == [(True, True, True)]
     assert rows["label"][0] == CAR
 
 
-def test_beyond_the_labelled_sector_nothing_is_judged_but_life():
-    truth = FrameTruth.of(KITTI_TYPES, [0], ["Car"], [car(1.0, 10.0)])
-    objects, proposals, _ = judge(frame(truth, [(blob(30, 1, 10), 0)], [(7, 0, "car")]), KITTI_RULES)
-    assert objects[["to_segment", "to_classify", "to_follow"]].tolist() == [(True, False, True)]
+def test_beyond_the_labelled_sector_only_the_life_of_tracks_is_judged():
+    objects, proposals = judged(FrameTruth.of(KITTI_TYPES, [0], ["Car"], [car(1.0, 10.0)]), [(blob(30, 1, 10), 0)])
+    assert objects[OBJECT].tolist() == [(True, False, True)]
     assert not proposals["to_report"][0]
 
 
 def test_parked_cars_outside_their_labels():
     nothing = FrameTruth.of(KITTI_TYPES, [], [], [], parked=np.array([car(10.0)]))
-    scene = frame(nothing, [(blob(30, 10), 0), (blob(30, 30), 1)], [(7, 0, "car"), (8, 1, "car")])
-    for column in ("to_classify", "to_report", "to_associate"):
-        assert judge(scene, KITTI_RULES)[1][column].tolist() == [False, True]
-        assert judge(scene, counting("parked"))[1][column].tolist() == [True, True]
-    labelled = dataclasses.replace(scene, truth=dataclasses.replace(cars(10.0), parked=nothing.parked))
-    assert judge(labelled, KITTI_RULES)[1]["to_classify"].tolist() == [True, True]
+    blobs = [(blob(30, 10), 0), (blob(30, 30), 1)]
+    assert judged(nothing, blobs, TWO)[1][PROPOSAL].tolist() == [(False,) * 3, (True,) * 3]
+    assert judged(nothing, blobs, TWO, counting("parked"))[1][PROPOSAL].tolist() == [(True,) * 3] * 2
+    labelled = dataclasses.replace(cars(10.0), parked=nothing.parked)
+    assert judged(labelled, blobs, TWO)[1]["to_classify"].tolist() == [True, True]
 
 
-def test_dontcare_regions():
+@pytest.mark.parametrize(("rules", "reported"), [(KITTI_RULES, False), (counting("dontcare"), True)])
+def test_dontcare_regions(rules, reported):
     region = Regions(np.array([[490.0, 0.0, 510.0, 360.0]]), AHEAD_CAMERA)
     nothing = FrameTruth.of(KITTI_TYPES, [], [], [], regions=region)
-    scene = frame(nothing, [(blob(30, 20), 0), (blob(30, 20, 5), 1)], [(7, 0, "car"), (8, 1, "car")])
-    assert judge(scene, KITTI_RULES)[1]["to_report"].tolist() == [False, True]
-    assert judge(scene, counting("dontcare"))[1]["to_report"].tolist() == [True, True]
+    _, proposals = judged(nothing, [(blob(30, 20), 0), (blob(30, 20, 5), 1)], TWO, rules)
+    assert proposals["to_report"].tolist() == [reported, True]
 
 
-def test_roles_of_labelled_types():
-    blobs, tracks = [(blob(30, 10), 0)], [(7, 0, "car")]
-
-    def rows(types, name):
-        return judge(frame(FrameTruth.of(types, [0], [name], [car(10.0)]), blobs, tracks), CUBOID_RULES)[:2]
-
-    van, of_van = rows(KITTI_TYPES, "Van")
-    assert van["to_classify"][0]
-    assert of_van["label"][0] == CAR
-    van, of_van = rows(PAPER_TYPES, "Van")
-    assert not van[["to_segment", "to_classify", "to_follow"]].tolist()[0][0]
-    assert of_van[["to_classify", "to_report", "to_associate"]].tolist() == [(False, False, False)]
-    bus, of_bus = rows(PANDASET_TYPES, "Bus")
-    assert bus[["to_segment", "to_classify", "to_follow"]].tolist() == [(True, False, True)]
-    assert (of_bus["to_classify"][0], of_bus["to_report"][0], of_bus["owner"][0]) == (False, True, CAR)
-    tram, of_tram = rows(KITTI_TYPES, "Tram")
-    assert tram[["to_segment", "to_classify", "to_follow"]].tolist() == [(True, False, False)]
-    assert (of_tram["to_classify"][0], of_tram["to_report"][0], of_tram["owner"][0]) == (True, True, BACKGROUND)
+@pytest.mark.parametrize(
+    ("types", "name", "judgement", "of_proposal", "owner"),
+    [
+        (KITTI_TYPES, "Van", (True, True, True), (True, True, True), CAR),
+        (PAPER_TYPES, "Van", (False, False, False), (False, False, False), CAR),
+        (PANDASET_TYPES, "Bus", (True, False, True), (False, True, False), CAR),
+        (KITTI_TYPES, "Tram", (True, False, False), (True, True, True), BACKGROUND),
+    ],
+)
+def test_roles_of_labelled_types(types, name, judgement, of_proposal, owner):
+    truth = FrameTruth.of(types, [0], [name], [car(10.0)])
+    objects, proposals = judged(truth, [(blob(30, 10), 0)], rules=CUBOID_RULES)
+    assert objects[OBJECT].tolist() == [judgement]
+    assert proposals[PROPOSAL].tolist() == [of_proposal]
+    assert proposals["owner"][0] == owner
 
 
-def test_range():
-    far = frame(cars(70.0), [(blob(30, 70), 0)], [(7, 0, "car")])
-    assert not judge(far, CUBOID_RULES)[0]["to_follow"][0]
-    assert not judge(far, CUBOID_RULES)[1]["to_report"][0]
-    assert judge(far, KITTI_RULES)[0]["to_follow"][0]
+@pytest.mark.parametrize(("rules", "counts"), [(CUBOID_RULES, False), (KITTI_RULES, True)])
+def test_range(rules, counts):
+    objects, proposals = judged(cars(70.0), [(blob(30, 70), 0)], rules=rules)
+    assert (objects["to_follow"][0], proposals["to_report"][0]) == (counts, counts)
 
 
 def test_frames_without_objects_or_proposals():
-    nothing = FrameTruth.of(KITTI_TYPES, [], [], [])
-    objects, proposals, _ = judge(frame(nothing, [], []), KITTI_RULES)
+    objects, proposals = judged(FrameTruth.of(KITTI_TYPES, [], [], []), [], [])
     assert (len(objects), len(proposals)) == (0, 0)
     objects, proposals, associations = judge(frame(cars(10.0), [(blob(30, 10), NONE)], []), KITTI_RULES)
     assert (objects["outcome"][0], objects["track"][0], len(proposals)) == (Outcome.MISSED, NONE, 0)
@@ -146,17 +140,12 @@ def test_frames_without_objects_or_proposals():
 
 def test_associations_compare_by_the_points_in_common():
     blobs = [(blob(30, 10), 0), (blob(10, 10), NONE), (blob(20, 10, 5), 0)]
-    _, _, associations = judge(frame(cars(10.0, first_id=5), blobs, [(7, 0, "car")]), KITTI_RULES)
-    assert (associations[0].truth.tolist(), associations[0].track.tolist()) == ([5], [7])
-    assert associations[0].similarity.tolist() == [[0.5]]
-    assert not len(associations[1].truth)
+    _, _, (first, second, *_) = judge(frame(cars(10.0, first_id=5), blobs, ONE), KITTI_RULES)
+    assert (first.truth.tolist(), first.track.tolist(), first.similarity.tolist()) == ([5], [7], [[0.5]])
+    assert not len(second.truth)
 
 
-@given(
-    st.integers(0, 2**32 - 1),
-    st.integers(1, 6),
-    st.booleans(),
-)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.booleans())
 def test_points_of_objects_are_those_inside(seed, n, tilted):
     rng = np.random.default_rng(seed)
     points = np.c_[rng.uniform(-150, 150, (3000, 2)), rng.uniform(-2, 2, 3000), np.zeros(3000)].astype(np.float32)

@@ -15,7 +15,7 @@ PLACES = (10.0, 20.0)
 
 
 def followed(*histories, points=30):
-    """Frames in which each of two cars is followed by these tracks, None for a miss, '-' where it is not labelled."""
+    """Frames with two cars and the tracks that follow each of them: None for a miss, '-' where it is not labelled."""
     frames = []
     for index, tracks in enumerate(zip(*histories, strict=True)):
         shown = [k for k, track in enumerate(tracks) if track != "-"]

@@ -108,6 +108,13 @@ def test_a_table_beside_each_scan(tmp_path):
     assert truth.frames[70].box.tolist() == [[9, 1, 0, 4, 2, 1.5, 0]]
 
 
+def labels(folder, text):
+    path = layouts.tracking(folder).parents[1] / "label_02" / "0003.txt"
+    path.parent.mkdir()
+    path.write_text("0 4 " + LABEL.format(type="Car", edges="0 0 9 9") + text)
+    return path
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -117,21 +124,13 @@ def test_a_table_beside_each_scan(tmp_path):
         (lambda p: cuboids(p, "0,b,Car,9,1,0.5,2,1,1.5,0.1\n"), r"truth\.csv:2: no cuboid"),
         (lambda p: cuboids(p, "2,3,Car,9,1,0.5,2,1,1.5,0.1\n"), r"2 poses, none for frame 2"),
         (lambda p: tracklets(layouts.raw_drive(p), ("Car", "x", [1])), "item 0 is no tracklet"),
+        (lambda p: labels(p, "0 4 Car 0 0\n"), r"0003\.txt:2: no label"),
+        (lambda p: labels(p, "0 4 " + LABEL.format(type="Car", edges="a b c d")), r"0003\.txt:2: no label"),
     ],
 )
 def test_broken_truth(tmp_path, make, message):
     with pytest.raises(MisuseError, match=message):
         open_truth(make(tmp_path))
-
-
-def test_broken_label_files(tmp_path):
-    scans = layouts.tracking(tmp_path)
-    (scans.parents[1] / "label_02").mkdir()
-    path = scans.parents[1] / "label_02" / "0003.txt"
-    for text in ("0 4 Car 0 0\n", "0 4 " + LABEL.format(type="Car", edges="a b c d")):
-        path.write_text("0 4 " + LABEL.format(type="Car", edges="0 0 9 9") + text)
-        with pytest.raises(MisuseError, match=r"0003\.txt:2: no label"):
-            open_truth(path)
 
 
 @pytest.mark.kitti

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from modt.errors import MisuseError
@@ -7,20 +5,12 @@ from modt_desk.evaluation.truth import Role
 from modt_desk.experiments.catalogue import chosen
 from modt_desk.experiments.drives import completed, kitti_drives
 from modt_desk.experiments.study import Study
-from modt_desk.simulation.kitti_raw import DriveWriter
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
-
-
-def test_a_folder_without_labels_is_refused(tmp_path):
-    with pytest.raises(MisuseError, match="no labelled KITTI drives"):
-        kitti_drives(tmp_path)
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.desk.recorded import written
 
 
 def test_further_objects_make_another_drive_of_the_one_that_has_its_sweeps(tmp_path):
-    writer = DriveWriter(tmp_path, CAMERA)
-    for frame, truth in SyntheticStream("street", "vlp-16", 0.2, seed=2).sweeps():
-        writer.write(frame, truth)
-    writer.close()
+    written(tmp_path, SyntheticStream("street", "vlp-16", 0.2, seed=2))
     table = tmp_path / "further.csv"
     head = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
     table.write_text(f"{head}\n0,0,Pedestrian,9,0,-1.7,0.6,0.6,1.7,0\n")
@@ -34,11 +24,16 @@ def test_further_objects_make_another_drive_of_the_one_that_has_its_sweeps(tmp_p
     assert streams == {drives[0].name, whole.name}
     with pytest.raises(MisuseError, match="2 have their sweeps"):
         completed([*drives, *drives], table)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(MisuseError, match="no labelled KITTI drives"):
+        kitti_drives(tmp_path / "empty")
 
 
 @pytest.mark.kitti
 def test_the_labels_give_table_iii(kitti_root):
-    study = Study(chosen(["table3", "fig8"]), kitti_drives(kitti_root), [()])
+    drives = kitti_drives(kitti_root)
+    assert [drive.name for drive in drives if drive.scans] == ["0005"], "only those with their sweeps are replayed"
+    study = Study(chosen(["table3", "fig8"]), drives, [()])
     rows = study.rows(1, lambda name: None)
     found = {row.streams: row for row in rows if row.experiment == "table3" and row.quantity == "N_go"}
     lives = {"0005, tracking 0000": 34.9, "0014, tracking 0004": 26.9, "0001": 33.1, "0059, tracking 0011": 63.3}
@@ -46,8 +41,3 @@ def test_the_labels_give_table_iii(kitti_root):
     assert [found[name].paper for name in lives] == [34.9, 27.1, 32.4, 61.9]
     beta = [row.value for row in rows if row.streams == "0059, tracking 0011" and row.experiment == "fig8"]
     assert beta == sorted(beta, reverse=True)
-
-
-@pytest.mark.kitti
-def test_only_drives_with_their_sweeps_are_replayed(kitti_root):
-    assert [drive.name for drive in kitti_drives(kitti_root) if drive.scans] == ["0005"]

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ CAR = int(ObjectClass.CAR)
 
 
 def judged(n_objects: int, n_frames: int, seed: int = 0) -> Judged:
-    """Cars that are found now and then, and as many tracks of other things."""
+    """Cars that are detected in four of five frames, and as many tracks of other things."""
     rng = np.random.default_rng(seed)
     ids, frames = (grid.ravel() for grid in np.meshgrid(np.arange(n_objects), np.arange(n_frames)))
     found = rng.random(len(ids)) < 0.8
@@ -50,15 +48,12 @@ def test_average_precision_is_that_of_the_judgement():
     assert car.low < car.value < car.high
 
 
-def test_a_single_object_has_no_interval():
-    car = next(f for f in precisions(judged(1, 30), "x") if f.quantity == "AP car").estimate
-    assert car.value > 0
-    assert car.low is car.high is None
-
-
-def test_more_objects_have_a_narrower_interval():
+def test_more_objects_have_a_narrower_interval_and_a_single_one_has_none():
     few, many = (next(precisions(judged(n, 20), "x")).estimate for n in (4, 64))
     assert many.high - many.low < few.high - few.low
+    single = next(f for f in precisions(judged(1, 30), "x") if f.quantity == "AP car").estimate
+    assert single.value > 0
+    assert single.low is single.high is None
 
 
 def test_ratio_is_one_of_sums_and_resamples_whole_objects():
@@ -89,7 +84,7 @@ def test_further_objects_count_for_precision_alone():
     assert len(ObjectLengths.of(made).wanted) == 3
 
 
-def test_a_curve_falls_from_the_most_probable_to_the_last_found():
+def test_a_curve_falls_from_the_most_probable_to_the_last_detected():
     found = [(f.at, f.estimate.value) for f in curves(judged(5, 30), "x") if f.quantity == "precision car"]
     recalls, values = zip(*found, strict=True)
     assert list(recalls) == sorted(recalls)

@@ -1,30 +1,13 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from modt.app import assembly
 from modt.profile import load
-from modt.segmentation.kernels import NUMPY
 from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.experiments.drives import simulated_drives
 from modt_desk.experiments.figures import ObjectLengths
 from modt_desk.experiments.judged import NetworkReplay
-from modt_desk.experiments.segmented import segmented
-
-
-def test_a_segmented_drive_keeps_the_points_that_matter():
-    config = load("hdl-64e")
-    first = segmented(DRIVE, config)
-    segmenter = assembly.segmenter(config, DRIVE.fov(), NUMPY)
-    for made, (frame, truth) in zip(first.frames, DRIVE.sweeps(), strict=True):
-        whole = segmenter.segment(frame.points)
-        np.testing.assert_array_equal(made.proposals.coordinates, whole.coordinates)
-        np.testing.assert_array_equal(made.proposals.box, whole.box)
-        np.testing.assert_array_equal(made.frame.points[made.proposals.members], frame.points[whole.members])
-        np.testing.assert_array_equal(made.truth.box, truth.box)
-        assert len(made.frame.points) < len(frame.points)
 
 
 @pytest.mark.slow
@@ -59,15 +42,10 @@ def test_the_ideal_tracker_never_breaks_a_life_that_it_follows():
     assert ObjectLengths.of(ideal).followed.sum() > 0
 
 
-def test_with_an_ideal_tracker_tracking_by_detection_calls_every_proposal():
-    replay = NetworkReplay(load("hdl-64e"), "conventional", ideal=True)
-    found = replay.judged(DRIVE)
-    assert len(found.calls) == found.frames["proposals"].sum()
-
-
 def test_beyond_the_range_of_interest_there_is_nothing():
     for ideal in (True, False):
-        replay = NetworkReplay(load("hdl-64e"), ideal=ideal, range_m=20.0)
-        found = replay.judged(DRIVE).proposals
-        assert len(found)
+        replay = NetworkReplay(load("hdl-64e"), "conventional", ideal=ideal, range_m=20.0)
+        judged = replay.judged(DRIVE)
+        found = judged.proposals
         assert found["range_m"][found["label"] == 0].max() <= 25.0
+        assert len(judged.calls) == judged.frames["proposals"].sum(), "tracking by detection calls every proposal"

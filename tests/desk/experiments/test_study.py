@@ -1,24 +1,16 @@
-from __future__ import annotations
-
 import pytest
 
 from modt_desk.experiments.catalogue import EXPERIMENTS, chosen
 from modt_desk.experiments.drives import simulated_drives
 from modt_desk.experiments.segmented import _segmented
-from modt_desk.experiments.study import Row, Study
-
-
-def rows(jobs: int) -> list[Row]:
-    return Study(chosen(["table5"]), simulated_drives(2, 0.3), [()]).rows(jobs, lambda name: None)
+from modt_desk.experiments.study import Study
 
 
 def test_a_replay_that_experiments_share_is_made_once():
-    apart = [
-        Study([EXPERIMENTS[name]], simulated_drives(1, 0.4), [()]).tasks() for name in ("table5", "fig14", "table6")
-    ]
-    together = Study(chosen(["table5", "fig14", "table6"]), simulated_drives(1, 0.4), [()]).tasks()
+    names, drives = ["table5", "fig14", "table6"], simulated_drives(1, 0.4)
+    apart = [Study([EXPERIMENTS[name]], drives, [()]).tasks() for name in names]
     assert [len(tasks) for tasks in apart] == [2, 2, 2]
-    assert len(together) == 3, "conventional, accurate and efficient"
+    assert len(Study(chosen(names), drives, [()]).tasks()) == 3, "conventional, accurate and efficient"
 
 
 def test_drives_and_profiles_have_tasks_of_their_own():
@@ -27,14 +19,11 @@ def test_drives_and_profiles_have_tasks_of_their_own():
 
 
 @pytest.mark.slow
-def test_a_drive_is_segmented_once_for_each_profile():
+def test_a_drive_is_segmented_once_for_each_profile_and_several_processes_give_the_same_rows():
     _segmented.cache_clear()
     done = []
-    Study(chosen(["table5", "fig11"]), simulated_drives(2, 0.2), [(), ("paper",)]).rows(1, done.append)
-    assert _segmented.cache_info().misses == 4
-    assert len(done) == _segmented.cache_info().misses + _segmented.cache_info().hits
-
-
-@pytest.mark.slow
-def test_several_processes_give_the_same_rows():
-    assert rows(2) == rows(1)
+    study = Study(chosen(["table5"]), simulated_drives(2, 0.2), [(), ("paper",)])
+    rows = study.rows(1, done.append)
+    info = _segmented.cache_info()
+    assert (info.misses, info.misses + info.hits) == (4, len(done))
+    assert study.rows(2, done.append) == rows

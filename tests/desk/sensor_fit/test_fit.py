@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from modt import assets, profile
-from modt.config import ProfileConfig
 from modt.sensor_fit.beams import cell_m
 from modt.sources.recognise import open_stream
-from modt_desk.sensor_fit.findings import Finding, Recording, doubts, profile_text
-from modt_desk.sensor_fit.fit import FINDERS, fit
+from modt_desk.sensor_fit.findings import Recording, doubts, profile_text
+from modt_desk.sensor_fit.fit import fit
 from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording, with_mast, with_scale
 
@@ -26,8 +25,9 @@ def fitted(name, scene="street"):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", ["street", "hall"])
-@pytest.mark.parametrize("name", ["vlp-16", "hdl-64e", "pandar64", "mid-360"])
+@pytest.mark.parametrize(
+    ("name", "scene"), [("vlp-16", "street"), ("hdl-64e", "hall"), ("pandar64", "street"), ("mid-360", "hall")]
+)
 def test_the_height_is_found(name, scene):
     config, _ = fitted(name, scene)
     assert config.sensor.height_m == pytest.approx(sensor(name).height_m, abs=0.1)
@@ -61,28 +61,26 @@ def test_a_recording_that_stands_still_does_not_tell_the_robot_from_what_is_arou
     assert any("min_range_m" in doubt and "stands still" in doubt for doubt in doubts(findings))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "scale"), [("hdl-64e", "hdl-64e"), ("vlp-16", "none")])
-def test_the_scale_of_the_reflectance_is_found(name, scale):
-    assert fitted(name)[0].sensor.reflectance == scale
+def without_reflectance(recorded):
+    swept = [np.column_stack([p[:, :3], np.full(len(p), -1, np.float32)]) for p in recorded.sweeps]
+    return Recording(swept, recorded.stamps_s)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "scale"), [("pandar64", "pandar64"), ("vlp-16", "none")])
-def test_a_scale_of_several_sensors_counts_with_the_beams_that_are_known(name, scale):
-    config, findings = fit(with_scale(recording(name), "pandar64"))
+@pytest.mark.parametrize(
+    ("name", "change", "scale", "evidence"),
+    [
+        ("hdl-64e", None, "hdl-64e", ""),
+        ("vlp-16", None, "none", ""),
+        ("pandar64", lambda recorded: with_scale(recorded, "pandar64"), "pandar64", "as of the pandar64"),
+        ("vlp-16", lambda recorded: with_scale(recorded, "pandar64"), "none", "other beams"),
+        ("hdl-64e", without_reflectance, "none", "none is recorded"),
+    ],
+)
+def test_the_scale_of_the_reflectance_is_found_where_the_beams_are_known(name, change, scale, evidence):
+    config, findings = fit(change(recording(name))) if change else fitted(name)
     assert config.sensor.reflectance == scale
-    said = next(f.evidence for f in findings if f.key == "reflectance")
-    assert "as of the pandar64" in said
-    assert ("other beams" in said) is (scale == "none")
-
-
-@pytest.mark.slow
-def test_reflectance_that_is_not_recorded_has_no_scale():
-    swept = [np.column_stack([p[:, :3], np.full(len(p), -1, np.float32)]) for p in recording("hdl-64e").sweeps]
-    config, findings = fit(Recording(swept, recording("hdl-64e").stamps_s))
-    assert config.sensor.reflectance == "none"
-    assert next(f.evidence for f in findings if f.key == "reflectance") == "none is recorded"
+    assert evidence in next(f.evidence for f in findings if f.key == "reflectance")
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -100,16 +98,6 @@ def test_the_text_is_the_profile(name):
     assert profile.parse(text) == config
     assert text.count("check this") == len(doubts(findings)) > 0
     assert max(map(len, text.split("\n"))) < 200
-
-
-def test_a_finder_adds_keys_that_rest_on_those_before_it():
-    def frequencies(_: Recording, config: ProfileConfig):
-        assert config.sensor.height_m == pytest.approx(0.8, abs=0.1)
-        yield Finding("decision", "frequency", (0.1, 0.1, 0.1), "counted")
-
-    config, findings = fit(recording("vlp-16"), (*FINDERS, frequencies))
-    assert config.decision.frequency == (0.1, 0.1, 0.1)
-    assert profile.parse(profile_text("with frequencies", findings)) == config
 
 
 @pytest.mark.kitti

@@ -8,25 +8,21 @@ import pytest
 from modt.cli.main import main
 from modt.geometry import inverse
 from modt.sources.recognise import open_stream
-from modt_desk.simulation.kitti_raw import DATE, DriveWriter
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from modt_desk.simulation.kitti_raw import DATE
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.desk.recorded import written
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("drive")
+def drive(tmp_path_factory):
+    """A street on disk: its writer, its stream, its sweeps."""
     stream = SyntheticStream("street", "vlp-16", 1.5, seed=4)
-    writer = DriveWriter(folder, CAMERA)
-    sweeps = list(stream.sweeps())
-    for frame, truth in sweeps:
-        writer.write(frame, truth)
-    writer.close()
-    return writer, stream, sweeps
+    return written(tmp_path_factory.mktemp("drive"), stream), stream, list(stream.sweeps())
 
 
 @pytest.mark.parametrize("layout", ["drive", "sequence"])
-def test_points_times_poses_and_camera_are_read_back(written, layout):
-    writer, stream, sweeps = written
+def test_points_times_poses_and_camera_are_read_back(drive, layout):
+    writer, stream, sweeps = drive
     read = open_stream(getattr(writer, layout))
     frames = list(read)
     assert [f.index for f in frames] == [f.index for f, _ in sweeps]
@@ -46,20 +42,16 @@ def test_points_times_poses_and_camera_are_read_back(written, layout):
 @pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
 def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, turn_s):
     stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
-    writer = DriveWriter(tmp_path, CAMERA)
-    for frame, truth in stream.sweeps():
-        assert frame.turn_s == turn_s
-        writer.write(frame, truth)
-    writer.close()
+    assert [frame.turn_s for frame in stream] == [turn_s] * 3
+    writer = written(tmp_path, stream)
     read = open_stream(writer.drive)
-    assert read.info.notes == ()
     np.testing.assert_allclose([f.turn_s for f in read], turn_s, atol=1e-9)
     starts, stamps = ((writer.drive / "velodyne_points" / f"timestamps{k}.txt").read_text() for k in ("_start", ""))
     assert (starts == stamps) is not distort
 
 
-def test_tracklets_hold_the_boxes_in_view_of_the_camera(written):
-    writer, _, sweeps = written
+def test_tracklets_hold_the_boxes_in_view_of_the_camera(drive):
+    writer, _, sweeps = drive
     items = ET.parse(writer.drive / "tracklet_labels.xml").getroot().find("tracklets").findall("item")
     assert len(items) > 3
     assert {i.findtext("objectType") for i in items} <= {"Car", "Van", "Truck", "Pedestrian", "Cyclist"}
@@ -74,8 +66,8 @@ def test_tracklets_hold_the_boxes_in_view_of_the_camera(written):
             assert at[0] > 0
 
 
-def test_labels_hold_class_and_instance(written):
-    writer, _, sweeps = written
+def test_labels_hold_class_and_instance(drive):
+    writer, _, sweeps = drive
     for frame, truth in sweeps[:3]:
         packed = np.fromfile(writer.sequence / "labels" / f"{frame.index:06d}.label", np.uint32)
         np.testing.assert_array_equal(packed & 0xFFFF, truth.semantic)

@@ -1,19 +1,16 @@
-"""Reported intensities: as a real HDL-64E reports them, without effect on anything else."""
+"""Intensities are like those of a real HDL-64E, and have no effect on anything else."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt_desk.simulation.materials import (
-    Material,
-)
+from modt_desk.simulation.materials import Material
 from modt_desk.simulation.raycast import RayCaster
 from modt_desk.simulation.sensors import sensor
 from modt_desk.simulation.simulator import Receiver
 from modt_desk.simulation.solids import box
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt_desk.simulation.vehicles import car, car_size, van, van_size
 
 HDL = sensor("hdl-64e")
 
@@ -65,28 +62,9 @@ def test_an_intensity_offset_changes_the_intensity_alone():
 
 def test_paint_is_darker_at_grazing_incidence():
     turned = [received(box((14.0, 0.0, 0.0), (0.1, 3.0, 1.0), Material.CAR_PAINT, yaw))[1] for yaw in (0.0, 0.8, 1.3)]
-    c, s = np.cos(1.2), np.sin(1.2)
-    lean = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    centre = np.array([14.0, 0.0, 0.0])
-    upright = box((0.0, 0.0, 0.0), (0.1, 3.0, 1.0), Material.CAR_PAINT)
-    leant = received(upright.transformed(lean, centre))[1]
     means = [v.mean() for v in turned]
     assert means == sorted(means, reverse=True)
     assert means[2] < 0.6 * means[0]
-    assert leant.mean() < 0.6 * means[0]
-    assert (leant == 0).mean() > 0.1 > (turned[0] == 0).mean()
-
-
-@pytest.mark.parametrize(("make", "size"), [(car, car_size), (van, van_size)])
-def test_plates_and_lamps_lie_at_the_ends_of_a_vehicle_inside_its_box(make, size):
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        length, width, height = size(rng)
-        made = make(rng, (length, width, height))
-        part = made.take(np.isin(made.material, (Material.RETRO, Material.LAMP)))
-        assert len(part) == 4
-        assert (np.abs(part.centre) + part.half <= np.array([length, width, 2 * height]) / [2, 2, 2] + 0.01).all()
-        assert (np.abs(part.centre[:, 0]) > 0.4 * length).all()
 
 
 def test_a_body_keeps_its_intensity_offset():

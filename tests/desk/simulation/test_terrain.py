@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from modt.geometry import rotation_zyx, se3
 from modt_desk.simulation.materials import Material
 from modt_desk.simulation.raycast import RayCaster
 from modt_desk.simulation.sensors import sensor
@@ -26,13 +27,7 @@ def ground(height) -> Terrain:
 
 def tilted(pitch_rad=0.0, roll_rad=0.0):
     """(4, 4) pose of a sensor above the origin."""
-    pitch = np.array(
-        [[np.cos(pitch_rad), 0, np.sin(pitch_rad)], [0, 1, 0], [-np.sin(pitch_rad), 0, np.cos(pitch_rad)]]
-    )
-    roll = np.array([[1, 0, 0], [0, np.cos(roll_rad), -np.sin(roll_rad)], [0, np.sin(roll_rad), np.cos(roll_rad)]])
-    T = np.eye(4)
-    T[:3, :3], T[2, 3] = pitch @ roll, HEIGHT_M
-    return T
+    return se3(rotation_zyx(roll_rad, pitch_rad, 0.0), np.array([0.0, 0.0, HEIGHT_M]))
 
 
 def points_on(terrain: Terrain, caster: RayCaster, T, share=1.0):

@@ -46,20 +46,7 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     assert [rows[0][f"motion_{name}"] for name in CLASS_NAMES] == [0, 150, -60, 20]
 
 
-def test_an_earlier_record_is_read():
-    old = [{key: value for key, value in post.items() if key != "witness"} for post in posts(0.0)]
-    table = track_table([frame_rows(0, recorded(0, *old), [])], np.zeros((1, 3)))
-    for name in ("classified", "motion_car"):
-        assert not table[:, COLUMNS.index(name)].any()
-
-
-@pytest.mark.parametrize("frames", [0, 1])
-def test_no_track_is_no_row(frames):
-    rows = [frame_rows(at, recorded(at), []) for at in range(frames)]
-    assert track_table(rows, np.zeros((frames, 3))).shape == (0, len(COLUMNS))
-
-
-def rows(x, y, seen=1):
+def rows(x, y=0.0, seen=1):
     table = np.zeros((len(x), len(COLUMNS)), np.int64)
     for name, values in {"x": x, "y": y}.items():
         table[:, COLUMNS.index(name)] = np.multiply(values, SCALE[name])
@@ -67,14 +54,20 @@ def rows(x, y, seen=1):
     return table
 
 
+FAR, LOST = rows([60]), rows([60] * 50, seen=0)
+
+
 @pytest.mark.parametrize(
-    ("x", "y", "reach"),
-    [([3, -4], [0, 1], 6.0), ([3, 1], [0, 12], 20.0), ([-25], [2], 30.0), ([80], [2], REACH_M), ([], [], REACH_M)],
+    ("table", "reach"),
+    [
+        (rows([3, -4], [0, 1]), 6.0),
+        (rows([3, 1], [0, 12]), 20.0),
+        (rows([-25], [2]), 30.0),
+        (rows([80], [2]), REACH_M),
+        (track_table([], np.zeros((0, 3))), REACH_M),
+        (np.concatenate([rows(np.linspace(-8, 8, 40)), FAR, LOST]), 10.0),
+    ],
+    ids=["room", "hall", "street", "beyond", "no track", "one far and lost ones"],
 )
-def test_a_room_is_shown_larger_than_a_street(x, y, reach):
-    assert reach_m(rows(x, y)) == reach
-
-
-def test_a_single_track_far_away_and_lost_ones_do_not_count():
-    far, lost = rows([60], [0]), rows([60] * 50, [0] * 50, seen=0)
-    assert reach_m(np.concatenate([rows(np.linspace(-8, 8, 40), np.zeros(40)), far, lost])) == 10.0
+def test_a_room_is_shown_larger_than_a_street(table, reach):
+    assert reach_m(table) == reach

@@ -26,40 +26,30 @@ def recording(stamps):
     return Recording(Frame(i, s, np.full((3, 4), i, np.float32), turn_s=0.1) for i, s in enumerate(stamps))
 
 
-def played(reader, time, n):
-    out = []
+def played(stamps, n, **options):
+    """Times at which the first n sweeps of a recording are read, their stamps and numbers, and the reader."""
+    time, out = Time(), []
+    reader = PlayedReader(recording(stamps), clock=lambda: time.now, wait=time.wait, **options)
     while len(out) < n:
-        out += [(round(time.now - 50.0, 6), sweep) for sweep in reader.read(0.2)]
-    return out
+        out += [(round(time.now - 50.0, 6), round(s.stamp_s, 6), s.index) for s in reader.read(0.2)]
+    return out, reader
 
 
 def test_sweeps_come_at_the_pace_of_their_stamps():
-    time = Time()
-    reader = PlayedReader(recording([7.0, 7.1, 8.5]), clock=lambda: time.now, wait=time.wait)
-    out = played(reader, time, 3)
-    assert [at for at, _ in out] == [0.0, 0.1, 1.5]
-    assert [sweep.stamp_s for _, sweep in out] == [7.0, 7.1, 8.5]
-    assert [sweep.points[0, 0] for _, sweep in out] == [0, 1, 2]
-    assert [sweep.index for _, sweep in out] == [0, 1, 2]
+    out, reader = played([7.0, 7.1, 8.5], 3)
+    assert out == [(0.0, 7.0, 0), (0.1, 7.1, 1), (1.5, 8.5, 2)]
     with pytest.raises(StreamEndedError):
         reader.read(0.2)
 
 
 def test_a_loop_goes_on_with_rising_stamps():
-    time = Time()
-    reader = PlayedReader(recording([7.0, 7.1]), loop=True, clock=lambda: time.now, wait=time.wait)
-    out = played(reader, time, 5)
-    assert [round(sweep.stamp_s, 6) for _, sweep in out] == [7.0, 7.1, 7.2, 7.3, 7.4]
-    assert [at for at, _ in out] == [0.0, 0.1, 0.2, 0.3, 0.4]
-    assert {sweep.index for _, sweep in out} == {None}
+    out, _ = played([7.0, 7.1], 5, loop=True)
+    assert out == [(k / 10, pytest.approx(7.0 + k / 10), None) for k in range(5)]
 
 
-def test_a_loop_over_nothing_ends():
+def test_a_loop_over_nothing_ends_and_closing_ends_the_wait():
     with pytest.raises(StreamEndedError):
         PlayedReader(recording([]), loop=True).read(0.2)
-
-
-def test_closing_ends_the_wait():
     reader = PlayedReader(recording([0.0, 100.0]))
     assert len(reader.read(0.2)) == 1
     reader.close()

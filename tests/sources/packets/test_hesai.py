@@ -7,15 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from modt.errors import MisuseError
-from modt.sources.packets.hesai import GET_CALIBRATION, HesaiDecoder, asked_angles, model_of, read_angles
-from tests.sources.packets.simulated import BEGAN_S, decoded, packets
+from modt.sources.packets.capture import open_capture
+from modt.sources.packets.hesai import GET_CALIBRATION, REMEDY, HesaiDecoder, asked_angles, model_of, read_angles
+from tests.sources.packets.simulated import BEGAN_S, decoded
+from tools.send.pcap_writer import write_capture
 
 TURN_S = 0.1
 RANGE = 2500
-"""Of every point, in units."""
+"""Range of every point, in units."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Written:
     unit_m: float = 0.004
 
     def packet(self, at_s: float, mode: int = 0x37, cells: bytes = b"") -> bytes:
-        """Packet of a head that looked ahead at a whole turn and was sent at a time of the day."""
+        """Packet sent at a time of the day [s] by a head that looks ahead at the end of each turn."""
         returns = {0x39: 2, 0x3D: 3}.get(mode, 1)
         firings = self.blocks // returns
         body = b""
@@ -82,18 +83,17 @@ def test_each_model_is_decoded_by_its_angles(name):
     model = WRITTEN[name]
     angles_deg = angles_of(model.channels)
     decoder = HesaiDecoder("sensor", angles_deg)
-    sweeps, reception = decoded(decoder, model.turns(2.7))
+    (sweep,), reception = decoded(decoder, model.turns(1.7))
     assert model_of(model.packet(0.0)).name == name
-    assert (len(sweeps), reception.lost, reception.refused) == (2, 0, {})
-    for k, sweep in enumerate(sweeps, 1):
-        assert sweep.complete
-        assert sweep.turn_s == pytest.approx(TURN_S, rel=1e-3)
-        assert sweep.stamp_s == pytest.approx(BEGAN_S + 36_000 + TURN_S * k, abs=1e-3)  # straight ahead
-        x, y, z, reflectance = sweep.points.T
-        distance = np.sqrt(x * x + y * y + z * z)
-        assert distance == pytest.approx(RANGE * model.unit_m, rel=1e-4)
-        assert reflectance == pytest.approx(0.2)
-        assert len(x) == pytest.approx(TURN_S / model.firing_s * model.channels, rel=0.002)
+    assert (reception.lost, reception.refused) == (0, {})
+    assert sweep.complete
+    assert sweep.turn_s == pytest.approx(TURN_S, rel=1e-3)
+    assert sweep.stamp_s == pytest.approx(BEGAN_S + 36_000 + TURN_S, abs=1e-3)  # straight ahead
+    x, y, z, reflectance = sweep.points.T
+    distance = np.sqrt(x * x + y * y + z * z)
+    assert distance == pytest.approx(RANGE * model.unit_m, rel=1e-4)
+    assert reflectance == pytest.approx(0.2)
+    assert len(x) == pytest.approx(TURN_S / model.firing_s * model.channels, rel=0.002)
     elevation = np.rad2deg(np.arcsin(z / distance))
     assert np.unique(elevation.round(2)) == pytest.approx(np.sort(angles_deg[:, 0]), abs=0.02)
     top = np.abs(elevation - angles_deg[0, 0]) < 0.01
@@ -103,34 +103,31 @@ def test_each_model_is_decoded_by_its_angles(name):
 
 
 @pytest.mark.parametrize(("mode", "seen"), [(0x37, 3.0), (0x39, 7.0), (0x3D, 7.0)])
-def test_of_several_returns_the_one_of_the_greatest_reflectance_is_taken(mode, seen):
+def test_the_brightest_of_several_returns_is_taken(mode, seen):
     model = WRITTEN["PandarXT-32M"]
     cells = b"".join(struct.pack("<HBB", round(m / 0.005), r, 0) * 32 for m, r in ((3.0, 10), (7.0, 90), (9.0, 5)))
-    sweeps, reception = decoded(HesaiDecoder("sensor", angles_of(32)), model.turns(2.7, mode=mode, cells=cells))
-    assert [s.complete for s in sweeps] == [True, True]
-    assert np.linalg.norm(sweeps[0].points[:, :3], axis=1) == pytest.approx(seen, rel=1e-4)
+    (sweep,), reception = decoded(HesaiDecoder("sensor", angles_of(32)), model.turns(1.7, mode=mode, cells=cells))
+    assert sweep.complete
+    assert np.linalg.norm(sweep.points[:, :3], axis=1) == pytest.approx(seen, rel=1e-4)
     assert reception.lost == 0
 
 
-def test_an_ideal_xt_32_sees_the_scene_it_is_in(caplog):
-    from modt_desk.simulation.synthetic_stream import SyntheticStream
-
-    decoder = HesaiDecoder("sensor")
-    sweeps, _ = decoded(decoder, packets("xt-32", 4))
-    assert decoder.profile == "xt-32"
-    assert "beams as of any PandarXT-32" in caplog.text
-    scene = list(SyntheticStream("street", "xt-32", 0.4, seed=1))
+@pytest.mark.parametrize(("angles_deg", "given"), [(None, "is not given"), (angles_of(32), "has 32 channels")])
+def test_a_model_whose_units_differ_needs_its_calibration(tmp_path, angles_deg, given):
+    timed = WRITTEN["Pandar64"].turns(1)
+    decoder = HesaiDecoder("sensor", angles_deg)
+    sweeps, reception = decoded(decoder, timed)
+    reason = f"the calibration of this Pandar64 {given}; {REMEDY}"
+    assert (sweeps, reception.refused) == ([], {reason: len(timed)})
+    sweeps, _ = decoded(decoder, WRITTEN["PandarXT-32"].turns(3.7))  # forged packets at start blind nobody
     assert len(sweeps) == 3
-    for sweep, frame in zip(sweeps, scene[1:4], strict=True):
-        distance, _ = cKDTree(frame.points[:, :3]).query(sweep.points[:, :3])
-        assert np.quantile(distance, 0.95) < 0.05  # m
+    path = tmp_path / "forged.pcap"
+    write_capture(path, timed, 2368)
+    with pytest.raises(MisuseError, match=r"no whole sweep \(Hesai\), packets are refused: the calibration"):
+        open_capture(path, {})
 
 
-def test_a_model_whose_units_differ_needs_its_calibration(tmp_path):
-    with pytest.raises(MisuseError, match="the calibration of this Pandar64 is not given; give calibration=FILE"):
-        decoded(HesaiDecoder("sensor"), WRITTEN["Pandar64"].turns(0.1))
-    with pytest.raises(MisuseError, match="the calibration of this Pandar64 has 32 channels"):
-        decoded(HesaiDecoder("sensor", angles_of(32)), WRITTEN["Pandar64"].turns(0.1))
+def test_a_table_without_plausible_angles_is_no_calibration(tmp_path):
     path = tmp_path / "angles.csv"
     for text in ("", "Channel,Elevation,Azimuth\n", "1,95.0,0\n", "1,nan,0\n"):
         path.write_text(text)
@@ -138,21 +135,19 @@ def test_a_model_whose_units_differ_needs_its_calibration(tmp_path):
             read_angles(path)
 
 
+TABLE = b"Laser id,Elevation,Azimuth\r\n1,15.5,-1.04\r\n2,14,3.1\r\n"
+
+
 @pytest.mark.parametrize(
-    ("answer", "n"),
+    ("answer", "angles"),
     [
-        (
-            b"\x47\x74\x05\x00"
-            + struct.pack(">I", 52)
-            + b"Laser id,Elevation,Azimuth\r\n1,15.5,-1.04\r\n2,14,3.1\r\n",
-            2,
-        ),
+        (b"\x47\x74\x05\x00" + struct.pack(">I", len(TABLE)) + TABLE, [[15.5, -1.04], [14, 3.1]]),
         (b"\x47\x74\x05\x01" + bytes(4), None),
         (b"\x47\x74\x05\x00\xff\xff\xff\xff", None),
         (b"\x47", None),
     ],
 )
-def test_the_sensor_is_asked_for_its_calibration(answer, n, caplog):
+def test_the_sensor_is_asked_for_its_calibration(answer, angles, caplog):
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def give():
@@ -165,5 +160,5 @@ def test_the_sensor_is_asked_for_its_calibration(answer, n, caplog):
         giving.start()
         angles_deg = asked_angles("127.0.0.1", server.getsockname()[1])
         giving.join()
-    assert (None if angles_deg is None else angles_deg.tolist()) == (n and [[15.5, -1.04], [14, 3.1]])
-    assert ("does not give its calibration" in caplog.text) is (n is None)
+    assert (None if angles_deg is None else angles_deg.tolist()) == angles
+    assert ("does not give its calibration" in caplog.text) is (angles is None)

@@ -9,19 +9,12 @@ from modt.sources.recognise import open_stream
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-
 
 @pytest.fixture
 def path(tmp_path):
     file = tmp_path / "drive.pcap"
     write_capture(file, packets(), 2368)
     return file
-
-
-def test_a_capture_is_recognised(path):
-    info = open_stream(path).info
-    assert (info.name, info.layout, info.profile, info.period_s) == ("drive", "Velodyne packets", "vlp-16", 0.1)
 
 
 def test_a_hesai_is_recognised_and_has_the_calibration_beside_its_capture(tmp_path, caplog):
@@ -35,7 +28,8 @@ def test_a_hesai_is_recognised_and_has_the_calibration_beside_its_capture(tmp_pa
 
 
 def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
-    whole = list(open_stream(path))
+    info, whole = open_stream(path).info, list(open_stream(path))
+    assert (info.name, info.layout, info.profile, info.period_s) == ("drive", "Velodyne packets", "vlp-16", 0.1)
     path.write_bytes(path.read_bytes()[:-50])
     stream = open_stream(path)
     assert [f.points.tobytes() for f in stream] == [f.points.tobytes() for f in whole]
@@ -43,7 +37,7 @@ def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
     assert "sweep 3: truncated within a record" in caplog.text
 
 
-def test_missing_packets_and_refused_ones_are_faults(path):
+def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(path):
     timed = [*packets()]
     del timed[110:113]
     timed.insert(50, (timed[50][0], bytes(1206)))
@@ -54,27 +48,18 @@ def test_missing_packets_and_refused_ones_are_faults(path):
         (0, "3 packets are missing", False),
         (3, "1 packets refused: no packet of a Velodyne", False),
     ]
-
-
-@pytest.mark.parametrize("step_s", [-60.0, -3.0, 3600.0])
-def test_a_file_whose_clock_was_set_loses_no_sweep(path, step_s):
-    timed, again = [*packets()], packets(sweeps=20)
-    later = ((at_s + 0.6 + step_s, payload) for at_s, payload in again)
-    write_capture(path, [*timed, *later], 2368)
+    timed = [*packets(), *((at_s - 59.4, payload) for at_s, payload in packets(sweeps=8))]
+    write_capture(path, timed, 2368)
     stream = open_stream(path)
     stamps_s = [f.stamp_s for f in stream]
     assert stamps_s == sorted(stamps_s)
-    assert len(stamps_s) >= 20
+    assert len(stamps_s) >= 8
     assert stream.faults.skipped == 0
 
 
 def test_invalid_options_are_refused(path):
-    for options, cause in (
-        ({"model": "vlp-17"}, "model=vlp-17.*use one of"),
-        ({"calibration": "nowhere.yaml"}, "nowhere.yaml: no calibration"),
-    ):
-        with pytest.raises(MisuseError, match=cause):
-            open_stream(path, capture=options)
+    with pytest.raises(MisuseError, match="no calibration"):
+        open_stream(path, capture={"calibration": "nowhere.yaml"})
     with pytest.raises(MisuseError, match="model does not apply"):
         open_stream(path.parent, capture={"model": "vlp-16"})
 

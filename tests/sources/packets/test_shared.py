@@ -1,16 +1,16 @@
 """Promises that the decoders of all makers share: faults of the network are counted and change no other sweep."""
 
-from __future__ import annotations
-
 import os
+import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from modt.errors import MisuseError
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
 from modt.sources.packets.livox import LivoxDecoder
@@ -18,8 +18,9 @@ from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.point_cloud_file import read_pcd
-from tests.sources.packets.simulated import decoded, equal, packets, packets_of_bag
+from tests.sources.packets.simulated import BEGAN_S, decoded, equal, packets, scene
 from tools.send.faults import Timed
+from tools.send.packet_bag import packets_of_bag
 
 OTHER = "of another model than the packets before"
 
@@ -31,16 +32,14 @@ def edited(at: int, value: bytes) -> Callable[[bytes], bytes]:
 
 @dataclass(frozen=True)
 class Maker:
-    """A decoder, packets of three whole sweeps or more, and unusable packets with the reason of their refusal."""
+    """A decoder, packets of three whole sweeps or more, and unusable packets with the reasons of their refusal."""
 
     decoder: Callable[[], PacketDecoder]
     timed: Callable[[], list[Timed]]
     lost: tuple[int, ...]  # packets within the second sweep
-    refused: str
     broken: Callable[[bytes], bytes]  # a packet with an impossible field
-    foreign: Callable[[bytes], bytes] | None = None
-    of_foreign: str = OTHER
-    lengths: str = field(default="")  # reason for another length, by default `refused`
+    foreign: Callable[[bytes], bytes] | None  # a packet of another sensor
+    refused: dict[str, int]  # reasons for three payloads of other lengths, a broken and a foreign one
 
 
 def ouster_folder() -> Path:
@@ -57,46 +56,76 @@ MAKERS = {
         lambda: VelodyneDecoder("sensor"),
         lambda: list(packets()),
         (160, 161, 190),
-        "no packet of a Velodyne",
         edited(502, b"\xff\xff"),
         lambda _: packets("hdl-64e", 4)[40][1],
+        {"no packet of a Velodyne": 4, OTHER: 1},
     ),
     "hesai": Maker(
         lambda: HesaiDecoder("sensor"),
         lambda: list(packets("xt-32", 4)),
         (400, 401, 430),
-        "no packet of a Hesai",
         edited(12, b"\xff\xff"),
         lambda p: edited(6, b"\x10")(p[:12] + b"".join(p[k : k + 66] for k in range(12, 1052, 130)) + p[1052:]),
+        {"no packet of a Hesai": 4, OTHER: 1},
     ),
     "livox": Maker(
         lambda: LivoxDecoder("sensor"),
         lambda: list(packets("mid-360", 4)),
         (130, 131, 150),
-        "no packet of points of a Livox",
         edited(10, b"\0"),
+        None,
+        {"no packet of points of a Livox": 4},
     ),
     "ouster": Maker(
         lambda: OusterDecoder("sensor", ouster_folder() / "OS-1-128_v2.3.0_1024x10.json"),
         of_ouster,
         (70, 71, 90),
-        "no packet of an Ouster",
         lambda p: np.random.default_rng(0).bytes(len(p)),
         edited(4, b"\x01" * 8),
-        "of another sensor than the metadata",
-        "not the 8448 bytes of the metadata's format",
+        {
+            "not the 8448 bytes of the metadata's format": 3,
+            "no packet of an Ouster": 1,
+            "of another sensor than the metadata": 1,
+        },
     ),
 }
 
 
 @pytest.fixture(params=[pytest.param(name, marks=[pytest.mark.kitti] * (name == "ouster")) for name in MAKERS])
 def maker(request: pytest.FixtureRequest) -> Maker:
-    if request.param == "velodyne":
-        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
     if request.param == "ouster":
         request.getfixturevalue("kitti_root")
         pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
     return MAKERS[request.param]
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "n", "whole", "turn_s"),
+    [("velodyne", "vlp-16", 5, 3, 0.1), ("hesai", "xt-32", 4, 3, 0.1), ("livox", "mid-360", 4, 2, 0.0)],
+)
+def test_sweeps_are_those_of_the_scene(name: str, model: str, n: int, whole: int, turn_s: float) -> None:
+    """The first turn began before it was heard."""
+    decoder = MAKERS[name].decoder()
+    sweeps, reception = decoded(decoder, packets(model, n))
+    assert decoder.profile == model
+    assert (len(sweeps), reception.lost, reception.refused) == (whole, 0, {})
+    for k, (sweep, frame) in enumerate(zip(sweeps, scene(model, n)[1:], strict=False), 1):
+        assert sweep.complete
+        assert sweep.turn_s == pytest.approx(turn_s, abs=1e-4)
+        assert sweep.stamp_s == pytest.approx(BEGAN_S + 0.1 * k + 0.05, abs=2e-3)  # straight ahead
+        assert sweep.points.dtype == np.float32
+        assert 0 < sweep.points[:, 3].max() <= 1
+        returns = frame.points[frame.points[:, :3].any(axis=1)]
+        assert len(sweep.points) == pytest.approx(len(returns), rel=0.02)
+        distance, _ = cKDTree(returns[:, :3]).query(sweep.points[:, :3])
+        assert np.quantile(distance, 0.95) < 0.05  # m; a packet's azimuths are those of its blocks
+
+
+def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module, name in (("velodyne_decoder", "velodyne"), ("ouster.sdk.core", "ouster")):
+        monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(MisuseError, match=rf"pip install '\.\[{name}\]'"):
+            MAKERS[name].decoder()
 
 
 def test_lost_packets_are_counted_and_their_sweep_is_incomplete(maker: Maker) -> None:
@@ -135,10 +164,8 @@ def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker: Maker
     sweeps, reception = decoded(maker.decoder(), dirty)
     assert equal(sweeps, whole)
     assert reception.lost == 0
-    expected = {maker.lengths: 3 * n, maker.refused: n} if maker.lengths else {maker.refused: 4 * n}
-    expected |= {maker.of_foreign: n} if maker.foreign else {}
-    assert reception.refused == expected
-    assert sum("only counted" in r.message for r in caplog.records) == len(expected)  # one line a reason
+    assert reception.refused == {reason: n * count for reason, count in maker.refused.items()}
+    assert sum("only counted" in r.message for r in caplog.records) == len(maker.refused)  # one line a reason
 
 
 CLOUDS = {  # recorded packets: name, calibration, number of sweeps, greatest median distance [m]
@@ -163,13 +190,12 @@ def test_points_are_those_of_another_decoder(kitti_root: Path, name: str) -> Non
     (cloud,) = folder.glob("*.pcd")
     theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # cut elsewhere, with both returns
     if table is None:
-        pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-        sweeps, reception = decoded(VelodyneDecoder("sensor"), packets_of_bag(folder, 1206))
+        sweeps, reception = decoded(VelodyneDecoder("sensor"), packets_of_bag(folder))
         assert reception.lost == 0
         assert all(s.complete for s in sweeps)
     else:
         angles_deg = read_angles(folder.parent / "calibration" / f"{table}.csv")
-        sweeps, reception = decoded(HesaiDecoder("sensor", angles_deg), packets_of_bag(folder, 1500, 1508))
+        sweeps, reception = decoded(HesaiDecoder("sensor", angles_deg), packets_of_bag(folder))
         assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * n_sweeps, abs=2e-4)
         theirs = theirs[:, [1, 0, 2]] * [1, -1, 1]  # x right, y forward
     assert (len(sweeps), reception.refused) == (n_sweeps, {})

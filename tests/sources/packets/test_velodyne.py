@@ -1,64 +1,32 @@
 """Velodyne's packets: sweeps cut behind the sensor, everything else counted."""
 
 import logging
+import re
 import struct
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
-from modt.errors import MisuseError
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.velodyne import VelodyneDecoder, model_named
 from modt.sources.stream import Reception
-from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets
+from tests.sources.packets.simulated import bearing_deg, decoded, equal, packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
-
-pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
 
 
 def sweeps_of(timed, **options):
     return decoded(VelodyneDecoder("sensor", **options), timed)
 
 
-@pytest.fixture
-def calibration(tmp_path):
-    path = tmp_path / "ideal.yaml"
-    path.write_text(ideal_calibration(LAYOUTS["hdl-64e"]))
-    return path
-
-
-def test_sweeps_of_a_vlp_16():
-    timed = packets()
-    sweeps, reception = sweeps_of(timed)
-    assert len(sweeps) == 3  # the first turn began before it was heard
-    assert all(s.complete for s in sweeps)
-    assert (reception.lost, reception.refused) == (0, {})
-    for k, sweep in enumerate(sweeps, 1):
-        assert sweep.turn_s == pytest.approx(0.1, abs=1e-4)
-        assert sweep.stamp_s == pytest.approx(BEGAN_S + 0.1 * k + 0.05, abs=1e-3)  # straight ahead
-        assert sweep.points.dtype == np.float32
-        assert 0 < sweep.points[:, 3].max() <= 1
-        assert 20_000 < len(sweep.points) < 30_000
-
-
-def test_points_are_those_of_the_scene_in_the_frame_of_the_sensor():
-    from modt_desk.simulation.synthetic_stream import SyntheticStream
-
-    scene = list(SyntheticStream("street", "vlp-16", 0.5, seed=1))
-    for sweep, frame in zip(sweeps_of(packets())[0], scene[1:4], strict=True):
-        distance, _ = cKDTree(frame.points[:, :3]).query(sweep.points[:, :3])
-        assert np.quantile(distance, 0.95) < 0.05  # m; a packet's azimuths are those of its blocks
-
-
 @pytest.mark.slow
-def test_an_hdl_64e_is_recognised_and_warned_of_without_its_calibration(calibration, caplog):
+def test_an_hdl_64e_is_recognised_and_warned_of_without_its_calibration(tmp_path, caplog):
     decoder = VelodyneDecoder("sensor")
     assert len(decoded(decoder, packets("hdl-64e", 4))[0]) == 2
     assert decoder.profile == "hdl-64e"
     assert "give its own by calibration=FILE" in caplog.text
     caplog.clear()
-    sweeps, _ = sweeps_of(packets("hdl-64e", 4), calibration=calibration)
+    (tmp_path / "ideal.yaml").write_text(ideal_calibration(LAYOUTS["hdl-64e"]))
+    sweeps, _ = sweeps_of(packets("hdl-64e", 4), calibration=tmp_path / "ideal.yaml")
     assert [s.complete for s in sweeps] == [True, True]
     elevation = np.rad2deg(np.arcsin(sweeps[0].points[:, 2] / np.linalg.norm(sweeps[0].points[:, :3], axis=1)))
     off = np.abs(elevation[:, None] - LAYOUTS["hdl-64e"].elevations_deg).min(axis=1)
@@ -88,50 +56,43 @@ def test_a_burst_of_losses_is_counted_whole(first, lost):
     assert all(s.points.tobytes() in whole for s in sweeps if s.complete)
 
 
-def test_a_head_that_stands_still_gives_no_sweep_and_what_is_kept_is_bounded():
-    payload = packets()[100][1]
-    decoder, reception = VelodyneDecoder("sensor"), Reception()
-    for k in range(2000):
-        still = payload[:2] + struct.pack("<H", 9000 + k % 3) + payload[4:]
-        assert not decoder.decode(BEGAN_S + 1e-3 * k, restamped(still, 1e-3 * k), reception)
-    assert len(decoder._turn.entries) < 400
-
-
-def test_a_sector_that_the_sensor_is_set_not_to_see_is_not_lost():
+def test_a_sector_that_the_sensor_is_set_not_to_see_is_not_lost_and_its_sweep_ends_at_the_pause():
     timed = [(at_s, p) for at_s, p in packets() if not 90 < azimuth_deg(p) < 270]
-    sweeps, reception = sweeps_of(timed)
-    assert [s.complete for s in sweeps] == [True] * len(sweeps)
-    assert len(sweeps) >= 2
+    whole, reception = sweeps_of(timed)
+    assert [s.complete for s in whole] == [True] * len(whole)
+    assert len(whole) >= 2
     assert reception.lost == 0
-    assert np.abs(bearing_deg(sweeps[0].points)).max() < 100
-
-
-def test_a_sweep_of_a_sector_is_handed_over_when_its_sensor_pauses():
-    timed = [(at_s, p) for at_s, p in packets() if not 90 < azimuth_deg(p) < 270]
-    whole, _ = sweeps_of(timed)
-    decoder, reception = VelodyneDecoder("sensor"), Reception()
-    sweeps, paused = [], []
+    assert np.abs(bearing_deg(whole[0].points)).max() < 100
+    decoder, reception, paused = VelodyneDecoder("sensor"), Reception(), []
     for i, (at_s, payload) in enumerate(timed):
-        sweeps += decoder.decode(at_s, payload, reception)
+        decoder.decode(at_s, payload, reception)
         if i + 1 < len(timed) and timed[i + 1][0] - at_s > 0.01:
             paused.append(len(decoder.pause(reception)))
-            sweeps += decoder.pause(reception)  # once only
+            assert not decoder.pause(reception)
     assert paused[:1] == [0]  # the sector is known after a turn
     assert paused.count(1) == len(whole) - 1
     assert reception.lost == 0
 
 
+def stamp_us(payload):
+    return struct.unpack_from("<I", payload, 1200)[0]
+
+
+def at_time(payload, time_us):
+    return payload[:1200] + struct.pack("<I", round(time_us) % 3_600_000_000) + payload[1204:]
+
+
 def restamped(payload, by_s):
-    stamp_us = struct.unpack_from("<I", payload, 1200)[0] + round(by_s * 1e6)
-    return payload[:1200] + struct.pack("<I", stamp_us % 3_600_000_000) + payload[1204:]
+    return at_time(payload, stamp_us(payload) + by_s * 1e6)
 
 
 def azimuth_deg(payload):
     return struct.unpack_from("<H", payload, 2)[0] / 100
 
 
-def with_identity(timed, identity):
-    return [(at_s, payload[:1205] + bytes([identity])) for at_s, payload in timed]
+def with_tail(timed, tail):
+    """Packets with a return mode and an identity."""
+    return [(at_s, payload[:1204] + bytes(tail)) for at_s, payload in timed]
 
 
 @pytest.mark.parametrize(
@@ -139,53 +100,29 @@ def with_identity(timed, identity):
     [
         (0x22, None, None),
         (0x22, "vlp-16", None),
-        (0x21, None, "say hdl-32e at the pace of vlp-16; decoded as vlp-16; give model= to overrule"),
-        (
-            0x21,
-            "vlp-16",
-            "say hdl-32e at the pace of vlp-16; decoded as vlp-16; leave model= out to have it recognised",
-        ),
-        (0x22, "vlp-32c", "say vlp-16; decoded as vlp-32c; leave model= out to have it recognised"),
+        (0x21, None, "hdl-32e.*decoded as vlp-16; give model="),
+        (0x21, "vlp-16", "hdl-32e.*decoded as vlp-16; leave model= out"),
+        (0x22, "vlp-32c", "vlp-16.*decoded as vlp-32c; leave model= out"),
     ],
 )
 def test_the_model_is_by_its_pace_or_as_declared_and_a_contradiction_is_one_line(identity, declared, warning, caplog):
-    timed = with_identity(packets(), identity)
+    timed = with_tail(packets(), (0x37, identity))
     decoder = VelodyneDecoder("sensor", model_named(declared) if declared else None)
     with caplog.at_level(logging.WARNING):
         sweeps, _ = decoded(decoder, timed)
     assert decoder.profile == (declared or "vlp-16")
-    assert [r.message for r in caplog.records] == ([f"sensor: its packets {warning}"] if warning else [])
+    assert len(caplog.records) == (warning is not None)
+    assert warning is None or re.search(warning, caplog.text)
+    assert all(np.isfinite(s.points).all() for s in sweeps)
     if declared != "vlp-32c":
         assert equal(sweeps, sweeps_of(packets())[0])
 
 
-@pytest.mark.parametrize("declared", ["vlp-16", "hdl-64e", "vls-128", "vlp-32c"])
-@pytest.mark.parametrize("sent", ["vlp-16", "hdl-64e"])
-def test_a_wrong_declaration_breaks_nothing(sent, declared):
-    sweeps, _ = sweeps_of(packets(sent, 5 if sent == "vlp-16" else 4), model=model_named(declared))
-    assert all(np.isfinite(s.points).all() for s in sweeps)
-
-
-def test_single_returns_of_any_kind_are_taken():
-    single, _ = sweeps_of(packets())
-    last = [(at_s, payload[:1204] + b"\x38" + payload[1205:]) for at_s, payload in packets()]
-    assert equal(sweeps_of(last)[0], single)
-
-
-def test_an_unknown_model_is_counted():
-    timed = with_identity(packets(), 0x77)
-    sweeps, reception = sweeps_of(timed)
+def test_single_returns_of_any_kind_are_taken_but_no_unknown_model():
+    assert equal(sweeps_of(with_tail(packets(), (0x38, 0x22)))[0], sweeps_of(packets())[0])
+    sweeps, reception = sweeps_of(with_tail(packets(), (0x37, 0x77)))
     assert sweeps == []
-    assert reception.refused == {"of a model of Velodyne that is unknown; give model=": len(timed)}
-
-
-def test_an_unknown_name_and_a_broken_calibration_are_refused(tmp_path):
-    with pytest.raises(MisuseError, match="use one of vlp-16"):
-        model_named("vlp-17")
-    broken = tmp_path / "broken.yaml"
-    broken.write_text("lasers: 5")
-    with pytest.raises(MisuseError, match="no calibration"):
-        VelodyneDecoder("sensor", None, broken)
+    assert reception.refused == {"of a model of Velodyne that is unknown; give model=": len(packets())}
 
 
 @pytest.mark.kitti
@@ -221,16 +158,12 @@ def test_another_model_is_adopted_once_the_one_before_is_silent(caplog):
     assert "packets are of another model, and those of the one before have ended" in caplog.text
 
 
-def at_time(payload, time_us):
-    return payload[:1200] + struct.pack("<I", int(time_us)) + payload[1204:]
-
-
 def test_a_turn_holds_no_more_packets_than_a_sensor_sends():
     timed = packets("vlp-16", 5)
     decoder, reception = VelodyneDecoder("sensor"), Reception()
     for at_s, payload in timed[:130]:
         decoder.decode(at_s, payload, reception)
-    began_us, last_us = (struct.unpack_from("<I", timed[k][1], 1200)[0] for k in (80, 129))
+    began_us, last_us = (stamp_us(timed[k][1]) for k in (80, 129))
     for k in range(3000):
         within_us = began_us + (last_us - began_us) * (0.1 + 0.8 * (k * 0.618 % 1))
         decoder.decode(timed[129][0], at_time(timed[100][1], within_us), reception)
@@ -238,16 +171,3 @@ def test_a_turn_holds_no_more_packets_than_a_sensor_sends():
     assert reception.refused["more than a turn has; do several sensors send to this port?"] > 2000
     sweeps = [s for at_s, p in timed[130:] for s in decoder.decode(at_s, p, reception)]
     assert len(sweeps) >= 2  # the sensor's own packets go on
-
-
-def test_lost_packets_are_never_negative():
-    decoder, reception = VelodyneDecoder("sensor"), Reception()
-    lost = 0
-    for k, (at_s, payload) in enumerate(packets("vlp-16", 8)):
-        stamp_us = struct.unpack_from("<I", payload, 1200)[0]
-        if k % 200 == 199:  # ever so slightly after the last, in a turn that has lasted for too long
-            decoder._longest_s = 0.0
-            stamp_us -= 1300
-        decoder.decode(at_s, at_time(payload, stamp_us), reception)
-        assert reception.lost >= lost
-        lost = reception.lost

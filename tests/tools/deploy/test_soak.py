@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import islice
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tests.sources.packets.simulated import packets
@@ -43,52 +44,40 @@ def test_the_clock_of_the_sensor_is_set_once_by_its_fault():
         assert step_us - stamps.wrap_us // 2 == 1e6 * faulty.fault.clock_s
 
 
-def session(lost):
-    recording = SimpleNamespace(health=lambda: {"lost_lines": lost})
-    return SimpleNamespace(status=lambda: {"loop": {}}, recording=recording)
-
-
-def witness(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0):
-    seen = Witness()
-    for k in range(1, 2000):
-        seen.times_s.append(0.1 * k)
-        seen.full.append(not 50 < 0.1 * k < full_from)
-        seen.missed.append(sum(at <= 0.1 * k for at in missed_at))
-        seen.resident_mb.append(150.0 * (1 + growth * k / 1000))
-        seen.descriptors.append(12 + int(leaks * k / 1000))
+def witness(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0, stall_s=0.0):
+    seen, times_s = Witness(), 0.1 * np.arange(1, 2000)
+    seen.times_s = (times_s + stall_s * (times_s > 49.0)).tolist()
+    seen.full = [not 50 < t < full_from for t in times_s]
+    seen.missed = [sum(at <= t for at in missed_at) for t in times_s]
+    seen.resident_mb = (150.0 * (1 + growth * times_s / 100)).tolist()
+    seen.descriptors = (12 + (leaks * times_s / 100).astype(int)).tolist()
     return seen
 
 
-EPISODE = (FAULTS[0], 48.0, 3, 50.0, 4)
+NAMED = {fault.name: fault for fault in FAULTS}
+FIRST = FAULTS[0].name
 
 
 @pytest.mark.parametrize(
-    ("seen", "episode", "wrong"),
+    ("seen", "fault", "counted", "lost", "wrong"),
     [
-        (witness(), EPISODE, None),
-        (witness(missed_at=(49.0, 51.0)), EPISODE, None),
-        (witness(), (*EPISODE[:4], 3), "were not counted"),
-        (witness(full_from=55.0), EPISODE, "recovery took 5.0 s"),
-        (witness(missed_at=(30.0,)), EPISODE, None),
-        (witness(missed_at=(30.0, 31.0)), EPISODE, "2 deadlines missed between faults"),
-        (witness(growth=0.3), EPISODE, "memory grew"),
-        (witness(leaks=3), EPISODE, "descriptors leaked"),
+        (witness(), FIRST, 1, 0, None),
+        (witness(missed_at=(49.0, 51.0)), FIRST, 1, 0, None),
+        (witness(), FIRST, 0, 0, "were not counted"),
+        (witness(full_from=55.0), FIRST, 1, 0, "recovery took 5.0 s"),
+        (witness(missed_at=(30.0,)), FIRST, 1, 0, None),
+        (witness(missed_at=(30.0, 31.0)), FIRST, 1, 0, "2 deadlines missed between faults"),
+        (witness(growth=0.3), FIRST, 1, 0, "memory grew"),
+        (witness(leaks=3), FIRST, 1, 0, "descriptors leaked"),
+        (witness(), FULL_DISK, 7, 7, None),
+        (witness(), FULL_DISK, 7, 8, "1 records lost but on a full disk"),
+        (witness(), "hog", 0, 0, None),
+        (witness(stall_s=0.3), "hog", 0, 0, "hog: 1 of 1 were not counted"),
     ],
 )
-def test_the_verdict_names_what_is_wrong(seen, episode, wrong, capsys):
-    found = judge(seen, [Episode(*episode)], session(0))
+def test_the_verdict_names_each_shortcoming(seen, fault, counted, lost, wrong, capsys):
+    recording = SimpleNamespace(health=lambda: {"lost_lines": lost})
+    session = SimpleNamespace(status=lambda: {"loop": {}}, recording=recording)
+    found = judge(seen, [Episode(NAMED[fault], 48.0, 3, 50.0, 3 + counted)], session)
     assert [wrong in line for line in found] == ([True] if wrong else [])
-    assert FAULTS[0].name in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(("lost", "wrong"), [(7, []), (8, ["1 records lost but on a full disk"])])
-def test_records_may_be_lost_on_a_full_disk_alone(lost, wrong):
-    disk = next(fault for fault in FAULTS if fault.name == FULL_DISK)
-    assert judge(witness(), [Episode(disk, 48.0, 3, 50.0, 10)], session(lost)) == wrong
-
-
-@pytest.mark.parametrize(("stall_s", "wrong"), [(0.0, []), (0.3, ["hog: 1 of 1 were not counted"])])
-def test_a_hog_that_costs_nothing_need_not_be_counted(stall_s, wrong):
-    hog, seen = next(fault for fault in FAULTS if fault.name == "hog"), witness()
-    seen.times_s = [t + stall_s * (t > 49.0) for t in seen.times_s]
-    assert judge(seen, [Episode(hog, 48.0, 3, 50.0, 3)], session(0)) == wrong
+    assert fault in capsys.readouterr().out

@@ -1,6 +1,7 @@
-"""The sender of packets."""
+"""The sender of packets, and faults of a network."""
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,29 +12,22 @@ from modt.sources.recognise import open_stream
 from tests.sources import layouts
 from tests.sources.packets.simulated import packets
 from tools.send import packets as sender
+from tools.send.faults import PacketFaults
 from tools.send.loops import ouster_loop, turn_loop
 from tools.send.pcap_writer import write_capture
 
 
-class RecordingSocket:
-    def __init__(self):
-        self.sent = []
-
-    def send(self, payload):
-        self.sent.append(payload)
-
-
 def test_each_packet_is_sent_when_it_is_due():
-    now_s, slept = [10.0], []
+    now_s, slept, sent = [10.0], [], []
 
     def sleep(time_s):
         slept.append(time_s)
         now_s[0] += time_s
 
-    to = RecordingSocket()
     timed = [(0.0, b"a"), (0.5, b"b"), (0.5, b"c"), (2.0, b"d")]
+    to = SimpleNamespace(send=sent.append)
     assert sender.send(timed, to, clock=lambda: now_s[0], sleep=sleep) == 4
-    assert to.sent == [b"a", b"b", b"c", b"d"]
+    assert sent == [b"a", b"b", b"c", b"d"]
     assert slept == pytest.approx([0.5, 1.5])
 
 
@@ -83,3 +77,30 @@ def test_an_ouster_is_repeated_without_a_gap(kitti_root, tmp_path):
     assert stream.reception.lost == 0
     assert np.diff([f.stamp_s for f in frames]) == pytest.approx([0.1] * 3, abs=1e-3)
     assert len({f.points.tobytes() for f in frames}) == 1
+
+
+PACKETS = [(0.1 * k, bytes([k])) for k in range(200)]
+
+
+def applied(**shares):
+    return list(PacketFaults(**shares).applied(PACKETS))
+
+
+def test_a_seed_decides_on_the_faults_and_without_shares_there_are_none():
+    assert applied() == PACKETS
+    shares = {"lost": 0.1, "duplicated": 0.1, "reordered": 0.1, "garbage": 0.1}
+    assert applied(**shares, seed=1) == applied(**shares, seed=1) != applied(**shares, seed=2)
+
+
+def test_each_fault_is_of_its_kind():
+    payloads = [p for _, p in PACKETS]
+    lost = [p for _, p in applied(lost=0.2)]
+    assert 120 < len(lost) < 190
+    assert lost == [p for p in payloads if p in set(lost)]
+    doubled = [p for _, p in applied(duplicated=0.2)]
+    assert sorted(set(doubled)) == payloads
+    assert len(doubled) > 210
+    disordered = [p for _, p in applied(reordered=0.2)]
+    assert disordered != payloads
+    assert sorted(disordered) == payloads[: len(disordered)]
+    assert len([p for _, p in applied(garbage=0.2)]) > 210

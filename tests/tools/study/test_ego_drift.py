@@ -7,8 +7,8 @@ import pytest
 
 from modt.geometry import rotation_zyx, se3
 from modt.sources.recognise import open_stream
-from modt_desk.simulation.kitti_raw import DriveWriter
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.desk.recorded import written
 from tools.study import ego_drift
 
 
@@ -31,19 +31,16 @@ def test_drift_in_path_end_and_heading():
 
 @pytest.mark.slow
 def test_the_drift_of_a_written_drive_is_small_against_positions_and_velocities(tmp_path, monkeypatch, capsys):
-    stream = SyntheticStream("street", "vlp-16", 2.0, seed=2)
-    writer = DriveWriter(tmp_path, CAMERA)
-    for frame, truth in stream.sweeps():
-        writer.write(frame, truth)
-    writer.close()
-    indices = [s.index for s in open_stream(writer.drive).scans]
-    positions = np.array([s.T_world_sensor for s in open_stream(writer.drive).scans])
-    assert abs(ego_drift.drift(ego_drift.integrated(writer.drive, indices), positions)["end_percent"]) < 0.5
-    monkeypatch.setattr(sys, "argv", ["ego_drift", str(writer.drive), str(writer.drive), "--no-kiss"])
+    drive = written(tmp_path, SyntheticStream("street", "vlp-16", 2.0, seed=2)).drive
+    scans = open_stream(drive).scans
+    positions = np.array([s.T_world_sensor for s in scans])
+    integrated = ego_drift.integrated(drive, [s.index for s in scans])
+    assert abs(ego_drift.drift(integrated, positions)["end_percent"]) < 0.5
+    monkeypatch.setattr(sys, "argv", ["ego_drift", str(drive), str(drive), "--no-kiss"])
     ego_drift.main()
     said = capsys.readouterr().out
     assert "means over 2 drives" in said
     assert "proposals, camera against OXTS positions" in said
-    figures = ego_drift.drift(ego_drift.by_proposals(open_stream(writer.drive), camera=False), positions)
+    figures = ego_drift.drift(ego_drift.by_proposals(open_stream(drive), camera=False), positions)
     assert abs(figures["heading_deg"]) < 1.0
     assert abs(figures["end_percent"]) < 5.0

@@ -5,12 +5,7 @@ import pytest
 
 from modt.types import NONE, Proposals
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tools.study.filter_consistency import (
-    BodyTrack,
-    body_tracks,
-    majority_bodies,
-    study,
-)
+from tools.study.filter_consistency import BodyTrack, body_tracks, majority_bodies, study
 
 
 def random_track(rng, n, scale):

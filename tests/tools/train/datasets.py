@@ -1,7 +1,5 @@
 """Data sets and scans for the tests of the training tools."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Augmentation of crops."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +12,7 @@ from tools.train.dataset import Sensors
 
 
 @given(counts=st.lists(st.integers(6, 300), min_size=1, max_size=8), seed=st.integers(0, 200))
-def test_augmentation_keeps_every_crop_and_enough_points(counts: list[int], seed: int) -> None:
+def test_augmentation_keeps_every_crop_and_enough_points(counts, seed):
     rng = np.random.default_rng(seed)
     points, proposals = blobs(counts, rng)
     crops = gather(points, proposals, np.arange(len(counts)), 1000)
@@ -28,7 +26,7 @@ def test_augmentation_keeps_every_crop_and_enough_points(counts: list[int], seed
     assert np.isfinite(seen.xyz).all()
 
 
-def test_no_augmented_crop_is_finer_than_its_sensor() -> None:
+def test_no_augmented_crop_is_finer_than_its_sensor():
     rng = np.random.default_rng(0)
     azimuth, elevation = np.meshgrid(np.arange(-3, 3, 0.1), np.arange(-4.9, 0, 0.5))  # ten beams
     a, e = np.deg2rad(azimuth.ravel()), np.deg2rad(elevation.ravel())

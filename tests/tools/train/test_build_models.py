@@ -1,10 +1,7 @@
 """From labelled scans to a model with its card."""
 
-from __future__ import annotations
-
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +14,7 @@ from tools.train.synthetic_scans import simulated_scans
 
 
 @pytest.mark.slow
-def test_one_command_trains_on_scans_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_command_trains_on_scans_of_ones_own(tmp_path, monkeypatch):
     pytest.importorskip("torch", reason="extra [train] is not installed")
     shipped = set(build_models.MODELS.glob("*.onnx"))
     scans = simulated_scans(["street", "crossing"], [3, 4], [0.0], camera=False, sensors=["vlp-16"])

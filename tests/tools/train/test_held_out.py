@@ -1,23 +1,46 @@
-"""Cross-validation over drives."""
-
-from __future__ import annotations
+"""Cross-validation over drives: folds, weights of the pool, calibration, scores by sensor."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import pytest
+from scipy.special import softmax
 
 from modt.classification.crops import Crops
-from modt.types import NONE
+from modt.types import NONE, Int
+from modt_desk.evaluation.class_score import top_calibration_error
 from tests.tools.train.datasets import data_of, truth_of
-from tools.train.dataset import CLUSTERED, SHIPPED
-from tools.train.held_out import Validation, out_of_fold
+from tools.train.dataset import CLUSTERED, SHIPPED, SYNTHETIC, Dataset, folds
+from tools.train.held_out import Calibration, Validation, fit_calibration, fit_pool, out_of_fold
+from tools.train.scores import by_sensor, recall_at, shift
 
 
-def test_out_of_fold_models_predict_drives_unseen_in_training() -> None:
+def single_points(label: Int, **columns: Any) -> Dataset:
+    """Crops of one point each."""
+    return data_of(Crops(np.zeros((len(label), 3), np.float32), np.arange(len(label) + 1)), label, **columns)
+
+
+def test_folds_split_real_scans_by_drive_and_leave_out_the_rest():
+    drive = np.array([0, 0, 1, 2, 3, 4, 4, 5])  # the last two drives are synthetic
+    truth = truth_of(np.array([1, 2, 1]), np.array([0, 1, 2]))
+    label, variant = np.array([1, 0, 2, 1, 0, 1, 0, 3]), np.where(drive < 4, SHIPPED, SYNTHETIC)
+    fold = folds(single_points(label, variant=variant, drive=drive, truth=truth), 3)
+    assert (fold[4:] == NONE).all()
+    assert sorted(set(fold[:4].tolist())) == [0, 1, 2]
+    assert len(set(fold[:3].tolist())) == 3  # the objects are spread
+
+
+def test_unknown_and_partial_crops_are_not_trainable():
+    partial, unknown = np.array([False, False, False, True]), np.array([True, False, True, False])
+    data = single_points(np.array([0, 0, 1, 0]), partial=partial, unknown=unknown)
+    assert data.trainable.tolist() == [False, True, True, False]
+
+
+def test_out_of_fold_models_predict_drives_unseen_in_training():
     drive = np.repeat(np.arange(6), 5)
     label = np.tile(np.arange(5) % 4, 6)
-    crops = Crops(np.zeros((30, 3), np.float32), np.arange(31))
-    data = data_of(crops, label, drive=drive, truth=truth_of(label, drive))
+    data = single_points(label, drive=drive, truth=truth_of(label, drive))
     predicted = []
 
     def trained(among: np.ndarray, i: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -33,16 +56,110 @@ def test_out_of_fold_models_predict_drives_unseen_in_training() -> None:
     assert (held.logits.argmax(axis=1) == held.validation.label).all()
 
 
-def test_every_sensor_counts_as_much_as_the_others() -> None:
+def test_every_sensor_counts_as_much_as_the_others():
     label, sensor = np.array([0, 0, 0, 1, 0, 1, 2, 0]), np.array([0, 0, 0, 0, 1, 1, 1, 1])
     partial, variant = np.arange(8) == 4, np.where(np.arange(8) == 7, CLUSTERED, SHIPPED)
-    crops = Crops(np.zeros((8, 3), np.float32), np.arange(9))
     truth = truth_of(label[4:], np.array([0, 0, 0, 9]), row=np.array([5, NONE, 7, 4]))
     columns = {"sensor": sensor, "sensor_names": ("a", "b"), "partial": partial, "variant": variant}
-    valid = Validation.of(data_of(crops, label, truth=truth, **columns))
+    valid = Validation.of(single_points(label, truth=truth, **columns))
     np.testing.assert_allclose(valid.weight, [1 / 8] * 4 + [0, 1 / 4, 1 / 4])
     np.testing.assert_allclose(valid.class_frequency, [3 / 8, 3 / 8, 1 / 4, 0])
     assert valid.truth.row.tolist() == [5, NONE, NONE]  # crop 7 and drive 9 are not validated
     some = valid.weight_of(valid.sensor == 1)
     assert not some[:5].any()
     np.testing.assert_allclose(np.bincount(valid.label, some)[1:] * 5 / 8, [3 / 8, 1 / 4])  # as often as among all
+
+
+LABEL = np.arange(400) % 4
+SURE = np.log(np.eye(4)[LABEL] * 0.96 + 0.01)
+NOTHING = np.zeros((400, 4))
+
+
+def validation() -> Validation:
+    """400 crops, as many of every class."""
+    return Validation.of(single_points(LABEL, truth=truth_of(LABEL, 0 * LABEL, row=np.arange(400))))
+
+
+def test_what_contradicts_a_network_that_is_right_has_no_weight():
+    valid = validation()
+    weights, _ = fit_pool(softmax(SURE, axis=1), softmax(-SURE, axis=1), -SURE, valid, valid.weight)
+    assert weights.network > 0.95
+    assert max(weights.box, weights.reflectance) < 0.05
+
+
+def test_the_box_tells_objects_from_background_alone():
+    valid = validation()
+    weights, log_posterior = fit_pool(softmax(NOTHING, axis=1), softmax(SURE, axis=1), NOTHING, valid, valid.weight)
+    assert weights.box > 0.95
+    assert weights.reflectance == 0.0
+    posterior = softmax(log_posterior, axis=1)
+    assert posterior[LABEL == 0, 0].min() > 0.9
+    np.testing.assert_allclose(posterior[:, 1], posterior[:, 3])
+
+
+def test_calibration_recovers_temperature_and_class_offsets():
+    rng = np.random.default_rng(0)
+    true = rng.normal([2.0, 0, 0, 0], 2.0, (6000, 4))
+    share = Calibration.identity().apply(true)
+    label = np.array([rng.choice(4, p=p) for p in share])
+    distorted = 3 * (true - [2.0, 0, 0, 0])
+    found = fit_calibration(distorted, label, np.full(6000, 1 / 6000))
+    assert found.temperature == pytest.approx(3.0, rel=0.1)
+    assert found.offset[1:] == pytest.approx(np.full(3, -2.0), abs=0.2)
+    assert top_calibration_error(found.apply(distorted), label) < 0.02
+    assert top_calibration_error(Calibration.identity().apply(distorted), label) > 0.1
+
+
+def test_calibration_folds_into_the_last_layer():
+    rng = np.random.default_rng(0)
+    calibration = Calibration(1.7, np.array([0.0, -1.0, 0.5, 2.0]))
+    x, weight, bias = rng.normal(size=(5, 8)), rng.normal(size=(8, 4)), rng.normal(size=4)
+    *hidden, folded = calibration.fold_into([(weight, bias), (weight, bias)])
+    np.testing.assert_allclose(hidden[0][0], weight, atol=1e-6)
+    np.testing.assert_allclose(
+        Calibration.identity().apply(x @ folded[0] + folded[1]), calibration.apply(x @ weight + bias), atol=1e-5
+    )
+
+
+def test_recall_counts_the_objects_called_right_at_the_precision():
+    score = np.array([9.0, 8, 7, 6, 5, 4])
+    right = np.array([True, True, False, True, True, False])
+    row, every = np.array([0, 3, 4, NONE, 5]), np.ones(6, np.bool_)
+    wanted = np.array([True, True, True, True, False])  # the last one has too few points
+
+    def recall(precision: float) -> tuple[float, float]:
+        found = recall_at(precision, score, right, every, wanted, row)
+        assert found["objects"] == 4
+        return found["of_all"], found["of_found"]
+
+    assert recall(0.9) == (0.25, 0.3333)
+    assert recall(0.8) == (0.75, 1.0)  # four right of five
+    assert recall_at(0.8, score, ~right, every, wanted, row)["of_all"] == 0.0
+
+
+def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor():
+    rng = np.random.default_rng(0)
+    n = 4000
+    frequency = np.array([[0.9, 0.05, 0.03, 0.02], [0.4, 0.2, 0.2, 0.2]])
+    sensor = np.repeat([0, 1], n)
+    label = np.concatenate([rng.choice(4, n, p=p) for p in frequency])
+    likelihood = np.eye(4)[label] * 2.0 + rng.normal(0, 1.5, (2 * n, 4))
+    truth = truth_of(label, sensor, sensor=sensor, row=np.arange(2 * n))
+    columns = {"sensor": sensor, "drive": sensor, "sensor_names": ("rare", "often")}
+    valid = Validation.of(single_points(label, truth=truth, **columns))
+    scale = 2.0 / 1.5**2  # of the exact log-likelihood ratio
+    exact = by_sensor(scale * likelihood + np.log(valid.class_frequency), valid, valid.clear)
+    assert set(exact) == {"often", "rare"}
+    for scores in exact.values():
+        assert scores["temperature"] == pytest.approx(1.0, abs=0.1)
+        assert scores["calibration_error"] < 0.03
+    sharper = by_sensor(3 * scale * likelihood + np.log(valid.class_frequency), valid, valid.sensor == 0)
+    assert list(sharper) == ["rare"]
+    assert sharper["rare"]["temperature"] == pytest.approx(3.0, rel=0.15)
+    assert sharper["rare"]["calibration_error"] > 0.05
+
+
+def test_a_class_that_is_absent_keeps_the_assumed_frequency():
+    assumed = np.array([0.7, 0.1, 0.1, 0.1])
+    found = shift(np.array([0.5, 0.5, 0.0, 0.0]), assumed)
+    np.testing.assert_allclose(found, np.log([0.5 / 0.7, 5.0, 1.0, 1.0]))

@@ -1,9 +1,5 @@
 """Readers of labelled scans."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -18,13 +14,12 @@ from tools.train.labelled_scans import (
     beams,
     folder_scans,
     pandaset_scans,
-    points_in_box,
     thinned,
 )
 from tools.train.synthetic_scans import simulated_scans
 
 
-def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path: Path) -> None:
+def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path):
     car = np.array([11.35, 0.0, 0.5, 0.2], np.float32) + np.linspace(0, 1, 30)[:, None] * np.float32([0, 1, 0, 0])
     carrier = np.array([[1.4, 0.1, 1.0, 0.2]], np.float32)
     np.savez(tmp_path / "log_1.npz", points=np.concatenate([carrier, car]))
@@ -42,25 +37,21 @@ def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path: Path) -> None:
     assert len(scan.objects[0]) == 30
 
 
-def test_points_in_a_rotated_box_are_above_the_ground() -> None:
-    box = np.array([10.0, 0.0, -1.7, 4.0, 2.0, 1.5, np.pi / 2])
-    points = np.array([[10, 1.9, -1, 0], [11.9, 0, -1, 0], [10, 0, -1.6, 0], [10, 0, 0.5, 0]], np.float32)
-    assert points_in_box(points, box).tolist() == [True, False, False, False]
+def pandaset(folder, name, points, rows):
+    """The scan of points [m, world] and rows of a table of labels."""
+    (folder / "scans").mkdir()
+    np.c_[points, np.full(len(points), 9)].astype(np.float32).tofile(folder / "scans" / f"{name}.bin")
+    (folder / f"{name}.csv").write_text(f"class,x,y,z,length,width,height,yaw,points\n{rows}")
+    (scan,) = pandaset_scans(folder)
+    return scan
 
 
-def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_unlabelled(tmp_path: Path) -> None:
-    (tmp_path / "scans").mkdir()
+def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_unlabelled(tmp_path):
     feet = np.array([[10.79, 0.0], [20.79, 0.0], [30.79, 0.0], [40.79, 0.0]])
-    points = np.c_[np.repeat(feet, 25, axis=0), np.tile(np.linspace(0.3, 1.1, 25), 4), np.full(100, 9)]
-    points.astype(np.float32).tofile(tmp_path / "scans" / "000001.bin")
-    (tmp_path / "000001.csv").write_text(
-        "class,x,y,z,length,width,height,yaw,points\n"
-        "Pedestrian_with_Object,10.79,0,0.6,0.8,0.8,1.9,0,25\n"
-        "Medium-sized_Truck,20.79,0,0.6,7,2.5,1.9,0,25\n"
-        "Bicycle,30.79,0,0.6,1.8,0.6,1.8,0,25\n"
-        "Bicycle,40.79,0,0.6,1.8,0.6,1.2,0,25\n"
-    )
-    (scan,) = pandaset_scans(tmp_path)
+    points = np.c_[np.repeat(feet, 25, axis=0), np.tile(np.linspace(0.3, 1.1, 25), 4)]
+    rows = "Pedestrian_with_Object,10.79,0,0.6,0.8,0.8,1.9,0,25\nMedium-sized_Truck,20.79,0,0.6,7,2.5,1.9,0,25\n"
+    rows += "Bicycle,30.79,0,0.6,1.8,0.6,1.8,0,25\nBicycle,40.79,0,0.6,1.8,0.6,1.2,0,25\n"
+    scan = pandaset(tmp_path, "000001", points, rows)
     assert scan.sensor == "pandar64"
     assert scan.kinds == (ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST, ObjectClass.BACKGROUND)
     np.testing.assert_allclose(scan.boxes[:, :3], [[10, 0, -2.2], [30, 0, -2.15], [40, 0, -1.85]], atol=1e-6)
@@ -68,27 +59,19 @@ def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_un
     assert np.flatnonzero(scan.unlabelled).tolist() == list(range(25, 50))
 
 
-def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_unknown(tmp_path: Path) -> None:
-    (tmp_path / "scans").mkdir()
-    side = np.linspace(-2.0, 2.0, 41)
-    height = np.full(41, 1.6)
+def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_unknown(tmp_path):
+    side, height = np.linspace(-2.0, 2.0, 41), np.full(41, 1.6)
     across = np.c_[np.full(41, -20.0), 30.0 + side, height]  # sensor at (-30, 34.1, 1.79)
     along = np.c_[-10.0 + side, np.full(41, 30.0), height]
     people = np.array([[-20.0, 51.6, 1.6], [-21.3, 51.4, 1.6], [-20.0, 55.0, 1.6]])
-    points = np.concatenate([across, along, people])
-    np.c_[points, np.zeros(len(points))].astype(np.float32).tofile(tmp_path / "scans" / "world-000040.bin")
-    (tmp_path / "world-000040.csv").write_text(
-        "class,x,y,z,length,width,height,yaw,points\n"
-        "Car,-20,30,1.2,4.4,1.8,1.5,0,41\n"
-        "Car,-10,30,1.2,4.4,1.8,1.5,0,41\n"
-    )
-    (scan,) = pandaset_scans(tmp_path)
+    rows = "".join(f"Car,{x},30,1.2,4.4,1.8,1.5,0,41\n" for x in (-20, -10))
+    scan = pandaset(tmp_path, "world-000040", np.concatenate([across, along, people]), rows)
     np.testing.assert_allclose(scan.boxes[:, 6], [np.pi / 2, 0.0])
     assert [len(own) for own in scan.objects] == [41, 41]
     assert np.flatnonzero(scan.unlabelled).tolist() == [82, 83]
 
 
-def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole() -> None:
+def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole():
     azimuth = np.arange(0.1, 2 * np.pi, 0.1)
     rho = np.repeat([20.0, 15.0, 10.0, 5.0], len(azimuth))  # beam by beam, from the top
     a = np.tile(azimuth, 4)
@@ -103,7 +86,7 @@ def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole() -> 
     assert scan.sensor == "hdl-64e, 32 beams"
 
 
-def test_scans_in_a_folder_are_those_that_were_written(tmp_path: Path) -> None:
+def test_scans_in_a_folder_are_those_that_were_written(tmp_path):
     made = list(simulated_scans(["street"], [3], [0.0, 0.5], camera=False, sensors=["vlp-16"]))
     write_folder(tmp_path, made)
     found = list(folder_scans(tmp_path, "mine", made[0].profile))
@@ -124,7 +107,7 @@ def test_scans_in_a_folder_are_those_that_were_written(tmp_path: Path) -> None:
         list(folder_scans(tmp_path, "mine", made[0].profile))
 
 
-def test_the_calibration_of_a_folder_states_where_labels_are_complete(tmp_path: Path) -> None:
+def test_the_calibration_of_a_folder_states_where_labels_are_complete(tmp_path):
     (scan,) = simulated_scans(["street"], [3], [0.0], camera=True, sensors=["vlp-16"])
     write_folder(tmp_path, [scan])
     (tmp_path / "calib").mkdir()

@@ -1,15 +1,13 @@
 """Counting of the motion witness's table."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tools.study.drives import simulated
-from tools.train.motion_witness import CELLS, MOST, WEIGHT, counted, log_likelihood_ratio
+from tools.train.motion_witness import CELLS, FRAGMENTS, MOST, WEIGHT, counted, log_likelihood_ratio
 
 
-def test_ratio_of_frequent_cells_is_that_of_the_counts() -> None:
-    counts = np.full((3, CELLS, 4), 100_000)
+def test_ratio_of_frequent_cells_is_that_of_the_counts():
+    counts = np.full((4, CELLS, 4), 100_000)
     counts[:, 0, 2] *= 3
     ratio = log_likelihood_ratio(counts)
     expected = WEIGHT * np.log(3 / (CELLS + 2) * CELLS)
@@ -17,16 +15,24 @@ def test_ratio_of_frequent_cells_is_that_of_the_counts() -> None:
     np.testing.assert_allclose(ratio[:, 0], 0.0, atol=1e-3)
 
 
-def test_a_length_without_counts_has_those_of_all_lengths_and_no_certainty() -> None:
-    counts = np.zeros((3, CELLS, 4), np.int64)
-    counts[0, 1, 0] = counts[0, 2, 1] = 1000
+def test_an_object_that_is_hardly_ever_so_short_is_none_there():
+    counts = np.full((4, CELLS, 4), 100_000)
+    counts[FRAGMENTS, :, 2] = 0
+    ratio = log_likelihood_ratio(counts)
+    assert (ratio[FRAGMENTS, 1] == -MOST).all()
+    np.testing.assert_allclose(ratio[FRAGMENTS, 0], 0.0, atol=1e-3)
+
+
+def test_a_length_without_counts_has_those_of_all_lengths_and_no_certainty():
+    counts = np.zeros((4, CELLS, 4), np.int64)
+    counts[1, 1, 0] = counts[1, 2, 1] = 1000
     ratio = log_likelihood_ratio(counts)
     assert np.abs(ratio).max() <= MOST
-    np.testing.assert_allclose(ratio[1], ratio[2])
-    assert ratio[1, 0, 2] == MOST
+    np.testing.assert_allclose(ratio[2], ratio[3])
+    assert ratio[2, 0, 2] == MOST
 
 
-def test_every_judged_track_of_a_drive_is_counted_once() -> None:
+def test_every_judged_track_of_a_drive_is_counted_once():
     counts = counted(simulated("crossing", "vlp-16", 0.5, 900), 0)
     assert counts[:, 3:].sum() < counts.sum()  # hardly anything has gone far within half a second
     assert counts[..., 0].sum() > counts[..., 1:].sum() > 0

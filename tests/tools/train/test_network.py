@@ -1,11 +1,10 @@
-"""The network in PyTorch."""
+"""The network in PyTorch, and its export to ONNX."""
 
-from __future__ import annotations
-
+import numpy as np
 import pytest
 
 
-def test_max_pooled_linear_has_the_gradients_of_its_definition() -> None:
+def test_max_pooled_linear_has_the_gradients_of_its_definition():
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
     from tools.train.network import MaxPooledLinear
 
@@ -22,3 +21,27 @@ def test_max_pooled_linear_has_the_gradients_of_its_definition() -> None:
         strict=True,
     ):
         assert torch.allclose(one, other, atol=1e-6)
+
+
+def test_the_exported_network_equals_the_trained_one(tmp_path_factory):
+    torch = pytest.importorskip("torch", reason="extra [train] is not installed")
+    from modt.classification.pointnet import PointNet
+    from modt.config import ClassificationConfig, SensorConfig
+    from tools.train.export_pointnet import graph
+    from tools.train.network import PointNet as Trained
+
+    torch.manual_seed(0)
+    net = Trained()
+    counts = torch.tensor([1, 5, 60, 400, 900])
+    for _ in range(3):  # gives the normalisations something to hold
+        net(torch.randn(int(counts.sum()), 3) * 1.5, counts)
+    for norm in net.norms:
+        torch.nn.init.normal_(norm.log_scale, 0, 0.3)
+    net.eval()
+    path = tmp_path_factory.mktemp("model") / "net.onnx"
+    path.write_bytes(graph(net.layers()).SerializeToString())
+    exported = PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+    for n in (1, 2, 17, 400, 1200):
+        xyz = torch.randn(2 * n, 3) * 2
+        expected = torch.softmax(net(xyz, torch.tensor([n, n])), dim=1).detach().numpy()
+        np.testing.assert_allclose(exported.infer(xyz.reshape(2, n, 3).numpy()), expected, atol=1e-4)

@@ -1,7 +1,5 @@
 """Copy-paste augmentation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,7 @@ from tests.tools.train.datasets import scan_of
 from tools.train.paste import ObjectCut, paste_objects
 
 
-def test_a_pasted_object_stands_on_the_ground_and_occludes_the_scene() -> None:
+def test_a_pasted_object_stands_on_the_ground_and_occludes_the_scene():
     rng = np.random.default_rng(0)
     azimuth, elevation = np.meshgrid(np.arange(-180, 180, 0.4), np.arange(-24, -1, 0.8))
     rho = 1.7 / np.tan(np.deg2rad(-elevation.ravel()))

@@ -53,5 +53,5 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     out = arguments.out or directory / default_name(arguments.frame, arguments.animate)
     save_view(directory, arguments.frame, arguments.truth, capture, out)
-    print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
+    print(f"{out} ({out.stat().st_size / 1e3:,.0f} kB)")
     return 0

@@ -37,6 +37,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
     silent = [0.0] * len(CLASS_NAMES)  # runs of earlier versions have no witness
     tracks.witness[:] = np.array([row.get("witness", silent) for row in rows]).reshape(tracks.witness.shape)
+    tracks.size_m[:] = np.array([row.get("size", [0.0] * 3) for row in rows]).reshape(tracks.size_m.shape)
     tracks.key_points[:] = [row["viewed"] for row in rows]
     tracks.final[:] = [row["final"] for row in rows]
     tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]

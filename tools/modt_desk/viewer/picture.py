@@ -116,7 +116,9 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     labels = []
     for k in np.flatnonzero(is_object).tolist():
         name = names[kind[k]]
-        text = f"{'false: ' if false[k] else ''}#{rows[k, 0]} {name} {100 * of[f'p_{name}'][k]:.0f} %"
+        probability = of[f"p_{name}"][k]
+        doubt = "?" if probability < 0.5 else ""
+        text = f"{'false: ' if false[k] else ''}#{rows[k, 0]} {name}{doubt} {100 * probability:.0f} %"
         labels.append((xy[k, 0], box[k, :, 1].max(), text, wrong if false[k] else INK))
     return labels
 

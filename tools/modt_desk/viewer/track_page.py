@@ -122,6 +122,7 @@ def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) ->
 
 
 def _reported(row: Row) -> str:
-    """The class that is reported, with its own probability."""
+    """The class that is reported, with its own probability; with a question mark below one half."""
     name = CLASS_NAMES[int(row["class"])]
-    return f"{name} {100 * row[f'p_{name}']:.1f} %"
+    doubt = "?" if row["class"] and row[f"p_{name}"] < 0.5 else ""
+    return f"{name}{doubt} {100 * row[f'p_{name}']:.1f} %"

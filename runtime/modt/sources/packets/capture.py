@@ -266,9 +266,12 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         else:
             remedy = f"for an Ouster, save its metadata as {path.with_suffix('.json')} or give metadata=FILE"
         raise MisuseError(path, f"no packets of a {layout} ({there})", remedy)
-    _, first = next(_decoded(capture, decoder, Reception()), (0.0, None))
+    reception = Reception()
+    _, first = next(_decoded(capture, decoder, reception), (0.0, None))
     if first is None:
-        raise MisuseError(path, f"no whole sweep of a {layout}", "record at least two turns of the sensor")
+        why, _, remedy = max(reception.refused, key=reception.refused.__getitem__, default="").partition("; ")
+        cause = f"no whole sweep ({layout})" + (f", packets are refused: {why}" if why else "")
+        raise MisuseError(path, cause, remedy or "record at least two turns of the sensor")
     info = StreamInfo(
         path.stem,
         f"{layout} packets",

@@ -176,7 +176,6 @@ class HesaiDecoder(TurnDecoder):
     """Turns of a Hesai; the return with the greatest reflectance represents a firing."""
 
     maker, wrap_s = "Hesai", 86_400.0
-    unknown = "of a model of Hesai whose calibration is not given"
     signature = staticmethod(model_of)
 
     def __init__(self, name: str, angles_deg: Float64 | None = None) -> None:
@@ -194,8 +193,7 @@ class HesaiDecoder(TurnDecoder):
             angles_deg = np.column_stack([model.elevations_deg, np.zeros(model.channels)])
         if angles_deg is None or len(angles_deg) != model.channels:
             given = "is not given" if angles_deg is None else f"has {len(angles_deg)} channels"
-            if self._signature is None:
-                raise MisuseError(self.name, f"the calibration of this {model.name} {given}", REMEDY)
+            self.unknown = f"the calibration of this {model.name} {given}; {REMEDY}"
             return None
         self._model, self.profile = model, model.profile
         self._azimuth_deg = angles_deg[:, 1].astype(np.float32)

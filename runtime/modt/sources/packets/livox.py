@@ -95,7 +95,7 @@ class LivoxDecoder(PacketDecoder):
         if before_ns is None:
             return []
         gaps_ns = np.diff([before_ns, *stamps_ns])
-        lost = int((np.rint(gaps_ns / np.median(gaps_ns)) - 1).sum())
+        lost = int(np.maximum(np.rint(gaps_ns / np.median(gaps_ns)) - 1, 0).sum())  # lying stamps have gaps near 0
         reception.lost += lost
         points = np.concatenate([_points(self._packets[stamp_ns]) for stamp_ns in stamps_ns])
         middle_s = (self._window + 0.5) * SWEEP_NS * 1e-9

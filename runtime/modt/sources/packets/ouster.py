@@ -23,6 +23,8 @@ TIMEOUT_S = 5.0
 MAX_METADATA_BYTES = 2**20
 MAX_LOST_FRAMES = 20
 """Greatest number of consecutive frames that count as lost; beyond it the sensor was restarted."""
+RESTARTED_BY = 20
+"""Number of consecutive packets of earlier frames by which the sensor was restarted, or a false number was followed."""
 
 
 class OusterDecoder(PacketDecoder):
@@ -68,13 +70,26 @@ class OusterDecoder(PacketDecoder):
         ):  # the initialisation id changes at each start
             refuse(reception, self.name, "of another sensor than the metadata")
             return []
+        if self._ended(self._format.frame_id(packet.buf)):
+            refuse(reception, self.name, "late: its frame has ended")
+            self._late += 1
+            if self._late < RESTARTED_BY:
+                return []
+            self._forget()
+        self._late = 0
         return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
+
+    def _ended(self, number: int) -> bool:
+        """Whether the number of a frame is before that of the present one; the batcher ignores such packets."""
+        numbers, present = self._format.max_frame_id + 1, self._frame.frame_id
+        return present >= 0 and 0 < (present - number) % numbers < numbers // 2
 
     def _forget(self) -> None:
         used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]
         self._batcher, self._frame = self._sdk.FrameBatcher(self._info), self._sdk.LidarFrame(self._info, used)
         self._clock = DeviceClock()
         self._last_id: int | None = None
+        self._late = 0
 
     def _read(self, metadata: Path | str) -> tuple[Any, Any, Any]:
         """SDK's objects for the metadata: sensor, format of its packets, and projection."""
@@ -112,14 +127,18 @@ class OusterDecoder(PacketDecoder):
         if 0 <= passed <= MAX_LOST_FRAMES:
             lost += passed * int(self._awaited.sum())
         reception.lost += lost
+        if not (frame.timestamp.astype(np.int64) > 0).any():
+            refuse(reception, self.name, "a whole frame without stamps, or with stamps beyond the year 2262")
+            return []
         stamp_s, turn_s = self._times()
         return [Sweep(stamp_s, self._points(), turn_s, complete=not missing.any())]
 
     def _times(self) -> tuple[float, float]:
         """Stamp and duration of the frame [s]."""
         frame = self._frame
-        seen = np.flatnonzero(frame.timestamp)
-        time_ns = frame.timestamp.astype(np.int64)[seen]
+        time_ns = frame.timestamp.astype(np.int64)
+        seen = np.flatnonzero(time_ns > 0)
+        time_ns = time_ns[seen]
         per_column_s = float(time_ns[-1] - time_ns[0]) * 1e-9 / max(int(seen[-1] - seen[0]), 1)
         near = int(np.abs(seen - self._width // 2).argmin())
         ahead_s = float(time_ns[near]) * 1e-9 + (self._width / 2 - float(seen[near])) * per_column_s

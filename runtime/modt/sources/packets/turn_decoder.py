@@ -163,7 +163,7 @@ class TurnDecoder(PacketDecoder):
 
     @abstractmethod
     def _recognise(self, payloads: Sequence[bytes]) -> object:
-        """Prepare for the model of most of the packets, and return its signature; None for an unknown model."""
+        """Prepare for the model of most of the packets, and return its signature; None with a reason in `unknown`."""
 
     @abstractmethod
     def _entry(self, received_s: float, payload: bytes) -> Entry:

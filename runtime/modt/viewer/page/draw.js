@@ -79,10 +79,12 @@ function trail(row) {
   });
 }
 
-const label = (row) => {
-  const { name } = run.classes[row.class];
-  return `#${row.id} ${name} ${(100 * row[`p_${name}`]).toFixed(0)} %`;
+// The reported class with its posterior; with a question mark below one half, as in `uncertain` of tracks.jsonl.
+const reported = (row, digits) => {
+  const { name } = run.classes[row.class], p = row[`p_${name}`];
+  return `${name}${row.class && p < 0.5 ? "?" : ""} ${(100 * p).toFixed(digits)} %`;
 };
+const label = (row) => `#${row.id} ${reported(row, 0)}`;
 
 // A line of text centred at x, above y, or further up where another one lies; left out where there is no room.
 function write(text, x, y, colour, needed) {

@@ -54,7 +54,7 @@ function events(rows) {
     }
     const before = rows[k - 1] || {};
     if (row.state !== before.state) found.push([row.at, stateOf(row)]);
-    if (row.class !== before.class) found.push([row.at, `reported as ${percent(row, run.classes[row.class])}`]);
+    if (row.class !== before.class) found.push([row.at, `reported as ${reported(row, 1)}`]);
   });
   return found;
 }

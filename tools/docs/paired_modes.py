@@ -1,0 +1,93 @@
+"""Write the section of docs/paper.md on what tracking adds, on the same simulated drives for every mode.
+
+    python -m tools.docs.paired_modes
+
+It takes ten minutes of CPU time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from modt.types import Float64
+from modt_desk.evaluation.class_score import class_scores
+from modt_desk.evaluation.evaluation import DriveRows
+from modt_desk.experiments.markdown import commit
+from tools.docs.sections import DOCS, replace_section, write
+from tools.study import drives, sensors
+
+PAGE, MARK = DOCS / "paper.md", "tools.docs.paired_modes"
+SENSORS = "vlp-16", "os1-64", "hdl-64e", "mid-360", "pandar64", "xt-32"
+
+BASELINE, MODES = "conventional", ("accurate", "efficient")
+SCENES, SEEDS, SECONDS = ("street", "crossing"), range(1100, 1104), 6.0
+"""Drives of each sensor. No choice of this project is made on them."""
+RESAMPLES = 200
+"""Draws of the drives of each sensor, with replacement, from which an interval is taken."""
+Rows = Mapping[str, Sequence[DriveRows]]
+"""Judged drives of each mode, in one order."""
+
+
+def table() -> Iterator[str]:
+    """Markdown: the mean over sensors with its 95 % interval, and each sensor."""
+    judged = {sensor: _judged(sensor) for sensor in SENSORS}
+    yield f"Commit {commit()}; made by `python -m {MARK}`."
+    yield ""
+    number = len(SEEDS) * len(SCENES)
+    title = f"AP less that of `{BASELINE}`, {number} simulated drives a sensor, paired [points]"
+    yield f"| {title} | {' | '.join(sensors.CLASSES)} |"
+    yield "|---|" + "---|" * len(sensors.CLASSES)
+    for mode in MODES:
+        mean, low, high = interval(list(judged.values()), mode, np.random.default_rng(0))
+        cells = [f"{m:+.1f} ({a:+.1f}, {b:+.1f})" for m, a, b in zip(mean, low, high, strict=True)]
+        yield f"| **`{mode}`, mean and 95 % interval** | {' | '.join(cells)} |"
+        for sensor, rows in judged.items():
+            yield f"| `{mode}`, {sensor} | {' | '.join(f'{d:+.1f}' for d in difference(rows, mode))} |"
+
+
+def interval(judged: Sequence[Rows], mode: str, rng: np.random.Generator) -> tuple[Float64, Float64, Float64]:
+    """(C,) mean over sensors of the difference [points] by class, and the ends of its 95 % interval."""
+    mean: Float64 = np.mean([difference(rows, mode) for rows in judged], axis=0)
+    drawn = [np.mean([difference(_drawn(rows, rng), mode) for rows in judged], axis=0) for _ in range(RESAMPLES)]
+    low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
+    return mean, low, high
+
+
+def difference(rows: Rows, mode: str) -> Float64:
+    """(C,) average precision of a mode less that of BASELINE, by class [points]."""
+    difference: Float64 = _precisions(rows[mode]) - _precisions(rows[BASELINE])
+    return difference
+
+
+def _drawn(rows: Rows, rng: np.random.Generator) -> Rows:
+    """As many drives drawn with replacement, the same of every mode."""
+    n = len(rows[BASELINE])
+    index = rng.integers(n, size=n).tolist()
+    return {mode: [drives[k] for k in index] for mode, drives in rows.items()}
+
+
+def _precisions(rows: Sequence[DriveRows]) -> Float64:
+    tables = (np.concatenate([getattr(drive, name) for drive in rows]) for name in ("objects", "proposals"))
+    scores = class_scores(*tables)
+    return np.array([100.0 * (scores[name].average_precision or 0.0) for name in sensors.CLASSES])
+
+
+def _judged(sensor: str) -> Rows:
+    """Every mode on the drives of a sensor."""
+    found: dict[str, list[DriveRows]] = {mode: [] for mode in (BASELINE, *MODES)}
+    for number, (seed, scene) in enumerate((seed, scene) for seed in SEEDS for scene in SCENES):
+        drive = drives.simulated(scene, sensor, SECONDS, seed)
+        for mode, rows in found.items():
+            rows.append(sensors.run(drive, drive.profile, mode, drive.fov, number))
+    return found
+
+
+def document() -> str:
+    """The page with its section made anew."""
+    return replace_section(PAGE.read_text(encoding="utf-8"), MARK, "\n".join(table()))
+
+
+if __name__ == "__main__":
+    write(__doc__, PAGE, document)
