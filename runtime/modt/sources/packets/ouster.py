@@ -24,7 +24,7 @@ MAX_METADATA_BYTES = 2**20
 MAX_LOST_FRAMES = 20
 """Greatest number of consecutive frames that count as lost; beyond it the sensor was restarted."""
 RESTARTED_BY = 20
-"""Number of consecutive packets of earlier frames by which the sensor was restarted, or a false number was followed."""
+"""Number of consecutive packets of earlier frames by which the sensor was restarted, or has sent a false number."""
 
 
 class OusterDecoder(PacketDecoder):
@@ -33,6 +33,8 @@ class OusterDecoder(PacketDecoder):
     A sweep is complete with the last packet of its window. A sweep that began before the first received packet is
     discarded. The first of two returns of a firing is taken.
     """
+
+    _late: int  # number of consecutive packets of earlier frames
 
     def __init__(self, name: str, metadata: Path | str) -> None:
         """Make a decoder for the source of a name; `metadata`: a file, or the host name of the sensor.
@@ -82,7 +84,7 @@ class OusterDecoder(PacketDecoder):
     def _ended(self, number: int) -> bool:
         """Whether the number of a frame is before that of the present one; the batcher ignores such packets."""
         numbers, present = self._format.max_frame_id + 1, self._frame.frame_id
-        return present >= 0 and 0 < (present - number) % numbers < numbers // 2
+        return bool(present >= 0 and 0 < (present - number) % numbers < numbers // 2)
 
     def _forget(self) -> None:
         used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]
