@@ -24,7 +24,7 @@ MAX_METADATA_BYTES = 2**20
 MAX_LOST_FRAMES = 20
 """Greatest number of consecutive frames that count as lost; beyond it the sensor was restarted."""
 RESTARTED_BY = 20
-"""Number of consecutive packets of earlier frames after which the sensor was restarted, or a false number followed."""
+"""Number of consecutive packets of earlier frames by which the sensor was restarted, or has sent a false number."""
 
 
 class OusterDecoder(PacketDecoder):
