@@ -168,7 +168,7 @@ def _fuzz(job: Job) -> None:
 
 
 def _by_coverage(job: Job, seeds: Any, feed: Feed) -> None:
-    """Feed mutations of atheris, and as many of the project's own, which know texts."""
+    """Feed mutations, half of them by atheris, half by the project's own, which also change words of a text."""
     import atheris
 
     from tests.fuzz.mutation import mutated

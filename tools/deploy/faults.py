@@ -31,15 +31,15 @@ while True:
     time.sleep(0.02)
 """
 HOG_PRIORITY = 20
-"""Above the priority of the loop."""
+"""Real-time priority of a hog, a process that computes on the core of the loop; above the priority of the loop."""
 FULL_DISK = "full disk"
 """The one fault that may cost records."""
 BLOCKS, BLOCK_BYTES, CELL = 12, 100, np.dtype([("distance", "<u2"), ("reflectance", "u1")])
-"""A Velodyne's packet: blocks of a head of four bytes and of the returns of 32 firings."""
+"""A Velodyne's packet: blocks, each of a head of four bytes and 32 returns."""
 
 
 class World:
-    """Switches that the faults turn.
+    """Switches by which faults take effect.
 
     Attributes:
         disk_full, meter_lost, stage_broken: the fault is active.

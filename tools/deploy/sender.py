@@ -62,7 +62,7 @@ class Faulty:
 
 
 def paced(packets: Iterable[Timed]) -> Iterator[Timed]:
-    """Packets at their times, so that those that a fault takes away pass as slowly as the others."""
+    """Packets, each at its time. A packet that a fault then removes takes as long as any other."""
     began_s = time.monotonic()
     for at_s, payload in packets:
         time.sleep(max(began_s + at_s - time.monotonic(), 0.0))

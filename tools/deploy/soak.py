@@ -4,11 +4,12 @@
 
 A process of its own sends the recording as the packets of a VLP-16 to a UDP port, where the service receives them.
 
-Every fault must be reported by its counter (a process that takes the core only if results stall). The next result
-must be there within a second, at full quality. No record is lost except on a full disk. At most one deadline in 1,000
-is missed between faults. Memory and open descriptors stay flat. The exit status is 0 if all this holds.
+The exit status is 0 if the run keeps these promises. Each fault is counted where the status shows it; a process that
+takes the core ("hog") needs to be counted only if results stall. A second after a fault there are results of full
+quality again. Records are lost only on a full disk. At most one deadline in 1,000 is missed between faults. Memory
+and open descriptors stay flat.
 
-`--fifo` takes the priority of a service, and gives hogs a higher one.
+`--fifo` runs at the real-time priority of a service; hogs get a higher one.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT, Fault, World
 from tools.options import parser
 
 WARM_UP_S, REST_S, SETTLE_S = 15.0, 4.0, 2.5
-"""Time before the first fault, between two faults, and after one, until missed deadlines are not its effect [s]."""
+"""Time before the first fault, between two faults, and after a fault while a missed deadline is its effect [s]."""
 MAX_RECOVERY_S, MAX_MISSED, MAX_GROWTH = 1.0, 0.001, 0.05
 STALL = 1.5
 """A longer time between two results, in periods, is a stall."""

@@ -100,7 +100,7 @@ class Ladder:
             self.patience_s = min(2 * self.patience_s, MAX_PATIENCE_S) if failed else CALM_S
             self._cause, self._calm_s, self._ample_s = event, now_s, now_s
         elif self.step < before:
-            self._down_s = self._calm_s = now_s  # the time of ample slack counts on
+            self._down_s = self._calm_s = now_s  # the time with ample slack is not reset
         return event if self.step != before else None
 
 

@@ -76,7 +76,7 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
         age_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
         doubt = replace(unsettled, accepted=False, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts)
         return doubt, None, mark
-    measured = before.accepted if fits else not before.doubtful_s  # none of an interval that begins in a standstill
+    measured = before.accepted if fits else not before.doubtful_s  # unless the meter stood still at its start
     levels = [W for W in (step.watts, near_W if agrees else None) if W is not None] if measured else []
     after = History(True, reading, low_W=min(shown[0], *levels, math.inf), high_W=max(shown[1], *levels, -math.inf))
     if not measured:

@@ -90,7 +90,7 @@ def _write_table(path: Path, rows: Sequence[Row]) -> None:
 
 
 def _command(arguments: argparse.Namespace) -> str:
-    """As another user would write it."""
+    """The command, as another user would write it."""
     words = ["modt", "evaluate", "--experiment", *arguments.experiment]
     words += ["--kitti", "ROOT"] if arguments.kitti else []
     words += ["--simulated", str(arguments.simulated)] if arguments.simulated else []

@@ -23,8 +23,9 @@ from modt_desk.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK
 Runs = dict[str, RunCosts]
 """A stream's runs: tracking-by-detection first, the run of varied load last, the modes between."""
 OBSERVED = ("sweep_points", "proposals", "alive", "tracks", "points")
-"""First columns of what tracking alone sees of a frame: `tracks` are new, `points` the network's if it classified
-every proposal. Then, for each mode between, the tracks that ask for a class for the first time, none being given."""
+"""First columns of what tracking without classification shows of a frame: `tracks` counts the new ones, `points` what
+the network would process if it classified every proposal. A further column for each mode between counts the tracks
+that ask for a class for the first time."""
 _RESAMPLES = 300
 _VARIED = 0.2
 """Relative spread of the points of sweeps above which segmentation has a constant beside its cost a point."""

@@ -29,8 +29,8 @@ class Rules:
 KITTI_RULES = Rules()
 """Labels cover what the left colour camera sees, and leave out road users."""
 KITTI_ALL_ROUND_RULES = replace(KITTI_RULES, sector_deg=180.0, complete=True)
-"""Labels in KITTI's layout that lie behind the sensor, too."""
+"""Labels in KITTI's layout that cover the full circle."""
 CUBOID_RULES = Rules(
     min_points_followed=20, min_points_further=20, by_iou=True, sector_deg=180.0, max_range_m=60.0, complete=True
 )
-"""Labels all round."""
+"""Tables of cuboids, which cover the full circle."""

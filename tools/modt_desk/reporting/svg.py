@@ -31,7 +31,7 @@ class Trace:
     y: Float64
     dots: bool = False  # marks instead of a line
     dashed: bool = False
-    colour: str = ""  # instead of that of its place
+    colour: str = ""  # replaces the colour that its place in the plot gives it
 
 
 def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = False) -> str:

@@ -37,7 +37,7 @@ INK, SOFT, LINE, PAPER = (LIGHT[name] for name in ("ink", "soft", "line", "paper
 _TEXT_PT = 9.5
 _PANEL = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
 _LEAST_PT = 0.8
-"""Width of a point, at least."""
+"""Least width of a point."""
 _DATES_S = 1e8
 """Stamps from here on count from 1970."""
 Label = tuple[float, float, str, str]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 class Words(str, Enum):
-    """A text that is written as itself."""
+    """Base of enumerations whose members are written as their values."""
 
     __str__ = str.__str__
 

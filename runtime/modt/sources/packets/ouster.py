@@ -34,6 +34,8 @@ class OusterDecoder(PacketDecoder):
     discarded. The first of two returns of a firing is taken.
     """
 
+    _late: int  # number of consecutive packets of earlier frames
+
     def __init__(self, name: str, metadata: Path | str) -> None:
         """Make a decoder for the source of a name; `metadata`: a file, or the host name of the sensor.
 
@@ -82,7 +84,7 @@ class OusterDecoder(PacketDecoder):
     def _ended(self, number: int) -> bool:
         """Whether the number of a frame is before that of the present one; the batcher ignores such packets."""
         numbers, present = self._format.max_frame_id + 1, self._frame.frame_id
-        return present >= 0 and 0 < (present - number) % numbers < numbers // 2
+        return bool(present >= 0 and 0 < (present - number) % numbers < numbers // 2)
 
     def _forget(self) -> None:
         used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]
