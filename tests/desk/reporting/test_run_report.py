@@ -280,7 +280,7 @@ def test_how_many_are_as_late_or_later(tmp_path):
 
 
 @given(st.lists(st.integers(0, 100), min_size=1, max_size=200))
-def test_points_hold_the_sums_of_their_frames(values: list[int]) -> None:
+def test_points_hold_the_sums_of_their_frames(values):
     series = FrameSeries(1, points=8)
     for value in values:
         series.add([value])
