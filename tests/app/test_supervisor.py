@@ -37,14 +37,6 @@ def test_an_invalid_address_is_named(place):
         supervisor_of({"NOTIFY_SOCKET": place})
 
 
-def test_without_a_socket_there_is_no_supervisor():
-    opened = os.listdir("/proc/self/fd")
-    supervisor = supervisor_of({"NOTIFY_SOCKET": ""})
-    supervisor.alive()
-    assert os.listdir("/proc/self/fd") == opened
-    supervisor.close()
-
-
 @pytest.mark.parametrize("abstract", [False, True])
 def test_ready_is_sent_first_and_the_watchdog_served(tmp_path, abstract):
     name = f"@modt-test-{os.getpid()}" if abstract else str(tmp_path / "notify")

@@ -44,11 +44,14 @@ def here(command: str, *words: object, program=main) -> int:
 
 
 def refusal(capsys, *arguments: object, program=main) -> str:
-    """Last line that a command prints which is misused."""
+    """The line that a command prints when it is misused, after notes or its usage."""
     assert here(*arguments, program=program) == 2
     said = capsys.readouterr()
+    *before, line = said.err.splitlines()
     assert said.out == ""
-    return said.err.splitlines()[-1]
+    assert all(text.startswith(("modt: ", "usage: ", " ")) for text in before)
+    assert line.startswith("modt")
+    return line
 
 
 def session(out: Path, frames: int | None, **options) -> Session:

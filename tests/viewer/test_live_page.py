@@ -63,15 +63,8 @@ class Reader:
 
 @pytest.fixture
 def read(live):
-    readers = []
-
-    def begin(*arguments, **headers):
-        readers.append(Reader(live, *arguments, **headers))
-        return readers[-1]
-
-    yield begin
-    for reader in readers:
-        reader.close()
+    with ExitStack() as readers:
+        yield lambda *path, **headers: readers.enter_context(closing(Reader(live, *path, **headers)))
 
 
 @pytest.fixture

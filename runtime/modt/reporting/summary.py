@@ -23,10 +23,6 @@ class TrackLives:
         self._alive: dict[int, tuple[int, bool]] = {}
         self._ended = {True: [0, 0], False: [0, 0]}  # foreground: tracks, frames with a proposal
 
-    def __len__(self) -> int:
-        """Number of tracks that are held."""
-        return len(self._alive)
-
     def add(self, tracks: Iterable[tuple[int, bool, bool]]) -> None:
         """Add the tracks of one frame: id, whether it has a proposal, whether it is foreground."""
         present: dict[int, tuple[int, bool]] = {}

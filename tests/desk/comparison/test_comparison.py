@@ -42,32 +42,22 @@ def mode_run(name, log, budget=lambda index: UNLIMITED, windows=None):
     return ModeRun(Scripted(name, ledger, log), ledger, budget, windows)
 
 
-def column(made, name):
-    return made.counts()[:, COUNTS.index(name)].tolist()
-
-
-@pytest.fixture
-def one():
-    made = mode_run("one", [])
-    interleave(FRAMES, [made], turn=1)
-    return made
-
-
-def test_counts_of_first_further_and_reacquired_views(one):
-    assert column(one, "proposals") == [2, 1, 2, 1, 0, 1]
-    assert column(one, "tracks") == [2, 0, 0, 1, 0, 1]
-    assert column(one, "classified_tracks") == [2, 0, 0, 0, 0, 1]
-    assert column(one, "classified") == [2, 1, 1, 0, 0, 1]
-    assert column(one, "reacquired") == [0, 0, 1, 0, 0, 0]
-    assert column(one, "calls") == [1, 1, 1, 0, 0, 1]
-    assert column(one, "foreground") == [2, 1, 2, 0, 0, 1]
-
-
-def test_lives_are_frames_with_a_proposal(one):
-    assert one.lives.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}
+def test_counts_of_first_further_and_reacquired_views_and_lives_of_tracks():
+    one = mode_run("one", [])
+    interleave(FRAMES, [one], turn=1)
+    expected = {
+        "proposals": [2, 1, 2, 1, 0, 1],
+        "tracks": [2, 0, 0, 1, 0, 1],
+        "classified_tracks": [2, 0, 0, 0, 0, 1],
+        "classified": [2, 1, 1, 0, 0, 1],
+        "reacquired": [0, 0, 1, 0, 0, 0],
+        "calls": [1, 1, 1, 0, 0, 1],
+        "foreground": [2, 1, 2, 0, 0, 1],
+    }
+    assert {name: one.counts()[:, COUNTS.index(name)].tolist() for name in expected} == expected
+    assert one.lives.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}, "frames with a proposal"
     counts = total(one.counts())
-    assert counts.tracks == one.lives.count
-    assert counts.n_go == pytest.approx(one.lives.mean)
+    assert (counts.tracks, counts.n_go) == (one.lives.count, pytest.approx(one.lives.mean))
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ EVERY = np.full(FRAMES, N)
 FEW = np.full(FRAMES, 2)
 
 
-def test_intervals_cover_the_truth_with_noise() -> None:
+def test_intervals_cover_the_truth_with_noise():
     truth = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured.value
     found = estimate_gamma(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
     assert found.measured.low < truth < found.measured.high
@@ -44,7 +44,7 @@ def test_intervals_cover_the_truth_with_noise() -> None:
     assert found.deviation.low < 0 < found.deviation.high
 
 
-def test_uncounted_cost_is_unexplained() -> None:
+def test_uncounted_cost_is_unexplained():
     dear = run(FEW)
     dear.cost[:, STAGES.index("segmentation")] *= 2
     found = estimate_gamma(run(EVERY), dear, varied(), np.random.default_rng(0))
@@ -68,7 +68,7 @@ class Repeated:
         return self._slower * self._run.cost
 
 
-def test_counts_and_costs_are_of_the_same_repetition() -> None:
+def test_counts_and_costs_are_of_the_same_repetition():
     passes = [Repeated(40), Repeated(3), Repeated(8)]
     middle = RunCosts.median(passes)
     np.testing.assert_array_equal(middle.counts, passes[2].counts())

@@ -81,7 +81,7 @@ def covers(found, values: np.ndarray) -> np.ndarray:
     return (found.low < values) & (values < found.high)
 
 
-def test_unit_costs_are_found() -> None:
+def test_unit_costs_are_found():
     found = Rates.fit(CALIBRATION)
     assert found.segmentation @ [1.0, 60_000] == pytest.approx(60_000 * SEG_S, rel=0.02)
     # points and proposals vary together from frame to frame: their sum is determined
@@ -90,7 +90,7 @@ def test_unit_costs_are_found() -> None:
     assert found.views["accurate"].each == pytest.approx(3.0 / 0.8, rel=0.15)
 
 
-def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation() -> None:
+def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation():
     streams = [stream(1, points=120_000), stream(2, points=30_000)]
     for each in streams:
         for mode in each.runs.values():
@@ -100,14 +100,14 @@ def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation() -> None:
 
 
 @pytest.mark.parametrize("calibration", [CALIBRATION, CALIBRATION[:1]])
-def test_another_stream_is_predicted(calibration: list[Stream]) -> None:
+def test_another_stream_is_predicted(calibration):
     found, truth = predicted(calibration), measured(TEST)
     assert truth[GAMMA].min() > 2.5
     np.testing.assert_allclose(found.expected.values, truth, rtol=0.12)
     assert covers(found, truth).all()
 
 
-def test_it_is_nearer_than_simple_guesses() -> None:
+def test_it_is_nearer_than_simple_guesses():
     found, truth = predicted(), measured(TEST)
     equation = found.expected.equation
     for k in (3, 4):
@@ -126,7 +126,7 @@ def test_it_misses_where_tracks_are_ten_times_as_many_or_cost_twice_as_much():
     assert not covers(predicted(), measured(dear)).any()
 
 
-def test_a_stream_without_proposals_saves_nothing() -> None:
+def test_a_stream_without_proposals_saves_nothing():
     found = expect(Rates.fit(CALIBRATION), np.zeros((3, 7), np.int64), 10)
     assert found.cost["conventional"] == pytest.approx(found.cost["efficient"], rel=0.05)
     assert found.equation.gamma == 1.0

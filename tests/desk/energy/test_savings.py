@@ -21,7 +21,7 @@ def efficient(tracks: int = 200, reached: int = 200, classified: int = 200, reac
 
 
 @given(st.floats(1e-4, 1.0), st.floats(1e-5, 0.1), st.integers(1, 60), st.integers(1, 400))
-def test_neutral_parameters_are_the_papers_equation(seg: float, item: float, n: int, tracks: int) -> None:
+def test_neutral_parameters_are_the_papers_equation(seg, item, n, tracks):
     base = replace(baseline(n=n), points=0)
     run = replace(base, tracks=tracks, classified_tracks=tracks, classified=tracks)
     found = reconcile(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0), NOTHING, NOTHING)
@@ -41,7 +41,7 @@ counts = st.builds(
 
 
 @given(counts, st.floats(1e-6, 1e-2), st.floats(0, 1e-2), st.floats(0, 100))
-def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: float, measured: float) -> None:
+def test_the_terms_add_up_to_the_deviation(run, seg, choose, measured):
     found = reconcile(
         baseline(), run, replace(COSTS, seg=seg), OtherCosts(1e-3, choose), OtherCosts(2e-3, 2 * choose)
     )
@@ -52,7 +52,7 @@ def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: floa
 
 
 @given(counts)
-def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
+def test_energy_of_the_model_is_counts_times_costs(run):
     base = baseline()
     found = reconcile(base, run, COSTS, OtherCosts(2e-3, 1e-4), OtherCosts(3e-3, 3e-4))
     assert found.model.e1 == pytest.approx(COSTS.seg + 2e-3 + 1e-4 + COSTS.classification(base) / base.frames)
@@ -61,7 +61,7 @@ def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
     assert found.model.views == pytest.approx(run.classified / run.tracks)
 
 
-def test_empty_runs_save_nothing() -> None:
+def test_empty_runs_save_nothing():
     nothing = Counts(0, 0, 0, 0, 0, 0, 0, 0, 0)
     found = reconcile(nothing, nothing, COSTS, SAME, SAME)
     assert found.model.gamma == pytest.approx(1.0)
@@ -75,13 +75,13 @@ models = st.builds(EnergyModel, e_seg=positive, e_class=positive, n=positive, n_
 
 
 @given(models)
-def test_the_three_lines_of_equation_3_agree(model: EnergyModel) -> None:
+def test_the_three_lines_of_equation_3_agree(model):
     na = model.n * model.a
     assert (1 + na) / (1 + na / model.n_go) == pytest.approx(model.gamma)
     assert (1 + 1 / na) / (1 / na + 1 / model.n_go) == pytest.approx(model.gamma)
 
 
 @given(models)
-def test_gamma_lies_between_one_and_the_life_of_a_track(model: EnergyModel) -> None:
+def test_gamma_lies_between_one_and_the_life_of_a_track(model):
     assert 1.0 - 1e-12 <= model.gamma <= model.n_go * (1 + 1e-12)
     assert model.short_form_error >= -1e-12

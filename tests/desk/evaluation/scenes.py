@@ -6,7 +6,7 @@ from modt.classes import CLASS_NAMES
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
 
-SURE = {name: np.eye(4)[k] * 0.96 + 0.01 for k, name in enumerate(CLASS_NAMES)}
+CERTAIN = {name: np.eye(4)[k] * 0.96 + 0.01 for k, name in enumerate(CLASS_NAMES)}
 
 
 def car(x: float, y: float = 0.0) -> list[float]:
@@ -20,17 +20,8 @@ def blob(n: int, x: float, y: float = 0.0) -> np.ndarray:
     return np.c_[x + t - 0.5, np.full(n, y), -1.2 + 0.5 * t, np.zeros(n)].astype(np.float32)
 
 
-def frame(
-    truth: FrameTruth,
-    blobs: list[tuple[np.ndarray, int]],
-    tracks: list[tuple[int, int, str]],
-    *,
-    index: int = 0,
-    classified: int = 0,
-    posteriors: np.ndarray | None = None,
-    **more,
-) -> JudgedFrame:
-    """Blobs of points with their proposals; tracks as identity, proposal and class, of which they are sure."""
+def frame(truth, blobs, tracks, *, index=0, classified=0, posteriors=None, **more) -> JudgedFrame:
+    """Blobs of points with their proposals; tracks as identity, proposal and class, which is almost certain."""
     points = np.concatenate([np.zeros((0, 4), np.float32), *(points for points, _ in blobs)])
     proposal = np.concatenate([np.zeros(0, np.int64), *(np.full(len(points), k) for points, k in blobs)])
     ids, of_track, names = zip(*tracks, strict=True) if tracks else ((), (), ())
@@ -43,7 +34,7 @@ def frame(
         track=np.array(ids, np.int64),
         of_track=np.array(of_track, np.int64),
         reported=np.array([CLASS_NAMES.index(name) for name in names], np.int64),
-        posterior=np.array([SURE[n] for n in names]).reshape(-1, 4) if posteriors is None else posteriors,
+        posterior=np.array([CERTAIN[n] for n in names]).reshape(-1, 4) if posteriors is None else posteriors,
         truth=truth,
         **more,
     )

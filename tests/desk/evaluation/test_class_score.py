@@ -30,7 +30,9 @@ def test_average_precision_precision_and_recall():
 
 def test_an_object_that_is_not_segmented_is_missed_by_every_recall():
     missed = frame(cars(10, 18), [(blob(30, 10), 0), (blob(30, 18), -1)], [(0, 0, "car")])
-    found = score([missed]).ranges["all"].classification["car"]
+    ranges = score([missed]).ranges["all"]
+    found = ranges.classification["car"]
+    assert (ranges.segmentation["car"].objects, ranges.segmentation["car"].recall) == (2, 0.5)
     assert (found.average_precision, found.recall, found.recall_of_found, found.precision) == (0.5, 0.5, 1.0, 1.0)
 
 

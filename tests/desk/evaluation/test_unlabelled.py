@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modt_desk.evaluation.unlabelled import moving
-from tests.cli.commands import modt
+from tests.cli.commands import here
 from tests.desk.recorded import drive_and_run
 
 STAMPS_S = np.arange(30) / 10
@@ -50,14 +50,9 @@ def test_the_frames_of_the_motion_are_found():
 
 
 @pytest.mark.command
-def test_a_label_that_is_left_out_is_found_and_put_back(tmp_path):
-    def done(*command):
-        found = modt(*command, cwd=tmp_path)
-        assert (found.returncode, found.stderr) == (0, "")
-        return found.stdout
-
+def test_a_label_that_is_left_out_is_found_and_put_back(tmp_path, capsys):
     def listed(folder, *options):
-        done("evaluate", run, drive, *options, "--unlabelled", folder)
+        assert here("evaluate", run, drive, *options, "--unlabelled", tmp_path / folder) == 0
         path = tmp_path / folder / "further.csv"
         return list(csv.DictReader(path.read_text().splitlines())) if path.exists() else []
 
@@ -79,8 +74,9 @@ def test_a_label_that_is_left_out_is_found_and_put_back(tmp_path):
     page = (tmp_path / "after" / "tracks.html").read_text()
     assert f"Track {track}<" in page
     assert page.count("from the side") >= len(rows) / 3
-    further = ("--further", "after/further.csv")
-    assert f"--further adds {len(before) + 1} objects" in done("evaluate", run, drive, *further)
+    further = ("--further", tmp_path / "after" / "further.csv")
+    assert here("evaluate", run, drive, *further) == 0
+    assert f"--further adds {len(before) + 1} objects" in capsys.readouterr().out
     assert listed("completed", *further) == []
 
 

@@ -39,19 +39,22 @@ def judged(n_objects: int, n_frames: int, seed: int = 0) -> Judged:
     return Judged(np.zeros(n_frames, FRAME), objects, proposals, calls)
 
 
+def estimate(made):
+    """Average precision of cars."""
+    return next(f for f in precisions(made, "x") if f.quantity == "AP car").estimate
+
+
 def test_average_precision_is_that_of_the_judgement():
     made = judged(5, 30)
-    expected = class_scores(made.objects, made.proposals)["car"].average_precision
-    car = next(f for f in precisions(made, "x") if f.quantity == "AP car").estimate
+    expected, car = class_scores(made.objects, made.proposals)["car"].average_precision, estimate(made)
     assert car.value == pytest.approx(expected)
     assert car.n == 5
     assert car.low < car.value < car.high
 
 
 def test_more_objects_have_a_narrower_interval_and_a_single_one_has_none():
-    few, many = (next(precisions(judged(n, 20), "x")).estimate for n in (4, 64))
+    few, many, single = (estimate(judged(n, 20)) for n in (4, 64, 1))
     assert many.high - many.low < few.high - few.low
-    single = next(f for f in precisions(judged(1, 30), "x") if f.quantity == "AP car").estimate
     assert single.value > 0
     assert single.low is single.high is None
 
@@ -79,8 +82,7 @@ def test_further_objects_count_for_precision_alone():
     made = judged(5, 30)
     made.objects["role"][made.objects["id"] > 2] = Role.FURTHER
     made.objects["to_follow"] = made.objects["role"] != Role.FURTHER
-    car = next(f for f in precisions(made, "x") if f.quantity == "AP car").estimate
-    assert car.n == 5
+    assert estimate(made).n == 5
     assert len(ObjectLengths.of(made).wanted) == 3
 
 

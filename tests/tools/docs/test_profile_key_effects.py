@@ -95,7 +95,7 @@ def scan_folder(config: ProfileConfig, folder: Path) -> str:
     return str([frame.stamp_s for frame in inputs.stream(request)])
 
 
-PRODUCT = street((6, 4.0), "fusion.rule", "product")
+PRODUCT = street((6, 2.5), "fusion.rule", "product")
 SCENARIOS: dict[str, Scenario] = {
     "": street(),
     "sensor.period_s": scan_folder,

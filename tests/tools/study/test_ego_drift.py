@@ -31,7 +31,7 @@ def test_drift_in_path_end_and_heading():
 
 @pytest.mark.slow
 def test_the_drift_of_a_written_drive_is_small_against_positions_and_velocities(tmp_path, monkeypatch, capsys):
-    drive = written(tmp_path, SyntheticStream("street", "vlp-16", 2.0, seed=2)).drive
+    drive = written(tmp_path, SyntheticStream("street", "vlp-16", 1.0, seed=2)).drive
     scans = open_stream(drive).scans
     positions = np.array([s.T_world_sensor for s in scans])
     integrated = ego_drift.integrated(drive, [s.index for s in scans])

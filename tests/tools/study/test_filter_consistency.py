@@ -32,7 +32,7 @@ def test_errors_are_consistent_only_at_the_scale_of_their_covariance():
 
 @pytest.fixture(scope="module", name="consistencies")
 def consistencies_on_crossings():
-    streams = [SyntheticStream("crossing", "vlp-16", 3.0, seed) for seed in (1, 2, 3)]
+    streams = [SyntheticStream("crossing", "vlp-16", 3.0, seed) for seed in (1, 2)]
     return study([track for stream in streams for track in body_tracks(stream, "vlp-16")])
 
 
@@ -40,7 +40,7 @@ def consistencies_on_crossings():
 def test_the_filter_is_nearly_consistent_for_walkers(consistencies):
     """A consistent filter has a mean of 2. Displacements from consecutive outlines alone give 5.5."""
     position, motion = consistencies["pedestrian, moving"]["position"], consistencies["pedestrian, moving"]["motion"]
-    assert position.tracks >= 40
+    assert position.tracks >= 25
     assert position.mean < 1.2 * position.high
     assert position.beyond < 0.15
     assert position.rms < 0.15
@@ -53,7 +53,7 @@ def test_the_filter_is_nearly_consistent_for_standing_objects(consistencies):
     """The visible part of occluded background moves along the occluder, and the part that a single beam meets jumps
     from sweep to sweep. No filter models such errors.
     """
-    for kind, tracks, mean in (("pedestrian, standing", 10, 2.0), ("background, standing", 60, 12.0)):
+    for kind, tracks, mean in (("pedestrian, standing", 5, 2.0), ("background, standing", 40, 12.0)):
         position = consistencies[kind]["position"]
         assert position.tracks >= tracks
         assert position.mean < mean
