@@ -238,8 +238,8 @@ def _split(
     """Objects that are split off longer proposals.
 
     Returns:
-        rows: (S,) tracks of objects that were observed a frame ago, and have no proposal now, one that is too long, or
-            one of few points.
+        rows: (S,) tracks of objects that were observed a frame ago, and have no proposal now, one that is too long
+            or one of few points.
         hosts: (S,) proposal off which each is split.
         label: (K,) proposal of each member of the frame; those split off follow the others.
     """
