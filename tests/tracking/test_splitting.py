@@ -110,6 +110,12 @@ def test_a_person_splits_the_wall_though_a_proposal_was_matched(rows, matched, w
     assert after.proposals.count[own] == [PERSON_POINTS], why
 
 
+def test_a_track_that_is_hardly_a_person_keeps_its_proposal():
+    tracks = tracks_of_person_and_wall()
+    tracks.posterior[0] = [0.6, 0.0, 0.4, 0.0]
+    assert len(split(tracks, wall_with(PERSON), rows=[0]).proposals) == 1
+
+
 def test_two_people_in_one_proposal_keep_a_piece_and_the_rest():
     other = box(10, 3.2, 0.6, 0.6, 1.7, z=-0.85)
     proposals = joined(frame_of([PERSON, other], points=PERSON_POINTS)[1], [(0, 1)])

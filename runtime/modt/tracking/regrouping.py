@@ -40,6 +40,8 @@ LONGER_M = 0.3
 """A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m]."""
 PAD_M = 0.2
 """Margin around the expected extent, and above the expected top, within which points are split off [m]."""
+LIKELY = 0.5
+"""Probability of its class from which a track leaves its proposal for a piece; less: false people live longer."""
 TOUCH_M = 0.05
 """A piece that reaches this near to the margin goes on beyond it: its end there is not known [m]."""
 MIN_POINTS, MIN_SHARE = 8, 0.4
@@ -249,7 +251,8 @@ def _split(
     held = (~lost).nonzero()[0]
     own_m = widths(observations.kdop.take(own[held], axis=1)).max(axis=0)
     few = observations.count[own[held]] < MIN_SHARE * tracks.points[held]
-    lost[held] = few | (own_m > MAX_SIZE_M[tracks.last_class[held], 0])
+    likely = tracks.posterior[held, tracks.last_class[held]] >= LIKELY
+    lost[held] = likely & (few | (own_m > MAX_SIZE_M[tracks.last_class[held], 0]))
     lost &= (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
     lost &= tracks.last_class != ObjectClass.BACKGROUND.value
     k = lost[pairs.rows].nonzero()[0]
