@@ -137,7 +137,8 @@ class Regrouping:
         new = number[n:]
         if proposals.reflectance is not None:
             proposals.reflectance[new] = np.nan
-        observations.kdop[:, new] = _locate(tracks, rows, observations.kdop[:, new], matches)
+        if len(rows):
+            observations.kdop[:, new] = _locate(tracks, rows, observations.kdop[:, new], matches)
         observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
         return Associated(
             proposals, observations, matches.take(np.arange(len(matches.rows)), number[matches.proposals])
@@ -247,14 +248,14 @@ def _split(
     """
     proposals, observations, n = frame.proposals, frame.observations, len(frame.proposals)
     label = np.arange(n).repeat(proposals.count)
-    lost = own == NONE
-    held = (~lost).nonzero()[0]
-    own_m = widths(observations.kdop.take(own[held], axis=1)).max(axis=0)
-    few = observations.count[own[held]] < MIN_SHARE * tracks.points[held]
-    likely = tracks.posterior[held, tracks.last_class[held]] >= LIKELY
-    lost[held] = likely & (few | (own_m > MAX_SIZE_M[tracks.last_class[held], 0]))
-    lost &= (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
-    lost &= tracks.last_class != ObjectClass.BACKGROUND.value
+    may = (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
+    may &= tracks.last_class != ObjectClass.BACKGROUND.value
+    lost = may & (own == NONE)
+    held = (may & ~lost).nonzero()[0]
+    class_, kept = tracks.last_class[held], own[held]
+    longest_m = widths(observations.kdop.take(kept, axis=1)).max(axis=0, initial=0.0)
+    odd = (longest_m > MAX_SIZE_M[class_, 0]) | (observations.count[kept] < MIN_SHARE * tracks.points[held])
+    lost[held] = odd & (tracks.posterior[held, class_] >= LIKELY)
     k = lost[pairs.rows].nonzero()[0]
     rows, hosts = pairs.rows[k], pairs.proposals[k]
     expected, kdop = tracks.predicted_kdops(rows), observations.kdop.take(hosts, axis=1)
