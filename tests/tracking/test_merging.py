@@ -162,7 +162,8 @@ def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length
     follower = Follower()
     for i in range(KNOWN):
         follow(follower, [box(10, 3, 5.0)], i, classes=(object_class,))
-    assert follow(follower, [box(10, 3, length_m)], KNOWN, classes=(object_class,)) == [0]
+    frame, proposals = frame_of([box(10, 3, length_m)], KNOWN, points=POINTS)
+    follower.follow(frame, proposals)
     envelope = follower.tracks.envelope[0]
     assert envelope[0] + envelope[4] == pytest.approx(known_m, abs=0.25)
 

@@ -1,5 +1,7 @@
 """Objects are split off larger proposals where their tracks expect them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.geometry import inverse, transform_boxes
+from modt.geometry.kdop import DIRECTIONS
 from tests.odometry.test_deskew import skewed
 from tests.tracking.tracking_scenes import (
     EYE,
@@ -33,9 +36,9 @@ def wall_with(*people, points=PERSON_POINTS, wall=WALL):
     return joined(frame_of([*people, wall], points=counts)[1], [range(len(people) + 1)])
 
 
-def split(tracks, proposals, rows):
+def split(tracks, proposals, rows, matched=None):
     """The frame after splitting."""
-    return regrouped(tracks, associated(proposals, rows))
+    return regrouped(tracks, associated(proposals, rows, matched))
 
 
 def tracks_of_person_and_wall(object_class=PEDESTRIAN, person=PERSON, **columns):
@@ -46,7 +49,7 @@ def tracks_of_person_and_wall(object_class=PEDESTRIAN, person=PERSON, **columns)
     return tracks
 
 
-def test_the_points_of_a_person_are_split_off_a_wall_and_measure_nothing():
+def test_the_points_of_a_person_are_split_off_a_wall_and_measure_its_position_alone():
     tracks = tracks_of_person_and_wall()
     after = split(tracks, wall_with(PERSON), rows=[1])
     assert after.proposals.count.tolist() == [WALL_POINTS, PERSON_POINTS]
@@ -55,10 +58,71 @@ def test_the_points_of_a_person_are_split_off_a_wall_and_measure_nothing():
     np.testing.assert_allclose(after.proposals.box[1], PERSON, atol=0.05)
     np.testing.assert_allclose(after.proposals.box[0, :6], WALL[:6], atol=0.05)
     order = after.matches.rows.argsort()
-    np.testing.assert_allclose(after.matches.position[order], tracks.x[:, :2])
-    assert (after.matches.covariance[:, 0, 0] >= 100).all()
-    np.testing.assert_allclose(after.observations.kdop[:, 1], tracks.predicted_kdops()[:, 0])
+    np.testing.assert_allclose(after.matches.position[order], tracks.x[:, :2], atol=0.05)
+    assert (after.matches.covariance[order, 0, 0] >= [0.001, 100]).all()
+    shift = after.matches.position[order][0] - tracks.x[0, :2]
+    np.testing.assert_allclose(after.observations.kdop[:, 1], tracks.predicted_kdops()[:, 0] + DIRECTIONS.T @ shift)
     assert (after.observations.bottom[1], after.observations.top[1]) == (tracks.bottom[0], tracks.top[0])
+
+
+@pytest.mark.parametrize("step_m", [-0.12, 0.0, 0.12])
+def test_a_piece_moves_its_track_along_the_wall(step_m):
+    """The ends along the wall are free: nobody else is near them."""
+    tracks = tracks_of_person_and_wall(person=box(10 - step_m, 2.5, 0.6, 0.6, 1.7, z=-0.85))
+    after = split(tracks, wall_with(PERSON), rows=[1])
+    position = after.matches.position[after.matches.rows == 0][0]
+    assert position == pytest.approx([10.0, 2.5], abs=0.06)
+
+
+def test_a_piece_within_a_large_thing_measures_nothing():
+    """Returns of it reach the margin on every side."""
+    tracks = tracks_of_person_and_wall()
+    around = joined(
+        frame_of([PERSON, box(10, 2.5, 3.0, 3.0, 1.6, z=-0.9)], points=[PERSON_POINTS, 4000])[1], [(0, 1)]
+    )
+    after = split(tracks, around, rows=[1])
+    mine = after.matches.rows == 0
+    np.testing.assert_allclose(after.matches.position[mine], tracks.x[:1, :2], atol=0.02)
+    assert after.matches.covariance[mine, 0, 0] > 0.05  # where nothing touches it 0.005
+
+
+@pytest.mark.parametrize(
+    ("rows", "matched", "why"),
+    [
+        ([0], [0], "its proposal is too long for a person"),
+        ([0, 1], [1, 0], "its proposal is of few points"),
+        ([0], [1], "its proposal is of few points"),
+    ],
+)
+def test_a_person_splits_the_wall_though_a_proposal_was_matched(rows, matched, why):
+    frame = frame_of([PERSON, WALL, box(10, 2.1, 0.1, 0.1, 0.4, z=-0.5)], points=[PERSON_POINTS, WALL_POINTS, 12])[1]
+    tracks = tracks_of_person_and_wall()
+    after = split(tracks, joined(frame, [(0, 1), (2,)]), rows=rows, matched=matched)
+    own = after.matches.proposals[after.matches.rows == 0]
+    assert after.proposals.count[own] == [PERSON_POINTS], why
+
+
+def test_a_track_that_is_hardly_a_person_keeps_its_proposal():
+    tracks = tracks_of_person_and_wall()
+    tracks.posterior[0] = [0.6, 0.0, 0.4, 0.0]
+    assert len(split(tracks, wall_with(PERSON), rows=[0]).proposals) == 1
+
+
+def test_two_people_in_one_proposal_keep_a_piece_and_the_rest():
+    other = box(10, 3.2, 0.6, 0.6, 1.7, z=-0.85)
+    proposals = joined(frame_of([PERSON, other], points=PERSON_POINTS)[1], [(0, 1)])
+    tracks = tracks_at([PERSON, other], PEDESTRIAN, PEDESTRIAN)
+    tracks.points[:] = PERSON_POINTS
+    for row in (0, 1):
+        after = split(tracks, proposals, rows=[row], matched=[0])
+        assert sorted(after.matches.rows) == [0, 1]
+        assert after.proposals.count == pytest.approx([PERSON_POINTS] * 2, abs=15)  # some lie where both are expected
+
+
+def test_the_reflectance_of_a_piece_is_unknown():
+    proposals = replace(wall_with(PERSON), reflectance=np.full((1, 5), 0.3))
+    after = split(tracks_of_person_and_wall(), proposals, rows=[1])
+    np.testing.assert_array_equal(after.proposals.reflectance, [[0.3] * 5, [np.nan] * 5])
 
 
 def test_other_matches_stay_as_they_are():

@@ -5,7 +5,8 @@ Pairs of a track and a proposal within its known extent are listed once, and ser
 
 - *Take*: a track takes the larger part of its object from a junior track, which gets the other part.
 - *Join*: parts of a car, or of background that may be one, are joined to the proposal of its track.
-- *Split*: the track of an object that is expected within a longer proposal takes the points where it is expected.
+- *Split*: the track of an object that is expected within a longer proposal takes the points where it is expected, if
+  it has no proposal of its own, one that is too long for its class, or one of few points.
 
 The senior of two tracks is that of which more points were seen, not the older one: a fragment begins in the frame in
 which its car does, and a bush is older than the car that passes it.
@@ -22,11 +23,12 @@ import numpy as np
 from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_SIZE_M, PART_PERSON
 from modt.classes import ObjectClass
 from modt.geometry import yaw_of
-from modt.geometry.kdop import DIRECTIONS, coverage, widths
+from modt.geometry.kdop import DIRECTIONS, coverage, measured, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
+from modt.tracking.kdop_association import POSITION_SIGMA_M
 from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals
 
@@ -38,10 +40,16 @@ LONGER_M = 0.3
 """A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m]."""
 PAD_M = 0.2
 """Margin around the expected extent, and above the expected top, within which points are split off [m]."""
+LIKELY = 0.5
+"""Probability of its class from which a track leaves its proposal for a piece; less: false people live longer."""
+TOUCH_M = 0.05
+"""A piece that reaches this near to the margin goes on beyond it: its end there is not known [m]."""
 MIN_POINTS, MIN_SHARE = 8, 0.4
 """Least number of points that are split off and that remain; least share of the points last seen."""
 MAX_DROP_M = 0.4
 """Greatest distance of the top of a part below the expected top [m]."""
+_UNKNOWN_M2 = 100.0
+"""Variance of a position along an axis on which something touches both ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +113,12 @@ class Regrouping:
         into = _join(tracks, observations, pairs, own, owner)
         joined = (into != np.arange(n)).nonzero()[0]
         rows, hosts, piece = _split(tracks, frame, placement, pairs, own)
-        measured = np.ones(len(tracks) + 1, np.bool_)  # the last is that of NONE
-        measured[owner[hosts]] = False
+        intact = np.ones(len(tracks) + 1, np.bool_)  # the last is that of NONE
+        intact[owner[hosts]] = False
         lost = owner[joined]
         own[lost[lost != NONE]] = NONE
         own[rows] = n + np.arange(len(rows))
-        changed = ((own != before) | ~measured[:-1]).nonzero()[0]
+        changed = ((own != before) | ~intact[:-1]).nonzero()[0]
         if not len(changed) + len(joined):
             return frame
         matches = matches.reassigned(tracks, changed, own[changed])
@@ -129,8 +137,8 @@ class Regrouping:
         new = number[n:]
         if proposals.reflectance is not None:
             proposals.reflectance[new] = np.nan
-        # A piece shows nothing new of its track, least of all where too much was taken.
-        observations.kdop[:, new] = tracks.predicted_kdops(rows)
+        if len(rows):
+            observations.kdop[:, new] = _locate(tracks, rows, observations.kdop[:, new], matches)
         observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
         return Associated(
             proposals, observations, matches.take(np.arange(len(matches.rows)), number[matches.proposals])
@@ -237,14 +245,21 @@ def _split(
     """Objects that are split off longer proposals.
 
     Returns:
-        rows: (S,) tracks of objects that were observed a frame ago, and have no proposal now.
+        rows: (S,) tracks of objects that were observed a frame ago, and have no proposal now, one that is too long
+            or one of few points.
         hosts: (S,) proposal off which each is split.
         label: (K,) proposal of each member of the frame; those split off follow the others.
     """
     proposals, observations, n = frame.proposals, frame.observations, len(frame.proposals)
     label = np.arange(n).repeat(proposals.count)
-    lost = (own == NONE) & (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
-    lost &= tracks.last_class != ObjectClass.BACKGROUND.value
+    may = (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
+    may &= tracks.last_class != ObjectClass.BACKGROUND.value
+    lost = may & (own == NONE)
+    held = (may & ~lost).nonzero()[0]
+    class_, kept = tracks.last_class[held], own[held]
+    longest_m = widths(observations.kdop.take(kept, axis=1)).max(axis=0, initial=0.0)
+    odd = (longest_m > MAX_SIZE_M[class_, 0]) | (observations.count[kept] < MIN_SHARE * tracks.points[held])
+    lost[held] = odd & (tracks.posterior[held, class_] >= LIKELY)
     k = lost[pairs.rows].nonzero()[0]
     if not len(k):
         return k, k, label
@@ -275,11 +290,34 @@ def _split(
     member, pair = member[mine], pair[mine]
     size, highest = np.bincount(pair, minlength=len(rows)), np.full(len(rows), -np.inf)
     np.maximum.at(highest, pair, z[mine])
-    taken = np.bincount(hosts, size, n)
     splits = (size >= np.maximum(MIN_POINTS, MIN_SHARE * tracks.points[rows])) & (highest >= top - MAX_DROP_M)
-    splits &= count - taken[hosts] >= MIN_POINTS
+    for these in (
+        own[rows] == hosts,
+        splits,
+    ):  # a track keeps its proposal where the others' pieces leave nothing else
+        splits &= ~these | (count - np.bincount(hosts, size * splits, n)[hosts] >= MIN_POINTS)
     label[member] = np.where(splits, n + splits.cumsum() - 1, hosts)[pair]
     return rows[splits], hosts[splits], label
+
+
+def _locate(tracks: TrackTable, rows: Int, kdop: Float64, matches: Matches) -> Float64:
+    """(8, S) k-DOPs of the tracks (S,) whose pieces have (8, S) k-DOPs; writes the measured positions into matches.
+
+    A piece shows where its track is, by the ends at which nothing touches it, and nothing new of its shape.
+    """
+    x, expected = tracks.x.take(rows, axis=0)[:, :2].T, tracks.predicted_kdops(rows)
+    mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x
+    touched, gain = kdop > expected + (PAD_M - TOUCH_M), kdop - mean
+    both = touched & np.roll(touched, 4, axis=0)
+    gain = np.where(both, 0.0, np.where(touched, -np.roll(gain, 4, axis=0), gain))
+    before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * _UNKNOWN_M2
+    shift, covariance, end_variance = measured(mean, mean + gain, POSITION_SIGMA_M**2, before)
+    at = np.empty(len(tracks), np.int64)
+    at[matches.rows] = np.arange(len(matches.rows))
+    at = at[rows]
+    matches.position[at] += shift
+    matches.covariance[at], matches.end_variance[at] = covariance, end_variance.T
+    return expected + DIRECTIONS.T @ shift.T
 
 
 def _fit_together(a: Float64, b: Float64, size: Float64) -> Bool:
