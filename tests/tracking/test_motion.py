@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from modt.classes import ObjectClass
 from modt.geometry.kdop import DIRECTIONS
 from modt.tracking.track_table import LAG_S, TrackTable
 
@@ -21,8 +22,9 @@ def box(x: float, y: float, length: float, width: float) -> np.ndarray:
     return np.array([x, y]) + np.array([[0, 0], [length, 0], [0, width], [length, width]])
 
 
-def follow(frames: list[np.ndarray]) -> TrackTable:
+def follow(frames: list[np.ndarray], confirmed: ObjectClass = ObjectClass.BACKGROUND) -> TrackTable:
     tracks = TrackTable.blank(1)
+    tracks.final[:], tracks.last_class[:] = True, confirmed
     for k, corners in enumerate(frames):
         tracks.kdop[:] = kdop(corners)
         tracks.box[:, 3:5] = np.ptp(corners, axis=0)
@@ -51,6 +53,12 @@ def test_the_size_is_that_of_the_whole_object_while_most_of_it_is_hidden() -> No
     hidden = follow([*seen, *[box(0, 0, 1.8, 0.6)] * 30]).size_m[0]
     assert hidden[0] > 3.0
     assert follow([*seen, box(0, 0, 6.0, 1.8), *seen]).size_m[0, 0] < 5.2  # merged with something for once
+
+
+def test_a_cyclist_who_passes_by_a_wall_is_not_as_large_as_it() -> None:
+    seen = [box(0, 0, 1.5, 0.7)] * 10
+    frames = [*seen, box(0, 0, 2.4, 2.3), *seen]
+    assert follow(frames, ObjectClass.CYCLIST).size_m[0, 1] < 0.9 < 1.2 < follow(frames).size_m[0, 1]
 
 
 def test_a_door_that_turns_about_its_hinge_goes_less_than_its_end() -> None:
