@@ -181,7 +181,7 @@ def test_an_object_is_classified_again_at_growing_intervals_and_background_is_no
 @pytest.mark.parametrize(
     ("moved_m", "view", "person"), [(1.5, [0.75, 0.08, 0.15, 0.02], True), (0.0, LIKE_ANY, False)]
 )
-def test_a_possible_person_is_classified_again_within_three_frames(
+def test_a_possible_person_is_classified_again_within_four_frames(
     make: type[FusedTracks], moved_m: float, view: list[float], person: bool
 ) -> None:
     subject, asked = Fused(make(CONFIG, FixedPrior(FREQUENCY.tolist())), 12), []
@@ -193,7 +193,7 @@ def test_a_possible_person_is_classified_again_within_three_frames(
             asked.append(frame)
             assert not subject.fuse(*view).any()
     waits = np.diff([*asked, frame])
-    assert (waits.max() == 3) if person else (waits.max() > 10)
+    assert (waits.max() == 4) if person else (waits.max() > 10)
 
 
 def test_a_remembered_place_is_background_until_its_box_may_be_an_object() -> None:

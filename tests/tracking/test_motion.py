@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from modt.tracking.track_table import LAG_S
+from modt.classes import ObjectClass
+from modt.tracking.track_table import LAG_S, TrackTable
 from tests.tracking.tracking_scenes import Follower, box
 
 
@@ -34,6 +35,18 @@ def test_the_size_is_that_of_the_whole_object_while_most_of_it_is_hidden():
     seen = [box(20, 0, 4.3, 1.8)] * 10
     assert displacement([*seen, *[box(20, 0, 1.8, 0.6)] * 30])[2][0] > 3.0
     assert displacement([*seen, box(20, 0, 6.0, 1.8), *seen])[2][0] < 5.2  # merged with something for once
+
+
+def test_a_cyclist_who_passes_by_a_wall_is_not_as_large_as_it():
+    widths_m = []
+    for confirmed in (ObjectClass.CYCLIST, ObjectClass.BACKGROUND):
+        tracks = TrackTable.blank(1)
+        tracks.final[:], tracks.last_class[:], tracks.size_m[:] = True, confirmed, [1.5, 0.7, 1.7]
+        for width_m in (2.3, *[0.7] * 10):
+            tracks.box[:, 3:6] = 1.5, width_m, 1.7
+            tracks.observe_motion(np.array([0]), 0.1)
+        widths_m.append(tracks.size_m[0, 1])
+    assert widths_m[0] < 0.9 < 1.2 < widths_m[1]
 
 
 def test_a_door_that_turns_about_its_hinge_goes_less_than_its_end():

@@ -46,7 +46,7 @@ UNSURE_GROWTH, UNSURE_FRAMES = 1.3, 2
 """The same of an uncertain track. With longer intervals, fewer calls are made and cars are recognised later."""
 LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
 """Posterior from which an uncertain track is probably background, and UNSURE_GROWTH of such a track."""
-MAYBE_PERSON, PERSON_FRAMES = 0.25, 3
+MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 """Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
 a view of a few points says little, and many of them are right."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]

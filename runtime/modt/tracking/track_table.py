@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modt.class_sizes import IS_PERSON
 from modt.geometry.kdop import DIRECTIONS
 from modt.types import Bool, Float64, Int, Tracks, column
 
@@ -14,8 +15,9 @@ ESTABLISHED_HITS = 4
 """Frames in which a track was observed, from which its velocity and class change proposals."""
 LAG_S = 1.5
 """Time constant of the place that a displacement is measured from."""
-GROWTH, SHRINKAGE = 0.5, 0.02
-"""Weight of a larger and of a smaller box in the size of a track: a part that is hidden was seen before."""
+GROWTH, PERSON_GROWTH, SHRINKAGE = 0.5, 0.1, 0.02
+"""Weight of a larger box in the size of a track, of a confirmed person, who passes by things and is merged with them
+for a frame or two, and of a smaller box, since a part that is hidden was seen before."""
 
 
 @dataclass(slots=True)
@@ -60,5 +62,7 @@ class TrackTable(Tracks):
         self.observed_s[rows] += dt_s
         known = self.size_m.take(rows, axis=0)
         change = self.box.take(rows, axis=0)[:, 3:6] - known
-        self.size_m[rows] = known + np.where(change > 0, GROWTH, SHRINKAGE) * change
+        person = self.final[rows] & IS_PERSON[self.last_class[rows]]
+        growth = np.where(person, PERSON_GROWTH, GROWTH)[:, None]
+        self.size_m[rows] = known + np.where(change > 0, growth, SHRINKAGE) * change
         self.lagged_kdop[rows] = lagged + (1.0 - math.exp(-dt_s / LAG_S)) * shift
