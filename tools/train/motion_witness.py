@@ -24,8 +24,9 @@ WEIGHT, MOST = 0.5, 1.5
 """Weight of the witness beside network and box; its greatest absolute logarithm."""
 SMOOTHING = 200
 """Counts of a class over all lengths that are added to those of one length."""
-FRAGMENTS = 0
-"""Length for which the length itself is evidence: hardly any object is never seen longer."""
+FRAGMENTS, JOINT_SMOOTHING = 0, 50
+"""Length for which the length itself is evidence, since hardly any object is never seen longer, and counts that are
+added to a class there, over all lengths."""
 SCENES, SEEDS, SECONDS = ("street", "crossing"), range(800, 806), 8.0
 """Drives that are counted, by every sensor; the seeds are not those of any published figure."""
 
@@ -52,7 +53,8 @@ def log_likelihood_ratio(counts: Int) -> Float64:
     overall = (counts.sum(axis=0) + 1.0) / (counts.sum(axis=0) + 1.0).sum(axis=0)
     smooth = counts + SMOOTHING * overall
     log = np.log(smooth / smooth.sum(axis=1, keepdims=True))
-    log[FRAGMENTS] += np.log(smooth[FRAGMENTS].sum(axis=0) / smooth.sum(axis=(0, 1)))
+    joint = counts + JOINT_SMOOTHING / len(counts) * overall
+    log[FRAGMENTS] = np.log(joint / joint.sum(axis=(0, 1)))[FRAGMENTS]
     ratio = WEIGHT * (log[:, :, 1:] - log[:, :, :1])
     limited: Float64 = np.clip(ratio, -MOST, MOST).transpose(0, 2, 1)
     return limited
