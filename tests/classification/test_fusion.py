@@ -72,6 +72,19 @@ def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     assert subject.asks(False) == [True, False]
 
 
+@pytest.mark.parametrize(
+    ("x", "length_m", "height_m", "asked"),
+    [(2.5, 0.6, 1.7, True), (3.5, 0.6, 1.7, False), (2.5, 1.5, 1.7, False), (2.5, 0.6, 0.6, False)],
+)
+def test_what_may_be_a_person_near_by_is_asked_about_whatever_its_box_says(
+    x: float, length_m: float, height_m: float, asked: bool
+) -> None:
+    proposals, tracks = scene()
+    proposals.box[:, :6] = [x, 0.0, 0.0, length_m, 0.4, height_m]
+    fusion = FurtherViews(CONFIG, FixedPrior(WALL, WALL))
+    assert fusion.asks(tracks, proposals, np.ones(2, np.bool_)).tolist() == [asked] * 2
+
+
 @pytest.mark.parametrize("mode", [FirstViews, FurtherViews])
 def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(mode: type[FusedTracks]) -> None:
     subject = Fused(mode(CONFIG, FixedPrior(CAR, CAR)), 50, 50, frames=3)

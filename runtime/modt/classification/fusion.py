@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON
-from modt.classes import N_CLASSES, ObjectClass
+from modt.class_sizes import IS_PERSON, MAX_PERSON_M
+from modt.classes import N_CLASSES, PERSON_M, ObjectClass
 from modt.classification.motion_witness import log_likelihood
 from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
@@ -49,6 +49,8 @@ LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
 MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 """Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
 a view of a few points says little, and many of them are right."""
+NEAR_M = 3.0
+"""Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
@@ -199,16 +201,16 @@ class FirstViews(FusedTracks):
 class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is certain, and where something changes (Table II).
 
-    A track, a remembered place too, is classified as soon as its box may be an object's. An uncertain one is
-    classified again where it shows clearly more points, and at growing intervals, as is a certain object. Certain
-    background is only where it shows far more points and may be an object by its box. A person is not while the view
-    cuts off more than half.
+    A track, a remembered place too, is classified as soon as its box may be an object's, or a person's near by: the
+    box prior takes tall people who stand for background. An uncertain one is classified again where it shows clearly
+    more points, and at growing intervals, as is a certain object. Certain background is only where it shows far more
+    points and may be an object by its box. A person is not while the view cuts off more than half.
     """
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
         self.observe(tracks, proposals)
-        first = self._may_be_object(tracks)
+        first = self._may_be_object(tracks) | _near(tracks, proposals)
         object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
         review = object_ & (tracks.age >= REVIEW_GROWTH * tracks.key_age + REVIEW_FRAMES)
         review |= first & _shows_more(tracks, FAR_MORE_POINTS)
@@ -218,6 +220,13 @@ class FurtherViews(FusedTracks):
         further = np.where(self.certain(tracks.posterior), review, unsure)
         asks: Bool = (tracks.proposal != NONE) & ~tracks.hidden & np.where(tracks.viewed, further, first)
         return asks
+
+
+def _near(tracks: Tracks, proposals: Proposals) -> Bool:
+    """(M,) tracks whose proposal is near, and as long and as high as a person may be."""
+    x, y, _, length_m, _, height_m, _ = proposals.box.T
+    near = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
+    return np.append(near, False)[tracks.proposal]  # the last is that of NONE
 
 
 def _log(probability: Float64) -> Float64:
