@@ -76,13 +76,12 @@ def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     ("x", "length_m", "height_m", "asked"),
     [(2.5, 0.6, 1.7, True), (3.5, 0.6, 1.7, False), (2.5, 1.5, 1.7, False), (2.5, 0.6, 0.6, False)],
 )
-def test_what_may_be_a_person_near_by_is_asked_about_whatever_its_box_says(
+def test_a_possible_person_near_by_is_classified_whatever_its_box_says(
     x: float, length_m: float, height_m: float, asked: bool
 ) -> None:
-    proposals, tracks = scene()
-    proposals.box[:, :6] = [x, 0.0, 0.0, length_m, 0.4, height_m]
-    fusion = FurtherViews(CONFIG, FixedPrior(WALL, WALL))
-    assert fusion.asks(tracks, proposals, np.ones(2, np.bool_)).tolist() == [asked] * 2
+    subject = Fused(FurtherViews(CONFIG, FixedPrior(WALL, WALL)), 50, 50, frames=3)
+    subject.proposals.box[:, :6] = [x, 0.0, 0.0, length_m, 0.4, height_m]
+    assert subject.asks() == [asked] * 2
 
 
 @pytest.mark.parametrize("mode", [FirstViews, FurtherViews])
