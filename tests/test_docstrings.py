@@ -7,6 +7,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 DEPENDENT = re.compile(r"(Of|That of|By which|What)\b")
 """Beginnings that need a sentence before them."""
+DESCRIPTION = re.compile(r"^ +\w[\w, ]*: (?:\([^)]*\) )?(?=of |that of |what )", re.MULTILINE)
+"""An argument, attribute or value, whose description begins so."""
 
 
 def docstrings(source: str):
@@ -28,6 +30,6 @@ def test_no_docstring_begins_in_the_middle_of_a_sentence():
         f"{path.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
         for path in files
         for line, text in docstrings(path.read_text(encoding="utf-8"))
-        if DEPENDENT.match(text)
+        if DEPENDENT.match(text) or DESCRIPTION.search(text)
     ]
     assert found == []

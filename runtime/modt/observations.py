@@ -20,7 +20,7 @@ class Observations:
     Attributes:
         box: (P, 7) world frame.
         centroid: (P, 2) mean of the points [m].
-        kdop: (8, P) of the points, see geometry/kdop.py [m].
+        kdop: (8, P) k-DOPs of the points, see geometry/kdop.py [m].
         bottom, top: (P,) heights of the lowest and the highest point [m].
         count: (P,) points.
         range_m: (P,) distance from the sensor.

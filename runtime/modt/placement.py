@@ -95,7 +95,7 @@ class Placement:
 
     Attributes:
         T_world_sensor: (4, 4) pose at the stamp.
-        motion: of the sensor up to it.
+        motion: motion of the sensor up to the frame.
         turn_s: as in Frame.
     """
 

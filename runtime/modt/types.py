@@ -119,8 +119,8 @@ class Proposals:
         """Members in another grouping.
 
         Args:
-            members: (K,) of the new proposals, one after the other.
-            coordinates: (3, K) of them.
+            members: (K,) points of the new proposals, one after the other.
+            coordinates: (3, K) coordinates of those points.
             count: (Q,) members of each new proposal.
             source: (Q,) proposal whose centroid, box and other columns each new one takes over.
         """
@@ -159,8 +159,8 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
     """Members and (3, ...) coordinates of runs of them, one after the other.
 
     Args:
-        members: (K,) of the proposals.
-        coordinates: (3, K) of them.
+        members: (K,) points of the proposals.
+        coordinates: (3, K) coordinates of those points.
         runs: (2, R) first row of each run, and the row after its last.
     """
     slices = [slice(*run) for run in runs.T.tolist()]

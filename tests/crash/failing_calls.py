@@ -66,7 +66,7 @@ class Faults:
     """Counts the calls of the system that a run makes, and fails those that are given by their numbers.
 
     Attributes:
-        calls: what was called, in order.
+        calls: names of the calls, in order.
         now_s: the monotonic clock.
         calendar_s: time by which the calendar is ahead of it.
         last_s: time of the last fault; minus infinity before.

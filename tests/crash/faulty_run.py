@@ -136,7 +136,7 @@ class FaultyRun:
         """From the start to a signal.
 
         Raises:
-            Exception: what has ended the run.
+            Exception: the error that has ended the run.
         """
         faults, folder = self.faults, self._folder
         with ExitStack() as stack:

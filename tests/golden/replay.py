@@ -43,12 +43,12 @@ def summary(result: FrameResult) -> dict[str, Any]:
     """A frame in plain numbers.
 
     frame, proposals, classifications, deferred, born: counts.
-    id: by track.
-    points: by proposal.
-    state: by track, the digit of its state.
-    class: by track, the initial of its class (Y: cyclist), a capital where it is final.
-    box: of the tracks whose class is an object's, by id: x, y, z, l, w, h [mm, sensor frame], yaw [mrad].
-    box_sum: of all proposals [mm, mrad].
+    id: id by track.
+    points: number of points by proposal.
+    state: digit of the state by track.
+    class: initial of the class by track (Y: cyclist), a capital where it is final.
+    box: box by id, of the tracks of objects: x, y, z, l, w, h [mm, sensor frame], yaw [mrad].
+    box_sum: sum of the boxes of all proposals [mm, mrad].
     """
     tracks, boxes = result.tracks, 1000 * result.proposals.box
     owner = tracks.row_of_proposal(len(result.proposals))

@@ -102,7 +102,7 @@ class Fault:
     Attributes:
         seconds: duration.
         counter: the counter that reports it.
-        network: what becomes of packets on their way.
+        network: faults of packets on their way.
         packet: changes a packet, by a random generator.
         clock_s: step of the sensor's clock when the fault begins [s].
         switch: turns it on and off in the world.

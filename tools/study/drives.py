@@ -47,7 +47,7 @@ def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None)
 
     Args:
         path: its folder, with the scans in `scans/` or beside the labels.
-        profile: of its sensor.
+        profile: profile of its sensor.
         further: table of objects that the labels leave out (docs/evaluation.md).
     """
     scans = path / "scans"

@@ -194,7 +194,7 @@ def kitti_crops(path: Path, root: Path) -> None:
 
     Args:
         path: file to write (.npz).
-        root: of KITTI, with argoverse2/ and pandaset/ beside object/.
+        root: KITTI's root, with argoverse2/ and pandaset/ beside object/.
     """
     writer, scans = CropWriter(), list(kitti(root))
     for scan in scans:

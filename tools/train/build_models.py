@@ -50,7 +50,7 @@ def build(crops: list[Path], near: list[Path], out: Path, steps: int, data: str,
         crops: data sets.
         near: two data sets of near_crops, one to train on and one for the card.
         out: the model.
-        steps: of each network.
+        steps: training steps of each network.
         data: description of the data, for the card.
         licence: for the card.
     """

@@ -51,7 +51,7 @@ class Sensors:
     """Ground and resolution at each crop.
 
     Attributes:
-        ground_z_m: (R,) of the ground beneath, sensor frame.
+        ground_z_m: (R,) height of the ground beneath, sensor frame.
         azimuth_deg, elevation_deg: (R,) between neighbouring returns of a beam, and between neighbouring beams there.
     """
 
@@ -109,15 +109,15 @@ class Dataset:
 
     Attributes:
         crops: R crops.
-        sensors: of the crops.
+        sensors: sensors of the crops.
         label, owner, partial, unknown, tall: (R,) as in tools.train.build_crops.Labels.
-        variant, drive: (R,) of each crop.
-        sensor: (R,) of each crop, its place in `sensor_names`.
+        variant, drive: (R,) variant and drive of each crop.
+        sensor: (R,) index into `sensor_names`, for each crop.
         reflectance: (R, 5) statistics of the returns; NaN where unknown or measured by another sensor.
         truth: labelled objects of the validation.
-        sensor_names: of the sensors.
+        sensor_names: names of the sensors.
         provenance: options and counts of each file.
-        sha256: of each file.
+        sha256: SHA-256 of each file.
     """
 
     crops: Crops

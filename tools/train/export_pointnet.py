@@ -236,9 +236,9 @@ def export(
 
     Args:
         out: the model.
-        layers: of the network.
-        boxes: of the box classifier.
-        reflectance: of the reflectance classifiers.
+        layers: layers of the network.
+        boxes: layers of the box classifier.
+        reflectance: layers of the reflectance classifiers.
         report: facts of the training; those of the box and of each reflectance classifier under the names of both.
         data: description of the training data, for the card.
         licence: for the card.

@@ -54,7 +54,7 @@ def fit_calibration(logits: Float64, label: Int, weight: Float64, base: Float64 
     Args:
         logits: (R, 4) uncalibrated.
         label: (R,) classes.
-        weight: (R,) of each, 1 in total.
+        weight: (R,) weight of each, 1 in total.
         base: (R, 4) calibrated logits that they are added to.
     """
 
@@ -72,11 +72,11 @@ class Validation:
     """The crops that are validated: those of real scans, where the data set has any.
 
     Attributes:
-        rows: (R,) of the data set.
+        rows: (R,) rows of the data set.
         label, owner: (R,) class, and class whose objects hold most of the points.
         clear: (R,) clearly one object, or clearly none.
         sensor: (R,) as in the data set.
-        sensor_names: of the data set.
+        sensor_names: names of the sensors of the data set.
         truth: labelled objects of the drives of these crops; their rows are among the R.
     """
 
@@ -131,7 +131,7 @@ class HeldOut:
 
     Attributes:
         validation: the crops.
-        logits: (R, 4) of each.
+        logits: (R, 4) logits of each.
         calibration: fitted to the clear ones.
     """
 
@@ -173,7 +173,7 @@ def fit_pool(
         box: (R, 4) P(class | box).
         reflectance: (R, 4) log P(reflectance | class, box), zeros without: its weight is then zero.
         valid: the crops.
-        weight: (R,) of each, 1 in total.
+        weight: (R,) weight of each, 1 in total.
     """
     log_frequency = np.log(valid.class_frequency.clip(1e-9))
 

@@ -73,7 +73,7 @@ class Scan:
     """A scan and its labels.
 
     Attributes:
-        name: of the scan.
+        name: name of the scan.
         drive: its recording; the unit of the split into training and validation.
         points: (N, 4) sensor frame.
         objects: point indices of each of the B labelled objects.
@@ -82,7 +82,7 @@ class Scan:
         fov: region with complete labels.
         unlabelled: (N,) points without a label.
         sensor: name of the sensor, by which results are grouped.
-        profile: of the sensor.
+        profile: profile of the sensor.
     """
 
     name: str
@@ -188,7 +188,7 @@ def folder_scans(folder: Path, sensor: str, config: ProfileConfig) -> Iterator[S
     forward). Scans named DRIVE_NUMBER are of one drive.
 
     Args:
-        folder: of the scans.
+        folder: folder of the scans.
         sensor: its name.
         config: its profile.
 

@@ -122,8 +122,8 @@ def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sen
 
     Args:
         crops: in the frame of the sensors that measured them.
-        sensors: of the crops.
-        rng: of the random choices.
+        sensors: sensors of the crops.
+        rng: source of the random choices.
 
     Returns:
         crops, the sensors that would measure them so, (R,) rows of the crops given, and (R,) flags of Cut.

@@ -60,7 +60,7 @@ def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generat
         scan: to paste into.
         cuts: objects, of any drive.
         attempts: number of objects that are tried.
-        rng: of the choice of drives, objects and places.
+        rng: source of the choice of drives, objects and places.
     """
     by_class = {kind: [cut for cut in cuts if cut.kind == kind] for kind in CLASS_SHARE}
     sources = {rng.choice(sorted({cut.drive for cut in same})).item() for same in by_class.values() if same}

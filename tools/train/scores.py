@@ -79,7 +79,7 @@ def recall_at(
 
     Args:
         precision: to be reached.
-        score: (R,) of the class.
+        score: (R,) score of the class.
         right: (R,) crops that lie on an object of the class.
         mine: (R,) crops to look at.
         wanted: (T,) objects to find.

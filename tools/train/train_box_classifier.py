@@ -69,7 +69,7 @@ def cross_validate(
         network: (R, 4) out-of-fold probabilities of the PointNet.
         k: number of folds.
         steps: training steps of a fold.
-        seed: of the first fold.
+        seed: seed of the first fold.
     """
 
     def model(among: Bool, i: int) -> Model:

@@ -149,7 +149,7 @@ def table(first: Student, net: Student, boxes: MlpBoxClassifier, log_frequency: 
         first: the network before training.
         net: the network after it.
         boxes: both box classifiers, and the weights of the pool.
-        log_frequency: (4,) that networks and boxes assume.
+        log_frequency: (4,) log of the class frequencies that networks and boxes assume.
         held: crops that nothing was trained on.
     """
     rows = np.flatnonzero(held.trainable)

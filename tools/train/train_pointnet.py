@@ -62,13 +62,13 @@ def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]
 def worth(data: Dataset, box: Float64, rows: Int, seed: int) -> Float64:
     """(R,) how often to draw each crop, relatively: background by how much its box is like an object's.
 
-    The box rules most background out, and the pool with it does: what is left is what the network is asked about.
+    The pool with the box rules most background out, and the network judges only the rest.
 
     Args:
         data: all R crops.
         box: (R, 7) features of their boxes.
         rows: to train the box classifier on.
-        seed: of its training.
+        seed: seed of its training.
     """
     layers = train_box_classifier.train(data, rows, BOX_STEPS, seed)
     posterior = softmax(box_classifier.logits(layers, box), axis=1)

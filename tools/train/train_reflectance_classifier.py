@@ -67,11 +67,11 @@ def cross_validate(
 
     Args:
         data: all crops.
-        features: (R, 12) of them.
+        features: (R, 12) features of the crops.
         network: (R, 4) out-of-fold probabilities of the PointNet.
         k: number of folds.
         steps: training steps of a fold.
-        seed: of the first fold.
+        seed: seed of the first fold.
     """
     boxes: dict[int, Layers] = {}
 

@@ -110,7 +110,7 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
     Args:
         count: (P,) points.
         box: (P, 7) sensor frame.
-        ground_z_m: (P,) of the ground beneath each, sensor frame.
+        ground_z_m: (P,) height of the ground beneath each, sensor frame.
         beam_sr: (P,) or () solid angle of a point [sr].
     """
     x, y, z, length, width, height, _ = box.T

@@ -52,8 +52,8 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
     """Points of the given proposals, sensor frame; larger ones evenly subsampled, deterministically.
 
     Args:
-        points: (N, 4) of the frame.
-        proposals: of the frame.
+        points: (N, 4) points of the frame.
+        proposals: proposals of the frame.
         which: (R,) proposals to gather.
         max_points: per crop.
     """
@@ -77,7 +77,7 @@ def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
 
     Args:
         crops: points in the sensor frame.
-        ground_z_m: (R,) of the ground beneath each.
+        ground_z_m: (R,) height of the ground beneath each.
     """
     if not len(crops):
         return crops

@@ -31,7 +31,7 @@ class LikeliestClass:
 
     Args:
         config: costs.
-        frequency: (4,) of the classes among proposals, which the posteriors assume.
+        frequency: (4,) frequencies of the classes among proposals that the posteriors assume.
 
     Attributes:
         frequency: the same.
@@ -57,10 +57,10 @@ class Decision(LikeliestClass):
 
     Args:
         config: costs, and the frequency at the start.
-        frequency: (4,) of the classes among proposals, which the posteriors assume.
+        frequency: (4,) frequencies of the classes among proposals that the posteriors assume.
 
     Attributes:
-        frequency: (4,) of the classes among the proposals of this stream, as estimated so far.
+        frequency: (4,) frequencies of the classes among the proposals of this stream, as estimated so far.
     """
 
     def __init__(self, config: DecisionConfig, frequency: Float64) -> None:

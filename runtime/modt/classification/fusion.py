@@ -87,8 +87,8 @@ class Certainty:
     posterior under equal class frequencies.
 
     Args:
-        log_frequency: (4,) of the classes.
-        object_threshold, background_threshold: of either.
+        log_frequency: (4,) log of the frequencies of the classes.
+        object_threshold, background_threshold: posteriors from which a class is confirmed.
     """
 
     def __init__(self, log_frequency: Float64, object_threshold: float, background_threshold: float) -> None:
@@ -124,7 +124,7 @@ class FusedTracks:
 
     Args:
         config: condition of a view, threshold of certainty.
-        prior: of a proposal before its view.
+        prior: probabilities of the classes of a proposal before its view.
         background_threshold: evidence at which background is certain.
     """
 

@@ -62,7 +62,7 @@ def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int
     Args:
         moved_m: (R,) displacement within about the last two seconds [m].
         observed_s: (R,) time since the first proposal [s].
-        length_m: (R,) of the track [m].
+        length_m: (R,) length of the track [m].
     """
     still = np.searchsorted(YOUNG_S, observed_s, side="right")
     gone = np.searchsorted(MOVED_M, moved_m, side="right") + len(YOUNG_S)

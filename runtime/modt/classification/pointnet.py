@@ -187,8 +187,8 @@ class PointNet:
     Attributes:
         path: model file.
         sha256: its hash, equal to that in its card (the file beside it that ends in .md).
-        box_scores: of its box classifier, and of its reflectance classifier for this sensor.
-        class_frequency: (4,) of the classes among proposals, which the posteriors assume; a model that states none
+        box_scores: classifiers of boxes, and of reflectance for this sensor.
+        class_frequency: (4,) frequencies of the classes that the posteriors assume; a model that states none
             assumes that all are equal.
 
     Raises:
@@ -222,8 +222,8 @@ class PointNet:
         """(R, 4) class probabilities of the given proposals, in their order.
 
         Args:
-            points: (N, 4) of the frame.
-            proposals: of the frame.
+            points: (N, 4) points of the frame.
+            proposals: proposals of the frame.
             which: (R,) proposals to classify.
         """
         crops = gather(points, proposals, which, self.config.max_points)

@@ -18,9 +18,9 @@ class PoolWeights:
     """Exponents of the likelihoods that multiply the class frequency to a posterior.
 
     Attributes:
-        network: of P(points | class).
-        box: of P(box | object) / P(box | background).
-        reflectance: of P(reflectance | class, box).
+        network: weight of P(points | class).
+        box: weight of P(box | object) / P(box | background).
+        reflectance: weight of P(reflectance | class, box).
     """
 
     network: float = 1.0
@@ -60,7 +60,7 @@ def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Flo
 
     Args:
         log_box: (R, 4) log P(class | box), up to a constant a row.
-        log_frequency: (4,) of the classes.
+        log_frequency: (4,) log of the frequencies of the classes.
         weight: exponent of the box.
     """
     out = np.repeat(log_frequency[None], len(log_box), axis=0)
@@ -78,8 +78,8 @@ def log_pool(
         network: (R, 4) P(class | points).
         log_box: (R, 4) log P(class | box), up to a constant a row.
         reflectance: (R, 4) log P(reflectance | class, box), up to a constant a row.
-        log_frequency: (4,) of the classes, which network and box assume.
-        weights: of the three.
+        log_frequency: (4,) log of the frequencies of the classes that network and box assume.
+        weights: weights of the three.
     """
     score = pooled_prior(log_box, log_frequency, weights.box)
     score += weights.network * (np.log(np.maximum(network, _MIN_PROBABILITY)) - log_frequency)

@@ -80,7 +80,7 @@ class FrequencyPrior:
     """The frequency of the classes among proposals, the same for each: it excludes none.
 
     Args:
-        frequency: (4,) of the classes.
+        frequency: (4,) frequencies of the classes.
     """
 
     pool_weight = 0.0

@@ -42,7 +42,7 @@ class MlpReflectanceClassifier:
     """Multilayer perceptron of 1,604 weights over box features and reflectance statistics, side by side.
 
     Args:
-        layers: of the network.
+        layers: layers of the network.
         weights: in the pool of network, box and reflectance.
     """
 

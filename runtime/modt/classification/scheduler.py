@@ -157,9 +157,9 @@ class Scheduler:
 
         Args:
             tracks: alive.
-            proposals: of this frame.
+            proposals: proposals of this frame.
             asks: (M,) tracks that request a class, each with a proposal.
-            budget: of the frame.
+            budget: budget of the frame.
         """
         asking = (asks & (tracks.proposal != NONE)).nonzero()[0]
         worth = self.worth(tracks, proposals, asking)

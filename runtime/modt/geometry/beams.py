@@ -32,7 +32,7 @@ class BeamTable:
     """Spacing from the elevations of all beams: the wider of the gaps above and below the nearest one.
 
     Args:
-        elevations_deg: of two beams or more, in any order.
+        elevations_deg: elevations of two beams or more, in any order.
     """
 
     CELLS = 1024

@@ -142,12 +142,12 @@ def pair_costs(
         a: n of them, where they are expected.
         b: k of them.
         covariance: (3, n) xx, xy and yy of the position of each of a [m2].
-        variance: of the position of any of b [m2].
+        variance: variance of the positions of b [m2].
         pairs: (K,) index of each among a, and among b.
-        weights: of the cost.
+        weights: weights of the terms of the cost.
 
     Returns:
-        cost: (K,) of the displacement, and what the differences add.
+        cost: (K,) cost of the displacement and of the differences in shape.
         coverage: (K,) intersection over the smaller of the two.
     """
     rows, columns = pairs
@@ -178,7 +178,7 @@ def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple
     Args:
         rows: (K,) first index of each pair.
         columns: (K,) second index.
-        cost: (K,) of each, below limit.
+        cost: (K,) cost of each pair, below limit.
         limit: cost of leaving a row or a column without a partner.
 
     Returns:
@@ -233,12 +233,12 @@ def measured(a: Float64, b: Float64, variance: float, before: Float64) -> tuple[
     Args:
         a: (8, K) k-DOPs before [m].
         b: (8, K) and after [m].
-        variance: of the displacement if the ends agree [m2].
+        variance: variance of the displacement if the ends agree [m2].
         before: (4, K) variance along each axis by ends that disagreed, a frame ago [m2].
 
     Returns:
         shift: (K, 2) from a to b [m].
-        covariance: (K, 2, 2) of it [m2].
+        covariance: (K, 2, 2) covariance of the displacement [m2].
         end_variance: (4, K) variance along each axis by ends that disagree, or did [m2].
     """
     width = widths(b)

@@ -19,7 +19,7 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     Args:
         rows: (K,) first index of each candidate pair.
         columns: (K,) second index; no pair occurs twice.
-        cost: (K,) of each, below limit.
+        cost: (K,) cost of each pair, below limit.
         limit: cost of leaving a row or a column without a partner.
 
     Raises:

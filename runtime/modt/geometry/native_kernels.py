@@ -32,7 +32,7 @@ class NativeGeometryKernels(GeometryKernels):
     """The passes in C.
 
     Args:
-        library: that of `modt.native.library`.
+        library: the compiled library (`modt.native.library`).
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:

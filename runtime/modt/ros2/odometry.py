@@ -23,7 +23,7 @@ class OdometryMessage:
     Attributes:
         stamp_s: its time [s].
         child_frame_id: the frame whose pose it is.
-        T_odom_child: (4, 4) that pose in the frame of the header.
+        T_odom_child: (4, 4) pose in the frame of the header.
     """
 
     stamp_s: float

@@ -220,8 +220,8 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | None:
     """The turn of a sweep whose seam lies behind the sensor; None for another seam, or times that fit no turn.
 
     Args:
-        points: (N, 4) of the sweep; points at the origin are ignored.
-        times: (N,) of the points, in seconds, microseconds or nanoseconds.
+        points: (N, 4) points of the sweep; those at the origin are ignored.
+        times: (N,) times of the points, in seconds, microseconds or nanoseconds.
     """
     chosen = slice(None, None, max(1, len(points) // TURN_SAMPLES))
     x, y, _, _ = points[chosen].T.astype(np.float64)

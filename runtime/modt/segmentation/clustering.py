@@ -70,9 +70,9 @@ class StripMerger:
 class Clusterer:
     """Clusters of points that can be objects.
 
-    A coarse grid connects objects with sparse returns. What it may connect too much is clustered again on a grid of
-    half the spacing: of an oversized cluster (a wall, a hedge) the parts that stand out are kept; off a cluster that
-    may hold a person and more the parts that may be a person are split.
+    A coarse grid connects objects with sparse returns. Clusters that it may have joined wrongly are clustered once more
+    on a grid of half the spacing. An oversized cluster (a wall, a hedge) keeps only the parts that stand out of it. Parts
+    that may be a person are split off a cluster that may hold a person and more.
 
     Args:
         sensor: range and beam spacing.

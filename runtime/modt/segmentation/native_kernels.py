@@ -91,7 +91,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     """The passes in C.
 
     Args:
-        library: that of `modt.native.library`.
+        library: the compiled library (`modt.native.library`).
         instructions: the set that it is compiled for.
     """
 

@@ -29,7 +29,7 @@ class Segmenter:
     """Sweeps to proposals (section III-A).
 
     Args:
-        config: of the stage.
+        config: configuration of the stage.
         sensor: mount, range and resolution.
         fov: part of space to segment.
         kernels: passes over points, cells and groups.

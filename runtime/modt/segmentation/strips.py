@@ -98,9 +98,9 @@ def merge_strips(bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> In
     """(G,) first of the clusters that make one car with each, itself where it is not merged.
 
     Args:
-        bounds: of the clusters.
+        bounds: bounds of the clusters.
         beam_rad: (G,) spacing of the beams at the foot of each [rad].
-        limits: of strips and cars.
+        limits: sizes of strips and cars.
     """
     self_index = np.arange(len(bounds))
     representative = self_index.copy()

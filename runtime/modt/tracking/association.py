@@ -20,10 +20,10 @@ class Matches:
     """Pairs of a track and a proposal; no row and no proposal occurs twice.
 
     Attributes:
-        rows: (K,) of the tracks.
-        proposals: (K,) of this frame.
-        position: (K, 2) that each proposal measures of its track [m, world].
-        covariance: (K, 2, 2) of that position [m2].
+        rows: (K,) rows of the tracks.
+        proposals: (K,) proposals of this frame.
+        position: (K, 2) position of each track as its proposal measures it [m, world].
+        covariance: (K, 2, 2) covariance of that position [m2].
         end_variance: (K, 4) part of it by ends of the k-DOP that disagree, along each axis [m2].
     """
 

@@ -146,7 +146,7 @@ class Filter:
     Args:
         acceleration: [m/s2], and
         turn: [rad/s] that add to the covariance, as of `predict`.
-        library: of compiled passes, or None: then the functions above are called.
+        library: library of compiled passes; with None the functions above are called.
     """
 
     def __init__(self, acceleration: float, turn: float, library: ctypes.CDLL | None = None) -> None:

@@ -57,7 +57,7 @@ class Associated:
     """A frame after association.
 
     Attributes:
-        proposals: of the frame.
+        proposals: proposals of the frame.
         observations: the proposals in the world.
         matches: pairs of tracks and proposals.
     """
@@ -72,7 +72,7 @@ class Pairs:
     """Tracks and the proposals that overlap their known extents, by falling seniority of the tracks.
 
     Attributes:
-        rows, proposals: (K,) of each pair.
+        rows, proposals: (K,) row and proposal of each pair.
         known: (8, K) known extent of the track, as a k-DOP [m].
         within: (K,) part of the proposal that lies within the known extent.
         free: (K,) the track may take the proposal, and most of one lies within the other.
@@ -101,7 +101,7 @@ class Regrouping:
         Args:
             tracks: as predicted.
             frame: proposals, observations and matches.
-            placement: of the frame in the world.
+            placement: placement of the frame in the world.
         """
         observations, matches, n = frame.observations, frame.matches, len(frame.proposals)
         if not n:
@@ -168,7 +168,7 @@ class Regrouping:
 
         Args:
             frame: the grouping before.
-            placement: of the frame in the world.
+            placement: placement of the frame in the world.
             label: (K,) proposal of each member.
             source: (Q,) former proposal whose columns each takes over.
             renewed: (Q,) those whose members changed: box and k-DOP come from their points.

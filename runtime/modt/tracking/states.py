@@ -68,7 +68,7 @@ class Transition:
         source: state it leaves.
         label: the table's name of it.
         target: state it leads to.
-        event: that fires it.
+        event: event that fires it.
         meaning: the table's description, in a phrase.
     """
 

@@ -48,8 +48,8 @@ class Tracker:
     Args:
         config: its parameters.
         machine: the table that drives the states.
-        association: how proposals find their tracks; by default as the configuration says.
-        period_s: of the sensor; what the configuration gives in frames of coasting is this many times as long.
+        association: association of proposals with tracks; by default the configured one.
+        period_s: time between sweeps; a track that is not seen is kept for `max_missed` of them.
         kernels: passes over points and pairs.
     """
 
@@ -111,7 +111,7 @@ class Tracker:
 
         Args:
             stamp_s: time of the frame [s].
-            proposals: of the frame.
+            proposals: proposals of the frame.
             located: the same in the world.
 
         Returns:

@@ -140,7 +140,7 @@ class Figure:
     """A figure of an experiment.
 
     Attributes:
-        variant: what is compared.
+        variant: variant that is compared.
         at: value that is swept, None of a single one.
         quantity: its name, with its unit.
         estimate: the figure.

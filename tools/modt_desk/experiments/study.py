@@ -36,7 +36,7 @@ class Row:
         variant, at, quantity: as in Figure.
         value, low, high: the figure and its 95 % interval, None where there is none.
         n: objects or tracks that were resampled.
-        paper, paper_over: what the paper states, and of which drives.
+        paper, paper_over: figures of the paper, and the drives they are taken over.
     """
 
     experiment: str

@@ -39,7 +39,7 @@ class RecordedRun:
             window covers it; `call_mJ`, the estimated energy of each of its classifications, where it is attributed.
         states: names, in the order of the column `state`.
         tracks: (R, COLUMNS) as `track_rows.COLUMNS`.
-        poses: (F, 3) of the sensor in the world: x, y [m], yaw [rad].
+        poses: (F, 3) poses of the sensor in the world: x, y [m], yaw [rad].
     """
 
     record: RunRecord
