@@ -70,9 +70,9 @@ class StripMerger:
 class Clusterer:
     """Clusters of points that can be objects.
 
-    A coarse grid connects objects with sparse returns. Clusters that it may have joined wrongly are clustered once more
-    on a grid of half the spacing. An oversized cluster (a wall, a hedge) keeps only the parts that stand out of it. Parts
-    that may be a person are split off a cluster that may hold a person and more.
+    A coarse grid connects objects with sparse returns. Clusters that it may have joined wrongly are clustered once
+    more on a grid of half the spacing. An oversized cluster (a wall, a hedge) keeps only the parts that stand out of
+    it. Parts that may be a person are split off a cluster that may hold a person and more.
 
     Args:
         sensor: range and beam spacing.
