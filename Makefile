@@ -6,7 +6,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 
-.PHONY: replay test quick quick-one quick-other check format hooks clean
+.PHONY: replay test test-one test-other quick quick-one quick-other check format hooks clean
 
 replay: $(VENV)/.run
 	$(BIN)/modt replay --out runs/embedded
@@ -14,21 +14,29 @@ replay: $(VENV)/.run
 	$(BIN)/modt view runs/embedded
 	@echo "To look at it: open runs/embedded/view.html in a browser"
 
-test: check
-	$(BIN)/python -m pytest
+# The tests run in two halves at a time. Those that exchange ROS 2 messages stand in one of them.
+HALVES := $(MAKE) --no-print-directory --jobs=2 --output-sync=target
+PYTEST := $(BIN)/python -m pytest -p no:cacheprovider
+ONE    := tests/app tests/classification tests/desk tests/segmentation tests/sensor_fit
+QUICK  := -m "not slow and not command and not install and not kitti"
 
-# Tests by their markers (pyproject.toml), in two halves at a time. Tests that exchange ROS 2 messages stand in one of them.
-QUICK := $(BIN)/python -m pytest -p no:cacheprovider -m "not slow and not command and not install and not kitti"
-ONE   := tests/app tests/classification tests/desk tests/segmentation tests/sensor_fit
+test: check
+	$(HALVES) test-one test-other
+
+test-one: $(VENV)/.test
+	$(PYTEST) $(ONE)
+
+test-other: $(VENV)/.test
+	$(PYTEST) tests $(ONE:%=--ignore=%)
 
 quick: $(VENV)/.test
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=target quick-one quick-other
+	$(HALVES) quick-one quick-other
 
 quick-one: $(VENV)/.test
-	$(QUICK) $(ONE)
+	$(PYTEST) $(QUICK) $(ONE)
 
 quick-other: $(VENV)/.test
-	$(QUICK) tests $(ONE:%=--ignore=%)
+	$(PYTEST) $(QUICK) tests $(ONE:%=--ignore=%)
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .
