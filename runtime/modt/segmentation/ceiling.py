@@ -41,10 +41,9 @@ def below_ceiling_m(height: Float32) -> float | None:
 
 
 def below_grazed_m(level: Float32, max_height_m: float) -> float | None:
-    """The same for a ceiling about the greatest height used, by (N,) heights above the sensor's floor, one of SAMPLED."""
+    """The same for a ceiling about the greatest height used, by (N,) sampled heights above the sensor's floor."""
     upper = level[level > np.float32(ABOVE_M)]
-    low, high = (np.float32(max_height_m + bound) for bound in GRAZED_M)
-    on_ceiling = np.count_nonzero((upper > low) & (upper < high))
+    on_ceiling = np.count_nonzero((upper > max_height_m + GRAZED_M[0]) & (upper < max_height_m + GRAZED_M[1]))
     if SAMPLED * len(upper) < MIN_RETURNS or on_ceiling < MIN_SHARE * len(upper):
         return None
     return max_height_m - GRAZED_CLEARANCE_M
