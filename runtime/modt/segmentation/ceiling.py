@@ -19,8 +19,7 @@ EDGE_SHARE, CLEARANCE_M = 0.05, 0.15
 SAMPLED = 8
 """One return of so many is looked at for a ceiling that begins above the greatest height used."""
 GRAZED_M, GRAZED_CLEARANCE_M = (-0.1, 0.3), 0.2
-"""Bounds of such a ceiling above the greatest height used, and distance below that height up to which objects reach:
-the lowest returns of a ceiling there are within it, over people's heads."""
+"""Bounds of such a ceiling above the greatest height used; distance below that height up to which objects reach."""
 
 
 def below_ceiling_m(height: Float32) -> float | None:
@@ -42,15 +41,9 @@ def below_ceiling_m(height: Float32) -> float | None:
 
 
 def below_grazed_m(level: Float32, max_height_m: float) -> float | None:
-    """Height [m] up to which objects reach under a ceiling that begins about max_height_m; None without one.
-
-    Args:
-        level: (N,) heights of all returns above the floor under the sensor, one of SAMPLED [m].
-        max_height_m: greatest height used above ground.
-    """
+    """The same for a ceiling about the greatest height used, by (N,) sampled heights above the sensor's floor."""
     upper = level[level > np.float32(ABOVE_M)]
-    low, high = (np.float32(max_height_m + bound) for bound in GRAZED_M)
-    on_ceiling = np.count_nonzero((upper > low) & (upper < high))
+    on_ceiling = np.count_nonzero((upper > max_height_m + GRAZED_M[0]) & (upper < max_height_m + GRAZED_M[1]))
     if SAMPLED * len(upper) < MIN_RETURNS or on_ceiling < MIN_SHARE * len(upper):
         return None
     return max_height_m - GRAZED_CLEARANCE_M

@@ -8,10 +8,9 @@ from modt.config import SensorConfig
 from modt.placement import Mount
 from modt.types import Cut, Float32, Float64, Int
 
-_STEPS, _NEAR_M = 0.75, 0.1
-"""A proposal is cut this near to the outermost beam [beam spacings], beyond which none passes, and range used [m]."""
-_TILTED_M = 8.0
-"""A tilt makes the beams end on people as far away as this [m]; the models of what is cut know none farther away."""
+_STEPS, _NEAR_M, _TILTED_M = 0.75, 0.1, 8.0
+"""A proposal is cut this near to the outermost beam [beam spacings], beyond which none passes, and range used [m]; by
+a tilted sensor as far away as the last [m], since the models of what is cut know nothing farther away."""
 
 
 class ViewEnds:

@@ -11,8 +11,8 @@ from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Float64, Int
 
-_UNMEASURED_M2 = 100.0 * np.eye(2)
-"""Covariance of a position that was not measured."""
+UNMEASURED_M2 = 100.0
+"""Variance along either axis of a position that was not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Matches:
             np.concatenate([same.rows, rows]),
             np.concatenate([same.proposals, proposals]),
             np.concatenate([same.position, tracks.x.take(rows, axis=0)[:, :2]]),
-            np.concatenate([same.covariance, _UNMEASURED_M2[None].repeat(len(rows), axis=0)]),
+            np.concatenate([same.covariance, (UNMEASURED_M2 * np.eye(2))[None].repeat(len(rows), axis=0)]),
             np.concatenate([same.end_variance, tracks.end_variance.take(rows, axis=0)]),
         )
 

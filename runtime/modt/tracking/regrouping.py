@@ -27,7 +27,7 @@ from modt.geometry.kdop import DIRECTIONS, coverage, measured, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations, observe
 from modt.placement import Placement
-from modt.tracking.association import Matches
+from modt.tracking.association import UNMEASURED_M2, Matches
 from modt.tracking.kdop_association import POSITION_SIGMA_M
 from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals
@@ -48,8 +48,6 @@ MIN_POINTS, MIN_SHARE = 8, 0.4
 """Least number of points that are split off and that remain; least share of the points last seen."""
 MAX_DROP_M = 0.4
 """Greatest distance of the top of a part below the expected top [m]."""
-_UNKNOWN_M2 = 100.0
-"""Variance of a position along an axis on which something touches both ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,8 +243,7 @@ def _split(
     """Objects that are split off longer proposals.
 
     Returns:
-        rows: (S,) tracks of objects that were observed a frame ago, and have no proposal now, one that is too long
-            or one of few points.
+        rows: (S,) tracks of objects seen a frame ago that have no proposal, or one that is too long or of few points.
         hosts: (S,) proposal off which each is split.
         label: (K,) proposal of each member of the frame; those split off follow the others.
     """
@@ -291,10 +288,7 @@ def _split(
     size, highest = np.bincount(pair, minlength=len(rows)), np.full(len(rows), -np.inf)
     np.maximum.at(highest, pair, z[mine])
     splits = (size >= np.maximum(MIN_POINTS, MIN_SHARE * tracks.points[rows])) & (highest >= top - MAX_DROP_M)
-    for these in (
-        own[rows] == hosts,
-        splits,
-    ):  # a track keeps its proposal where the others' pieces leave nothing else
+    for these in (own[rows] == hosts, splits):  # a track keeps its proposal if the other pieces leave nothing else
         splits &= ~these | (count - np.bincount(hosts, size * splits, n)[hosts] >= MIN_POINTS)
     label[member] = np.where(splits, n + splits.cumsum() - 1, hosts)[pair]
     return rows[splits], hosts[splits], label
@@ -310,11 +304,9 @@ def _locate(tracks: TrackTable, rows: Int, kdop: Float64, matches: Matches) -> F
     touched, gain = kdop > expected + (PAD_M - TOUCH_M), kdop - mean
     both = touched & np.roll(touched, 4, axis=0)
     gain = np.where(both, 0.0, np.where(touched, -np.roll(gain, 4, axis=0), gain))
-    before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * _UNKNOWN_M2
+    before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
     shift, covariance, end_variance = measured(mean, mean + gain, POSITION_SIGMA_M**2, before)
-    at = np.empty(len(tracks), np.int64)
-    at[matches.rows] = np.arange(len(matches.rows))
-    at = at[rows]
+    at = (matches.rows == rows[:, None]).argmax(axis=1)
     matches.position[at] += shift
     matches.covariance[at], matches.end_variance[at] = covariance, end_variance.T
     return expected + DIRECTIONS.T @ shift.T
