@@ -23,7 +23,7 @@ SENSORS = "vlp-16", "os1-64", "hdl-64e", "mid-360", "pandar64", "xt-32"
 
 BASELINE, MODES = "conventional", ("accurate", "efficient")
 SCENES, SEEDS, SECONDS = ("street", "crossing"), range(1100, 1104), 6.0
-"""Drives of each sensor. No choice of this project is made on them."""
+"""Drives of each sensor. PERSON_GROWTH of `modt.tracking.track_table` was added after a look at the first of them."""
 RESAMPLES = 200
 """Draws of the drives of each sensor, with replacement, from which an interval is taken."""
 Rows = Mapping[str, Sequence[DriveRows]]
