@@ -25,7 +25,7 @@ from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.strips import CarLimits
-from modt.tracking.kalman import Filter
+from modt.tracking.kalman import filter_of
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, UNRECORDED
@@ -263,7 +263,7 @@ def test_filter(kernels, seed, m, dt_s):
     tables = []
     for each in (NUMPY, kernels):
         own, covariance = x.copy(), A @ A.transpose(0, 2, 1) + 0.1 * np.eye(4)
-        kalman = Filter(2.0, 0.3, each.library)
+        kalman = filter_of(each, 2.0, 0.3)
         kalman.predict(own, covariance, dt_s)
         kalman.update(own, covariance, rows, z, R)
         kalman.observe_speed(own, covariance, rows[1:], 0.0, 0.5)

@@ -14,6 +14,7 @@ from array import array
 import numpy as np
 
 from modt.geometry import wrap
+from modt.geometry.kernels import GeometryKernels
 from modt.native.library import FLOAT64, INT64, Own, Signatures, declare
 from modt.types import Float64, Int
 
@@ -132,6 +133,44 @@ def inverse_2x2(S: Float64) -> Float64:
     return inverse
 
 
+class Filter:
+    """The filter on a table of states x (M, 4) and covariances P (M, 4, 4), in place: the reference.
+
+    Args:
+        acceleration: [m/s2], and
+        turn: [rad/s] that add to the covariance, as of `predict`.
+    """
+
+    def __init__(self, acceleration: float, turn: float) -> None:
+        self.acceleration, self.turn = acceleration, turn
+
+    def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
+        """All states dt_s later."""
+        x[:], P[:] = tracks_first(*predict(*components_first(x, P), dt_s, self.acceleration, self.turn))
+
+    def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:
+        """The rows after the observed places z (K, 2) of covariance R (K, 2, 2), at a speed that is not negative.
+
+        One that may stand is turned to where it seems to go.
+        """
+        own, covariance = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
+        place, noise = components_first(z, R)
+        turned = face(own, covariance, _heading(own, covariance[SPEED, SPEED], place))
+        x[rows], P[rows] = tracks_first(*turn_about(*update(*turned, place, noise)))
+
+    def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
+        """The rows after an observed speed of deviation sigma."""
+        own = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
+        x[rows], P[rows] = tracks_first(*observe_speed(*own, speed_mps, sigma_mps))
+
+
+def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
+    """(K,) heading towards z (2, K) of states (4, K) whose speed may be 0, of others their own."""
+    step_x, step_y = z - x[:2]
+    heading: Float64 = np.where(np.abs(x[SPEED]) < np.sqrt(speed_variance), np.arctan2(step_y, step_x), x[HEADING])
+    return heading
+
+
 _D, _L = ctypes.c_double, ctypes.c_int64
 _SIGNATURES: Signatures = {
     "modt_predict": (None, (FLOAT64, FLOAT64, _L, Own, Own, _D, Own)),
@@ -140,49 +179,33 @@ _SIGNATURES: Signatures = {
 }
 
 
-class Filter:
-    """The filter on a table of states x (M, 4) and covariances P (M, 4, 4), in place.
+class NativeFilter(Filter):
+    """The filter in C (`modt.native`)."""
 
-    Args:
-        acceleration: [m/s2], and
-        turn: [rad/s] that add to the covariance, as of `predict`.
-        library: library of compiled passes; with None the functions above are called.
-    """
-
-    def __init__(self, acceleration: float, turn: float, library: ctypes.CDLL | None = None) -> None:
-        self.acceleration, self.turn, self._library = acceleration, turn, library
-        if library is not None:
-            declare(library, _SIGNATURES)
+    def __init__(self, library: ctypes.CDLL, acceleration: float, turn: float) -> None:
+        super().__init__(acceleration, turn)
+        declare(library, _SIGNATURES)
+        self._library = library
 
     def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
         """All states dt_s later."""
-        if self._library is None:
-            x[:], P[:] = tracks_first(*predict(*components_first(x, P), dt_s, self.acceleration, self.turn))
-            return
         heading, along = x[:, HEADING].copy(), np.square(dt_s * self.acceleration)
         noise = array("d", (along, np.square(dt_s**2 / 2 * self.acceleration), np.square(dt_s * self.turn)))
         self._library.modt_predict(x, P, len(x), np.cos(heading), np.sin(heading), dt_s, noise)
 
     def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:
-        """The rows after the observed places z (K, 2) of covariance R (K, 2, 2), at a speed that is not negative.
-
-        One that may stand is turned to where it seems to go.
-        """
-        own, place = x.take(rows, axis=0).T.copy(), z.T.copy()
-        step_x, step_y = place - own[:2]
-        slow = np.abs(own[SPEED]) < np.sqrt(P[rows, SPEED, SPEED])
-        heading = np.where(slow, np.arctan2(step_y, step_x), own[HEADING])
-        if self._library is None:
-            covariance, noise = (A.transpose(1, 2, 0).copy() for A in (P.take(rows, axis=0), R))
-            x[rows], P[rows] = tracks_first(*turn_about(*update(*face(own, covariance, heading), place, noise)))
-            return
+        """The rows after the observed places z (K, 2) of covariance R (K, 2, 2), at a speed that is not negative."""
+        own = x.take(rows, axis=0).T.copy()
+        heading = _heading(own, P[rows, SPEED, SPEED], z.T.copy())
         turn = heading - own[HEADING]
         self._library.modt_update(x, P, rows, len(rows), heading, np.cos(turn), np.sin(turn), z, R)
 
     def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
         """The rows after an observed speed of deviation sigma."""
-        if self._library is None:
-            own = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
-            x[rows], P[rows] = tracks_first(*observe_speed(*own, speed_mps, sigma_mps))
-            return
         self._library.modt_observe_speed(x, P, rows, len(rows), speed_mps, sigma_mps**2)
+
+
+def filter_of(kernels: GeometryKernels, acceleration: float, turn: float) -> Filter:
+    """The filter where the other passes are."""
+    library = kernels.library
+    return Filter(acceleration, turn) if library is None else NativeFilter(library, acceleration, turn)

@@ -12,7 +12,7 @@ from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
-from modt.tracking.kalman import SPEED, Filter
+from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.states import Event, StateMachine
@@ -67,7 +67,7 @@ class Tracker:
         self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0)
         self._period_s = period_s
         self._regrouping = Regrouping(kernels)
-        self._filter = Filter(ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS, kernels.library)
+        self._filter = filter_of(kernels, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS)
         position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
         self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
         self._tracks = TrackTable.blank()
