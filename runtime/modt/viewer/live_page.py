@@ -13,9 +13,9 @@ from modt.errors import MisuseError
 from modt.sinks.records import line
 from modt.types import FrameResult
 from modt.viewer import theme
+from modt.viewer.html_page import LIVE, content, page
 from modt.viewer.live_server import LiveServer
 from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, occupied, packed_cells, packed_table
-from modt.viewer.theme import LIVE, content, page
 from modt.viewer.track_rows import planar, result_rows, scaled
 
 log = logging.getLogger(__name__)

@@ -1,17 +1,11 @@
-"""Look shared by pages and pictures (extent; colours of classes, states and stages), and the shell of a page."""
+"""Look shared by pages and pictures: extent, and colours of classes, states and stages."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
-from html import escape
-from pathlib import Path
-from typing import Any
 
 from modt.classes import CLASS_NAMES, CLASSES
 from modt.energy.ledger import STAGES
-from modt.viewer.packed import SIDE
-from modt.viewer.track_rows import COLUMNS, SCALE
 
 Entry = dict[str, str]
 """`name` and `colour` of a line of a legend."""
@@ -59,38 +53,3 @@ def states(names: Iterable[str]) -> list[Entry]:
 def stages(names: Sequence[str] = STAGES) -> list[Entry]:
     """Legend of the stages of a frame."""
     return [{"name": name, "colour": COLOURS[k % len(COLOURS)]} for k, name in enumerate(names)]
-
-
-_PAGE = Path(__file__).parent / "page"
-_SCRIPTS = [_PAGE / f"{part}.js" for part in ("data", "draw", "text", "input")]
-LIVE = _PAGE / "live.js"
-
-
-def content(states: list[Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
-    """Content of a page: columns, legends, budget of a frame, width of a cell (None without points)."""
-    return {
-        "schema": "modt.player/2",
-        "columns": [(name, SCALE.get(name, 1)) for name in COLUMNS],
-        "classes": classes(),
-        "states": states,
-        "stages": stages(),
-        "budget": budget,
-        "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},
-        "reach_m": REACH_M,
-        "frames": [],
-    }
-
-
-def page(name: str, about: str, known: dict[str, Any], script: Path) -> tuple[str, str]:
-    """HTML before and after the data of a page. The script fetches the frames and handles Play."""
-    css, body = ((_PAGE / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "html"))
-    scripts = "".join(part.read_text(encoding="utf-8") for part in (*_SCRIPTS, script))
-    text = json.dumps(known, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    head = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(name)}</title><style>{THEME}{css}</style></head><body>\n"
-        f"<header><h1>{escape(name)}</h1><span>{escape(about)}</span></header>\n{body}"
-        f'<script type="application/json" id="run">{text}</script>\n'
-    )
-    return head, f"<script>\n{scripts}</script></body></html>\n"

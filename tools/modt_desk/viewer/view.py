@@ -21,8 +21,8 @@ from modt.sinks.output import writing
 from modt.sources.stream import Stream
 from modt.types import Float32
 from modt.viewer import theme
+from modt.viewer.html_page import content, page
 from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, occupied, packed_cells, packed_table
-from modt.viewer.theme import content, page
 from modt_desk.evaluation.run_record import FramesByNumber
 from modt_desk.evaluation.truth import by_stamp
 from modt_desk.evaluation.truth_files import labels_beside, open_truth
