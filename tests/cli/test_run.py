@@ -34,12 +34,12 @@ def scans(tmp_path_factory):
 class Service:
     """A running `modt run`, and the socket that it notifies."""
 
-    def __init__(self, folder, *arguments):
+    def __init__(self, folder, *arguments, watchdog_s=2.0):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.socket.bind(str(folder / "notify"))
         self.socket.settimeout(DEADLINE_S)
         self.out = folder / "run"
-        notified = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": "2000000"}
+        notified = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": str(round(1e6 * watchdog_s))}
         self.process = begin("run", *arguments, "--out", self.out, cwd=folder, env={**environment(), **notified})
 
     def hear(self, beginning):

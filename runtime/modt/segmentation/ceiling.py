@@ -40,9 +40,9 @@ def below_ceiling_m(height: Float32) -> float | None:
     return ABOVE_M + BIN_M * begins - CLEARANCE_M
 
 
-def below_grazed_m(level: Float32, max_height_m: float) -> float | None:
-    """The same for a ceiling about the greatest height used, by (N,) sampled heights above the sensor's floor."""
-    upper = level[level > np.float32(ABOVE_M)]
+def below_grazed_m(z: Float32, sensor_height_m: float, max_height_m: float) -> float | None:
+    """The same for a ceiling about the greatest height used, by (N,) sampled heights relative to the sensor [m]."""
+    upper = z[z > np.float32(ABOVE_M - sensor_height_m)] + np.float32(sensor_height_m)
     on_ceiling = np.count_nonzero((upper > max_height_m + GRAZED_M[0]) & (upper < max_height_m + GRAZED_M[1]))
     if SAMPLED * len(upper) < MIN_RETURNS or on_ceiling < MIN_SHARE * len(upper):
         return None
