@@ -36,13 +36,13 @@ def test_few_returns_doors_and_what_is_higher_are_no_ceiling(ceiling_m, n):
 @pytest.mark.parametrize("ceiling_m", [2.55, 2.65, 2.75, 2.85])
 def test_a_ceiling_about_the_greatest_height_used_is_cut_well_below(ceiling_m):
     level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, 4000)]).astype(np.float32)
-    assert 2.3 < below_grazed_m(level[::SAMPLED], 2.6) < 2.5
+    assert 2.3 < below_grazed_m(level[::SAMPLED], 0.0, 2.6) < 2.5
 
 
 @pytest.mark.parametrize(("ceiling_m", "n"), [(3.2, 4000), (2.65, 100), (2.65, 0)])
 def test_a_high_ceiling_or_few_returns_about_the_greatest_height_used_are_none(ceiling_m, n):
     level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, n)]).astype(np.float32)
-    assert below_grazed_m(level[::SAMPLED], 2.6) is None
+    assert below_grazed_m(level[::SAMPLED], 0.0, 2.6) is None
 
 
 def test_the_lowest_returns_of_a_ceiling_above_the_greatest_height_used_join_nobody():

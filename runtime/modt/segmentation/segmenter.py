@@ -71,8 +71,9 @@ class Segmenter:
         """
         sensor_height_m = self.sensor_height_m(points)
         rows, above, height = self.kernels.above_ground(self.ground, points, sensor_height_m, self.bounds)
-        level = points[::SAMPLED, 2] + sensor_height_m
-        limit_m = below_ceiling_m(height) or below_grazed_m(level, self.config.max_height_m)
+        limit_m = below_ceiling_m(height)
+        if limit_m is None:
+            limit_m = below_grazed_m(points[::SAMPLED, 2], sensor_height_m, self.config.max_height_m)
         if limit_m is None:
             return rows, above, height
         kept = np.flatnonzero(height < np.float32(limit_m))
