@@ -54,6 +54,12 @@ class Service:
         _, said = self.process.communicate(timeout=DEADLINE_S)
         return self.process.returncode, said
 
+    def close(self):
+        self.socket.close()
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.communicate()
+
 
 @pytest.fixture
 def start(scans, tmp_path):
@@ -69,9 +75,7 @@ def start(scans, tmp_path):
 
     yield started
     for service in made:
-        service.socket.close()
-        service.process.kill()
-        service.process.communicate()
+        service.close()
 
 
 def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
