@@ -1,8 +1,10 @@
 """Recordings of ROS 2, in both kinds of files."""
 
 import gc
+import sqlite3
 import tempfile
 import threading
+from contextlib import closing, nullcontext
 
 import numpy as np
 import pytest
@@ -56,6 +58,15 @@ def test_poses_that_cannot_be_used_are_left_out_and_named(write, tmp_path, other
     assert not stream.info.has_poses
     assert note in " ".join(stream.info.pose_notes)
     assert [frame.T_world_sensor for frame in stream] == [None] * 4
+
+
+@pytest.mark.parametrize(("stated", "read"), [("", True), ("json", False)])
+def test_a_database_that_states_no_encoding_holds_cdr(stated, read, tmp_path):
+    path = write_rosbag2(tmp_path / "drive", clouds(2))
+    with closing(sqlite3.connect(next(path.glob("*.db3")))) as database, database:
+        database.execute("UPDATE topics SET serialization_format = ?", (stated,))
+    with nullcontext() if read else pytest.raises(MisuseError, match="no sensor_msgs/PointCloud2"):
+        assert open_stream(path).info.n_frames == 2
 
 
 def test_one_of_several_topics_is_to_be_chosen_and_what_is_there_is_named(write, tmp_path):

@@ -142,7 +142,7 @@ class DatabaseFile(BagFile):
         yield from self._rows(
             "SELECT name, type, coalesce(n, 0) FROM topics LEFT JOIN "
             "(SELECT topic_id, count(*) AS n FROM messages GROUP BY topic_id) ON topic_id = topics.id "
-            "WHERE serialization_format = 'cdr' AND typeof(name) = 'text' AND typeof(type) = 'text'"
+            "WHERE serialization_format IN ('cdr', '') AND typeof(name) = 'text' AND typeof(type) = 'text'"
         )
 
     def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
