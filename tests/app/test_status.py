@@ -17,7 +17,7 @@ def test_metrics_are_valid_lines_with_one_type_each():
     assert 'modt_loop_lateness_ms{quantile="p99"} 0.9' in lines
     assert 'modt_counts_visible{class="car"} 2' in lines
     assert 'modt_power_stages_J{stage="segmentation"} 0.25' in lines
-    assert 'modt_sink_written{sink="udp://x"} 5' in lines
+    assert 'modt_sink_written_total{sink="udp://x"} 5' in lines
     assert 'modt_sensor_refused_messages_total{reason="too short"} 3' in lines
     assert 'modt_loop_failures_total{kind="frame: \\"x\\""} 2' in lines
     assert "# TYPE modt_sensor_lost_messages_total counter" in lines

@@ -13,7 +13,7 @@ from modt.sinks.output import replace_file
 
 COUNTERS = re.compile(
     r"(frames|proposals|classifications|deferred|missed_deadlines|shed_sweeps|reloads|refused_reloads|steps_entered"
-    r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|(?:un)?sent|dropped)"
+    r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|written|failed|unsent|dropped)"
 )
 """Names of counters, which never decrease."""
 LABELS = {
