@@ -16,8 +16,8 @@ ESTABLISHED_HITS = 4
 LAG_S = 1.5
 """Time constant of the place that a displacement is measured from."""
 GROWTH, PERSON_GROWTH, SHRINKAGE = 0.5, 0.1, 0.02
-"""Weights in the size of a track: of a larger box; of a larger box of a confirmed person, who is merged with things in
-passing; and of a smaller box, since the part that is hidden was seen before."""
+"""Weights in the size of a track: of a larger box; of a larger box of a confirmed person, who is merged with things
+in passing; and of a smaller box, since the part that is hidden was seen before."""
 
 
 @dataclass(slots=True)
