@@ -8,6 +8,7 @@ import pytest
 
 from modt.config import OdometryConfig
 from modt.sources.pose_socket import PoseSocket
+from modt.sources.received_poses import PoseBuffer
 from modt.types import Frame
 
 CONFIG = OdometryConfig()
@@ -170,3 +171,11 @@ def test_silence_of_the_sender_is_no_lie(robot):
     robot.sent += round(5.0 / robot.interval_s)
     assert np.nanmax(robot.drive(1.0)) < 0.01
     assert sum(robot.odometry.refused.values()) == 0
+
+
+@pytest.mark.parametrize("far_m", [1e155, -1e308])
+def test_a_distance_beyond_all_numbers_is_a_leap(far_m):
+    buffer, T = PoseBuffer(CONFIG), np.eye(4)
+    T[0, 3] = far_m
+    buffer.add(0.0, np.eye(4))
+    assert buffer.leaps(0.1, T)

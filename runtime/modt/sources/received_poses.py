@@ -91,7 +91,7 @@ class PoseBuffer:
             return False
         dt_s = stamp_s - self.newest_s if stamp_s > self.newest_s else MAX_AGE_S
         last = self._poses[-1]
-        apart_m = float(np.linalg.norm(T[:3, 3] - last[:3, 3])) + _LEVER_M * _turn_rad(last, T)
+        apart_m = math.dist(T[:3, 3].tolist(), last[:3, 3].tolist()) + _LEVER_M * _turn_rad(last, T)
         return apart_m > POSITION_NOISE_M + self.config.max_speed_mps * dt_s
 
     def at(self, stamp_s: float) -> Float64 | None:
