@@ -13,12 +13,10 @@ from modt.sources.recognise import open_stream
 from modt.types import Frame
 from modt_desk.evaluation.further_objects import with_further
 from modt_desk.evaluation.rules import CUBOID_RULES, Rules
-from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
 from modt_desk.evaluation.truth_files import open_truth
-from modt_desk.simulation.kinds import TRUCK
+from modt_desk.experiments.drives import SIMULATED_TYPES
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-
-TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTRAL)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +32,10 @@ class Drive:
 
 def simulated(scene: str, sensor: str, seconds: float, seed: int) -> Drive:
     """A simulated drive, labelled all round."""
-    stream = SyntheticStream(scene, sensor, seconds, seed)
-    frames = [
-        (frame, FrameTruth.of(TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], truth.boxes))
-        for frame, truth in stream.sweeps()
-    ]
+    stream, frames = SyntheticStream(scene, sensor, seconds, seed), []
+    for frame, truth in stream.sweeps():
+        names = [kind.name for kind in truth.kinds]
+        frames.append((frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), names, truth.boxes)))
     return Drive(stream.info.name, load(sensor), frames)
 
 

@@ -55,49 +55,30 @@ class GraphWriter:
         self.weights.append(numpy_helper.from_array(value.astype(np.float16) if half else value, name))
         return self.add("Cast", name, to=TensorProto.FLOAT) if half else name
 
-    def pointnet(
-        self, points: str, layers: Sequence[Layer], shared: int, *, pool_first: bool, prefix: str = ""
-    ) -> str:
-        """Name of the (batch, out) logits; the first `shared` layers are applied to every point."""
-        value = self.add("Transpose", points, perm=[0, 2, 1]) if pool_first else points
-        for i, (weight, bias) in enumerate(layers):
-            columns, last_shared = pool_first and i < shared, i == shared - 1
-            weights = self.constant(f"{prefix}weight{i}", weight.T.copy() if columns else weight)
-            value = self.add("MatMul", *((weights, value) if columns else (value, weights)))
-            if columns and last_shared:
-                value = self.add("ReduceMax", value, axes=[2], keepdims=0)
-            biases = bias[:, None] if columns and not last_shared else bias
-            value = self.add("Add", value, self.constant(f"{prefix}bias{i}", biases))
-            if i < len(layers) - 1:
-                value = self.add("Relu", value)
-            if last_shared and not pool_first:
-                value = self.add("ReduceMax", value, axes=[1], keepdims=0)
-        return value
 
-
-def graph(
-    layers: Sequence[Layer],
-    *,
-    pool_first: bool = True,
-    shared: int = N_SHARED,
-    transform: tuple[Sequence[Layer], int] | None = None,
-    half: bool = False,
-) -> onnx.ModelProto:
+def graph(layers: Sequence[Layer], *, pool_first: bool = True, half: bool = False) -> onnx.ModelProto:
     """The ONNX graph of a PointNet.
 
     Args:
-        layers: first to last.
+        layers: first to last; the first N_SHARED are applied to every point.
         pool_first: False for the textbook order: a point a row, bias and ReLU on every one.
-        shared: number of layers applied to every point.
-        transform: layers of a PointNet that finds a matrix (3, 3) for the points, and how many of them are shared.
         half: store weights in half precision.
     """
-    write, points = GraphWriter(half=half), "points"
-    if transform:
-        matrix = write.pointnet(points, *transform, pool_first=pool_first, prefix="transform_")
-        matrix = write.add("Reshape", matrix, write.constant("shape", np.array([-1, 3, 3])))
-        points = write.add("MatMul", points, matrix)
-    write.add("Softmax", write.pointnet(points, layers, shared, pool_first=pool_first), axis=-1)
+    write = GraphWriter(half=half)
+    value = write.add("Transpose", "points", perm=[0, 2, 1]) if pool_first else "points"
+    for i, (weight, bias) in enumerate(layers):
+        columns, last_shared = pool_first and i < N_SHARED, i == N_SHARED - 1
+        weights = write.constant(f"weight{i}", weight.T.copy() if columns else weight)
+        value = write.add("MatMul", *((weights, value) if columns else (value, weights)))
+        if columns and last_shared:
+            value = write.add("ReduceMax", value, axes=[2], keepdims=0)
+        biases = bias[:, None] if columns and not last_shared else bias
+        value = write.add("Add", value, write.constant(f"bias{i}", biases))
+        if i < len(layers) - 1:
+            value = write.add("Relu", value)
+        if last_shared and not pool_first:
+            value = write.add("ReduceMax", value, axes=[1], keepdims=0)
+    write.add("Softmax", value, axis=-1)
     write.nodes[-1].output[0] = "probability"
     ends = (
         [helper.make_tensor_value_info("points", TensorProto.FLOAT, ["batch", "points", 3])],

@@ -1,14 +1,12 @@
-"""Tables over sensors, mounts and boards."""
+"""Tables over sensors and boards."""
 
 import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
 from modt.geometry import FieldOfView
-from modt.placement import Mount
 from modt_desk.evaluation.evaluation import evaluation
-from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tools.study import mounts, sensors
+from tools.study import sensors
 from tools.study.boards import BOARDS, Work, rating_of, table
 from tools.study.drives import simulated
 from tools.study.segmentation_recall import Tally
@@ -22,18 +20,6 @@ def test_a_row_over_sensors_has_every_figure_of_every_class():
     assert min(int(n) for n in cells[2].split(" / ")) > 0
     for column in cells[3:7]:
         assert all(0 <= int(share) <= 100 for share in column.split(" / ") if share != "-")
-
-
-@pytest.mark.slow
-def test_a_row_over_mounts_has_recall_and_precision_of_people():
-    stream = SyntheticStream("crowd", "vlp-16", 1.0, 3, height_m=0.8, mount_deg=(0.0, 10.0))
-    drive = mounts.run(stream, "accurate", mounts.of_mount("vlp-16", 0.8), Mount.of(0.0, 10.0))
-    *_, people, _cars = mounts.row("vlp-16", [drive]).strip("| ").split(" | ")
-    number, _, shares = people.partition(": ")
-    detected, recall, precision = map(int, shares.split(" / "))
-    assert int(number) > 10
-    assert 50 < recall <= detected <= 100
-    assert 50 < precision <= 100
 
 
 def test_times_on_boards_are_scaled_by_their_ratings_at_full_usage():

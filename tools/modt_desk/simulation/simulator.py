@@ -123,12 +123,10 @@ class Truth:
 
     instance: Int  # (N,) body of each point, NONE for the ground
     semantic: Int  # (N,) SemanticKITTI label of each point
-    object_class: Int  # (N,) class of each point's body
     bodies: Int  # (b,) indices of all bodies of annotated kinds, visible or not: their identities
     kinds: tuple[Kind, ...]  # kind of each
     boxes: Float64  # (b, 7) box of each, sensor frame
     points: Int  # (b,) number of points of each in this sweep
-    speed_mps: Float64  # (b,) speed of each
 
 
 class Simulator:
@@ -145,7 +143,6 @@ class Simulator:
         self.receiver = Receiver(sensor, np.random.default_rng([seed, 1]))
         normal = np.random.default_rng([seed, 3]).standard_normal((len(world.bodies), len(BODY_SIGMA)), np.float32)
         self._intensity_offset = normal * BODY_SIGMA
-        self._object_class = np.array([b.kind.object_class for b in world.bodies] + [0], np.int64)
         self._annotated = np.array([i for i, b in enumerate(world.bodies) if b.kind.name], np.int64)
         self._kinds = tuple(world.bodies[i].kind for i in self._annotated.tolist())
         self._labels = np.array([(b.kind.semantic, b.kind.moving) for b in world.bodies], np.int64).reshape(-1, 2)
@@ -212,10 +209,8 @@ class Simulator:
         return Truth(
             instance=instance,
             semantic=np.where(label > 0, label, SEMANTIC[material]).astype(np.int64),
-            object_class=self._object_class[instance],
             bodies=shown,
             kinds=self._kinds,
             boxes=transform_boxes(inverse(T_world_sensor), world.boxes(time_s)[shown]),
             points=np.bincount(instance + 1, minlength=len(world.bodies) + 1)[1:][shown],
-            speed_mps=speed[shown],
         )
