@@ -1,4 +1,4 @@
-"""The box tracker, and its assignment against the best of all assignments."""
+"""The box tracker, and its filter against the full Kalman filter."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt_desk.box_tracking import box_tracker
-from modt_desk.box_tracking.box_tracker import MAX_COST, BoxClass, BoxTracker, assign
+from modt_desk.box_tracking.box_tracker import BoxClass, BoxTracker
 
 CONFIG = BoxClass(report_above=-100.0, keep_above=0.0)
 CONFIDENT = BoxClass(report_above=5.0, keep_above=0.0)
@@ -83,26 +83,6 @@ def test_each_detection_has_exactly_one_track(scene):
         assert sorted(r.source) == list(range(len(places)))
         assert len(set(r.id)) == len(r.id)
         assert np.isfinite(r.box).all()
-
-
-def greatest_gain(cost):
-    """Greatest sum of MAX_COST - cost over all assignments, by enumeration."""
-    if not len(cost):
-        return 0.0
-    paired = [
-        MAX_COST - cost[0, j] + greatest_gain(np.delete(cost[1:], j, axis=1))
-        for j in np.flatnonzero(cost[0] < MAX_COST)
-    ]
-    return max([greatest_gain(cost[1:]), *paired])
-
-
-@given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 2**16))
-def test_no_assignment_is_cheaper(n, k, seed):
-    cost = np.random.default_rng(seed).uniform(0, 2, (n, k))
-    rows, columns = assign(cost)
-    assert len(set(rows)) == len(set(columns)) == len(rows)
-    assert (cost[rows, columns] < MAX_COST).all()
-    np.testing.assert_allclose((MAX_COST - cost[rows, columns]).sum(), greatest_gain(cost), atol=1e-9)
 
 
 STATES = arrays(np.float64, (3, 4), elements=st.floats(-50, 50, allow_subnormal=False))

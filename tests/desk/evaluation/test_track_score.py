@@ -83,13 +83,6 @@ def test_a_switch_costs_association_only():
     assert found["MOTA"] == pytest.approx(0.9)
 
 
-def test_sequences_add_up_and_empty_ones_count_nothing():
-    right, nothing = [association([5], [1])] * 10, [association([], [])] * 10
-    assert track_metrics([right, nothing])["HOTA"] == pytest.approx(1)
-    assert track_metrics([[association([5], [])] * 10])["MOTA"] == pytest.approx(0)
-    assert track_metrics([nothing]) == {}
-
-
 def test_without_the_extra_the_rest_is_there(monkeypatch):
     monkeypatch.setitem(sys.modules, "trackeval", None)
     found = score([frame(cars(10.0), [(blob(30, 10), 0)], [(1, 0, "car")])])
