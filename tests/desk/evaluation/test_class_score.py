@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from modt_desk.evaluation.class_score import expected_calibration_error, top_calibration_error
-from modt_desk.evaluation.evaluation import score
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
-from tests.desk.evaluation.scenes import blob, car, cars, frame
+from tests.desk.evaluation.scenes import blob, car, cars, frame, score
 
 
 def posterior(car):

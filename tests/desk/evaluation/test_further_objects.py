@@ -6,12 +6,11 @@ import pytest
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.types import NONE
-from modt_desk.evaluation.evaluation import score
 from modt_desk.evaluation.further_objects import COLUMNS, with_further
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import KITTI_TYPES, PAPER_TYPES, Role, Truth
-from tests.desk.evaluation.scenes import blob, cars, frame
+from tests.desk.evaluation.scenes import blob, cars, frame, score
 
 HEAD = ",".join(COLUMNS) + "\n"
 CAR_AT_20 = "0,5,Car,20,0,-1.7,4,2,1.5,0\n"

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from modt.types import NONE
-from modt_desk.evaluation.evaluation import collect, evaluation, score
+from modt_desk.evaluation.evaluation import collect, evaluation
 from modt_desk.evaluation.rows import Association
 from modt_desk.evaluation.rules import KITTI_RULES
 from modt_desk.evaluation.track_score import track_metrics
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
-from tests.desk.evaluation.scenes import blob, car, cars, frame
+from tests.desk.evaluation.scenes import blob, car, cars, frame, score
 
 PLACES = (10.0, 20.0)
 

@@ -118,30 +118,31 @@ TESTED_BESIDE = {
 """Tests of the keys that no scenario of perception or energy shows, by the beginning of their paths."""
 
 
+OTHER_VALUES: dict[str, Any] = {
+    "sensor.elevations_deg": tuple(np.linspace(-15.0, 15.0, 8).tolist()),
+    "sensor.elevation_span_deg": (-15.0, -10.0),
+    "sensor.blind_sectors_deg": (-15.0, -10.0),
+    "classification.model": "pointnet-synthetic",
+    "decision.frequency": (0.2, 0.2, 0.2),
+    "energy.board": "another",
+    "energy.meter": "another",
+}
+"""Another value of the keys that are neither a number nor a choice."""
+
+
 def other_values(key: Key) -> Iterator[Any]:
     """Other values of a key, the moderate ones first."""
     value, facts = attrgetter(key.path)(BASE), key.facts
-    if "options" in facts:
+    if key.path in OTHER_VALUES:
+        yield OTHER_VALUES[key.path]
+    elif "options" in facts:
         yield from facts["options"]
-    elif "length" in facts and value is None:
-        yield (0.2,) * facts["length"]
-    elif "most" in facts:
-        yield tuple(np.linspace(-15.0, 15.0, 8)[: facts["most"]].tolist())
-    elif key.kind == "str":
-        yield "pointnet-synthetic" if key.path == "classification.model" else "another"
     else:
         low, high = facts["low"], facts["high"]
-        start = low + (high - low) / 1000 if value is None else value
-        whole = key.kind.startswith("int")
-
-        def bounded(number: float) -> float:
-            number = min(max(number, low), high)
-            return round(number) if whole else float(number)
-
-        for scale in (0.5, 2.0, 0.1, 10.0):
-            yield tuple(bounded(scale * n) for n in start) if isinstance(start, tuple) else bounded(scale * start)
-        if not isinstance(start, tuple):
-            yield from (bounded(low), bounded(high))
+        start = np.array(low + (high - low) / 1000 if value is None else value, np.float64)
+        for other in (0.5 * start, 2.0 * start, 0.1 * start, 10.0 * start, low, high):
+            bounded = np.clip(other, low, high).tolist()
+            yield tuple(bounded) if isinstance(bounded, list) else round(bounded) if key.whole else bounded
 
 
 @cache

@@ -14,7 +14,7 @@ from modt_desk.evaluation.class_score import ClassScore, class_scores, top_calib
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rows import Association, Outcome, Rows, kinds, ratio
-from modt_desk.evaluation.rules import KITTI_RULES, Rules
+from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.track_score import TrackScore, track_metrics, track_scores
 from modt_desk.evaluation.truth import LABELLED, Role
 
@@ -89,15 +89,6 @@ class Evaluation:
     metrics: dict[str, dict[str, float]] | None  # metrics of all classes and of each; None without trackeval
     calibration_error: float | None  # expected, of the most probable class, over all judged proposals
     calibration_error_of_objects: float | None  # the same over the proposals that stand for an object
-
-
-def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES) -> Evaluation:
-    """The evaluation of the frames of one drive, in order.
-
-    Raises:
-        ValueError: there are no frames.
-    """
-    return evaluation([collect(frames, rules)])
 
 
 def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> DriveRows:

@@ -8,9 +8,7 @@ from pathlib import Path
 
 from modt import host, profile
 from modt.classification.pointnet import PointNet
-from modt_desk.experiments import paper
 from modt_desk.experiments.catalogue import Experiment
-from modt_desk.experiments.drives import KITTI
 from modt_desk.experiments.study import Row
 
 _MOST = 6
@@ -44,17 +42,13 @@ def _head(command: str, sources: str, rows: Sequence[Row]) -> Iterator[str]:
 
 def _body(experiments: Sequence[Experiment], rows: Sequence[Row]) -> Iterator[str]:
     for experiment in experiments:
-        own = [row for row in rows if row.experiment == experiment.name]
+        own = (row for row in rows if row.experiment == experiment.name)
         listed = [row for row in own if not row.quantity.startswith(_CURVES)]
         if not listed:
             continue
         yield from ("", f"## {experiment.title}", "", *([experiment.note, ""] if experiment.note else []))
         for cells in _table(experiment, listed):
             yield f"| {' | '.join(cells)} |"
-        if experiment.name == "table3":
-            there = {row.streams[:4] for row in own if row.kind == KITTI}
-            yield ""
-            yield from (f"- {drive}: {why}" for drive, why in paper.DEVIATIONS.items() if drive in there)
 
 
 def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str]]:
