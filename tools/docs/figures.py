@@ -88,7 +88,8 @@ def _row(name: str, found: Evaluation) -> str:
     whole, tracks = found.ranges[ALL], found.tracks.get(ALL)
     detected = [whole.segmentation[c].recall if c in whole.segmentation else None for c in CLASS_NAMES[1:]]
     scores = [whole.classification[c] for c in CLASS_NAMES[1:]]
-    columns = (detected, [s.recall for s in scores], [s.precision for s in scores], [tracks and tracks.life.ratio])
+    length = None if tracks is None else tracks.life.ratio
+    columns = detected, [s.recall for s in scores], [s.precision for s in scores], [length]
     return f"| {name} | {' | '.join(_shares(column) for column in columns)} |"
 
 
