@@ -62,16 +62,6 @@ def test_a_wider_sector_and_cut_objects_count_on_request(drives, capsys):
     assert called[0] < called[1]
 
 
-def test_further_objects_are_added(drives, tmp_path, capsys):
-    rows = "".join(f"{frame},1,Pedestrian,9,0,-1.7,1,1,2,0\n" for frame in (0, 1))
-    (tmp_path / "more.csv").write_text(f"{COLUMNS}\n{rows}")
-    more = ("--further", tmp_path / "more.csv")
-    assert "--further adds 1 of them, in 2 labels" in evaluated(capsys, *drives["vlp-16"], *more)
-    assert "leave out road users" in evaluated(capsys, *drives["vlp-16"])
-    found = json.loads(evaluated(capsys, *drives["vlp-16"], *more, "--json"))["sensors"]["vlp-16"]
-    assert (found["further_objects"], found["further_labels"], found["complete"]) == (1, 2, False)
-
-
 def test_misuse_is_one_line_with_the_remedy(drives, tmp_path, capsys):
     run, truth = drives["vlp-16"]
     lines = (run / "tracks.jsonl").read_text().splitlines(keepends=True)

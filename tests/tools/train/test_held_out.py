@@ -80,13 +80,6 @@ def validation() -> Validation:
     return Validation.of(single_points(LABEL, truth=truth_of(LABEL, 0 * LABEL, row=np.arange(400))))
 
 
-def test_what_contradicts_a_network_that_is_right_has_no_weight():
-    valid = validation()
-    weights, _ = fit_pool(softmax(SURE, axis=1), softmax(-SURE, axis=1), -SURE, valid, valid.weight)
-    assert weights.network > 0.95
-    assert max(weights.box, weights.reflectance) < 0.05
-
-
 def test_the_box_tells_objects_from_background_alone():
     valid = validation()
     weights, log_posterior = fit_pool(softmax(NOTHING, axis=1), softmax(SURE, axis=1), NOTHING, valid, valid.weight)
