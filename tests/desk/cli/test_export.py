@@ -136,9 +136,9 @@ def test_parquet_names_the_extra_that_it_needs(recorded, tmp_path, monkeypatch, 
 
 @pytest.fixture
 def copies(recorded, tmp_path):
-    """Copies of the run: without its source, its labels, a record, its poses, and as of a service."""
+    """Copies of the run: without its source, its labels, a whole record, and as of a service."""
     run, _ = recorded
-    names = ("gone", "bare", "odd", "old", "live")
+    names = ("gone", "bare", "odd", "live")
     made = {name: shutil.copytree(run, tmp_path / "copies" / name) for name in names}
     described = yaml.safe_load((run / "run.yaml").read_text())
     described["stream"]["path"] += "_gone"
@@ -147,8 +147,6 @@ def copies(recorded, tmp_path):
     (made["live"] / "run.yaml").write_text(yaml.safe_dump(described))
     shutil.rmtree(made["bare"] / "labels")
     (made["odd"] / "tracks.jsonl").write_text(json.dumps({"schema": SCHEMA, "frame": 1, "tracks": [{}]}) + "\n")
-    unplaced = [{k: v for k, v in record.items() if k != "T_world_sensor"} for record in records(run)]
-    (made["old"] / "tracks.jsonl").write_text("".join(json.dumps(record) + "\n" for record in unplaced))
     return made
 
 
@@ -169,8 +167,7 @@ def test_misuse_is_one_line_with_the_remedy(recorded, copies, tmp_path, capsys):
     for path, form, out, message in (
         (copies["bare"], "--semantickitti", "a", "modt replay --labels"),
         (copies["odd"], "--csv", "b", "tracks.jsonl:1: no record of a frame"),
-        (copies["odd"], "--semantickitti", "c", "tracks.jsonl:1: no record of a frame"),
-        (copies["old"], "--kitti", "d", "T_world_sensor"),
+        (copies["odd"], "--kitti", "c", "tracks.jsonl:1: no record of a frame"),
         (copies["gone"], "--kitti", "e", "no such file or directory"),
         (tmp_path, "--csv", "f", "describes no run"),
         (run, "--csv", "there", "exists already"),
