@@ -60,7 +60,7 @@ def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
 
 
 def contenders() -> dict[str, Work]:
-    """Timed work by name."""
+    """Work to time, by name."""
     found: dict[str, Work] = {YARDSTICK: partial(timed, lambda _: np.sort(_NUMBERS))}
     if find_spec("pypatchworkpp"):
         patchwork = import_module("pypatchworkpp")

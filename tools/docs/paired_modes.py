@@ -32,7 +32,7 @@ Rows = Mapping[str, Sequence[DriveRows]]
 
 
 def table() -> Iterator[str]:
-    """Markdown: the mean over sensors with its 95 % interval, and each sensor."""
+    """The mean over sensors with its 95 % interval, and each sensor, as Markdown."""
     judged = {sensor: _judged(sensor) for sensor in SENSORS}
     yield f"Commit {commit()}; made by `python -m {MARK}`."
     yield ""
@@ -76,7 +76,7 @@ def _precisions(rows: Sequence[DriveRows]) -> Float64:
 
 
 def _judged(sensor: str) -> Rows:
-    """Every mode on the drives of a sensor."""
+    """Judged drives of a sensor in every mode."""
     found: dict[str, list[DriveRows]] = {mode: [] for mode in (BASELINE, *MODES)}
     for number, (seed, scene) in enumerate((seed, scene) for seed in SEEDS for scene in SCENES):
         drive = drives.simulated(scene, sensor, SECONDS, seed)

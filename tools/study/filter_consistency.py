@@ -46,7 +46,7 @@ class BodyTrack:
 
     Attributes:
         kind: class and motion, as in "car, moving".
-        x, P: (n, 4), (n, 4, 4) of the filter.
+        x, P: (n, 4) state and (n, 4, 4) covariance of the filter.
         pose: (n, 4) true x, y [m], heading [rad] and speed [m/s], world frame.
     """
 

@@ -126,8 +126,8 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
         "",
         *_threshold_table(report["boxes"]["ruled_out"]),
     ]
-    for told in report["reflectance"]:
-        lines += [f"From box and reflectance, {told['sensor']}:", "", *_threshold_table(told["ruled_out"])]
+    for facts in report["reflectance"]:
+        lines += [f"From box and reflectance, {facts['sensor']}:", "", *_threshold_table(facts["ruled_out"])]
     return "\n".join(lines)
 
 
@@ -148,11 +148,11 @@ def _by_sensor(report: dict[str, Any]) -> list[str]:
         "box": boxes["cross_validation"],
         _pool_name(boxes["weights"]): boxes["pool"],
     }
-    for told in report["reflectance"]:
-        of_sensor = f", reflectance of the {told['sensor']}"
+    for facts in report["reflectance"]:
+        of_sensor = f", reflectance of the {facts['sensor']}"
         methods |= {
-            f"box{of_sensor}": told["cross_validation"],
-            _pool_name(told["weights"]) + of_sensor: told["pool"],
+            f"box{of_sensor}": facts["cross_validation"],
+            _pool_name(facts["weights"]) + of_sensor: facts["pool"],
         }
     lines = [
         "## Out of fold, by sensor (drives never split)",
@@ -229,8 +229,8 @@ def export(
     if reflectance:
         metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
             {
-                told["sensor"]: (own, PoolWeights.from_dict(told["weights"]))
-                for own, told in zip(reflectance, report["reflectance"], strict=True)
+                facts["sensor"]: (own, PoolWeights.from_dict(facts["weights"]))
+                for own, facts in zip(reflectance, report["reflectance"], strict=True)
             }
         )
     metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(

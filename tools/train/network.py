@@ -27,7 +27,7 @@ DROPOUT = 0.3
 HIDDEN = (32, 32)
 """Widths of the small networks."""
 Batch = tuple[Float64, Int, Float64 | float]
-"""(R, F) features of crops, (R,) their classes, and (R, 4) logits that those of the network are added to, or zero."""
+"""(R, F) features of crops, (R,) classes, and (R, 4) logits to which the network's are added, or zero."""
 
 
 class MaxPooledLinear(torch.autograd.Function):

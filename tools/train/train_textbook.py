@@ -37,7 +37,7 @@ RATE, DECAY, DECAY_EPOCHS = 1e-3, 0.7, 20
 
 
 def crops_of_epoch(data: Dataset) -> int:
-    """As many as the scans show."""
+    """Number of crops that the scans show, those of one epoch."""
     return int((data.trainable & (data.variant == SHIPPED)).sum())
 
 

@@ -17,7 +17,7 @@ from modt_desk.evaluation.kitti_labels import MAX_FRAME, MAX_ID, MAX_NUMBER, Lab
 from modt_desk.evaluation.truth import FrameTruth, Role, Truth, Types
 
 PARKED = "IgnoredCar"
-"""Type of a parked car that counts neither for nor against."""
+"""Type of a parked car that is ignored."""
 NUMBERS = ("x", "y", "z_bottom", "length", "width", "height", "yaw")
 COLUMNS = ("frame", "object", "type", *NUMBERS)
 WRITE = "write frame and object as whole numbers, the others in metres and radians, sizes above 0"
@@ -64,7 +64,7 @@ def _joined(frame: FrameTruth, labels: list[Label], types: Types) -> FrameTruth:
 
 
 def _boxes(frame: FrameTruth, labels: list[Label]) -> Float64:
-    """(n, 7) boxes of labels in the frame of those of the truth."""
+    """(n, 7) boxes of labels in the frame of the truth's boxes."""
     return transform_boxes(frame.T_box_sensor, np.array([label.box for label in labels]).reshape(-1, 7))
 
 
@@ -102,7 +102,7 @@ def _label(fields: dict[str, str]) -> Label:
     """The label of a line.
 
     Raises:
-        ValueError, TypeError or OverflowError: it is none.
+        ValueError, TypeError or OverflowError: it is no label.
     """
     frame, number = int(fields["frame"]), int(fields["object"])
     x, y, foot, length, width, height, yaw = values = [float(fields[name]) for name in NUMBERS]

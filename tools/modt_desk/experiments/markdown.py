@@ -12,7 +12,7 @@ from modt_desk.experiments.catalogue import Experiment
 from modt_desk.experiments.study import Row
 
 _MOST = 6
-"""Values of a sweep in a table; the CSV file has all."""
+"""Greatest number of values of a sweep in a table. The CSV file has all."""
 _CURVES = "precision "
 """Beginning of quantities that only the CSV file has."""
 _NOT_THERE = "-"
@@ -52,7 +52,7 @@ def _body(experiments: Sequence[Experiment], rows: Sequence[Row]) -> Iterator[st
 
 
 def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str]]:
-    """Head, rule and lines; columns are quantities, or the values of a sweep."""
+    """Heading, rule and lines. The columns are quantities, or the values of a sweep."""
     several = len({row.profile for row in rows}) > 1
     swept = sorted({row.at for row in rows if row.at is not None})
     lines: dict[tuple[str, ...], dict[str | float | None, str]] = {}
@@ -75,14 +75,14 @@ def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str
 
 
 def _spread(values: Sequence[float]) -> list[float]:
-    """At most _MOST of them, the ends included."""
+    """At most _MOST of the values, the ends included."""
     if len(values) <= _MOST:
         return list(values)
     return [values[round(k * (len(values) - 1) / (_MOST - 1))] for k in range(_MOST)]
 
 
 def number(value: float) -> str:
-    """Three digits."""
+    """A number with three digits."""
     return f"{value:.0f}" if abs(value) >= 100 or value == int(value) else f"{value:.3g}"
 
 

@@ -33,7 +33,7 @@ _OF_RANGE = {("fig8", 10.0, "beta"): 0.1, ("fig8", 70.0, "beta"): 0.02}
 
 
 def figure(experiment: str, streams: str, variant: str, at: float | None, quantity: str) -> tuple[float, str] | None:
-    """The paper's value of a figure, and what it is over; None where the paper does not state it."""
+    """The paper's value of a figure, and the drives that it is taken over. None where the paper does not state it."""
     drive, pooled = streams[:4], streams.endswith("drives")
     if at is not None and pooled:
         found = _OF_RANGE.get((experiment, at, quantity))

@@ -33,11 +33,11 @@ class RangeImage:
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Bounds of each solid in the range image; a solid across the seam has two windows."""
+    """Bounds of each solid in the range image. A solid across the seam has two windows."""
 
     solid: Int  # (W,) index of the solid, nearest first
-    rows: Int  # (W, 2) first, and one past the last
-    columns: Int  # (W, 2) first, and one past the last
+    rows: Int  # (W, 2) first row, and one past the last
+    columns: Int  # (W, 2) first column, and one past the last
     near: Float32  # (W,) least horizontal distance of the solid [m]
     n_columns: int  # columns of the image
 

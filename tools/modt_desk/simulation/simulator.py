@@ -24,7 +24,7 @@ from modt_desk.simulation.terrain import UInt8
 from modt_desk.simulation.world import MOVING_MPS, World
 
 GLOSSY = np.float32(0.25)
-"""Grazing loss above which the slope between beams counts as well: roofs and bonnets."""
+"""Grazing loss above which the slope between beams counts as well, as on roofs and bonnets."""
 
 
 class Receiver:
@@ -82,7 +82,7 @@ class Receiver:
         return np.where(solid < 0, ground, np.where(same, level, np.float32(0.7))).astype(np.float32)
 
     def _cos_glossy(self, near: Float32, solid: Int32, cosine: Float32, glossy: Bool) -> Float32:
-        """(B, A) the same cosine, with the slope between beams where the surface is glossy."""
+        """(B, A) cosine of incidence with the slope between beams, where the surface is glossy."""
         here = np.flatnonzero(glossy[:-1])
         below = here + near.shape[1]
         s, part, out = near.ravel(), solid.ravel(), cosine.flatten()
@@ -92,7 +92,7 @@ class Receiver:
         return out.reshape(near.shape)
 
     def _mix_edges(self, measured: Float32, near: Float32, detected: Bool, chance: Float32) -> None:
-        """Mixed pixels: at edges some returns lie between the surfaces, some of the nearer surface are late."""
+        """Mix pixels at edges: some returns lie between the surfaces, some of the nearer surface are late."""
         gap = near[:, 1:] - near[:, :-1]
         share = np.float32(self.sensor.mixed_share)
         split = np.flatnonzero((np.abs(gap) > 0.2) & detected[:, 1:] & detected[:, :-1])
@@ -108,7 +108,7 @@ class Receiver:
 
 
 N_SLICES = 64
-"""Sectors of a sweep within which nothing moves."""
+"""Number of sectors of a sweep. Nothing moves while one is measured."""
 
 
 def slice_delay_s(part: int, period_s: float) -> float:
