@@ -63,7 +63,7 @@ def difference(rows: Rows, mode: str) -> Float64:
 
 
 def _drawn(rows: Rows, rng: np.random.Generator) -> Rows:
-    """As many drives drawn with replacement, the same of every mode."""
+    """Draw as many drives with replacement, the same ones for every mode."""
     n = len(rows[BASELINE])
     index = rng.integers(n, size=n).tolist()
     return {mode: [drives[k] for k in index] for mode, drives in rows.items()}

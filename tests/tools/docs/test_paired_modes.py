@@ -1,4 +1,4 @@
-"""What tracking adds, on pairs of runs."""
+"""The difference that tracking makes, on pairs of runs."""
 
 from __future__ import annotations
 
