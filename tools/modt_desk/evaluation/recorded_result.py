@@ -35,8 +35,9 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     tracks.state[:] = [names.index(row["state"]) for row in rows]
     tracks.object_class[:] = [CLASS_NAMES.index(row["class"]) for row in rows]
     tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
-    tracks.witness[:] = np.array([row["witness"] for row in rows]).reshape(tracks.witness.shape)
-    tracks.size_m[:] = np.array([row["size"] for row in rows]).reshape(tracks.size_m.shape)
+    silent = [0.0] * len(CLASS_NAMES)  # runs of earlier versions have no witness
+    tracks.witness[:] = np.array([row.get("witness", silent) for row in rows]).reshape(tracks.witness.shape)
+    tracks.size_m[:] = np.array([row.get("size", [0.0] * 3) for row in rows]).reshape(tracks.size_m.shape)
     tracks.key_points[:] = [row["viewed"] for row in rows]
     tracks.final[:] = [row["final"] for row in rows]
     tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]
@@ -54,7 +55,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     proposals = _proposals(n_proposals)
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
-    classified = np.array(record["classified"], np.int64)
+    classified = np.array(record.get("classified", []), np.int64)
     return FrameResult(frame, T_world_sensor, proposals, tracks, names, int(record["deferred"]), classified)
 
 
