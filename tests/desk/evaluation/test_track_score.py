@@ -46,11 +46,6 @@ def test_discontinuities_and_where_the_next_track_comes_from():
     assert found.life.life == 12 / (2 + 3)
 
 
-def test_mis_associations_need_three_frames_on_each():
-    assert tracked([1, 1, 1, 2, 2, 2], [5, 5, 5, 1, 1, 1]).mis_associations == 1
-    assert tracked([1, 1, 1, 2, 2, 2], [5, 5, 5, 5, 1, 1]).mis_associations == 0
-
-
 def test_labelled_frames_count_whatever_points_they_have():
     found = tracked([1, 1], [2, "-"], points=9)
     assert (found.life.objects, found.life.life) == (0, None)

@@ -59,6 +59,18 @@ def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_un
     assert np.flatnonzero(scan.unlabelled).tolist() == list(range(25, 50))
 
 
+def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_unknown(tmp_path):
+    side, height = np.linspace(-2.0, 2.0, 41), np.full(41, 1.6)
+    across = np.c_[np.full(41, -20.0), 30.0 + side, height]  # sensor at (-30, 34.1, 1.79)
+    along = np.c_[-10.0 + side, np.full(41, 30.0), height]
+    people = np.array([[-20.0, 51.6, 1.6], [-21.3, 51.4, 1.6], [-20.0, 55.0, 1.6]])
+    rows = "".join(f"Car,{x},30,1.2,4.4,1.8,1.5,0,41\n" for x in (-20, -10))
+    scan = pandaset(tmp_path, "world-000040", np.concatenate([across, along, people]), rows)
+    np.testing.assert_allclose(scan.boxes[:, 6], [np.pi / 2, 0.0])
+    assert [len(own) for own in scan.objects] == [41, 41]
+    assert np.flatnonzero(scan.unlabelled).tolist() == [82, 83]
+
+
 def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole():
     azimuth = np.arange(0.1, 2 * np.pi, 0.1)
     rho = np.repeat([20.0, 15.0, 10.0, 5.0], len(azimuth))  # beam by beam, from the top
