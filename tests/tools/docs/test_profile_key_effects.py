@@ -101,7 +101,6 @@ SCENARIOS: dict[str, Scenario] = {
     "sensor.period_s": scan_folder,
     "sensor.blind_range_m": street(also="sensor.blind_sectors_deg", value=(-60.0, 60.0)),
     "sensor.blind_sectors_deg": street(also="sensor.blind_range_m", value=20.0),
-    "tracking.paper.": street(also="tracking.association", value="paper"),
     "fusion.start_frame": PRODUCT,
     "fusion.point_change": PRODUCT,
     "energy.": report,
