@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from modt.config import EnergyConfig
 from modt.energy.meters import meter as meter_module
 from modt.energy.meters.discovery import (
     discover,
@@ -33,8 +34,7 @@ def powercap(sys):
 
 
 def look(sys):
-    model = model_meter(idle_W=3.0, busy_W=7.0, wall_ns=lambda: 2_000_000_000, cpu_ns=lambda: 500_000_000)
-    return discover(model, sys, vcgencmd="no-such-command")
+    return discover(EnergyConfig(idle_W=3.0, busy_W=7.0), sys, vcgencmd="no-such-command")
 
 
 def server(sys):
@@ -278,7 +278,7 @@ def test_failing_pmic_gives_its_message(tmp_path):
 
 def test_without_meters_the_model_is_used(tmp_path):
     found = look(tmp_path)
-    assert found.best.meters[0].read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
+    assert model_meter(3.0, 7.0, lambda: 2 * 10**9, lambda: 10**9 // 2).read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
     assert found.best.facts.kind is Kind.ESTIMATED
     unusable = [c for c in found.candidates if not c.usable]
     assert len(unusable) == 4
