@@ -234,7 +234,7 @@ def main(arguments: list[str] | None = None) -> int:
         host.take_real_time_priority()
     world = World(core, given.hogs, fifo=given.fifo)
     world.install()
-    sessions.discover = lambda board: world.meters(time.monotonic)  # type: ignore[attr-defined]
+    sessions.discover = lambda board: world.meters(time.monotonic)  # type: ignore[attr-defined,assignment,misc]
     port = str(free_port())
     command = [sys.executable, "-m", "tools.deploy.sender", port, *([str(given.drive)] if given.drive else [])]
     with host.threads_on(others):

@@ -109,7 +109,7 @@ SCENARIOS: dict[str, Scenario] = {
 }
 """Scenario of each key, by the longest beginning of its path."""
 TESTED_BESIDE = {
-    "segmentation.kernels": "app/test_kernel_choice.py",
+    "segmentation.kernels": "app/test_assembly.py",
     "odometry.max_speed_mps": "sources/test_pose_socket.py",
     "loop.power_W": "app/test_ladder.py",
     "recording.": "sinks/test_recording.py",
