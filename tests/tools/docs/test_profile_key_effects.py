@@ -101,7 +101,6 @@ SCENARIOS: dict[str, Scenario] = {
     "sensor.period_s": scan_folder,
     "sensor.blind_range_m": street(also="sensor.blind_sectors_deg", value=(-60.0, 60.0)),
     "sensor.blind_sectors_deg": street(also="sensor.blind_range_m", value=20.0),
-    "tracking.paper.": street(also="tracking.association", value="paper"),
     "fusion.start_frame": PRODUCT,
     "fusion.point_change": PRODUCT,
     "energy.": report,
@@ -111,7 +110,7 @@ SCENARIOS: dict[str, Scenario] = {
 """Scenario of each key, by the longest beginning of its path."""
 TESTED_BESIDE = ("segmentation.kernels", "odometry.max_speed_mps", "loop.power_W", "recording.")
 """Keys that no scenario of perception or energy shows, by the beginning of their paths. Their tests are
-app/test_kernel_choice.py, sources/test_pose_socket.py, app/test_ladder.py and sinks/test_recording.py.
+app/test_assembly.py, sources/test_pose_socket.py, app/test_ladder.py and sinks/test_recording.py.
 """
 
 

@@ -1,12 +1,27 @@
-"""Tables over boards and sensors."""
+"""Tables over mounts, boards and sensors."""
 
 import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
+from modt.placement import Mount
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tools.study import mounts
 from tools.study.boards import BOARDS, Work, rating_of, table
 from tools.study.segmentation_recall import Tally
 from tools.train.synthetic_scans import simulated_scans
+
+
+@pytest.mark.slow
+def test_a_row_over_mounts_has_recall_and_precision_of_people():
+    stream = SyntheticStream("crowd", "vlp-16", 1.0, 3, height_m=0.8, mount_deg=(0.0, 10.0))
+    drive = mounts.run(stream, "accurate", mounts.of_mount("vlp-16", 0.8), Mount.of(0.0, 10.0))
+    *_, people, _cars = mounts.row("vlp-16", [drive]).strip("| ").split(" | ")
+    number, _, shares = people.partition(": ")
+    detected, recall, precision = map(int, shares.split(" / "))
+    assert int(number) > 10
+    assert 50 < recall <= detected <= 100
+    assert 50 < precision <= 100
 
 
 def test_times_on_boards_are_scaled_by_their_ratings_at_full_usage():

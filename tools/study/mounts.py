@@ -1,0 +1,117 @@
+"""Recall and precision of people by the mount of the sensor and by place, on simulated drives with exact truth.
+
+    python -m tools.study.mounts [--sensors vlp-16 ...] [--scenes yard corridor ...] [--heights 0.3 0.8 ...]
+                                 [--mounts 0,0 0,10 ...] [--seeds 700:702] [--seconds 4] [--mode accurate]
+
+A row is a sensor in a scene, at a height [m] and with a roll and a pitch [deg], over the seeds; its profile states
+the height. A cell has the number of objects of 20 points or more, the shares of them that are detected (point IoU
+over 1/2) and detected with the right class, and the precision of that class [%]. There are cells of people by
+distance [m], of all people and of cars.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from modt.app import assembly
+from modt.classes import ObjectClass
+from modt.cli.options import frames as number_range
+from modt.config import ProfileConfig
+from modt.geometry import FieldOfView, inverse, transform_boxes
+from modt.placement import Mount
+from modt.profile import load
+from modt.sensor_fit.recognition import recognise
+from modt_desk.evaluation.evaluation import DriveRows, collect
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.rows import Outcome
+from modt_desk.evaluation.rules import CUBOID_RULES
+from modt_desk.evaluation.truth import FrameTruth, Role
+from modt_desk.experiments.drives import SIMULATED_TYPES
+from modt_desk.simulation.sensors import SENSORS
+from modt_desk.simulation.synthetic_stream import SCENES, SyntheticStream
+from tools.options import parser
+
+BANDS_M = ((0.5, 3.0), (3.0, 8.0), (8.0, 20.0), (20.0, 60.0))
+EVERYWHERE_M = (0.0, float("inf"))
+HEIGHTS_M = (0.2, 0.3, 0.5, 0.8, 1.7)
+MOUNTS_DEG = ((0.0, 0.0), (0.0, 10.0), (0.0, 15.0), (10.0, 0.0), (15.0, 0.0), (180.0, 0.0))
+"""Roll and pitch."""
+PLACES = ("yard", "corridor", "hall", "crowd", "ramp")
+
+
+def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig, mount: Mount) -> DriveRows:
+    """Run a drive in a mode and judge it in the level frame."""
+    frames, mode = list(stream.sweeps()), assembly.MODES[mode_name]
+    config = recognise(frames[0][0].points, config).mounted(config)
+    pipeline, budget = assembly.pipeline(mode, config, FieldOfView()), mode.budget(config)
+
+    def judged() -> Iterator[JudgedFrame]:
+        for frame, truth in frames:
+            pose = mount.level(frame).T_world_sensor
+            assert pose is not None
+            boxes = transform_boxes(inverse(pose), stream.simulator.world.boxes(frame.stamp_s)[truth.bodies])
+            labels = FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], boxes)
+            result = JudgedFrame.of_result(pipeline.step(frame, budget), labels)
+            yield replace(result, points=mount.turn(frame.points))
+
+    return collect(judged(), CUBOID_RULES)
+
+
+def of_mount(sensor: str, height_m: float) -> ProfileConfig:
+    """The sensor's profile with the height of its mount."""
+    config = load(sensor)
+    return replace(config, sensor=replace(config.sensor, height_m=height_m))
+
+
+def shares(drives: Sequence[DriveRows], kind: ObjectClass, band_m: tuple[float, float]) -> str:
+    """Objects of a class within a band of range: their number, shares detected and recalled, and precision."""
+    objects, proposals = (
+        rows[(rows["range_m"] >= band_m[0]) & (rows["range_m"] < band_m[1])]
+        for rows in (np.concatenate([d.objects for d in drives]), np.concatenate([d.proposals for d in drives]))
+    )
+    wanted = objects[(objects["class"] == kind) & (objects["role"] == Role.COUNTED) & objects["to_segment"]]
+    reported = proposals[proposals["to_report"] & (proposals["reported"] == kind)]
+    of_class = (wanted["outcome"] == Outcome.DETECTED, wanted["reported"] == kind, reported["owner"] == kind)
+    percent = (f"{100 * np.mean(of):.0f}" if len(of) else "-" for of in of_class)
+    return f"{len(wanted)}: {' / '.join(percent)}"
+
+
+def row(of: str, drives: Sequence[DriveRows]) -> str:
+    """Markdown."""
+    people = [shares(drives, ObjectClass.PEDESTRIAN, band) for band in (*BANDS_M, EVERYWHERE_M)]
+    return f"| {of} | {' | '.join(people)} | {shares(drives, ObjectClass.CAR, EVERYWHERE_M)} |"
+
+
+def _angles(text: str) -> tuple[float, float]:
+    roll, pitch = text.split(",")
+    return float(roll), float(pitch)
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--sensors", nargs="+", choices=SENSORS, default=["vlp-16", "os1-64", "mid-360"])
+    options.add_argument("--scenes", nargs="+", choices=SCENES, default=PLACES)
+    options.add_argument("--heights", nargs="+", type=float, default=HEIGHTS_M, metavar="M")
+    options.add_argument("--mounts", nargs="+", type=_angles, default=MOUNTS_DEG, metavar="ROLL,PITCH")
+    options.add_argument("--seeds", type=number_range, default=(700, 702), metavar="A:B")
+    options.add_argument("--seconds", type=float, default=4.0)
+    options.add_argument("--mode", choices=assembly.MODES, default="accurate")
+    args = options.parse_args()
+    bands = [f"people {low:g}-{high:g}" for low, high in BANDS_M]
+    columns = ["sensor", "scene", "height", "roll, pitch", *bands, "people", "cars"]
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
+    for sensor, scene, height_m, angles in product(args.sensors, args.scenes, args.heights, args.mounts):
+        streams = [
+            SyntheticStream(scene, sensor, args.seconds, seed, height_m=height_m, mount_deg=angles)
+            for seed in range(*args.seeds)
+        ]
+        drives = [run(stream, args.mode, of_mount(sensor, height_m), Mount.of(*angles)) for stream in streams]
+        print(row(f"{sensor} | {scene} | {height_m:g} | {angles[0]:g}, {angles[1]:g}", drives), flush=True)
+
+
+if __name__ == "__main__":
+    main()
