@@ -68,11 +68,13 @@ def mode_run(name, metered):
     return ModeRun(board, board.ledger, lambda index: UNLIMITED, windows)
 
 
-def tree_of(metered):
+def tree_of(metered, coefficients=None):
     made = {name: mode_run(name, metered) for name in EVERY}
     interleave(FRAMES, [*made.values()], 10**9 if metered else 1)
     kind = Kind.MEASURED if metered else Kind.ESTIMATED
-    basis = Basis(EnergyConfig(idle_W=1.0, busy_W=4.0), replace(FACTS, kind=kind), period_s=0.1)
+    seg_J, class_J, point_J = coefficients or (None, None, None)
+    config = EnergyConfig(idle_W=1.0, busy_W=4.0, seg_J=seg_J, class_J=class_J, point_J=point_J)
+    basis = Basis(config, replace(FACTS, kind=kind), period_s=0.1)
     about = {
         "stream": "street", "frames": len(FRAMES), "fov": "full", "repeat": 1, "turn": 1, "basis": "at 10 Hz",
         "board": "test", "conditions": {"governor": None, "frequency_MHz": None, "core": 0},
@@ -116,6 +118,8 @@ def test_known_costs_are_reconciled(estimated, mode):
     assert saving["deviation"].value == pytest.approx(0.0, abs=1e-6)
     assert saving["gamma_net"].value == pytest.approx(expected)
     assert 1.0 < saving["gamma_gross"].value < saving["gamma_net"].value
+    calibrated = tree_of(False, coefficients=(3.0 * 10.975e-3, 3.0 * 1.5e-3, 0.0))["savings"][mode]
+    assert calibrated["gamma_calibrated"].value == pytest.approx(expected)
 
 
 def test_the_report_says_whether_it_tests_the_physics(estimated, measured):

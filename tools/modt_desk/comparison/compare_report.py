@@ -17,7 +17,7 @@ from modt_desk.comparison import gamma
 from modt_desk.comparison.comparison import COUNTS, Repetition, total
 from modt_desk.energy.board_fit import usable_windows
 from modt_desk.energy.run_energy import EnergySums, run_energy
-from modt_desk.energy.savings import UnitCosts
+from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt_desk.reporting.energy_plots import reconciliation_tree
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
 
@@ -62,6 +62,7 @@ def compare_tree(
         mode: _saving(
             gamma.estimate_gamma(baseline, runs[mode], load_varied_run, random), energy[modes[0]], energy[mode]
         )
+        | {"gamma_calibrated": estimate(_calibrated(baseline, runs[mode], basis))}
         for mode in modes[1:]
     }
     meter, board = basis.meter, basis.board
@@ -144,6 +145,19 @@ def _saving(found: gamma.GammaEstimate, energy1: dict[str, Quantity], energy2: d
         "deviation": found.deviation,
         "saved_J": estimate(saved_J, "J"),
     }
+
+
+def _calibrated(baseline: gamma.RunCosts, run: gamma.RunCosts, basis: Basis) -> float | None:
+    """Gamma from the joules of a calibration; stages not calibrated count by their CPU time."""
+    if basis.board.coefficients is None:
+        return None
+    seg_J, class_J, point_J = basis.board.coefficients
+    net_W = basis.board.active_W
+    other1, other2 = (
+        OtherCosts(net_W * c.track, net_W * c.schedule) for c in map(gamma.other_costs, (baseline, run))
+    )
+    costs = UnitCosts(seg_J, other1.track, 0.0, class_J, point_J)
+    return reconcile(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
 
 
 def _costs(costs: UnitCosts, baseline: gamma.RunCosts, energy: EnergySums) -> dict[str, Quantity]:

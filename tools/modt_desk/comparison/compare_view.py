@@ -65,10 +65,11 @@ def _verdict(saving: dict[str, Any]) -> str:
 
 
 def _against_meter(saving: dict[str, Any]) -> str:
-    deviation = saving["deviation_net"].value
+    deviation, calibrated = saving["deviation_net"].value, saving["gamma_calibrated"]
+    text = "" if calibrated.value is None else f"; gamma by calibrated joules is {calibrated.marked()}"
     if saving["gamma_gross"].kind is Kind.ESTIMATED or deviation is None:
-        return ""
-    return f"; deviation of the reconciliation {100 * deviation:+.1f} % against the meter"
+        return text
+    return f"{text}; deviation of the reconciliation {100 * deviation:+.1f} % against the meter"
 
 
 def compare_plots(tree: dict[str, Any]) -> list[Plot]:
