@@ -118,8 +118,9 @@ class Stages:
         """Process a frame; `reduced` leaves out distant points."""
         frame = self.odometry.place(frame)
         if reduced:
-            config = self.config
-            frame = replace(frame, points=within(frame.points, RANGE_SHARE * config.sensor.max_range_m))
+            x, y = frame.points[:, 0], frame.points[:, 1]
+            near = np.square(x) + np.square(y) <= (RANGE_SHARE * self.config.sensor.max_range_m) ** 2
+            frame = replace(frame, points=frame.points[near])
         result = self.pipeline.step(frame, budget)
         if isinstance(self.pipeline.tracker, Tracker) and isinstance(result.tracks, TrackTable):
             self._good = result.tracks, self.pipeline.tracker.next_id
@@ -206,8 +207,3 @@ class Stages:
             new.odometry.adopt(old.odometry)
         self.chosen, self.pipeline = chosen, new
         host.release_freed_pages()
-
-
-def within(points: Float32, range_m: float) -> Float32:
-    """The points (N, 4) within a range of the sensor."""
-    return points[np.square(points[:, 0]) + np.square(points[:, 1]) <= range_m**2]

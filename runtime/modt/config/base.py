@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
@@ -34,17 +34,13 @@ def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
     return field(default=default, metadata={"options": options, "meaning": meaning})
 
 
-def per_class(column: str, low: float, high: float, meaning: str, classes: tuple[ObjectClass, ...] = OBJECTS) -> Any:
-    """Field of a number for each class; the defaults are a column of the class table."""
-    values = tuple(getattr(CLASSES[c], column) for c in classes)
+def per_class(
+    column: str | None, low: float, high: float, meaning: str, classes: Sequence[ObjectClass] = OBJECTS
+) -> Any:
+    """Field of a number for each class; the defaults are a column of the class table, null without one."""
+    values = tuple(getattr(CLASSES[c], column) for c in classes) if column else None
     meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in classes)}."
     return field(default=values, metadata={"low": low, "high": high, "length": len(classes), "meaning": meaning})
-
-
-def shares(high: float, meaning: str) -> Any:
-    """Field of a share for each class of objects. The default is null."""
-    meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in OBJECTS)}."
-    return field(default=None, metadata={"low": 0.0001, "high": high, "length": len(OBJECTS), "meaning": meaning})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

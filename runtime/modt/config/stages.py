@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from modt.classes import CLASSES
-from modt.config.base import StageConfig, choice, number, per_class, shares
+from modt.config.base import StageConfig, choice, number, per_class
 
 BATCH = 4
 """Proposals of one network call: few enough for their features to stay in the cache."""
@@ -71,8 +71,11 @@ class DecisionConfig(StageConfig):
         1000.0,
         "Cost of a missed object, relative to a false one. Objects are reported from a posterior of 1 / (1 + cost).",
     )
-    frequency: tuple[float, ...] | None = shares(
-        0.33, "Share of each class among the proposals at the start of a run. Null: as the model assumes."
+    frequency: tuple[float, ...] | None = per_class(
+        None,
+        0.0001,
+        0.33,
+        "Share of each class among the proposals at the start of a run. Null: as the model assumes.",
     )
 
 

@@ -111,7 +111,7 @@ SCENARIOS: dict[str, Scenario] = {
 TESTED_BESIDE = {
     "segmentation.kernels": "app/test_assembly.py",
     "odometry.max_speed_mps": "sources/test_pose_socket.py",
-    "loop.power_W": "app/test_ladder.py",
+    "loop.power_W": "cli/test_run.py",
     "recording.": "sinks/test_recording.py",
 }
 """Tests of the keys that no scenario of perception or energy shows, by the beginning of their paths."""

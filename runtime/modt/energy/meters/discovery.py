@@ -262,9 +262,6 @@ def rail_power_W(text: str, known: set[str]) -> float:
 
 FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Functions that search sysfs, mounted at a path, for candidates of one type of meter."""
-_KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
-_SCOPES = (Scope.CPU, Scope.CPU_RAIL, Scope.SOC, Scope.MODULE, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
-"""Order of preference: this program has a larger share of a narrower scope."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,4 +304,4 @@ def _rank(candidate: Candidate) -> tuple[int, int, int]:
     facts = candidate.facts
     if facts is None or not candidate.usable:
         return (1, 0 if facts else 1, 0)
-    return (0, _KINDS.index(facts.kind), _SCOPES.index(facts.scope))
+    return (0, list(Kind).index(facts.kind), list(Scope).index(facts.scope))

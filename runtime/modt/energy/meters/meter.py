@@ -31,9 +31,8 @@ def worst(kinds: Iterable[Kind]) -> Kind:
 
 
 class Scope(Words):
-    """The consumers a meter covers, from the narrowest."""
+    """The consumers a meter covers, in order of preference: this program has a larger share of a narrower scope."""
 
-    PROCESS = "this process, by a model"
     CPU = "CPU packages"
     CPU_RAIL = "the rail of the CPU, with what shares it"
     SOC = "system on chip"
@@ -41,6 +40,7 @@ class Scope(Words):
     BOARD = "whole board"
     ROBOT = "everything on the battery"
     RAIL = "one rail, of unknown extent"
+    PROCESS = "this process, by a model"
 
 
 class MeterLostError(Exception):
