@@ -28,7 +28,7 @@ REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 
 
 class ValueRangeError(MisuseError):
-    """A configuration value of the wrong type or out of its range; key says which."""
+    """A configuration value of the wrong type or out of its range; `key` names it."""
 
     def __init__(self, key: str, cause: str, remedy: str) -> None:
         super().__init__(key, cause, remedy)

@@ -1,4 +1,4 @@
-"""The loop over a live source, on a clock that only working and waiting move."""
+"""The frames of a live source, on a clock that only working and waiting move."""
 
 import logging
 from unittest.mock import Mock, call

@@ -137,8 +137,8 @@ def test_another_sensor_is_noticed_and_followed(caplog):
     for frame in frames():
         stages.step(frame, UNLIMITED, reduced=False)
         stages.watch(frame)
-        if stages.looking is not None:
-            stages.looking.join()
+        if stages.recognising is not None:
+            stages.recognising.join()
     assert stages.misfits == 1
     assert stages.chosen.name == "as found"
     assert stages.config.sensor.elevation_step_deg > 1.0 or stages.config.sensor.elevations_deg
@@ -151,15 +151,15 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
         looks.append(frame.index)
         may_end.wait(60)
 
-    monkeypatch.setattr(stages, "_look_again", look)
+    monkeypatch.setattr(stages, "_recognise_again", look)
     for k in range(100):
         few = frames()[0].points[:: 8 if k // 10 % 2 else 1]
         stages.watch(Frame(k, 0.1 * k, few))
     assert len(looks) == 1
     may_end.set()
-    stages.looking.join()
+    stages.recognising.join()
     stages.watch(Frame(100, 10.0, few))
-    stages.looking.join()
+    stages.recognising.join()
     assert looks[1:] == [100]  # what it could not look at meanwhile
 
 
@@ -177,4 +177,4 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
 def test_sweeps_of_another_size_are_noticed_once_when_they_stay(sizes, noticed):
     watch, points = SensorWatch(), np.zeros((1000, 4), np.float32)
     points[:, 0] = 5.0
-    assert [k for k, size in enumerate(sizes) if watch.unlike(points[:size])] == noticed
+    assert [k for k, size in enumerate(sizes) if watch.changed(points[:size])] == noticed

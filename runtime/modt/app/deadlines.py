@@ -141,7 +141,7 @@ class Deadlines:
 class NoDeadlines:
     """Every frame of a replay is processed, and may spend the budget of its profile.
 
-    Attributes:
+    Args:
         report: report of the playback.
     """
 

@@ -33,13 +33,13 @@ class Step(IntEnum):
 GIVEN_UP = {
     Step.ALL: "nothing is given up",
     Step.DEFERRED: "classification is deferred",
-    Step.REDUCED: "what is far is left out",
+    Step.REDUCED: "distant points are left out",
     Step.DROPPED: "every second sweep is left out",
 }
 
 
 class Event(Enum):
-    """Load as seen by a frame or by a window of the meters."""
+    """Load that a frame or a window of the meters shows."""
 
     OVERRUN = "the result came after its deadline"
     OVER_POWER = "more power than the limit"

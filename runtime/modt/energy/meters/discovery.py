@@ -68,7 +68,7 @@ def find_powercap(sys: Path) -> list[Candidate]:
 
 
 def _packages(meters: list[Meter]) -> list[Candidate]:
-    """The packages as one candidate. A package whose readings lie between those of another shows the same counter."""
+    """All packages as one candidate. A package whose readings lie between those of another shows the same counter."""
     try:
         pairs = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
     except MeterLostError:
