@@ -224,11 +224,10 @@ def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
     """A profile as plain data, with all defaults and tuples as lists."""
-    return asdict(config, dict_factory=_listed)
-
-
-def _listed(items: list[tuple[str, Any]]) -> dict[str, Any]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in items}
+    return {
+        stage: {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
+        for stage, values in asdict(config).items()
+    }
 
 
 def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:

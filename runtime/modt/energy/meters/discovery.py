@@ -294,7 +294,7 @@ class Discovery:
 
 def discover(board: EnergyConfig, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
     """Search for every type of meter. The model of the board is the last of the usable ones."""
-    model = model_meter(board.idle_W, board.busy_W, time.monotonic_ns, time.process_time_ns)
+    model = model_meter(board, time.monotonic_ns, time.process_time_ns)
     found = [candidate for find in FINDERS for candidate in find(sys)]
     found += [*find_pmic(vcgencmd), Candidate(model.facts.name, (model,))]
     return Discovery(tuple(sorted(found, key=_rank)))
