@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from modt import profile
+from modt.app.chosen_profile import FOUND, choose
 from modt.app.inputs import Request
 from modt.app.stages import RANGE_SHARE, SWEEPS, SensorWatch, Stages
 from modt.energy.ledger import Ledger
@@ -178,3 +179,23 @@ def test_sweeps_of_another_size_are_noticed_once_when_they_stay(sizes, noticed):
     watch, points = SensorWatch(), np.zeros((1000, 4), np.float32)
     points[:, 0] = 5.0
     assert [k for k, size in enumerate(sizes) if watch.changed(points[:size])] == noticed
+
+
+BEAMS_DEG = (-15.1, *(float(v) for v in range(-13, 14, 2)), 15.2)
+
+
+@pytest.mark.parametrize(
+    ("asked", "named", "sensor", "beams"),
+    [
+        ((), "vlp-16", "vlp-16", BEAMS_DEG),
+        ((), None, FOUND, BEAMS_DEG),
+        (("vlp-16",), None, "vlp-16", profile.load("vlp-16").sensor.elevations_deg),
+    ],
+    ids=["a known sensor", "an unknown one", "a profile that was asked for"],
+)
+def test_beams_that_the_source_knows_are_used_unless_a_sensor_is_asked_for(asked, named, sensor, beams):
+    info = dataclasses.replace(INFO, profile=named, elevations_deg=BEAMS_DEG)
+    for first in (None, frames()[0]):
+        chosen = choose(asked, first, info)
+        assert chosen.config.sensor.elevations_deg == beams
+    assert chosen.sensor == sensor
