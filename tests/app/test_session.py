@@ -1,24 +1,43 @@
-"""The loop over a live source, on a clock that only working and waiting move."""
+"""The frames of a live source or a recording, on a clock that only working and waiting move."""
 
 import logging
+import os
+import signal
+from types import SimpleNamespace
 from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment, OncePerSecond
 from modt.app.deadlines import Deadlines, Timing
 from modt.app.ladder import Step
+from modt.app.playback import Playback
 from modt.app.session import WAIT_S, Session
-from modt.app.stop import Stop
+from modt.app.stop import NAP_S, Stop
+from modt.energy.ledger import Ledger
 from modt.errors import MisuseError, ModtError
 from modt.sources.stream import Received, StreamEndedError
 from modt.types import Budget, Frame
 from tests.results import Kept, result
 
-from .test_playback import Time
-
 POINTS = np.zeros((1, 4), np.float32)
+
+
+class Time:
+    """A clock that only sleeping and working move."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.now += seconds
 
 
 class Sensor:
@@ -180,28 +199,15 @@ def test_a_source_that_fails_is_asked_again_and_after_ten_failures_ends_the_run(
     assert len(calls) == 10
 
 
-def test_a_sink_that_fails_costs_neither_the_frame_nor_the_other_sinks():
-    class Broken(Kept):
-        def write(self, r):
-            raise ConnectionError("gone")
-
-    sinks = [Broken(), Kept()]
-    loop, _, _, _, _, seen = loop_of(2.0, sinks=sinks)
+@pytest.mark.parametrize(("broken", "kind"), [("sink", "sink 0"), ("observe", "records"), ("report", "status")])
+def test_a_sink_records_and_status_that_fail_cost_no_frame(broken, kind):
+    failing, sink = Mock(side_effect=KeyError("wall_ns")), Kept()
+    sinks, calls = ([Mock(write=failing), sink], {}) if broken == "sink" else ([sink], {broken: failing})
+    loop, _, stages, *_ = loop_of(3.0, sinks=sinks, **calls)
     loop.run()
-    assert sinks[1].indices == seen == list(range(1, 21))
-    assert loop.failures.counts == {"sink 0: ConnectionError": 20}
-
-
-@pytest.mark.parametrize(("broken", "kind"), [("observe", "records"), ("report", "status")])
-def test_records_and_status_that_fail_cost_no_frame(broken, kind):
-    def fail(*_):
-        raise KeyError("wall_ns")
-
-    sink = Kept()
-    loop = loop_of(3.0, sinks=[sink], **{broken: fail})[0]
-    loop.run()
-    assert len(sink.indices) == 30
-    assert loop.failures.counts[f"{kind}: KeyError"] >= 3
+    assert sink.indices == [index for index, *_ in stages.steps] == list(range(1, 31))
+    assert loop.failures.counts.keys() == {f"{kind}: KeyError"}
+    assert loop.failures.counts.total() >= 3
     assert loop.failures.in_a_row == 0
 
 
@@ -261,3 +267,61 @@ def test_the_cost_of_the_rest_rises_at_once_and_falls_slowly():
     for _ in range(200):
         last_ms = rest_ms(segmentation=10)
     assert last_ms == pytest.approx(10, rel=0.01)
+
+
+class Frames(list):
+    info, faults = SimpleNamespace(profile=None), None
+
+
+def starts(work, period=0.1):
+    """Times at which frames begin that take so long, and the playback after the last one."""
+    time, out = Time(), list[float]()
+    playback = Playback(Frames(work), Ledger(), 1 / period, time.sleep, time)
+    for _ in work:
+        seconds = playback.take(0.0).frame
+        out.append(time.now - 100.0)
+        time.now += seconds
+    with pytest.raises(StreamEndedError):
+        playback.take(0.0)
+    return out, playback
+
+
+@pytest.mark.parametrize(
+    ("work", "begins", "missed", "late_ms"),
+    [
+        ([0.03, 0.09, 0.0, 0.05], [0.0, 0.1, 0.2, 0.3], 0, 0),
+        ([0.35, 0.01, 0.01, 0.01], [0.0, 0.35, 0.45, 0.55], 2, 250),
+    ],
+    ids=["in time", "a stall, without a burst after it"],
+)
+def test_frames_start_at_absolute_deadlines_and_a_stall_is_counted(work, begins, missed, late_ms):
+    out, playback = starts(work)
+    assert out == pytest.approx(begins)
+    assert playback.report()["missed_deadlines"] == missed
+    assert playback.report()["max_lateness_ms"] == pytest.approx(late_ms)
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
+def test_frames_never_start_early_nor_in_a_burst(work):
+    out, playback = starts(work)
+    for i, first in enumerate(out):
+        for steps, later in enumerate(out[i:]):
+            assert later - first >= (steps - 1) * 0.1 - 1e-6  # one frame at most is made up for, never a row of them
+    assert playback.report()["missed_deadlines"] >= sum(w > 0.21 for w in work[:-1])
+
+
+def test_a_signal_ends_a_long_sleep_of_naps_that_add_up_to_it():
+    time, naps = Time(), []
+
+    def nap(seconds):
+        naps.append(seconds)
+        time.sleep(seconds + 0.003)
+        if len(naps) == 30:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with Stop(nap, time).on_signals() as stop:
+        stop.sleep(1.0)
+        assert time.now == pytest.approx(101.0, abs=0.004)
+        stop.sleep(100.0)
+    assert len(naps) == 30
+    assert max(naps) <= NAP_S
