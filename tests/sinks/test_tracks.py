@@ -22,7 +22,7 @@ def test_a_record_describes_the_frame_and_its_tracks():
     r = result(3, [7, 5], {0: 11, 1: 12}, {11: CAR}, lost=(9,), classified=2)
     r.tracks.witness[:] = [0.0, 1.5, -0.6, 0.25]
     r.tracks.points[:], r.tracks.age[:], r.tracks.missed[:] = 7, [1, 2, 5], [0, 0, 4]
-    r.tracks.viewed[:], r.tracks.final[:] = [True, False, True], [True, True, False]
+    r.tracks.key_points[:], r.tracks.final[:] = [7, 0, 7], [True, True, False]
     record = frame_record(r)
     assert record["schema"] == SCHEMA
     assert (record["frame"], record["stamp_s"], record["proposals"]) == (3, 0.3, 2)

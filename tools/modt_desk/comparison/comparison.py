@@ -91,7 +91,8 @@ class ModeRun:
 
     def cpu_s(self) -> Float64:
         """(frames, stages) CPU time of each stage of the pipeline [s]."""
-        return cpu_seconds(self.lines)
+        rows = [[line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES] for line in self.lines]
+        return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
     def _end(self, ids: Iterable[int]) -> None:
         for id_ in ids:
@@ -139,12 +140,6 @@ def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> N
         first = (first + 1) % len(runs)
     for run in runs:
         run.finish()
-
-
-def cpu_seconds(lines: Sequence[Line]) -> Float64:
-    """(frames, stages) CPU time of each stage of the pipeline by ledger lines [s]."""
-    rows = [[line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES] for line in lines]
-    return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
 
 def total(counts: Int) -> Counts:
