@@ -36,7 +36,6 @@ class Background(Generic[T]):
         encode: converts an item, before it is queued, to what the writer takes.
         retry_s: pause after a failure.
         close_s: time limit of `close`.
-        clock: [s].
     """
 
     def __init__(
@@ -48,10 +47,9 @@ class Background(Generic[T]):
         encode: Callable[[Any], T] | None = None,
         retry_s: float = RETRY_S,
         close_s: float = CLOSE_S,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name, self._writer, self._depth, self._encode = name, writer, depth, encode
-        self._retry_s, self._close_s, self._clock = retry_s, close_s, clock
+        self._retry_s, self._close_s = retry_s, close_s
         self._jobs: deque[Callable[[], None]] = deque()
         self._changed = threading.Condition()
         self._end_s: float | None = None
@@ -87,7 +85,7 @@ class Background(Generic[T]):
         """Drain the queue and close the writer within the time limit; the rest is dropped."""
         with self._changed:
             if self._end_s is None:
-                self._end_s = self._clock() + self._close_s / 2
+                self._end_s = time.monotonic() + self._close_s / 2
             self._changed.notify()
         self._thread.join(self._close_s)
         with self._changed:
@@ -131,7 +129,7 @@ class Background(Generic[T]):
         """Wait for the oldest job; None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._jobs or self._end_s is not None)
-            late = self._end_s is not None and self._clock() > self._end_s
+            late = self._end_s is not None and time.monotonic() > self._end_s
             return self._jobs.popleft() if self._jobs and not late else None
 
     def _fail(self, error: Exception) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ def read_pcd(path: Path, raw: bytes) -> Float32:
 
 
 def read_ply(path: Path, raw: bytes) -> Float32:
-    """(N, 4) points of the element `vertex` of a PLY file, its first one, as `points_of` scales them.
+    """(N, 4) points of the element `vertex` of a PLY file, as `points_of` scales them.
 
     Raises:
         ScanError: the file is no PLY file, is truncated, or its header promises impossible data.
@@ -60,14 +61,21 @@ def read_ply(path: Path, raw: bytes) -> Float32:
         raise ScanError(path, "no header of a PLY file", SKIPPED)
     try:
         encoding, elements = _ply_header(raw[:end].decode("ascii", "replace"))
-        element, n_points, properties = elements[0]
+        before = list(takewhile(lambda element: element[0] != "vertex", elements))
+        _, n_points, properties = elements[len(before)]
+        if encoding == "ascii":  # each row is a line, so lists behind the numbers and other elements can be skipped
+            properties = list(takewhile(lambda p: not p[1].startswith("list"), properties))
+        else:
+            start += sum(n_rows * _ply_row(kinds, encoding).itemsize for _, n_rows, kinds in before)
         row = _ply_row(properties, encoding)
     except (KeyError, ValueError, IndexError):
-        raise ScanError(path, "its header cannot be read, or its points have lists", SKIPPED) from None
-    if element != "vertex" or not 0 <= n_points <= MAX_POINTS or not row.names:
-        raise ScanError(path, "its header does not begin with the points of a scan", SKIPPED)
+        raise ScanError(path, "its header cannot be read, or has lists before its points", SKIPPED) from None
+    counts = [n_points, *(n_rows for _, n_rows, _ in before)]
+    if not all(0 <= count <= MAX_POINTS for count in counts) or not row.names:
+        raise ScanError(path, "its header promises what no scan has", SKIPPED)
     if encoding == "ascii":
-        table = _from_text(path, raw[start:].splitlines(), n_points, row)
+        lines = [line for line in raw[start:].splitlines() if line.strip()]
+        table = _from_text(path, lines[sum(counts[1:]) :], n_points, row)
     else:
         table = _from_bytes(path, raw, start, n_points, row)
     return points_of(_columns([name.lower() for name, _ in properties], table), path)

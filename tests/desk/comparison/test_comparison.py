@@ -56,9 +56,9 @@ def test_counts_of_first_further_and_reacquired_views_and_lives_of_tracks():
         "foreground": [2, 1, 2, 0, 0, 1],
     }
     assert {name: one.counts()[:, COUNTS.index(name)].tolist() for name in expected} == expected
-    assert one.lives.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}, "frames with a proposal"
+    assert one.lengths.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}, "frames with a proposal"
     counts = total(one.counts())
-    assert (counts.tracks, counts.n_go) == (one.lives.count, pytest.approx(one.lives.mean))
+    assert (counts.tracks, counts.n_go) == (one.lengths.count, pytest.approx(one.lengths.mean))
 
 
 @pytest.mark.parametrize(
