@@ -117,14 +117,17 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
     i32 above = 0;
     for (i32 k = 0; k < n; k++) {
         i32 place = span[k].place;
-        parent[k] = k;
+        i32 of = parent[k] = k;
         if (k && span[k - 1].place == place - 1 && near(&span[k - 1], &span[k]))
-            join(parent, k - 1, k);
+            of = parent[k - 1];
         while (span[above].place < place - side - 1)
             above++;
         for (i32 a = above; span[a].place <= place - side + 1; a++) /* ends at k */
-            if (parent[a] != parent[k] && near(&span[a], &span[k]))
-                join(parent, a, k);
+            if (parent[a] != of && near(&span[a], &span[k])) {
+                join(parent, parent[a], of);
+                of = parent[of];
+            }
+        parent[k] = of;
     }
     for (i32 k = 0; k < n; k++)
         parent[k] = parent[parent[k]];
