@@ -15,8 +15,7 @@ typedef struct {
     i32 *cell;
 } Scratch;
 
-enum { BLOCK = 512, GROUP = 8 }; /* points that stay in the first-level cache; points left out together */
-enum { LINE = 16 };              /* floats in a cache line */
+enum { BLOCK = 512, GROUP = 8, LINE = 16 }; /* points in the first-level cache, points left out together, floats of a line */
 
 /* PointColumns.from_array and PolarGrid.cell, of up to BLOCK points; those that are not finite, or as far as far_m,
  * are taken to the sensor. */
@@ -201,8 +200,7 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
         const uint8_t *kind = s->kind + ring * g->sectors;
         median_across(g->sectors, 1, row, ray);
         median_across(g->sectors, g->flank_sectors, ray, ray + g->sectors);
-        for (i32 k = 0; k < g->sectors; k++)
-        {
+        for (i32 k = 0; k < g->sectors; k++) {
             float beside = ray[g->sectors + k];
             row[k] = (kind[k] & RAMP ? ray[k] < beside : ray[k] - beside > g->flank_m) ? beside : ray[k];
         }
