@@ -18,7 +18,7 @@ from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.odometry.odometry import Odometry
-from modt.segmentation.clusters import Clusters
+from modt.segmentation.clusters import CellClusterer, Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
@@ -151,19 +151,18 @@ def test_cells_and_components(kernels, seed, n, sigma):
     expected, found = (k.occupied_cells(grid, points, height) for k in (NUMPY, kernels))
     assert same(expected, found)
     cells, sample, sampled, cell = expected
-    rng = np.random.default_rng(seed)
-    gap_m, use = (
-        rng.uniform(0, 1, len(cells)).astype(np.float32),
-        rng.random(len(cells)) < rng.choice([0.0, 0.7, 1.0]),
-    )
-    component = NUMPY.connect(grid, cells, gap_m, use)
-    assert same(component, kernels.connect(grid, cells, gap_m, use))
-    assert ((component == NONE) == ~use).all()
     assert (grid.number == NONE).all(), "the grid is empty again"
-    assert same(*(k.connect_coarse(SqrtRangeGrid(0.06, 80.0), cells, gap_m) for k in (NUMPY, kernels)))
-    n = int(component.max()) + 1
-    assert same(*(k.cluster_bounds(cells, sampled, component, n) for k in (NUMPY, kernels)))
-    used = np.where(use, component, n)
+    rng = np.random.default_rng(seed)
+    step_deg, max_extent_m = rng.choice([0.05, 0.2, 2.0]), rng.uniform(1.0, 9.0)
+    config = SegmentationConfig(cell_m=0.06 * np.sqrt(10), max_extent_m=max_extent_m)
+    clusterer = CellClusterer(SensorConfig(max_range_m=80.0, azimuth_step_deg=step_deg), config)
+    beam_m = rng.choice([0.0, 0.05, 0.4], len(cells)).astype(np.float32)
+    clustered = [k.cluster(clusterer, cells, sampled, beam_m) for k in (NUMPY, kernels)]
+    assert same(*clustered)
+    use = rng.random(len(cells)) < rng.choice([0.0, 0.7, 1.0])
+    kept, own = np.unique(clustered[0][0][use], return_inverse=True)
+    n, used = len(kept), np.full(len(cells), len(kept))
+    used[use] = own
     clusters = Clusters(points, height, cell, cells, sample, sampled, used, n + 1)
     number = consecutive(np.append(rng.random(n) < 0.7, [False]))
     assert same(*(k.view_bounds(clusters, number, number.max() + 1) for k in (NUMPY, kernels)))
