@@ -113,8 +113,6 @@ typedef struct {
     double size, overlap, height, count;
 } PairWeights;
 
-static inline double low(double a, double b) { return a < b ? a : b; }
-static inline double high(double a, double b) { return a > b ? a : b; }
 static inline double apart(double a, double b) { return __builtin_fabs(a - b); }
 
 /* pair_costs: coverage of n pairs (i, j) of shapes a and b, cost without the term of the determinant, and that
@@ -153,6 +151,54 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
         spread[pair] = determinant / (variance * variance);
         cost[pair] = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant / 2 + shape;
         coverage[pair] = low(covered[0], covered[1]);
+    }
+}
+
+/* coverage: part of each k-DOP a (8, n_a) that b (8, n_b) covers, of n pairs (i, j). */
+EXPORT void modt_coverage(const double *a, i64 n_a, const double *b, i64 n_b, const i64 *rows, const i64 *columns, i64 n,
+                          double pad_m, double *coverage)
+{
+    for (i64 pair = 0; pair < n; pair++) {
+        double part[4];
+        i64 i = rows[pair], j = columns[pair];
+        PROVEN(i >= 0 && i < n_a && j >= 0 && j < n_b);
+        for (int k = 0; k < 4; k++) {
+            double one = a[k * n_a + i], back = a[(k + 4) * n_a + i];
+            double common = low(one, b[k * n_b + j] + pad_m) + low(back, b[(k + 4) * n_b + j] + pad_m);
+            part[k] = high(common, 0.0) / high(one + back, pad_m);
+        }
+        coverage[pair] = low(part[0] * part[2], part[1] * part[3]);
+    }
+}
+
+/* measured: displacements between n k-DOPs a and b (8, n) with their covariances, and the variances by ends that
+ * disagree, of which `before` were a frame ago; given the limit of agreement, the squared share and the decay. */
+EXPORT void modt_measured(const double *a, const double *b, i64 n, double variance, const double *before,
+                          const double limits[3], double half_root, double (*shift)[2], double (*covariance)[2][2],
+                          double *end_variance)
+{
+    for (i64 m = 0; m < n; m++) {
+        double both[4], apart[4], weight[4], widest = -INFINITY, longest = 1.0;
+        for (int k = 0; k < 4; k++) {
+            double ahead = b[k * n + m] - a[k * n + m], behind = b[(k + 4) * n + m] - a[(k + 4) * n + m];
+            double width = b[k * n + m] + b[(k + 4) * n + m];
+            both[k] = ahead - behind, apart[k] = ahead + behind;
+            widest = high(widest, width), longest = high(longest, high(width, width - apart[k]));
+        }
+        for (int k = 0; k < 4; k++) {
+            double off = apart[k] * (longest / limits[0]), alike = high(1 - off * off, 0.0), unlike = 1 - alike * alike;
+            double by_ends = high(limits[1] * unlike * (apart[k] * apart[k]), limits[2] * before[k * n + m]);
+            end_variance[k * n + m] = by_ends = low(by_ends, limits[1] * (widest * widest));
+            weight[k] = 0.5 / (variance + by_ends);
+            both[k] = weight[k] * ((both[k] - unlike * __builtin_copysign(apart[k], both[k])) / 2);
+        }
+        double xx = weight[0] + (weight[1] + weight[3]) / 2, yy = weight[2] + (weight[1] + weight[3]) / 2;
+        double xy = (weight[1] - weight[3]) / 2, scale = 1.0 / (xx * yy - xy * xy);
+        double x = both[0] + half_root * (both[1] - both[3]), y = both[2] + half_root * (both[1] + both[3]);
+        covariance[m][0][0] = scale * yy, covariance[m][1][1] = scale * xx;
+        covariance[m][0][1] = covariance[m][1][0] = -scale * xy;
+        shift[m][0] = covariance[m][0][0] * x + covariance[m][0][1] * y;
+        shift[m][1] = covariance[m][0][1] * x + covariance[m][1][1] * y;
     }
 }
 

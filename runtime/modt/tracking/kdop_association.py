@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes, measured
+from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches
@@ -59,7 +59,8 @@ class KdopAssociation:
         x = tracks.x.take(rows, axis=0)[:, :2]
         mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
         before = tracks.end_variance.T.take(rows, axis=1)
-        shift, covariance, end_variance = measured(mean, observations.kdop.take(columns, axis=1), variance, before)
+        kdop = observations.kdop.take(columns, axis=1)
+        shift, covariance, end_variance = self._kernels.measured(mean, kdop, variance, before)
         return Matches(rows, columns, x + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:
