@@ -43,12 +43,12 @@ class LikeliestClass:
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track."""
-        self._say(tracks, tracks.posterior)
+        self._say(tracks, tracks.posterior.T)
 
     def _say(self, tracks: Tracks, weighed: Float64) -> None:
-        """Write the class of every track, of its weight (M, 4)."""
-        likeliest = weighed[:, 1:].argmax(axis=1) + 1
-        said = weighed[np.arange(len(weighed)), likeliest] >= self._threshold[likeliest - 1]
+        """Write the class of every track, of its weight (4, M)."""
+        likeliest = weighed[1:].argmax(axis=0) + 1
+        said = weighed[likeliest, np.arange(len(likeliest))] >= self._threshold[likeliest - 1]
         tracks.object_class = np.where(said, likeliest, 0)
 
 
@@ -74,21 +74,21 @@ class Decision(LikeliestClass):
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
-        adapted = self.adapted(tracks.posterior)
-        weighed = adapted.copy()
-        weighed[np.arange(len(weighed)), tracks.object_class] /= self._kept[tracks.object_class]
+        adapted = self.adapted(tracks.posterior.T.copy())
+        weighed, last = adapted.copy(), tracks.object_class
+        weighed[last, np.arange(len(last))] /= self._kept[last]
         self._say(tracks, weighed)
-        self._learn(adapted[tracks.proposal != NONE])
+        self._learn(adapted.take((tracks.proposal != NONE).nonzero()[0], axis=1))
 
     def adapted(self, posterior: Float64) -> Float64:
-        """(M, 4) posteriors under the frequencies of the stream."""
-        weighted = posterior * (self.frequency / self._assumed)
-        adapted: Float64 = weighted / weighted.sum(axis=1, keepdims=True)
+        """(4, M) posteriors under the frequencies of the stream."""
+        weighted = posterior * (self.frequency / self._assumed)[:, None]
+        adapted: Float64 = weighted / weighted.sum(axis=0)
         return adapted
 
     def _learn(self, adapted: Float64) -> None:
-        """The mean of the adapted posteriors, the frequency at the start counting as START_PROPOSALS."""
-        self._mass += adapted.sum(axis=0)
+        """The mean of the adapted posteriors (4, R), the frequency at the start counting as START_PROPOSALS."""
+        self._mass += adapted.sum(axis=1)
         total = self._mass.sum()
         if total > MEMORY_PROPOSALS:
             self._mass *= MEMORY_PROPOSALS / total

@@ -15,6 +15,8 @@ multiplied: n of them weigh n^GROWTH. Both means forget the past; a view counts 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_PERSON_M
@@ -56,20 +58,20 @@ _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 def normalise(probability: Float64) -> Float64:
     """(R, 4) rows scaled to sum 1 with entries of at least MIN_PROBABILITY; uniform where no entry is above 0."""
-    finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0)
-    greatest = finite.max(axis=1, keepdims=True, initial=0.0)
-    return _floored(np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0))
+    finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0).T
+    greatest = finite.max(axis=0, initial=0.0)
+    return _floored(np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0)).T
 
 
 def from_log_weights(log_weight: Float64) -> Float64:
-    """(R, 4) softmax of each row of finite numbers, with the floor of `normalise`."""
-    return _floored(np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf)))
+    """(4, R) softmax of each column of finite numbers, with the floor of `normalise`."""
+    return _floored(np.exp(log_weight - log_weight.max(axis=0)))
 
 
 def _floored(weight: Float64) -> Float64:
-    """(R, 4) rows of positive sum scaled to sum 1 with entries of at least MIN_PROBABILITY."""
-    floored = np.maximum(weight / weight.sum(axis=1, keepdims=True), MIN_PROBABILITY)
-    normalised: Float64 = floored / floored.sum(axis=1, keepdims=True)
+    """(4, R) columns of positive sum scaled to sum 1 with entries of at least MIN_PROBABILITY."""
+    floored = np.maximum(weight / weight.sum(axis=0), MIN_PROBABILITY)
+    normalised: Float64 = floored / floored.sum(axis=0)
     return normalised
 
 
@@ -96,11 +98,52 @@ class Certainty:
         self._object, self._background = object_threshold, background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
-        """(R,) of posteriors (R, 4)."""
-        objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self._object
-        evidence = posterior / self._frequency
-        background: Bool = evidence[:, ObjectClass.BACKGROUND] >= self._background * evidence.sum(axis=1)
+        """(R,) of posteriors (4, R)."""
+        objects: Bool = posterior[1:].max(axis=0) >= self._object
+        evidence = posterior / self._frequency[:, None]
+        background: Bool = evidence[ObjectClass.BACKGROUND] >= self._background * evidence.sum(axis=0)
         return objects | background
+
+
+class Seen(NamedTuple):
+    """The R tracks with a proposal, for the decision which of them is worth a classification."""
+
+    rows: Int
+    proposal: Int
+    hidden: Bool
+    may_be_object: Bool  # by box and motion
+    posterior: Float64  # (4, R)
+    points: Int
+    key_points: Int
+    age: Int
+    key_age: Int
+
+    @property
+    def viewed(self) -> Bool:
+        """(R,) whether the network has classified it at least once."""
+        viewed: Bool = self.key_points > 0
+        return viewed
+
+    def shows_more(self, ratio: float = MORE_POINTS) -> Bool:
+        """(R,) tracks whose proposal shows clearly more of them than their last view."""
+        more: Bool = self.points > ratio * self.key_points + MORE_POINTS_BY
+        return more
+
+    def waits(self, growth: Float64 | float, frames: int) -> Bool:
+        """(R,) tracks as many times as old as at their last view, and some frames."""
+        waits: Bool = self.age >= growth * self.key_age + frames
+        return waits
+
+    def person_waits(self) -> Bool:
+        """(R,) tracks that may be people and were last classified PERSON_FRAMES ago."""
+        may_be: Bool = self.posterior[IS_PERSON].sum(axis=0) > MAYBE_PERSON
+        return may_be & self.waits(1.0, PERSON_FRAMES)
+
+    def near(self, proposals: Proposals) -> Bool:
+        """(R,) tracks whose proposal is near, and as long and as high as a person may be."""
+        x, y, _, length_m, _, height_m, _ = proposals.box.T
+        near: Bool = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
+        return near[self.proposal]
 
 
 class EveryFrame:
@@ -134,16 +177,27 @@ class FusedTracks:
         self.config, self.prior, self._log_frequency = config, prior, log_frequency_of(prior)
         self.certain = Certainty(self._log_frequency, config.object_threshold, background_threshold)
 
-    def observe(self, tracks: Tracks, proposals: Proposals) -> None:
+    def observe(self, tracks: Tracks, proposals: Proposals) -> Seen:
         """Add the box and the motion of every track with a proposal to what is known of it."""
         rows = (tracks.proposal != NONE).nonzero()[0]
-        prior = self.prior.probability(proposals)[tracks.proposal[rows]]
-        tracks.prior[rows] = prior
-        evidence, known = _log(prior) - self._log_frequency, tracks.box_evidence.take(rows, axis=0)
-        gain = (np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows])[:, None]
-        tracks.box_evidence[rows] = known + gain * (evidence - known)
-        tracks.witness[rows] = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m[rows])
-        self._conclude(tracks, rows)
+        own, hidden = tracks.proposal[rows], tracks.hidden[rows]
+        prior = self.prior.probability(proposals).T.take(own, axis=1)
+        evidence, known = _log(prior) - self._log_frequency[:, None], _by_class(tracks.box_evidence, rows)
+        gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~hidden
+        witness = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m.take(rows, axis=0)).T
+        tracks.prior[rows], tracks.witness[rows] = prior.T, witness.T
+        tracks.box_evidence[rows] = (known + gain * (evidence - known)).T
+        weighed = prior * np.exp(witness)
+        probability = (weighed / weighed.sum(axis=0)).T
+        may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
+        posterior = self._conclude(tracks, rows)
+        points, key_points, age, key_age = (
+            tracks.points[rows],
+            tracks.key_points[rows],
+            tracks.age[rows],
+            tracks.key_age[rows],
+        )
+        return Seen(rows, own, hidden, may_be_object, posterior, points, key_points, age, key_age)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows; (R,) which are certain now.
@@ -160,23 +214,19 @@ class FusedTracks:
         tracks.weight[rows] = total
         tracks.views[rows] += 1
         tracks.key_points[rows], tracks.key_age[rows] = count, tracks.age[rows]
-        self._conclude(tracks, rows)
-        return self.certain(tracks.posterior[rows])
+        return self.certain(self._conclude(tracks, rows))
 
-    def _may_be_object(self, tracks: Tracks) -> Bool:
-        """(M,) tracks whose box and motion leave an object probable enough for a classification."""
-        weighed = tracks.prior * np.exp(tracks.witness)
-        probability = weighed / weighed.sum(axis=1, keepdims=True)
-        return self.prior.may_be_object(probability, self.config.min_object_probability)
-
-    def _conclude(self, tracks: Tracks, rows: Int) -> None:
-        """Write the posterior of the rows; the class of a remembered place has probability 1."""
+    def _conclude(self, tracks: Tracks, rows: Int) -> Float64:
+        """Write the posterior of the rows; (4, R). The class of a remembered place has probability 1."""
         weight = tracks.views[rows] ** GROWTH
-        known = self._log_frequency + weight[:, None] * tracks.evidence.take(rows, axis=0)
-        known += BOX_WEIGHT * tracks.box_evidence.take(rows, axis=0) + tracks.witness.take(rows, axis=0)
+        known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
+        known += BOX_WEIGHT * _by_class(tracks.box_evidence, rows) + _by_class(tracks.witness, rows)
         posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
-        posterior += MISMATCH_PROBABILITY * tracks.prior.take(rows, axis=0)
-        tracks.posterior[rows] = np.where(tracks.inherited[rows, None], _BACKGROUND, posterior)
+        posterior += MISMATCH_PROBABILITY * _by_class(tracks.prior, rows)
+        inherited = tracks.inherited[rows].nonzero()[0]
+        posterior[:, inherited] = _BACKGROUND[:, None]
+        tracks.posterior[rows] = posterior.T
+        return posterior
 
 
 class FirstViews(FusedTracks):
@@ -193,9 +243,10 @@ class FirstViews(FusedTracks):
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
-        self.observe(tracks, proposals)
-        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
-        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks) | _person_waits(tracks))
+        seen, asks = self.observe(tracks, proposals), np.zeros(len(tracks), np.bool_)
+        may = wants_class[seen.rows] & (tracks.hits[seen.rows] >= FIRST_VIEW_MIN_HITS) & ~seen.hidden
+        asks[seen.rows] = may & seen.may_be_object & (~seen.viewed | seen.shows_more() | seen.person_waits())
+        return asks
 
 
 class FurtherViews(FusedTracks):
@@ -209,39 +260,24 @@ class FurtherViews(FusedTracks):
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
-        self.observe(tracks, proposals)
-        first = self._may_be_object(tracks) | _near(tracks, proposals)
-        object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
-        review = object_ & (tracks.age >= REVIEW_GROWTH * tracks.key_age + REVIEW_FRAMES)
-        review |= first & _shows_more(tracks, FAR_MORE_POINTS)
-        likely_background = tracks.posterior[:, ObjectClass.BACKGROUND] > LIKELY_BACKGROUND
-        growth = np.where(likely_background, BACKGROUND_GROWTH, UNSURE_GROWTH)
-        unsure = _shows_more(tracks) | (tracks.age >= growth * tracks.key_age + UNSURE_FRAMES) | _person_waits(tracks)
-        further = np.where(self.certain(tracks.posterior), review, unsure)
-        asks: Bool = (tracks.proposal != NONE) & ~tracks.hidden & np.where(tracks.viewed, further, first)
+        seen, asks = self.observe(tracks, proposals), np.zeros(len(tracks), np.bool_)
+        background = seen.posterior[ObjectClass.BACKGROUND]
+        first = seen.may_be_object | seen.near(proposals)
+        review = (background < 0.5) & seen.waits(REVIEW_GROWTH, REVIEW_FRAMES)
+        review |= first & seen.shows_more(FAR_MORE_POINTS)
+        growth = np.where(background > LIKELY_BACKGROUND, BACKGROUND_GROWTH, UNSURE_GROWTH)
+        unsure = seen.shows_more() | seen.waits(growth, UNSURE_FRAMES) | seen.person_waits()
+        further = np.where(self.certain(seen.posterior), review, unsure)
+        asks[seen.rows] = ~seen.hidden & np.where(seen.viewed, further, first)
         return asks
 
 
-def _near(tracks: Tracks, proposals: Proposals) -> Bool:
-    """(M,) tracks whose proposal is near, and as long and as high as a person may be."""
-    x, y, _, length_m, _, height_m, _ = proposals.box.T
-    near = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
-    return np.append(near, False)[tracks.proposal]  # the last is that of NONE
+def _by_class(column: Float64, rows: Int) -> Float64:
+    """(4, R) rows of a column (M, 4), a contiguous row a class: arithmetic along axes of four would be slow."""
+    return column.T.take(rows, axis=1)
 
 
 def _log(probability: Float64) -> Float64:
     """Logarithm, of MIN_PROBABILITY at least."""
     logarithm: Float64 = np.log(np.maximum(probability, MIN_PROBABILITY))
     return logarithm
-
-
-def _person_waits(tracks: Tracks) -> Bool:
-    """(M,) tracks that may be people and were last classified PERSON_FRAMES ago."""
-    waits: Bool = tracks.posterior[:, IS_PERSON].sum(axis=1) > MAYBE_PERSON
-    return waits & (tracks.age >= tracks.key_age + PERSON_FRAMES)
-
-
-def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:
-    """(M,) tracks whose last proposal shows clearly more of them than their last view."""
-    more: Bool = tracks.points > ratio * tracks.key_points + MORE_POINTS_BY
-    return more

@@ -90,8 +90,9 @@ def log_pool(
 
 def softmax(log_probability: Float64) -> Float64:
     """(R, 4) probabilities whose logarithms are given up to a constant a row."""
-    likelihood = np.exp(log_probability - log_probability.max(axis=1, keepdims=True))
-    probability: Float64 = likelihood / likelihood.sum(axis=1, keepdims=True)
+    by_class = log_probability.T.copy()  # arithmetic along axes of four would be slow
+    likelihood = np.exp(by_class - by_class.max(axis=0))
+    probability: Float64 = (likelihood / likelihood.sum(axis=0)).T
     return probability
 
 

@@ -189,8 +189,9 @@ class NativeFilter(Filter):
 
     def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
         """All states dt_s later."""
-        heading, along = x[:, HEADING].copy(), np.square(dt_s * self.acceleration)
-        noise = array("d", (along, np.square(dt_s**2 / 2 * self.acceleration), np.square(dt_s * self.turn)))
+        heading = x[:, HEADING].copy()
+        along, across, turn = dt_s * self.acceleration, dt_s**2 / 2 * self.acceleration, dt_s * self.turn
+        noise = array("d", (along * along, across * across, turn * turn))
         self._library.modt_predict(x, P, len(x), np.cos(heading), np.sin(heading), dt_s, noise)
 
     def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:

@@ -95,6 +95,9 @@ class Pieces(NamedTuple):
     label: Int  # (K,) piece of each
 
 
+NO_PIECES = Pieces(*np.zeros((4, 0), np.int64))
+
+
 class Regrouping:
     """Corrects the grouping of a frame's points by what the tracks know.
 
@@ -284,7 +287,6 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
     A proposal is odd that is too long for the class of the track, or of few points.
     """
     proposals, observations, n = frame.proposals, frame.observations, len(frame.proposals)
-    nothing = np.zeros(0, np.int64)
     may = (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
     may &= tracks.last_class != ObjectClass.BACKGROUND.value
     lost = may & (own == NONE)
@@ -295,7 +297,7 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
     lost[held] = odd & (tracks.posterior[held, class_] >= LIKELY)
     k = (lost[pairs.rows] & (pairs.around > MIN_COVERAGE)).nonzero()[0]
     if not len(k):
-        return Pieces(nothing, nothing, nothing, nothing)
+        return NO_PIECES
     k = k[pairs.around[k].argsort(kind="stable")]
     rows, hosts = pairs.rows[k], pairs.proposals[k]
     length_m, expected_m = (
@@ -304,6 +306,8 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
     longer, best = length_m > expected_m + LONGER_M, np.full(len(tracks), NONE)
     best[rows[longer]] = hosts[longer]  # the last written covers most
     rows = (best != NONE).nonzero()[0]
+    if not len(rows):
+        return NO_PIECES
     hosts, top = best[rows], tracks.top[rows]
     count = proposals.count[hosts]
     pair = np.arange(len(rows)).repeat(count)

@@ -141,13 +141,14 @@ class Tracker:
             certain: (R,) whether the class of each is certain now.
         """
         t = self._tracks
-        if len(rows):
-            self._advance(rows, np.where(certain, Event.CLASSIFIED, Event.UNDECIDED))
+        self._advance(rows, np.where(certain, Event.CLASSIFIED, Event.UNDECIDED))
         return t.copy()
 
     def _advance(self, rows: Int, events: Event | Int) -> None:
         """Move rows to the states that events lead to; the state says whether the class is final."""
         t = self._tracks
+        if not len(rows):
+            return
         t.state[rows] = self.machine.transition(t.state[rows], events)
         t.final[rows] = self.machine.final[t.state[rows]]
 
@@ -194,15 +195,16 @@ class Tracker:
     def _keep_top(self, frame: Associated, known: Float64) -> None:
         """A person cut above is as high as in (R, 7) the boxes known before the frame: writes track and proposal."""
         t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
-        hidden_m = (known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2)
-        kept = IS_PERSON[t.last_class[rows]] & (hidden_m > 0)
-        if kept.any():
-            kept &= frame.proposals.cut[own] & Cut.TOP > 0
-        t.hidden[rows] = kept & (t.box[rows, 5] < PERSON_M / 2)
-        if not kept.any():
+        t.hidden[rows] = False
+        people = IS_PERSON[t.last_class[rows]].nonzero()[0]
+        people = people[frame.proposals.cut[own[people]] & Cut.TOP > 0]
+        if not len(people):
             return
-        for boxes, index in ((t.box, rows[kept]), (frame.proposals.box, own[kept])):
-            boxes[index, 2:6:3] += np.outer(hidden_m[kept], (0.5, 1.0))  # z of the middle, and height
+        rows, own, known = rows[people], own[people], known[people]
+        hidden_m = np.maximum((known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2), 0.0)
+        t.hidden[rows] = (hidden_m > 0) & (t.box[rows, 5] < PERSON_M / 2)
+        for boxes, index in ((t.box, rows), (frame.proposals.box, own)):
+            boxes[index, 2:6:3] += np.outer(hidden_m, (0.5, 1.0))  # z of the middle, and height
 
     def _observe_rest(self, rows: Int) -> None:
         """Which tracks are near their rest position; a track that stopped rests where it is."""
@@ -213,7 +215,7 @@ class Tracker:
         step = x[:, :2] - position
         near = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
         t.stationary[rows] = near & (hits > 2)
-        t.rest_position[rows] = position + REST_GAIN * near[:, None] * step
+        t.rest_position[rows] = position + (REST_GAIN * near)[:, None] * step
         if self._extended:
             self._filter.observe_speed(t.x, t.P, rows[near], 0.0, STATIONARY_SIGMA_MPS)
 
@@ -243,8 +245,7 @@ class Tracker:
         """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
         t = self._tracks
         rows = (t.inherited & (t.proposal != NONE) & ~near).nonzero()[0]
-        if len(rows):
-            self._advance(rows, Event.WITHDRAWN)
+        self._advance(rows, Event.WITHDRAWN)
 
     def _expire(self, at_rest: Bool) -> Int:
         """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
@@ -265,7 +266,7 @@ class Tracker:
         t.id[new] = self.next_id + np.arange(len(new))
         self.next_id += len(new)
         t.state[new] = self.machine.proposal
-        self._advance(new, np.where(known, Event.ASSOCIATED, Event.UNASSOCIATED))
+        self._advance(new, np.where(known, Event.ASSOCIATED.value, Event.UNASSOCIATED.value))
         self._advance(new[known], Event.JOINS_FINAL)
         position = self.association.initial_position(observations)[proposals]
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
