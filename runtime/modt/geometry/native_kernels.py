@@ -22,8 +22,8 @@ _SIGNATURES: Signatures = {
     "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _D, Own)),
     "modt_measured": (None, (FLOAT64, FLOAT64, _L, _D, FLOAT64, Own, _D, Own, Own, Own)),
     "modt_pair_costs": (None, (Own, Own, FLOAT64, _D, INT64, INT64, _L, Own, _D, _D, Own, Own, Own)),
-    "modt_certain_pairs": (None, (Own, FLOAT64, _L, _D, Own, Own, Own, Own)),
-    "modt_settle_pairs": (ctypes.c_int, (Own, FLOAT64, _L, _D, Own, Own, Own, Own, Own)),
+    "modt_certain_pairs": (None, (INT64, INT64, FLOAT64, _L, _D, Own, Own, Own, _L, Own)),
+    "modt_settle_pairs": (ctypes.c_int, (INT64, INT64, FLOAT64, _L, _D, Own, _L, Own, Own, Own, Own)),
     "modt_regrouped": (None, (Own, INT64, _L, INT64, INT64, INT64, _L, _L, Own, Own, Own)),
 }
 _PAIRS_EACH = 8
@@ -112,15 +112,13 @@ class NativeGeometryKernels(GeometryKernels):
     def assign(self, rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
         """Indices, ascending, of the candidate pairs that a least-cost assignment keeps."""
         n, sizes = len(rows), array("q", (int(rows.max(initial=-1)) + 1, int(columns.max(initial=-1)) + 1))
-        number, following = np.empty((2, max(sizes)), np.int64), np.empty((2, max(sizes)))
-        given, numbers, state = (structure(rows, columns), cost, n, limit), pointers(number), np.empty(n, np.uint8)
-        self.library.modt_certain_pairs(*given, sizes, numbers, pointers(following), state)
+        most, given, state = max(sizes), (rows, columns, cost, n, limit), np.empty(n, np.uint8)
+        number = np.empty((2, most), np.int64)
+        self.library.modt_certain_pairs(*given, sizes, number, np.empty((2, most)), most, state)
         if sizes[0]:
             few, many = sorted(sizes)
-            potentials, distance, matrix = np.empty(few), np.empty((2, many)), np.empty(few * many)
-            column_of, others = np.empty(few, np.int64), np.empty((3, many), np.int64)
-            scratch = pointers(potentials, distance, column_of, others)
-            if not self.library.modt_settle_pairs(*given, numbers, sizes, matrix, scratch, state):
+            costs, partners = np.empty(few * many + few + 2 * many), np.empty(few + 3 * many, np.int64)
+            if not self.library.modt_settle_pairs(*given, number, most, sizes, costs, partners, state):
                 raise ValueError("no assignment has a finite cost")
         return state.nonzero()[0]
 

@@ -107,7 +107,7 @@ typedef struct {
     double (*kdop)[8], (*lagged)[8], (*envelope)[8], (*mean)[8], (*box)[7], (*size)[3], (*anchor)[2];
     double *moved, *observed, *bottom, *top;
     i64 *proposal, *points;
-    const i64 *hits, *last_class;
+    const i64 *hits, *object_class;
     const uint8_t *final;
 } Table;
 
@@ -126,7 +126,7 @@ EXPORT void modt_observe(const Table *t, const Observations *seen, const i64 *ro
                          const double (*position)[2], const double (*along)[8], const Memory *memory)
 {
     for (i64 m = 0; m < n; m++) {
-        i64 row = rows[m], p = proposals[m], class = t->last_class[row];
+        i64 row = rows[m], p = proposals[m], class = t->object_class[row];
         PROVEN(p >= 0 && p < seen->n && class >= 0 && class < 4);
         double end[8], about[8], shift[8], longest = 0.0, moved = 0.0, weight = 1.0 - 1.0 / (double)t->hits[row];
         for (int k = 0; k < 8; k++) {

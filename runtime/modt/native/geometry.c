@@ -202,21 +202,22 @@ EXPORT void modt_measured(const double *a, const double *b, i64 n, double varian
     }
 }
 
-/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. The rows and columns of contested
- * pairs are numbered in `best`, and counted in `sizes`, which held the greatest index + 1, the length of `best` and of
- * the scratch `next`. */
-EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, double limit, i64 sizes[2],
-                               i64 *best[2], double *next[2], uint8_t *state)
+/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. The rows and the columns of
+ * contested pairs are numbered in two rows of `best`, of `most` each like the scratch `next`, and counted in `sizes`, which
+ * held the greatest index + 1. */
+EXPORT void modt_certain_pairs(const i64 *rows, const i64 *columns, const double *cost, i64 n, double limit,
+                               i64 sizes[2], i64 *best, double *next, i64 most, uint8_t *state)
 {
+    const i64 *index[2] = {rows, columns};
     for (int side = 0; side < 2; side++) {
         for (i64 k = 0; k < sizes[side]; k++) {
-            best[side][k] = NONE;
-            next[side][k] = limit;
+            best[side * most + k] = NONE;
+            next[side * most + k] = limit;
         }
         for (i64 pair = 0; pair < n; pair++) {
             PROVEN(index[side][pair] >= 0 && index[side][pair] < sizes[side]);
-            i64 *own = &best[side][index[side][pair]];
-            double *second = &next[side][index[side][pair]];
+            i64 *own = &best[side * most + index[side][pair]];
+            double *second = &next[side * most + index[side][pair]];
             if (*own == NONE || cost[pair] <= cost[*own]) {
                 *second = *own == NONE ? limit : cost[*own];
                 *own = pair;
@@ -225,20 +226,20 @@ EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, d
         }
     }
     for (i64 pair = 0; pair < n; pair++)
-        state[pair] = cost[pair] + limit < next[0][index[0][pair]] + next[1][index[1][pair]];
+        state[pair] = cost[pair] + limit < next[rows[pair]] + next[most + columns[pair]];
     for (i64 pair = 0; pair < n; pair++)
-        if (state[best[0][index[0][pair]]] != 1 && state[best[1][index[1][pair]]] != 1)
+        if (state[best[rows[pair]]] != 1 && state[best[most + columns[pair]]] != 1)
             state[pair] = 2;
     for (int side = 0; side < 2; side++) {
-        i64 number = 0;
+        i64 number = 0, *numbers = best + side * most;
         for (i64 k = 0; k < sizes[side]; k++)
-            best[side][k] = NONE;
+            numbers[k] = NONE;
         for (i64 pair = 0; pair < n; pair++)
             if (state[pair] == 2)
-                best[side][index[side][pair]] = 0;
+                numbers[index[side][pair]] = 0;
         for (i64 k = 0; k < sizes[side]; k++)
-            if (best[side][k] != NONE)
-                best[side][k] = number++;
+            if (numbers[k] != NONE)
+                numbers[k] = number++;
         sizes[side] = number;
     }
 }

@@ -166,7 +166,7 @@ class Regrouping:
         known, kdop = tracks.known_kdops(senior), frame.observations.kdop
         k, part = self._kernels.overlapping_pairs(known, kdop)
         rows, other = senior[k], owner[part]
-        person, class_ = IS_PERSON[tracks.last_class], tracks.last_class
+        person, class_ = IS_PERSON[tracks.object_class], tracks.object_class
         one_class = class_[rows] == class_[other]
         one_class |= (~person | tracks.hidden)[rows] & ~person[other]  # background and cars are easily confused
         free = (other == NONE) | (other == rows) | (junior[other] > junior[rows]) & one_class
@@ -232,7 +232,7 @@ class Regrouping:
 
 def _whole(tracks: TrackTable) -> Bool:
     """(M,) tracks whose parts are joined: of a hidden person the legs are left, one object."""
-    whole: Bool = ~IS_PERSON[tracks.last_class] | tracks.hidden
+    whole: Bool = ~IS_PERSON[tracks.object_class] | tracks.hidden
     return whole
 
 
@@ -243,7 +243,7 @@ def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, o
     rows, parts = pairs.rows[larger], pairs.proposals[larger]
     box = tracks.box.take(rows, axis=0)
     box[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
-    fits = _fit_together(box, observations.box.take(parts, axis=0), MAX_SIZE_M[tracks.last_class[rows]])
+    fits = _fit_together(box, observations.box.take(parts, axis=0), MAX_SIZE_M[tracks.object_class[rows]])
     changed: set[int] = set()
     for row, part in zip(rows[fits].tolist(), parts[fits].tolist(), strict=True):
         former, left = int(owner[part]), int(own[row])
@@ -260,7 +260,7 @@ def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, o
 
 def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> Int:
     """(P,) proposal into which each is joined, itself where it is not; the most senior track is served first."""
-    into, car = np.arange(len(owner)), tracks.last_class == ObjectClass.CAR.value
+    into, car = np.arange(len(owner)), tracks.object_class == ObjectClass.CAR.value
     host = own[pairs.rows]
     joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
     joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & _whole(tracks)[pairs.rows]
@@ -288,10 +288,10 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
     """
     proposals, observations, n = frame.proposals, frame.observations, len(frame.proposals)
     may = (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
-    may &= tracks.last_class != ObjectClass.BACKGROUND.value
+    may &= tracks.object_class != ObjectClass.BACKGROUND.value
     lost = may & (own == NONE)
     held = (may & ~lost).nonzero()[0]
-    class_, kept = tracks.last_class[held], own[held]
+    class_, kept = tracks.object_class[held], own[held]
     longest_m = widths(observations.kdop.take(kept, axis=1)).max(axis=0, initial=0.0)
     odd = (longest_m > MAX_SIZE_M[class_, 0]) | (observations.count[kept] < MIN_SHARE * tracks.points[held])
     lost[held] = odd & (tracks.posterior[held, class_] >= LIKELY)

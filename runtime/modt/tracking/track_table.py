@@ -35,7 +35,6 @@ MAX_LENGTH_M: Float64 = np.where(np.arange(len(MAX_SIZE_M)) == ObjectClass.BACKG
 class TrackTable(Tracks):
     """Tracks with the columns that only the tracker needs; k-DOPs as in geometry/kdop.py."""
 
-    last_class: Int = column(int)  # when the frame began
     kdop: Float64 = column(float, 8)  # last observed [m, world]
     lagged_kdop: Float64 = column(float, 8)  # which follows the last observed with a lag [m, world]
     envelope: Float64 = column(float, 8, fill=-np.inf)  # of all observed, slowly decaying, about the position [m]
@@ -72,7 +71,7 @@ def observe(
     a changing view moves one of them alone.
     """
     kdop, box = observations.kdop.T.take(proposals, axis=0), observations.box.take(proposals, axis=0)
-    about, class_ = kdop - position @ DIRECTIONS, t.last_class[rows]
+    about, class_ = kdop - position @ DIRECTIONS, t.object_class[rows]
     known, mean = t.envelope.take(rows, axis=0), t.mean_kdop.take(rows, axis=0)
     lagged, size = t.lagged_kdop.take(rows, axis=0), t.size_m.take(rows, axis=0)
     merged = (about[:, :4] + about[:, 4:] > MAX_LENGTH_M[class_][:, None]).any(axis=1)
@@ -106,7 +105,7 @@ class NativeObserve:
         """Write what the proposals (R,) show of the rows (R,)."""
         o = observations
         floats = t.kdop, t.lagged_kdop, t.envelope, t.mean_kdop, t.box, t.size_m, t.anchor, t.moved_m, t.observed_s
-        columns = structure(*floats, t.bottom, t.top, t.proposal, t.points, t.hits, t.last_class, t.final)
+        columns = structure(*floats, t.bottom, t.top, t.proposal, t.points, t.hits, t.object_class, t.final)
         seen = structure(o.kdop, o.box, o.bottom, o.top, o.count, len(o))
         decays = (ENVELOPE_DECAY, MEAN_KDOP_DECAY, AGREE_M, SHRINKAGE, GROWTH, 1.0 - math.exp(-dt_s / LAG_S), dt_s)
         numbers = array("d", (*decays, *MAX_LENGTH_M, *CONFIRMED_GROWTH))

@@ -177,7 +177,6 @@ class Tracker:
         t = self._tracks
         creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
         t.unseen_s += self._period_s if creeps else dt_s
-        t.last_class = t.object_class
         self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
@@ -196,7 +195,7 @@ class Tracker:
         """A person cut above is as high as in (R, 7) the boxes known before the frame: writes track and proposal."""
         t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
         t.hidden[rows] = False
-        people = IS_PERSON[t.last_class[rows]].nonzero()[0]
+        people = IS_PERSON[t.object_class[rows]].nonzero()[0]
         people = people[frame.proposals.cut[own[people]] & Cut.TOP > 0]
         if not len(people):
             return
@@ -238,7 +237,7 @@ class Tracker:
 
     def _background(self, near: Bool) -> Bool:
         """(M,) tracks that are finally background, and near their rest position."""
-        background: Bool = self._tracks.last_class == ObjectClass.BACKGROUND.value
+        background: Bool = self._tracks.object_class == ObjectClass.BACKGROUND.value
         return self._tracks.final & background & near
 
     def _withdraw(self, near: Bool) -> None:
