@@ -9,7 +9,8 @@ import pytest
 from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment, OncePerSecond
 from modt.app.deadlines import Deadlines, Timing
 from modt.app.ladder import Step
-from modt.app.loop import WAIT_S, Loop, Stop
+from modt.app.session import WAIT_S, Session
+from modt.app.stop import Stop
 from modt.errors import MisuseError, ModtError
 from modt.sources.stream import Received, StreamEndedError
 from modt.types import Budget, Frame
@@ -48,7 +49,7 @@ class Sensor:
 class Stages:
     """Stages that take some time, and fail at the frames in `fails`."""
 
-    budget = Budget(16, None)
+    budget, chosen = Budget(16, None), None
 
     def __init__(self, time, work_s):
         self.time, self.work_s, self.fails, self.steps = time, work_s, {}, []
@@ -69,19 +70,12 @@ def loop_of(seconds, work=lambda t: 0.02, sinks=(), silent=(0.0, 0.0), stop=None
     sensor, stages = Sensor(time, seconds, silent), Stages(time, work)
     pings, reports, seen = [], [], []
     supervisor = Mock(pings=pings, alive=lambda: pings.append(time.now))
-    loop = Loop(
-        sensor,
-        stages,
-        {f"sink {k}": sink for k, sink in enumerate(sinks)},
-        calls.get("observe", lambda r, line: seen.append(r.frame.index)),
-        calls.get("report", lambda supervisor: reports.append(time.now)),
-        Deadlines(0.1, time),
-        Containment(),
-        stop or Stop(),
-        time,
-    )
-    run = loop.run
-    loop.run, loop.deadlines, loop.failures = lambda: run(supervisor), loop._deadlines, loop._failures
+    named = {f"sink {k}": sink for k, sink in enumerate(sinks)}
+    deadlines = Deadlines(0.1, time)
+    loop = Session(sensor, stages, Mock(), named, deadlines, Containment(), stop or Stop(), (), None, clock=time)
+    loop._observe = calls.get("observe", lambda r, line: seen.append(r.frame.index))
+    loop._report = calls.get("report", lambda supervisor: reports.append(time.now))
+    loop.run = lambda: loop.follow(supervisor)
     return loop, sensor, stages, supervisor, reports, seen
 
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from modt.app.containment import Containment
 from modt.app.deadlines import NoDeadlines
-from modt.app.loop import NAP_S, Loop, Stop
 from modt.app.playback import Pace, Playback
+from modt.app.session import Session
+from modt.app.stop import NAP_S, Stop
 from modt.app.supervisor import Supervisor
 from modt.energy.ledger import Ledger
 from modt.sources.stream import Faults, StreamInfo
@@ -81,10 +82,9 @@ def replay(stages, sink, stop=None, observe=lambda r, line: None):
     """Play nine frames through stages, to the end or a signal."""
     source = Playback(Frames(result(i, [], {}).frame for i in range(9)), Pace(), stages.ledger)
     deadlines, contained = NoDeadlines(Pace().report), Containment(contains=False)
-    loop = Loop(
-        source, stages, {"sink": sink}, observe, lambda supervisor: None, deadlines, contained, stop or Stop()
-    )
-    loop.run(Supervisor())
+    session = Session(source, stages, Mock(), {"sink": sink}, deadlines, contained, stop or Stop(), (), None)
+    session._observe = observe
+    session.follow(Supervisor())
 
 
 @pytest.mark.parametrize("broken", ["stages", "sink"])

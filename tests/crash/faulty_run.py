@@ -17,12 +17,12 @@ from unittest.mock import patch
 
 import numpy as np
 
-from modt.app import metering
+from modt.app import session as sessions
 from modt.app.containment import Containment
 from modt.app.deadlines import Deadlines
-from modt.app.loop import Stop
 from modt.app.session import Session
 from modt.app.status import STALE_S
+from modt.app.stop import Stop
 from modt.app.supervisor import Supervisor
 from modt.cli.status import read
 from modt.config import ProfileConfig, RecordingConfig
@@ -32,7 +32,6 @@ from modt.energy.meters.meter import Conditions, Facts, Kind, Meter, Scope
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.energy.windows import Clocks, Windows
 from modt.errors import ModtError
-from modt.reporting.summary import Summary
 from modt.sinks import run_directory
 from modt.sinks.background import Background
 from modt.sinks.datagrams import Datagrams
@@ -183,13 +182,13 @@ class FaultyRun:
             )
             stages: Any = Stages(poses)
             supervisor = Supervisor(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
-            stack.enter_context(patch.object(metering, "windows", self._windows))
+            stack.enter_context(patch.object(sessions, "Windows", self._windows))
             stack.enter_context(patch.object(live_stream, "READ_S", PAUSE_S))
             (folder / "memory").mkdir()
             stack.enter_context(patch.object(run_directory, "MEMORY", folder / "memory"))
             stack.enter_context(faults.installed())
             session = Session(
-                source, stages, recording, sinks, deadlines, Containment(), stop, Summary(), [meter], None,
+                source, stages, recording, sinks, deadlines, Containment(), stop, [meter], None,
                 metrics=folder / "modt.prom", clock=lambda: faults.now_s,
             )  # fmt: skip
             self.session = session
@@ -200,7 +199,7 @@ class FaultyRun:
                     while True:
                         socket.socket.__base__.recv(notified, 65_536)  # type: ignore[union-attr]
 
-            report = session.loop._report
+            report = session._report
 
             def reported(supervisor: Any) -> None:
                 report(supervisor)
@@ -208,7 +207,7 @@ class FaultyRun:
                 if source.turn >= TURNS:
                     stop.signal = "SIGTERM"
 
-            session.loop._report = reported
+            session._report = reported  # type: ignore[method-assign]
             faults.active = True
             try:
                 session.run(supervisor, tick)
@@ -249,7 +248,7 @@ class FaultyRun:
 
         recording.write, recording.ledger = write_counted, ledger_counted  # type: ignore[method-assign]
 
-    def _windows(self, meters: Any, core: int | None) -> Windows:
+    def _windows(self, meters: Any, *_machine: object) -> Windows:
         faults = self.faults
         clocks = Clocks(
             lambda: int(1e9 * faults.monotonic()),

@@ -21,7 +21,7 @@ class Node:
     """A node whose topics hand bytes from publishers to subscriptions."""
 
     def __init__(self):
-        self.subscribed, self.published, self.types = defaultdict(list), defaultdict(int), {}
+        self.subscribed, self.types = defaultdict(list), {}
 
     def create_subscription(self, kind, topic, callback, qos, *, raw):
         assert raw
@@ -29,15 +29,11 @@ class Node:
         self.types[topic] = f"{kind.__module__}.{kind.__name__}"
 
     def create_publisher(self, kind, topic, qos):
-        self.published[topic] += 1
         self.types[topic] = f"{kind.__module__}.{kind.__name__}"
         return SimpleNamespace(
             publish=lambda data: [receive(data) for receive in self.subscribed[topic]],
             get_subscription_count=lambda: len(self.subscribed[topic]),
         )
-
-    def count_publishers(self, topic):
-        return self.published[topic]
 
 
 def install(monkeypatch):

@@ -6,7 +6,7 @@ from modt.address import parse_address
 from modt.errors import MisuseError
 from modt.schemes import SINKS
 from tests.results import CAR, result
-from tests.ros2.network import FAR, NEAR, until
+from tests.ros2.network import FAR, NEAR, has_sender, until
 
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds
@@ -30,7 +30,7 @@ def test_a_frame_is_published_to_its_subscribers(loopback):
     joined = dds.participant(FAR)
     heard = {t.name: dds.Subscription(joined, t.name, t.type, depth=1, reliable=True) for t, _ in sink.topics}
     until(lambda: all(publication.receivers for _, publication in sink.topics))
-    until(lambda: all(subscription.senders for subscription in heard.values()))
+    until(lambda: all(map(has_sender, heard.values())))
     sink.write(FRAME)
     for topic, _ in sink.topics:
         assert [message.data for message in heard[topic.name].take(60.0)] == [topic.encode(FRAME)]

@@ -88,8 +88,8 @@ def test_a_message_that_cannot_be_used_is_counted_and_skipped(write, tmp_path, c
     stream = open_stream(write(tmp_path / "drive", recorded))
     assert [frame.index for frame in stream] == [0, 2]
     assert stream.faults.skipped == 2
-    assert "/points 1: 6 bytes end within a field; frame skipped" in caplog.text
-    assert "/points 3: stamped 5.000 s before the last sweep; frame skipped" in caplog.text
+    assert "/points: frame 1: 6 bytes end within a field; frame skipped" in caplog.text
+    assert "/points: frame 3: stamped 5.000 s before the last sweep; frame skipped" in caplog.text
 
 
 def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):

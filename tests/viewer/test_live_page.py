@@ -13,7 +13,7 @@ from modt.geometry import rotation_zyx, se3
 from modt.schemes import SINKS
 from modt.viewer import live_server
 from modt.viewer.live_page import open_view
-from modt.viewer.live_server import MOST_CLIENTS, MOST_CONNECTIONS
+from modt.viewer.live_server import MOST_CONNECTIONS, MOST_PAGES
 from modt.viewer.track_rows import COLUMNS, SCALED, result_rows
 from tests import results
 
@@ -144,8 +144,8 @@ def test_one_that_stalls_holds_nobody_up_and_misses_what_is_old(live, read):
 
 
 def test_too_many_are_refused(live, read):
-    answers = [read().answer.status for _ in range(MOST_CLIENTS + 1)]
-    assert answers == [200] * MOST_CLIENTS + [503]
+    answers = [read().answer.status for _ in range(MOST_PAGES + 1)]
+    assert answers == [200] * MOST_PAGES + [503]
 
 
 @pytest.mark.parametrize(

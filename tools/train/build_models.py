@@ -22,7 +22,7 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
 """Simulated worlds of each kind."""
 NEAR_WORLDS, NEAR_STEPS = {1: 3000, 2: 550}, 4000
-"""Seed and number of the worlds near the sensor: to train on, and for the card; steps."""
+"""Seed and number of the worlds near the sensor, first for training, then for the card; training steps."""
 KITTI_DATA = (
     "106 + 2 and 53 more object frames and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; SemanticKITTI "
     "labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 sweeps of Argoverse 2 (B. "

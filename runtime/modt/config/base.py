@@ -47,11 +47,6 @@ def shares(high: float, meaning: str) -> Any:
     return field(default=None, metadata={"low": 0.0001, "high": high, "length": len(OBJECTS), "meaning": meaning})
 
 
-def mechanism(config: type[StageConfig]) -> Any:
-    """Field of a nested configuration, a mapping in a profile."""
-    return field(default_factory=config)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageConfig:
     """Base of every stage's configuration: checks each value against its declared bounds.
@@ -62,8 +57,6 @@ class StageConfig:
 
     def __post_init__(self) -> None:
         for f in fields(self):
-            if isinstance(f.default_factory, type) and issubclass(f.default_factory, StageConfig):
-                continue  # checked as it was made
             check(f, getattr(self, f.name))
 
 

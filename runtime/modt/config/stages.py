@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from modt.classes import CLASSES
-from modt.config.base import StageConfig, choice, mechanism, number, per_class, shares
+from modt.config.base import StageConfig, choice, number, per_class, shares
 
 BATCH = 4
 """Proposals of one network call: few enough for their features to stay in the cache."""
@@ -135,16 +135,6 @@ class SegmentationConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PaperAssociationConfig(StageConfig):
-    """Association cost of the paper (section III-B), in effect with `association: paper`."""
-
-    alpha: float = number(2.0, 0.0, 100.0, "", "Weight of 1 - IoU of the boxes seen from above.")
-    beta: float = number(0.01, 0.0, 10.0, "", "Weight of similar numbers of points, which lower the cost.")
-    gamma: float = number(0.1, 0.0, 10.0, "", "Weight of similar sizes, which lower the cost.")
-    t_da: float = number(0.95, 0.0, 100.0, "", "Greatest cost of a match.")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingConfig(StageConfig):
     """Association of proposals with tracks, and the end of a track."""
 
@@ -158,4 +148,3 @@ class TrackingConfig(StageConfig):
     max_missed: int = number(
         8, 0, 100, "frames", "Time without a proposal, in periods, after which a track is deleted (N of a9 and a14)."
     )
-    paper: PaperAssociationConfig = mechanism(PaperAssociationConfig)

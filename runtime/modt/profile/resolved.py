@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from modt import assets
-from modt.config import ProfileConfig, StageConfig, ValueRangeError
+from modt.config import ProfileConfig, ValueRangeError
 from modt.errors import MisuseError
-from modt.profile.yaml_text import MAX_CHARACTERS, Written, read, value_text
+from modt.profile.yaml_text import MAX_CHARACTERS, Layer, read, value_text
 
 DEFAULT = "hdl-64e"
 """Profile of the sensor if none is asked for."""
 Names = str | Path | Sequence[str | Path] | None
 """Names or files of profiles; later ones win key by key."""
-
-
-@dataclass(frozen=True, slots=True)
-class Layer:
-    """One profile as written: its name or file, and its values by the paths of their keys."""
-
-    name: str
-    settings: Mapping[str, Any]
-
-    @property
-    def of_sensor(self) -> bool:
-        """Whether it sets a key of the sensor."""
-        return any(path.startswith("sensor.") for path in self.settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +52,12 @@ class Resolved:
 
     def shown(self) -> str:
         """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
-        set_by = {path: layer.name for layer in (*self.assumed, *self.layers) for path in layer.settings}
-        text = "".join(_shown(dump(self.config), set_by))
+        text, layers = "", (*reversed(self.layers), *reversed(self.assumed))
+        for stage, values in dump(self.config).items():
+            text += f"{stage}:\n"
+            for key, value in values.items():
+                set_by = next((layer.name for layer in layers if key in layer.settings.get(stage, ())), "default")
+                text += f"  {key}: {value_text(value)} # {set_by}\n"
         near_m = self.config.sensor.person_seen_from_m
         return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
 
@@ -91,27 +81,17 @@ def resolve(names: Names = None) -> Resolved:
 
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
     """Configuration of a YAML text and of the profiles that it extends; raises as `resolve` does."""
-    layers = _chain(read(text, origin), Path(origin), ())
+    layers = _chain(read(text, origin, str(origin)), Path(origin), ())
     return _configured(tuple(layers.values()), ProfileConfig())
 
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
     """A profile as plain data, with all defaults and tuples as lists."""
-    return dataclasses.asdict(config, dict_factory=_listed)
+    return asdict(config, dict_factory=_listed)
 
 
 def _listed(items: list[tuple[str, Any]]) -> dict[str, Any]:
     return {key: list(value) if isinstance(value, tuple) else value for key, value in items}
-
-
-def _shown(data: Mapping[str, Any], set_by: Mapping[str, str], group: str = "", indent: str = "") -> Iterator[str]:
-    """Lines of YAML, each value with the profile that has set it."""
-    for key, value in data.items():
-        if isinstance(value, dict):
-            yield f"{indent}{key}:\n"
-            yield from _shown(value, set_by, f"{group}{key}.", f"{indent}  ")
-        else:
-            yield f"{indent}{key}: {value_text(value)} # {set_by.get(group + key, 'default')}\n"
 
 
 def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:
@@ -125,49 +105,39 @@ def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:
     return tuple(layers.values())
 
 
-def _chain(written: Written, path: Path, within: tuple[Path, ...]) -> dict[Path, Layer]:
+def _chain(layer: Layer, path: Path, within: tuple[Path, ...]) -> dict[Path, Layer]:
     """A profile by its resolved file, after the profiles that it extends; `within`: the files that lead to it."""
     chain: dict[Path, Layer] = {}
     within = (*within, path.resolve())
-    for name in written.extends:
+    for name in layer.extends:
         try:
             base = assets.find("profiles", name, ".yaml", path.parent)
         except MisuseError as error:
-            raise MisuseError(f"{written.place}: extends {name}", error.cause, error.remedy) from None
+            raise MisuseError(f"{layer.place}: extends {name}", error.cause, error.remedy) from None
         if base.resolve() in within:
             circle = ", ".join(file.stem for file in within[within.index(base.resolve()) :])
-            raise MisuseError(written.place, f"extends itself, by way of {circle}", "remove one of these `extends`")
-        for file, layer in _chain(_read(base), base, within).items():
-            chain.setdefault(file, layer)
+            raise MisuseError(layer.place, f"extends itself, by way of {circle}", "remove one of these `extends`")
+        for file, extended in _chain(_read(base), base, within).items():
+            chain.setdefault(file, extended)
+    return {**chain, path.resolve(): layer}
+
+
+def _read(path: Path) -> Layer:
     name = path.stem if path.parent == assets.folder("profiles") else str(path)
-    return {**chain, path.resolve(): Layer(name, written.settings)}
-
-
-def _read(path: Path) -> Written:
     try:
         with path.open(encoding="utf-8") as file:
-            return read(file.read(MAX_CHARACTERS + 1), path)
+            return read(file.read(MAX_CHARACTERS + 1), path, name)
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(path, f"cannot be read ({error})", "make it a readable UTF-8 file") from None
 
 
 def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:
-    merged = {path: value for layer in layers for path, value in layer.settings.items()}
+    merged: dict[str, dict[str, Any]] = {}
+    for layer in layers:
+        for stage, values in layer.settings.items():
+            merged[stage] = {**merged.get(stage, {}), **values}
     try:
-        config: ProfileConfig = _changed(base, merged, "")
+        return replace(base, **{stage: replace(getattr(base, stage), **values) for stage, values in merged.items()})
     except ValueRangeError as error:
         names = ", ".join(layer.name for layer in layers)
         raise MisuseError(f"{names}: {error.key}", error.cause, error.remedy) from None
-    return config
-
-
-def _changed(config: Any, settings: Mapping[str, Any], prefix: str) -> Any:
-    """A configuration with the values of some keys changed."""
-    changes = {}
-    for f in dataclasses.fields(config):
-        value, path = getattr(config, f.name), prefix + f.name
-        if isinstance(value, StageConfig):
-            changes[f.name] = _changed(value, settings, f"{path}.")
-        elif path in settings:
-            changes[f.name] = settings[path]
-    return dataclasses.replace(config, **changes)

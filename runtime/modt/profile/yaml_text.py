@@ -34,22 +34,29 @@ class _Loader(yaml.SafeLoader):
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
-    """Content of a profile.
+class Layer:
+    """One profile as written.
 
     Attributes:
+        name: its name or file.
+        settings: values by stage and key.
         extends: names of the profiles on which it is based.
         place: file and line of that key, or the file alone without it.
-        settings: value by the path of its key, "sensor.height_m".
     """
 
+    name: str
+    settings: Mapping[str, Mapping[str, Any]]
     extends: tuple[str, ...]
     place: str
-    settings: Mapping[str, Any]
+
+    @property
+    def of_sensor(self) -> bool:
+        """Whether it sets a key of the sensor."""
+        return bool(self.settings.get("sensor"))
 
 
-def read(text: str, origin: Path | str) -> Written:
-    """Content of a YAML text, in which every key is optional.
+def read(text: str, origin: Path | str, name: str) -> Layer:
+    """The profile of a YAML text, in which every key is optional; messages name its `origin`.
 
     Raises:
         MisuseError: not YAML, an unknown key or a value out of range, with the line and the nearest valid key.
@@ -62,15 +69,15 @@ def read(text: str, origin: Path | str) -> Written:
         cause = str(getattr(error, "problem", None) or "unreadable")
         raise MisuseError(place, f"no YAML ({cause})", "correct this line") from None
     stages = {f.name: f.default_factory for f in dataclasses.fields(ProfileConfig)}
-    extends, place, settings = tuple[str, ...](), str(origin), dict[str, Any]()
+    extends, place, settings = tuple[str, ...](), str(origin), dict[str, dict[str, Any]]()
     for key, node, line in _entries(root, origin, {EXTENDS: None, **stages}, "profile"):
         stage = stages.get(key)
         if isinstance(stage, type):
-            settings |= _stage(stage, node, origin, line, f"{key}.")
+            settings[key] = _stage(stage, node, origin, line)
         else:
             place = f"{origin}:{line}"
             extends = _names(_plain(node, place), place)
-    return Written(extends, place, settings)
+    return Layer(name, settings, extends, place)
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:
@@ -93,19 +100,15 @@ def value_text(value: Any) -> str:
     return text.removesuffix("\n").removesuffix("\n...")
 
 
-def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int, prefix: str) -> dict[str, Any]:
-    """Values of a mapping by the paths of their keys."""
+def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int) -> dict[str, Any]:
+    """Values of the keys of a stage."""
     known = {f.name: f for f in dataclasses.fields(kind)}
     settings: dict[str, Any] = {}
     for key, value, at in _entries(node, origin, known, kind.__name__, line):
-        inner = known[key].default_factory
-        if isinstance(inner, type) and issubclass(inner, StageConfig):
-            settings |= _stage(inner, value, origin, at, f"{prefix}{key}.")
-            continue
         plain = _plain(value, f"{origin}:{at}")
-        settings[prefix + key] = tuple(plain) if isinstance(plain, list) else plain
+        settings[key] = tuple(plain) if isinstance(plain, list) else plain
         try:
-            check(known[key], settings[prefix + key])
+            check(known[key], settings[key])
         except ValueRangeError as error:
             raise MisuseError(f"{origin}:{at}: {key}", error.cause, error.remedy) from None
     return settings

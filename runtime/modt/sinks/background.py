@@ -111,17 +111,17 @@ class Background(Generic[T]):
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # real-time priority is for the loop alone
         while (job := self._next()) is not None:
-            self._attempt(job)
+            try:
+                job()
+            except Exception as error:
+                self._fail(error)
+                continue
+            self._written += 1
+            if self._state != "ok":
+                log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
+                self._state = "ok"
         with suppress(Exception):
             self._writer.close()
-
-    def _attempt(self, job: Callable[[], None]) -> None:
-        try:
-            job()
-        except Exception as error:
-            self._fail(error)
-        else:
-            self._succeed()
 
     def _next(self) -> Callable[[], None] | None:
         """Wait for the oldest job; None at the end."""
@@ -145,9 +145,3 @@ class Background(Generic[T]):
         self._state = what
         with self._changed:
             self._changed.wait_for(lambda: self._end_s is not None, self._retry_s)
-
-    def _succeed(self) -> None:
-        self._written += 1
-        if self._state != "ok":
-            log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
-            self._state = "ok"

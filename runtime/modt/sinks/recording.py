@@ -250,7 +250,8 @@ class WholeRecording(Recording):
         *,
         labels: bool,
     ) -> None:
-        super().__init__(directory, RecordingConfig(disk_mb=1e7), AtOnce(), describe)  # more than a disk has
+        more_than_a_disk_has = RecordingConfig(disk_mb=1e7, gb_per_day=1e5)
+        super().__init__(directory, more_than_a_disk_has, AtOnce(), describe)
         self._sequence, self._camera, self._labels = sequence, camera, labels
         self._more: list[Writer[FrameResult]] = []
 
@@ -277,9 +278,6 @@ class WholeRecording(Recording):
         super().finish()
         for writer in self._more:
             writer.close()
-
-    def _allows(self) -> bool:
-        return True
 
     def _attempt(self, action: Callable[[], None]) -> bool:
         action()

@@ -35,7 +35,7 @@ def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOM
     if config.association == "paper":
         from modt.tracking.paper_association import PaperAssociation
 
-        return PaperAssociation(config.paper)
+        return PaperAssociation()
     return KdopAssociation(kernels)
 
 

@@ -3,11 +3,9 @@
 import struct
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture, Fragments
+from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture
 from tools.send.pcap_writer import ethernet, ipv4, udp
 
 PAYLOADS = [b"first", b"", bytes(range(256)) * 5]
@@ -42,7 +40,6 @@ def test_either_byte_order_and_unit(tmp_path, order, magic, stamp_s):
 SOURCES = {4: "192.0.2.1", 6: "fe80::c901"}
 SOURCE = bytes.fromhex("fe80000000000000000000000000c901")
 WHOLE = udp(bytes(i % 251 for i in range(4000)), 7502)
-EXTENSIONS = bytes((60, 0)) + bytes(6) + bytes((17, 1)) + bytes(14)
 
 
 def ipv6(payload, *, kind=17):
@@ -72,11 +69,6 @@ def test_link_layers(tmp_path, link, frame, version):
     assert (read.source, read.port, read.payload) == (SOURCES[version], 2368, b"payload")
 
 
-def test_extension_headers_of_ipv6_are_skipped(tmp_path):
-    path = file_of(tmp_path / "a.pcap", [ipv6(EXTENSIONS + udp(b"payload", 2368), kind=0)], link=RAW_IP)
-    assert payloads(path) == [b"payload"]
-
-
 def fragment(version, at):
     piece, more = WHOLE[at : at + 1480], at + 1480 < len(WHOLE)
     if version == 4:
@@ -90,11 +82,6 @@ def test_fragments_are_put_together_in_any_order(tmp_path, version):
     between = ipv4(udp(b"between", 7502))
     path = file_of(tmp_path / "a.pcap", [parts[2], parts[0], between, parts[1], parts[0]], link=RAW_IP)
     assert payloads(path) == [b"between", WHOLE[8:]]
-
-
-@given(st.binary(max_size=200), st.sampled_from([0x45, 0x60, 0x6F]))
-def test_any_bytes_are_a_packet_or_none(raw, first):
-    Fragments().whole(bytes([first]) + raw)
 
 
 def test_packets_that_hold_no_datagram_are_skipped(tmp_path):

@@ -80,13 +80,6 @@ def validation() -> Validation:
     return Validation.of(single_points(LABEL, truth=truth_of(LABEL, 0 * LABEL, row=np.arange(400))))
 
 
-def test_what_contradicts_a_network_that_is_right_has_no_weight():
-    valid = validation()
-    weights, _ = fit_pool(softmax(SURE, axis=1), softmax(-SURE, axis=1), -SURE, valid, valid.weight)
-    assert weights.network > 0.95
-    assert max(weights.box, weights.reflectance) < 0.05
-
-
 def test_the_box_tells_objects_from_background_alone():
     valid = validation()
     weights, log_posterior = fit_pool(softmax(NOTHING, axis=1), softmax(SURE, axis=1), NOTHING, valid, valid.weight)
@@ -153,10 +146,6 @@ def test_scores_are_of_the_posterior_under_the_class_frequency_of_the_sensor():
     for scores in exact.values():
         assert scores["temperature"] == pytest.approx(1.0, abs=0.1)
         assert scores["calibration_error"] < 0.03
-    sharper = by_sensor(3 * scale * likelihood + np.log(valid.class_frequency), valid, valid.sensor == 0)
-    assert list(sharper) == ["rare"]
-    assert sharper["rare"]["temperature"] == pytest.approx(3.0, rel=0.15)
-    assert sharper["rare"]["calibration_error"] > 0.05
 
 
 def test_a_class_that_is_absent_keeps_the_assumed_frequency():

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import time
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
+from modt.config import EnergyConfig
 from modt.energy.meters.meter import (
     Candidate,
     Facts,
@@ -18,6 +20,7 @@ from modt.energy.meters.meter import (
     MeterLostError,
     Scope,
     file_meter,
+    model_meter,
     number_or_none,
     probe,
     read_text,
@@ -303,8 +306,9 @@ class Discovery:
         raise MisuseError(f"meter {name}", "not on this machine", f"use one of: {names}")
 
 
-def discover(model: Meter, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
+def discover(board: EnergyConfig, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
     """Search for every type of meter. The model of the board is the last of the usable ones."""
+    model = model_meter(board.idle_W, board.busy_W, time.monotonic_ns, time.process_time_ns)
     found = [candidate for find in FINDERS for candidate in find(sys)]
     found += [*find_pmic(vcgencmd), Candidate(model.facts.name, (model,))]
     return Discovery(tuple(sorted(found, key=_rank)))

@@ -30,13 +30,6 @@ def worst(kinds: Iterable[Kind]) -> Kind:
     return max(kinds, key=list(Kind).index)
 
 
-class Measurand(Words):
-    """The physical quantity of a reading."""
-
-    ENERGY = "energy"  # a counter [J]
-    POWER = "power"  # a momentary value [W]
-
-
 class Scope(Words):
     """The consumers a meter covers, from the narrowest."""
 
@@ -68,9 +61,9 @@ class Facts:
     privilege: str = "none"  # needed to read it
 
     @property
-    def measurand(self) -> Measurand:
-        """Power if the kind is integrated, else energy."""
-        return Measurand.POWER if self.kind is Kind.INTEGRATED else Measurand.ENERGY
+    def counts(self) -> bool:
+        """Whether a reading is an energy [J]; else it is a momentary power [W]."""
+        return self.kind is not Kind.INTEGRATED
 
     @property
     def must_draw(self) -> bool:
@@ -84,7 +77,7 @@ class Meter:
 
     facts: Facts
     read: Callable[[], float]
-    """Present value [J or W, by the measurand]; raises MeterLostError."""
+    """Present value [J or W, by facts.counts]; raises MeterLostError."""
 
 
 def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:

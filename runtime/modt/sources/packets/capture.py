@@ -1,6 +1,7 @@
 """PCAP files as streams, and the UDP datagrams in them.
 
-Files of either byte order with stamps in µs or ns are read; IPv4 and IPv6 over Ethernet, Linux cooked or raw IP.
+Files of either byte order with stamps in µs or ns are read; IPv4, and IPv6 without further headers, over Ethernet,
+Linux cooked or raw IP.
 """
 
 from __future__ import annotations
@@ -25,9 +26,7 @@ MAX_PENDING = 64
 """Greatest number of incomplete packets; beyond it the oldest one is dropped."""
 MORE, OFFSET = 0x2000, 0x1FFF
 MAX_PACKET_BYTES = 65_535
-IPV6_BYTES, FRAGMENT = 40, 44
-EXTENSIONS = (0, 43, FRAGMENT, 60)
-"""Extension headers of IPv6: hop by hop, routing, fragment, destination."""
+IPV6_BYTES, FRAGMENT_HEADER = 40, 44
 
 
 Packet = tuple[str, int, bytes]
@@ -54,14 +53,12 @@ class Fragments:
         return None if payload is None else (".".join(map(str, raw[12:16])), raw[9], payload)
 
     def _whole_of_ipv6(self, raw: bytes) -> Packet | None:
-        length, kind, payload = int.from_bytes(raw[4:6], "big"), raw[6], raw[IPV6_BYTES:]
-        whole: bytes | None = payload[: length or None]
-        while whole and kind in EXTENSIONS and len(whole) >= 8:
-            kind, extension, size = whole[0], kind, 8 if kind == FRAGMENT else 8 * (whole[1] + 1)
-            where, key, whole = int.from_bytes(whole[2:4], "big"), raw[8:IPV6_BYTES] + whole[4:8], whole[size:]
-            if extension == FRAGMENT:
-                whole = self._joined(key, where & ~7, whole, bool(where & 1))
-        return None if whole is None else (socket.inet_ntop(socket.AF_INET6, raw[8:24]), kind, whole)
+        length, kind = int.from_bytes(raw[4:6], "big"), raw[6]
+        payload: bytes | None = raw[IPV6_BYTES:][: length or None]
+        if kind == FRAGMENT_HEADER and payload and len(payload) >= 8:
+            kind, where, key = payload[0], int.from_bytes(payload[2:4], "big"), raw[8:IPV6_BYTES] + payload[4:8]
+            payload = self._joined(key, where & ~7, payload[8:], bool(where & 1))
+        return None if payload is None else (socket.inet_ntop(socket.AF_INET6, raw[8:24]), kind, payload)
 
     def _joined(self, key: bytes, offset: int, payload: bytes, more: bool) -> bytes | None:
         """Payload that a fragment completes, None while a part is missing."""
@@ -215,8 +212,7 @@ class PacketStream:
                 stamps.doubt(sweep.stamp_s, arrived_s)
                 continue
             flaws = [f"{missing} packets are missing"] if missing else []
-            place = (index, path, f"{path}: sweep {index}")
-            if frame := stamps.frame(sweep, arrived_s, self.faults, place, flaws):
+            if frame := stamps.frame(sweep, arrived_s, index, path, self.faults, flaws):
                 yield frame
 
     def between(self, first: int, last: int | None) -> Self:
@@ -237,8 +233,7 @@ class PacketStream:
         if self.capture.flaw is not None:
             flaws.append(self.capture.flaw)
         for flaw in flaws:
-            path = str(self.capture.path)
-            self.faults.report(index, path, flaw, skipped=False, place=f"{path}: sweep {index}")
+            self.faults.report(index, self.capture.path, flaw, skipped=False)
 
 
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
