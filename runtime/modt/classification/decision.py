@@ -92,8 +92,8 @@ class Decision(LikeliestClass):
         total = self._mass.sum()
         if total > MEMORY_PROPOSALS:
             self._mass *= MEMORY_PROPOSALS / total
-        frequency = START_PROPOSALS * self._start + self._mass
-        frequency /= frequency.sum()
-        frequency[1:] = np.minimum(np.maximum(frequency, self._assumed), self._assumed * MAX_CHANGE)[1:]
-        frequency[0] = max(1.0 - frequency[1:].sum(), MIN_BACKGROUND)
-        self.frequency = frequency / frequency.sum()
+        mass, assumed = (START_PROPOSALS * self._start + self._mass).tolist(), self._assumed.tolist()
+        n = sum(mass)  # lists are faster than arrays of four
+        objects = [min(max(m / n, a), a * MAX_CHANGE) for m, a in zip(mass[1:], assumed[1:], strict=True)]
+        frequency = [max(1.0 - sum(objects), MIN_BACKGROUND), *objects]
+        self.frequency = np.array(frequency) / sum(frequency)

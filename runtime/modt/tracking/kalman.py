@@ -47,16 +47,8 @@ def symmetric(P: Float64) -> Float64:
     return (P + transposed(P)) / 2
 
 
-def motion(x: Float64, dt_s: float) -> Float64:
-    """(4, M) F(x): constant heading and speed for dt_s (Equation 1)."""
-    moved = x.copy()
-    moved[X] += dt_s * np.cos(x[HEADING]) * x[SPEED]
-    moved[Y] += dt_s * np.sin(x[HEADING]) * x[SPEED]
-    return moved
-
-
 def motion_jacobian(x: Float64, dt_s: float) -> Float64:
-    """(2, 2, M) derivative of F's x and y by heading and speed, at x; the rest of F changes nothing."""
+    """(2, 2, M) derivative of the motion's x and y by heading and speed, at x; heading and speed stay as they are."""
     c, s = dt_s * np.cos(x[HEADING]), dt_s * np.sin(x[HEADING])
     return np.array(((-s * x[SPEED], c), (c * x[SPEED], s)))
 
@@ -71,7 +63,7 @@ def predict(
     """
     F = motion_jacobian(x, dt_s)
     moved = x.copy()
-    moved[:2] += F[:, 1] * x[SPEED]  # motion(), which is linear in the speed
+    moved[:2] += F[:, 1] * x[SPEED]  # the motion is linear in the speed
     along, across = np.square(dt_s * acceleration), np.square(dt_s**2 / 2 * acceleration)
     after, cross = P.copy(), P[:2, 2:] + product(F, P[2:, 2:])
     after[:2, :2] += product(F, P[2:, :2]) + product(cross, transposed(F))

@@ -141,7 +141,7 @@ class Tracker:
             certain: (R,) whether the class of each is certain now.
         """
         t = self._tracks
-        self._advance(rows, np.where(certain, Event.CLASSIFIED, Event.UNDECIDED))
+        self._advance(rows, np.where(certain, Event.CLASSIFIED.value, Event.UNDECIDED.value))
         return t.copy()
 
     def _advance(self, rows: Int, events: Event | Int) -> None:
