@@ -106,44 +106,11 @@ class Certainty:
 
 
 class Seen(NamedTuple):
-    """The R tracks with a proposal, for the decision which of them is worth a classification."""
+    """The R tracks with a proposal."""
 
     rows: Int
-    proposal: Int
-    hidden: Bool
-    may_be_object: Bool  # by box and motion
     posterior: Float64  # (4, R)
-    points: Int
-    key_points: Int
-    age: Int
-    key_age: Int
-
-    @property
-    def viewed(self) -> Bool:
-        """(R,) whether the network has classified it at least once."""
-        viewed: Bool = self.key_points > 0
-        return viewed
-
-    def shows_more(self, ratio: float = MORE_POINTS) -> Bool:
-        """(R,) tracks whose proposal shows clearly more of them than their last view."""
-        more: Bool = self.points > ratio * self.key_points + MORE_POINTS_BY
-        return more
-
-    def waits(self, growth: Float64 | float, frames: int) -> Bool:
-        """(R,) tracks as many times as old as at their last view, and some frames."""
-        waits: Bool = self.age >= growth * self.key_age + frames
-        return waits
-
-    def person_waits(self) -> Bool:
-        """(R,) tracks that may be people and were last classified PERSON_FRAMES ago."""
-        may_be: Bool = self.posterior[IS_PERSON].sum(axis=0) > MAYBE_PERSON
-        return may_be & self.waits(1.0, PERSON_FRAMES)
-
-    def near(self, proposals: Proposals) -> Bool:
-        """(R,) tracks whose proposal is near, and as long and as high as a person may be."""
-        x, y, _, length_m, _, height_m, _ = proposals.box.T
-        near: Bool = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
-        return near[self.proposal]
+    may_be_object: Bool  # probable enough for a classification, by box and motion
 
 
 class EveryFrame:
@@ -180,24 +147,16 @@ class FusedTracks:
     def observe(self, tracks: Tracks, proposals: Proposals) -> Seen:
         """Add the box and the motion of every track with a proposal to what is known of it."""
         rows = (tracks.proposal != NONE).nonzero()[0]
-        own, hidden = tracks.proposal[rows], tracks.hidden[rows]
-        prior = self.prior.probability(proposals).T.take(own, axis=1)
+        prior = self.prior.probability(proposals).T.take(tracks.proposal[rows], axis=1)
         evidence, known = _log(prior) - self._log_frequency[:, None], _by_class(tracks.box_evidence, rows)
-        gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~hidden
+        gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows]
         witness = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m.take(rows, axis=0)).T
         tracks.prior[rows], tracks.witness[rows] = prior.T, witness.T
         tracks.box_evidence[rows] = (known + gain * (evidence - known)).T
         weighed = prior * np.exp(witness)
         probability = (weighed / weighed.sum(axis=0)).T
         may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
-        posterior = self._conclude(tracks, rows)
-        points, key_points, age, key_age = (
-            tracks.points[rows],
-            tracks.key_points[rows],
-            tracks.age[rows],
-            tracks.key_age[rows],
-        )
-        return Seen(rows, own, hidden, may_be_object, posterior, points, key_points, age, key_age)
+        return Seen(rows, self._conclude(tracks, rows), may_be_object)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows; (R,) which are certain now.
@@ -243,10 +202,13 @@ class FirstViews(FusedTracks):
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
-        seen, asks = self.observe(tracks, proposals), np.zeros(len(tracks), np.bool_)
-        may = wants_class[seen.rows] & (tracks.hits[seen.rows] >= FIRST_VIEW_MIN_HITS) & ~seen.hidden
-        asks[seen.rows] = may & seen.may_be_object & (~seen.viewed | seen.shows_more() | seen.person_waits())
-        return asks
+        rows, posterior, may_be_object = self.observe(tracks, proposals)
+        waits = wants_class & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
+        asks = np.zeros(len(tracks), np.bool_)
+        asks[rows] = may_be_object & (
+            (~tracks.viewed | _shows_more(tracks))[rows] | _person_waits(tracks, rows, posterior)
+        )
+        return asks & waits
 
 
 class FurtherViews(FusedTracks):
@@ -260,16 +222,37 @@ class FurtherViews(FusedTracks):
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
-        seen, asks = self.observe(tracks, proposals), np.zeros(len(tracks), np.bool_)
-        background = seen.posterior[ObjectClass.BACKGROUND]
-        first = seen.may_be_object | seen.near(proposals)
-        review = (background < 0.5) & seen.waits(REVIEW_GROWTH, REVIEW_FRAMES)
-        review |= first & seen.shows_more(FAR_MORE_POINTS)
+        rows, posterior, may_be_object = self.observe(tracks, proposals)
+        background, age, key_age = posterior[ObjectClass.BACKGROUND], tracks.age[rows], tracks.key_age[rows]
+        first = may_be_object | _near(proposals)[tracks.proposal[rows]]
+        review = (background < 0.5) & (age >= REVIEW_GROWTH * key_age + REVIEW_FRAMES)
+        review |= first & _shows_more(tracks, FAR_MORE_POINTS)[rows]
         growth = np.where(background > LIKELY_BACKGROUND, BACKGROUND_GROWTH, UNSURE_GROWTH)
-        unsure = seen.shows_more() | seen.waits(growth, UNSURE_FRAMES) | seen.person_waits()
-        further = np.where(self.certain(seen.posterior), review, unsure)
-        asks[seen.rows] = ~seen.hidden & np.where(seen.viewed, further, first)
+        unsure = _shows_more(tracks)[rows] | (age >= growth * key_age + UNSURE_FRAMES)
+        unsure |= _person_waits(tracks, rows, posterior)
+        further = np.where(self.certain(posterior), review, unsure)
+        asks = np.zeros(len(tracks), np.bool_)
+        asks[rows] = ~tracks.hidden[rows] & np.where(tracks.viewed[rows], further, first)
         return asks
+
+
+def _near(proposals: Proposals) -> Bool:
+    """(P,) proposals that are near, and as long and as high as a person may be."""
+    x, y, _, length_m, _, height_m, _ = proposals.box.T
+    near: Bool = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
+    return near
+
+
+def _person_waits(tracks: Tracks, rows: Int, posterior: Float64) -> Bool:
+    """(R,) rows that may be people by their posterior (4, R), and were last classified PERSON_FRAMES ago."""
+    waits: Bool = posterior[IS_PERSON].sum(axis=0) > MAYBE_PERSON
+    return waits & (tracks.age >= tracks.key_age + PERSON_FRAMES)[rows]
+
+
+def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:
+    """(M,) tracks whose last proposal shows clearly more of them than their last view."""
+    more: Bool = tracks.points > ratio * tracks.key_points + MORE_POINTS_BY
+    return more
 
 
 def _by_class(column: Float64, rows: Int) -> Float64:

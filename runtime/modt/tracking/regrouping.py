@@ -166,9 +166,8 @@ class Regrouping:
         known, kdop = tracks.known_kdops(senior), frame.observations.kdop
         k, part = self._kernels.overlapping_pairs(known, kdop)
         rows, other = senior[k], owner[part]
-        person, class_ = IS_PERSON[tracks.object_class], tracks.object_class
-        one_class = class_[rows] == class_[other]
-        one_class |= (~person | tracks.hidden)[rows] & ~person[other]  # background and cars are easily confused
+        a, b = tracks.object_class[rows], tracks.object_class[other]
+        one_class = (a == b) | _whole(tracks)[rows] & ~IS_PERSON[b]  # background and cars are easily confused
         free = (other == NONE) | (other == rows) | (junior[other] > junior[rows]) & one_class
         within = self._kernels.coverage(kdop, known, part, k)
         around = self._kernels.coverage(tracks.predicted_kdops(), kdop, rows, part)
