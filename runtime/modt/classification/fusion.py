@@ -34,7 +34,7 @@ FORGETTING, GROWTH = 0.72, 0.22
 BOX_FORGETTING, BOX_WEIGHT = 0.5, 0.75
 """Weight of the boxes so far at a further one, and of their mean."""
 MISMATCH_PROBABILITY = 0.05
-"""That a proposal is not the object of its track: the posterior is then the prior of its box."""
+"""Probability that a proposal is not the object of its track, whose posterior is then the prior of the box."""
 MORE_POINTS, FAR_MORE_POINTS, MORE_POINTS_BY = 1.25, 2.0, 5
 """An uncertain track is classified again at MORE_POINTS times the points of its last view, a certain one that may be
 an object at FAR_MORE_POINTS times; each by MORE_POINTS_BY more, which is random variation."""
@@ -50,7 +50,7 @@ LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
 """Posterior from which an uncertain track is probably background, and UNSURE_GROWTH of such a track."""
 MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 """Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
-a view of a few points says little, and many of them are right."""
+one view of a few points is weak evidence, and many of them are right."""
 NEAR_M = 3.0
 """Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
@@ -83,7 +83,7 @@ def log_frequency_of(prior: Prior) -> Float64:
 
 
 class Certainty:
-    """Whether the posterior of an object, or the evidence for background, reaches its threshold.
+    """Test whether the posterior of an object, or the evidence for background, reaches its threshold.
 
     Background is the most frequent class and has a high posterior before any view, so its threshold applies to the
     posterior under equal class frequencies.
@@ -176,7 +176,7 @@ class FusedTracks:
         return self.certain(self._conclude(tracks, rows))
 
     def _conclude(self, tracks: Tracks, rows: Int) -> Float64:
-        """Write the posterior of the rows; (4, R). The class of a remembered place has probability 1."""
+        """Write the posterior (4, R) of the rows, and return it. The class of a remembered place has probability 1."""
         weight = tracks.views[rows] ** GROWTH
         known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
         known += BOX_WEIGHT * _by_class(tracks.box_evidence, rows) + _by_class(tracks.witness, rows)

@@ -1,4 +1,4 @@
-"""The pool of network, box and reflectance: the box says whether there is an object, not which."""
+"""The pool of network, box and reflectance. The box tells objects from background, not one class from another."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _log_odds(log_probability: Float64) -> Float64:
 
 
 def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Float64:
-    """(R, 4) logarithm of the class frequency and of what log P(class | box) (R, 4) says, up to a constant.
+    """(R, 4) logarithm of the class frequency times the likelihood of an object by its box, up to a constant.
 
     Args:
         log_box: (R, 4) log P(class | box), up to a constant a row.

@@ -54,7 +54,7 @@ class GeometryKernels:
     """
 
     library: ctypes.CDLL | None = None
-    """Where compiled passes are."""
+    """Library of the compiled passes, for the kernels of other stages."""
     upright_boxes = staticmethod(upright_boxes)
     kdop_ends = staticmethod(kdop_ends)
     copy_runs = staticmethod(copy_runs)

@@ -52,9 +52,12 @@ EXPORT void modt_regrouped(const Rows *rows, const i64 *offsets, i64 n_groups, c
     i64 total = 0;
     for (i64 g = 0; g < n; g++)
         count[g] = 0;
-    for (i64 g = 0; g < n_groups; g++)
+    for (i64 g = 0; g < n_groups; g++) {
+        PROVEN(label[g] >= 0 && label[g] < n);
         count[label[g]] += offsets[g + 1] - offsets[g];
+    }
     for (i64 m = 0, g = 0; m < n_moved; m++) {
+        PROVEN(own[m] >= 0 && own[m] < n);
         while (offsets[g + 1] <= moved[m])
             g++;
         count[label[g]]--, count[own[m]]++;

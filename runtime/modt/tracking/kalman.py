@@ -59,7 +59,7 @@ def predict(
     """States and covariances dt_s later, F P F' + Q.
 
     Q is what an acceleration [m/s2] and a rate of turn [rad/s], white within dt_s, add. Across its heading a track
-    can be pushed as hard as along it while it stands: then the heading says nothing.
+    can be pushed as hard as along it while it stands, since its heading is then unknown.
     """
     F = motion_jacobian(x, dt_s)
     moved = x.copy()
@@ -94,8 +94,8 @@ def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) ->
 def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64]:
     """Turn the heading of tracks that stand to where they seem to go.
 
-    At speed zero every heading says the same, and the filter's linearisation would see motion along one of them
-    only: the heading may be chosen, and what is known along it and across it turns with it.
+    At speed zero all headings are the same state, but the linearisation sees motion along the chosen one alone. So the
+    heading is chosen anew, and the covariance along it and across it turns with it.
     """
     turn = heading_rad - x[HEADING]
     c, s = np.cos(turn), np.sin(turn)

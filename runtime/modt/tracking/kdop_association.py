@@ -69,9 +69,10 @@ class KdopAssociation:
 
 
 def _reach(xx: Float64, xy: Float64, yy: Float64) -> Float64:
-    """(M,) distance from positions of covariances [m2] at which a pair still costs less than MAX_COST [m].
+    """(M,) distance beyond which no pair of a track is listed, by the covariance of its position [m].
 
-    Shapes that do not overlap cost the weight of the overlap at least, and an uncertain position its uncertainty.
+    It is three deviations, or fewer where a pair would cost more than MAX_COST: shapes that do not overlap cost the
+    weight of the overlap at least, and an uncertain position costs its uncertainty.
     """
     least = POSITION_SIGMA_M**2 + JUMP_SIGMA_M**2
     uncertainty = np.log(((xx + least) * (yy + least) - xy * xy) / least**2)

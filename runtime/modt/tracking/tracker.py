@@ -82,7 +82,7 @@ class Tracker:
         self._tracks, self.next_id = tracks.copy(), next_id
 
     def adopt(self, other: Tracker) -> None:
-        """Go on where another tracker stands."""
+        """Continue with the tracks and the time of another tracker."""
         self.restore(other.tracks, other.next_id)
         self._stamp_s = other._stamp_s
 
@@ -145,7 +145,7 @@ class Tracker:
         return t.copy()
 
     def _advance(self, rows: Int, events: Event | Int) -> None:
-        """Move rows to the states that events lead to; the state says whether the class is final."""
+        """Move rows to the states that events lead to, and write whether the class is final there."""
         t = self._tracks
         if not len(rows):
             return
@@ -206,7 +206,7 @@ class Tracker:
             boxes[index, 2:6:3] += np.outer(hidden_m, (0.5, 1.0))  # z of the middle, and height
 
     def _observe_rest(self, rows: Int) -> None:
-        """Which tracks are near their rest position; a track that stopped rests where it is."""
+        """Write rest position and stationary of the rows; a track that stopped rests where it is."""
         t = self._tracks
         x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
         stopped = ((x[:, SPEED] < STOPPED_MPS) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
