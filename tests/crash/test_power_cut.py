@@ -1,11 +1,108 @@
 """After a power cut at any moment: what was synced is there, and a restart works and keeps to its limit."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
 import pytest
 
-from tests.crash.power_cut import PowerCuts
 from tests.sinks.recordings import begun, frame, frames, parts
 
 FRAMES, A_SECOND = 50, 5
+Entries = dict[str, int]
+
+
+@dataclass(frozen=True)
+class State:
+    """Inodes by number: the names in folders, and the bytes of files."""
+
+    folders: dict[int, Entries]
+    files: dict[int, bytes]
+
+    def write(self, root: int, target: Path) -> None:
+        """Lay it out below a folder; what has a name but never reached the disk is empty."""
+        target.mkdir()
+        for name, number in self.folders.get(root, {}).items():
+            if number in self.folders:
+                self.write(number, target / name)
+            else:
+                (target / name).write_bytes(self.files.get(number, b""))
+
+
+@dataclass
+class PowerCuts:
+    """Watches a folder, and notes what a power cut would leave after every call that changes or syncs it.
+
+    Attributes:
+        cuts: the states, each by what the disk did with what was not synced (lost all, kept the names, kept all), and
+            with what was safe then.
+    """
+
+    root: Path
+    cuts: list[tuple[str, State, int]] = field(default_factory=list)
+    safe: int = 0  # items that must be there from now on, as the test says
+    _durable: State = field(default_factory=lambda: State({}, {}))
+
+    def __post_init__(self) -> None:
+        live = self._live()
+        self._durable.folders.update(live.folders)
+        self._durable.files.update(live.files)
+
+    @property
+    def number(self) -> int:
+        """Inode of the root."""
+        return self.root.stat().st_ino
+
+    def note(self) -> None:
+        """A power cut may come now."""
+        live, durable = self._live(), self._durable
+        known = {number: {} for number in live.folders}
+        lost = State({**known, **{n: dict(names) for n, names in durable.folders.items()}}, dict(durable.files))
+        named = State(live.folders, dict(durable.files))
+        cuts = [("lost", lost, self.safe), ("named", named, self.safe), ("kept", live, self.safe)]
+        self.cuts += [cut for cut in cuts if cut not in self.cuts[-len(cuts) :]]
+
+    @contextmanager
+    def watch(self) -> Iterator[None]:
+        """Within it, calls of `os` are noted."""
+        names = ("rename", "replace", "mkdir", "unlink", "rmdir")
+        calls: dict[str, Any] = {name: self._noted(getattr(os, name)) for name in names}
+        with patch.multiple(os, fsync=self._synced(os.fsync), **calls):
+            yield
+
+    def _noted(self, call: Any) -> Any:
+        def noted(*arguments: Any, **options: Any) -> Any:
+            self.note()
+            result = call(*arguments, **options)
+            self.note()
+            return result
+
+        return noted
+
+    def _synced(self, call: Any) -> Any:
+        def synced(number: int) -> None:
+            self.note()
+            call(number)
+            inode, live = os.fstat(number).st_ino, self._live()
+            if inode in live.folders:
+                self._durable.folders[inode] = live.folders[inode]
+            else:
+                self._durable.files[inode] = live.files[inode]
+            self.note()
+
+        return synced
+
+    def _live(self) -> State:
+        folders, files = {}, {}
+        for folder, names, found in os.walk(self.root):
+            here = Path(folder)
+            folders[here.stat().st_ino] = {name: (here / name).stat().st_ino for name in (*names, *found)}
+            files.update({(here / name).stat().st_ino: (here / name).read_bytes() for name in found})
+        return State(folders, files)
 
 
 @pytest.fixture(name="disk", scope="module")

@@ -2,12 +2,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from modt.config import EnergyConfig
+from modt.energy.attribution import attribute
 from modt.energy.ledger import Ledger
 from modt.energy.meters.discovery import find_hwmon, find_powercap
 from modt.energy.meters.meter import Conditions, model_meter
 from modt.energy.windows import SCHEMA, Windows
 
-from .simulated import SimulatedMachine, write_files
+from .simulated import CALIBRATED, SimulatedMachine, line_of, write_files
 
 
 class Metered:
@@ -57,6 +59,8 @@ def test_window_has_its_energy_and_counts(metered):
     assert line["marks"] == []
     assert metered.frame(8, 0.9) is None
     assert metered.frame(9, 0.1)["frames"] == [8, 9, 2]
+    line = metered.second(10)  # the counter begins anew
+    assert (line["energy_J"], line["marks"]) == (pytest.approx(3.5, abs=2 * 61e-6), ["wrap"])
 
 
 def test_lost_meter_is_marked_and_resumes(metered):
@@ -126,3 +130,18 @@ def test_a_window_is_as_reliable_as_its_least_reliable_meter(metered):
             machine.wait(1.0)
             line = windows.close()
         assert (line["energy_J"], line["kind"]) == found
+
+
+@given(energy_J=st.floats(0, 20), frames=st.integers(0, 9), load=st.integers(0, 9))
+def test_the_energy_attributed_to_the_parts_of_a_window_is_its_own(energy_J, frames, load):
+    line = line_of(energy_J, frames, load)
+    for board in (EnergyConfig(), CALIBRATED):
+        assert sum(attribute(line, board).values()) == pytest.approx(energy_J)
+
+
+def test_coefficients_split_the_reading_of_a_calibrated_board_but_not_the_model():
+    parts = attribute(line_of(5.0, 2, 4), CALIBRATED)
+    expected = {"idle": 3.0, "segmentation": 0.2, "classification": 0.04 + 0.036, "unattributed": 1.724}
+    assert parts == pytest.approx(expected)
+    estimated = line_of(5.0, 2, 4, kind="estimated")
+    assert attribute(estimated, CALIBRATED) == attribute(estimated, EnergyConfig())

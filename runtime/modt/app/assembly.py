@@ -63,12 +63,9 @@ def _views(usual: Callable[[FusionConfig, Prior], Fusion], product: str) -> Call
     """A fusion, or the one of this name for the rule `product`, whose module is loaded on demand."""
 
     def made(config: FusionConfig, prior: Prior) -> Fusion:
-        rule = (
-            getattr(import_module("modt.classification.product_fusion"), product)
-            if config.rule == "product"
-            else usual
-        )
-        fusion: Fusion = rule(config, prior)
+        if config.rule != "product":
+            return usual(config, prior)
+        fusion: Fusion = getattr(import_module("modt.classification.product_fusion"), product)(config, prior)
         return fusion
 
     return made

@@ -143,7 +143,7 @@ class NoDeadlines:
     """Every frame of a replay is processed, and may spend the budget of its profile.
 
     Attributes:
-        report: report of the pace.
+        report: report of the playback.
     """
 
     reduced = False

@@ -18,7 +18,7 @@ from modt import host, profile
 from modt.app import inputs
 from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.deadlines import Deadlines, NoDeadlines
-from modt.app.playback import Pace, Playback
+from modt.app.playback import Playback
 from modt.app.stages import SensorWatch, Stages
 from modt.app.status import SCHEMA, Counts, Power, one_line
 from modt.app.stop import Stop
@@ -304,8 +304,7 @@ def replay(
         MisuseError: an invalid request.
     """
     stop, ledger = Stop(), Ledger()
-    pace = Pace(request.rate_hz, sleep=stop.sleep)
-    source = Playback(inputs.stream(request), pace, ledger)
+    source = Playback(inputs.stream(request), ledger, request.rate_hz, stop.sleep)
     stages = Stages(request, source.info, ledger)
     name = re.sub(r"[^\w.]+", "-", source.info.name)
     recording = WholeRecording(
@@ -316,7 +315,7 @@ def replay(
         labels=request.labels,
     )
     meters = discover(stages.config.energy).best.meters
-    deadlines, failures = NoDeadlines(pace.report), Containment(contains=False)
+    deadlines, failures = NoDeadlines(source.report), Containment(contains=False)
     return Session(source, stages, recording, sinks, deadlines, failures, stop, meters, core)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import socket
 import threading
-from collections.abc import Iterator
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler
 from ipaddress import ip_address
@@ -71,16 +70,16 @@ class LiveServer(ThreadingTCPServer):
         with self._changed:
             self._pages -= 1
 
-    def events(self, number: int) -> Iterator[bytes]:
-        """The newest event, each time that it is a later one than the last; a comment after ALIVE_S without one."""
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._closed or self._number > number, ALIVE_S)
-                if self._closed:
-                    return
-                event = self._event if self._number > number else b": alive\n\n"
-                number = self._number
-            yield event
+    def event_after(self, number: int) -> tuple[int, bytes] | None:
+        """Wait for an event after the one of a number, and return the newest with its number; None at the end.
+
+        After ALIVE_S without an event it is a comment.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self._number > number, ALIVE_S)
+            if self._closed:
+                return None
+            return self._number, self._event if self._number > number else b": alive\n\n"
 
     def close(self) -> None:
         """Stop the server and disconnect the pages."""
@@ -145,8 +144,9 @@ class _Handler(BaseHTTPRequestHandler):
             return
         try:
             self._head("text/event-stream")
-            for event in self.server.events(number):
-                self.wfile.write(event)
+            while (event := self.server.event_after(number)) is not None:
+                number, text = event
+                self.wfile.write(text)
         except OSError:
             with suppress(OSError):
                 self.connection.close()

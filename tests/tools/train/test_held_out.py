@@ -70,23 +70,15 @@ def test_every_sensor_counts_as_much_as_the_others():
     np.testing.assert_allclose(np.bincount(valid.label, some)[1:] * 5 / 8, [3 / 8, 1 / 4])  # as often as among all
 
 
-LABEL = np.arange(400) % 4
-SURE = np.log(np.eye(4)[LABEL] * 0.96 + 0.01)
-NOTHING = np.zeros((400, 4))
-
-
-def validation() -> Validation:
-    """400 crops, as many of every class."""
-    return Validation.of(single_points(LABEL, truth=truth_of(LABEL, 0 * LABEL, row=np.arange(400))))
-
-
 def test_the_box_tells_objects_from_background_alone():
-    valid = validation()
-    weights, log_posterior = fit_pool(softmax(NOTHING, axis=1), softmax(SURE, axis=1), NOTHING, valid, valid.weight)
+    label, nothing = np.arange(400) % 4, np.zeros((400, 4))
+    valid = Validation.of(single_points(label, truth=truth_of(label, 0 * label, row=np.arange(400))))
+    box = np.eye(4)[label] * 0.96 + 0.01
+    weights, log_posterior = fit_pool(softmax(nothing, axis=1), box, nothing, valid, valid.weight)
     assert weights.box > 0.95
     assert weights.reflectance == 0.0
     posterior = softmax(log_posterior, axis=1)
-    assert posterior[LABEL == 0, 0].min() > 0.9
+    assert posterior[label == 0, 0].min() > 0.9
     np.testing.assert_allclose(posterior[:, 1], posterior[:, 3])
 
 

@@ -181,8 +181,8 @@ def _player(view: View) -> None:
 
 
 def _picture(view: View) -> None:
-    figure = next(view.drawings(PICTURE_WIDTH, 1))  # names a missing library before the next module needs it
-    from modt_desk.viewer.film import save_picture
+    figure = next(view.drawings(PICTURE_WIDTH, 1))  # names a missing library
+    from modt_desk.viewer.picture import save_picture
 
     save_picture(view.out, figure, f"{view.run.facts['stream']['name']}, frame {view.run.numbers[view.at]}")
 
@@ -190,7 +190,7 @@ def _picture(view: View) -> None:
 def _film(view: View) -> None:
     drawings = view.drawings(FILM_WIDTH)
     first = next(drawings)
-    from modt_desk.viewer.film import save_film
+    from modt_desk.viewer.picture import save_film
 
     save_film(view.out, first, drawings, view.period_s)
 

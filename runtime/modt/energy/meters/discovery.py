@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import time
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -57,7 +56,8 @@ def find_powercap(sys: Path) -> list[Candidate]:
         elif zone.name.startswith("intel-rapl-mmio") and label in registers:
             found.append(Candidate(name, (), "the same package again", "none needed: its duplicate is used"))
         elif not (zone / "energy_uj").exists() and (zone / "power_uw").exists():
-            found.append(probe(name, (_scmi(zone, name),), "make its power_uw readable"))
+            facts = Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED)
+            found.append(probe(name, (file_meter(facts, zone / "power_uw"),), "make its power_uw readable"))
         elif label == "psys":
             found.append(probe(name, (_rapl(zone, name, Scope.BOARD),), _RAPL_REMEDY))
         elif label.startswith("package"):
@@ -92,10 +92,6 @@ def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
     return file_meter(facts, zone / "energy_uj")
 
 
-def _scmi(zone: Path, name: str) -> Meter:
-    return file_meter(Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED), zone / "power_uw")
-
-
 @dataclass(frozen=True, slots=True)
 class Board:
     """A board whose power rails are known, recognised by the model in its device tree and the labels of its rails.
@@ -118,37 +114,30 @@ BOARDS = (
 )
 
 
-def board_of(model: str, labels: Collection[str]) -> Board | None:
-    """The board of a model in the device tree with these rails; by the rails alone where the model is empty."""
-    for board in BOARDS:
-        if {board.cpu, *board.whole}.issubset(labels) and (not model or re.search(board.model, model)):
-            return board
-    return None
-
-
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
 _PART_SHARE = 1.1
 """A module is refused if the rails that it feeds draw more than this factor of its own power."""
 
 
 def find_hwmon(sys: Path) -> list[Candidate]:
-    """A candidate for each rail. Rails may feed one another, so only those of a known board are summed."""
+    """A candidate for the module of a known board (its supply rail or a sum of rails), then for each rail.
+
+    Rails may feed one another, so only those of a known board are summed. A board is known by its model in the device
+    tree and its rails; by the rails alone where there is no model.
+    """
     folders = sorted((sys / "class" / "hwmon").glob("hwmon*"), key=lambda p: (len(p.name), p.name))
     rails: dict[str, Meter] = {}
     for folder in folders:
         chip = text_or_none(folder / "name")
         if chip in _INA_CHIPS:
-            found_here = _rails(folder, chip)
-            rails |= {f"{label} of {folder.name}" if label in rails else label: m for label, m in found_here.items()}
+            for label, meter in _rails(folder, chip).items():
+                rails[f"{label} of {folder.name}" if label in rails else label] = meter
     if not rails:
         remedy = "wire an INA219, INA226 or INA3221 into the supply and load its driver"
         return [Candidate("hwmon", (), "no power monitor under /sys/class/hwmon", remedy)]
-    return _rails_of_board(text_or_none(sys / "firmware/devicetree/base/model") or "", rails)
-
-
-def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
-    """Candidates for the module of a known board (its supply rail or a sum of rails), then for each rail."""
-    remedy, board = "make the chip's inputs readable", board_of(model, rails)
+    model = text_or_none(sys / "firmware/devicetree/base/model") or ""
+    fitting = (b for b in BOARDS if rails.keys() >= {b.cpu, *b.whole} and (not model or re.search(b.model, model)))
+    board, remedy = next(fitting, None), "make the chip's inputs readable"
     found = [] if board is None else [_module(board, rails, remedy)]
     for label, meter in rails.items():
         if board is None or board.whole != (label,):

@@ -16,7 +16,7 @@ from modt.sources.stream import Received, StreamEndedError
 from modt.types import Budget, Frame
 from tests.results import Kept, result
 
-from .test_loop import Time
+from .test_playback import Time
 
 POINTS = np.zeros((1, 4), np.float32)
 
@@ -157,6 +157,13 @@ def test_failures_that_repeat_renew_the_stages_and_then_end_the_run():
     stages.fails = {1: MisuseError("poses", "too few", "give more")}
     with pytest.raises(MisuseError):
         loop.run()
+
+
+def test_a_replay_contains_no_failure():
+    failures, gone = Containment(contains=False), ConnectionError("gone")
+    for failing in (lambda: failures.spare("sink", Mock(side_effect=gone)), lambda: failures.fail(gone, "frame")):
+        with pytest.raises(ConnectionError):
+            failing()
 
 
 def test_a_source_that_fails_is_asked_again_and_after_ten_failures_ends_the_run():
