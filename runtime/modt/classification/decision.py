@@ -4,8 +4,8 @@ A posterior holds for the class frequencies that the model was trained to assume
 from the posteriors themselves (M. Saerens et al., "Adjusting the outputs of a classifier to new a priori
 probabilities", Neural Computation 2002), slowly and within bounds: no object becomes rarer than the model assumes,
 since the first of its class may yet come. An object is reported where its expected cost, if it were missed, exceeds
-that of a false one. The class that was reported last needs less, since a posterior also falls while the object is half
-hidden.
+that of a false one. The class that was reported last needs less, since a posterior also falls while the object is
+half hidden.
 """
 
 from __future__ import annotations

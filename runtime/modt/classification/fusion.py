@@ -176,7 +176,7 @@ class FusedTracks:
         return self.certain(self._conclude(tracks, rows))
 
     def _conclude(self, tracks: Tracks, rows: Int) -> Float64:
-        """Write the posterior (4, R) of the rows, and return it. The class of a remembered place has probability 1."""
+        """Posterior (4, R) of the rows, which is written; the class of a remembered place has probability 1."""
         weight = tracks.views[rows] ** GROWTH
         known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
         known += BOX_WEIGHT * _by_class(tracks.box_evidence, rows) + _by_class(tracks.witness, rows)

@@ -94,8 +94,8 @@ def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) ->
 def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64]:
     """Turn the heading of tracks that stand to where they seem to go.
 
-    At speed zero all headings are the same state, but the linearisation sees motion along the chosen one alone. So the
-    heading is chosen anew, and the covariance along it and across it turns with it.
+    At speed zero all headings are the same state, but the linearisation sees motion along the chosen one alone. So
+    the heading is chosen anew, and the covariance along it and across it turns with it.
     """
     turn = heading_rad - x[HEADING]
     c, s = np.cos(turn), np.sin(turn)

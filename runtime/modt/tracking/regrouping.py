@@ -16,7 +16,7 @@ The risk: a person who steps close to a parked car, and is not classified yet, b
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -53,37 +53,22 @@ OPPOSITE = np.arange(-4, 4)
 """Direction of a k-DOP that is opposite to each."""
 
 
-@dataclass(frozen=True, slots=True)
-class Associated:
-    """A frame after association.
-
-    Attributes:
-        proposals: proposals of the frame.
-        observations: the proposals in the world.
-        matches: pairs of tracks and proposals.
-    """
+class Associated(NamedTuple):
+    """A frame after association."""
 
     proposals: Proposals
-    observations: Observations
+    observations: Observations  # the proposals in the world
     matches: Matches
 
 
-@dataclass(frozen=True, slots=True)
-class Pairs:
-    """Tracks and the proposals that overlap their known extents, by falling seniority of the tracks.
+class Pairs(NamedTuple):
+    """Tracks and the proposals that overlap their known extents, by falling seniority of the tracks."""
 
-    Attributes:
-        rows, proposals: (K,) row and proposal of each pair.
-        within: (K,) part of the proposal that lies within the known extent.
-        around: (K,) part of the track, as it is expected, that lies within the proposal.
-        free: (K,) the track may take the proposal, and most of one lies within the other.
-    """
-
-    rows: Int
-    proposals: Int
-    within: Float64
-    around: Float64
-    free: Bool
+    rows: Int  # (K,) track of each pair
+    proposals: Int  # (K,) proposal of each pair
+    within: Float64  # (K,) part of the proposal that lies within the known extent
+    around: Float64  # (K,) part of the track, as it is expected, that lies within the proposal
+    free: Bool  # (K,) the track may take the proposal, and most of one lies within the other
 
 
 class Pieces(NamedTuple):

@@ -1,8 +1,9 @@
 """The finite-state machines of a proposal, as tables (Tables I and II, Figs. 3 and 6).
 
-A row names an event, the state that it leaves and the state that it leads to. In each state an event has one row at most, so arrays of
-states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are extensions: the paper has
-no budget, so it has no object that waits for its first class, no second look at a final class, no background map.
+A row names an event, the state that it leaves and the state that it leads to. In each state an event has one row at
+most, so arrays of states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are
+extensions: the paper has no budget, so it has no object that waits for its first class, no second look at a final
+class, no background map.
 """
 
 from __future__ import annotations

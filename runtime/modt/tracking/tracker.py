@@ -267,7 +267,7 @@ class Tracker:
         t.state[new] = self.machine.proposal
         self._advance(new, np.where(known, Event.ASSOCIATED.value, Event.UNASSOCIATED.value))
         self._advance(new[known], Event.JOINS_FINAL)
-        position = self.association.initial_position(observations)[proposals]
+        position = self.association.initial_position(observations).take(proposals, axis=0)
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
