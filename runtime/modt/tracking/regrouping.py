@@ -302,12 +302,8 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
     member, pair, xyz = member[below], pair[below], xyz.take(below, axis=1)
     xy = xyz[:2] + placement.deskew(tracks.x.take(rows, axis=0)[:, :2]).T.take(pair, axis=1)
     within = (DIRECTIONS.T @ xy <= (tracks.predicted_kdops(rows) + PAD_M).take(pair, axis=1)).all(axis=0).nonzero()[0]
-    within = within[member[within].argsort(kind="stable")]
-    member = member[within]
-    first = np.ones(len(member), np.bool_)
-    first[1:] = member[1:] != member[:-1]  # the first of two that expect a point takes it
-    within = within[first]
-    member, pair, z = member[first], pair[within], xyz[2, within]
+    member, first = np.unique(member[within], return_index=True)  # the first of two that expect a point takes it
+    pair, z = pair[within[first]], xyz[2, within[first]]
     size, highest = np.bincount(pair, minlength=len(rows)), np.full(len(rows), -np.inf)
     np.maximum.at(highest, pair, z)
     splits = (size >= np.maximum(MIN_POINTS, MIN_SHARE * tracks.points[rows])) & (highest >= top - MAX_DROP_M)
