@@ -31,10 +31,7 @@ class LikeliestClass:
 
     Args:
         config: costs.
-        frequency: (4,) frequencies of the classes among proposals that the posteriors assume.
-
-    Attributes:
-        frequency: the same.
+        frequency: (4,) frequencies of the classes among proposals that the posteriors assume; also an attribute.
     """
 
     def __init__(self, config: DecisionConfig, frequency: Float64) -> None:
