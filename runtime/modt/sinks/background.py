@@ -36,6 +36,7 @@ class Background(Generic[T]):
         encode: converts an item, before it is queued, to what the writer takes.
         retry_s: pause after a failure.
         close_s: time limit of `close`.
+        clock: [s].
     """
 
     def __init__(
@@ -47,9 +48,10 @@ class Background(Generic[T]):
         encode: Callable[[Any], T] | None = None,
         retry_s: float = RETRY_S,
         close_s: float = CLOSE_S,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name, self._writer, self._depth, self._encode = name, writer, depth, encode
-        self._retry_s, self._close_s = retry_s, close_s
+        self._retry_s, self._close_s, self._clock = retry_s, close_s, clock
         self._jobs: deque[Callable[[], None]] = deque()
         self._changed = threading.Condition()
         self._end_s: float | None = None
@@ -85,7 +87,7 @@ class Background(Generic[T]):
         """Drain the queue and close the writer within the time limit; the rest is dropped."""
         with self._changed:
             if self._end_s is None:
-                self._end_s = time.monotonic() + self._close_s / 2
+                self._end_s = self._clock() + self._close_s / 2
             self._changed.notify()
         self._thread.join(self._close_s)
         with self._changed:
@@ -109,23 +111,27 @@ class Background(Generic[T]):
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # real-time priority is for the loop alone
         while (job := self._next()) is not None:
-            try:
-                job()
-            except Exception as error:
-                self._fail(error)
-                continue
-            self._written += 1
-            if self._state != "ok":
-                log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
-                self._state = "ok"
+            self._attempt(job)
         with suppress(Exception):
             self._writer.close()
+
+    def _attempt(self, job: Callable[[], None]) -> None:
+        """Run a job in this thread, and count it by its outcome."""
+        try:
+            job()
+        except Exception as error:
+            self._fail(error)
+            return
+        self._written += 1
+        if self._state != "ok":
+            log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
+            self._state = "ok"
 
     def _next(self) -> Callable[[], None] | None:
         """Wait for the oldest job; None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._jobs or self._end_s is not None)
-            late = self._end_s is not None and time.monotonic() > self._end_s
+            late = self._end_s is not None and self._clock() > self._end_s
             return self._jobs.popleft() if self._jobs and not late else None
 
     def _fail(self, error: Exception) -> None:
