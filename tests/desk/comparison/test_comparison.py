@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from modt.config import EnergyConfig
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions, model_meter
 from modt.energy.windows import Clocks, Windows
@@ -79,7 +80,7 @@ def test_meters_are_read_at_the_ends_of_turns():
         return now[0]
 
     clocks = Clocks(tick, tick, tick)
-    metered = [Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), min_s=1e9) for _ in "ab"]
+    metered = [Windows([model_meter(EnergyConfig(), tick, tick)], clocks, Conditions(), min_s=1e9) for _ in "ab"]
     made = [mode_run(name, [], windows=windows) for name, windows in zip("ab", metered, strict=True)]
     interleave(FRAMES, made, turn=3)
     for each in made:

@@ -17,7 +17,7 @@ from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
-from modt.profile.yaml_text import to_yaml
+from modt.profile import to_yaml
 from modt.sinks.records import BROKEN, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.types import NONE, Float64, FrameResult, Int
