@@ -87,10 +87,10 @@ def test_result_is_independent_of_batch_and_order(shipped: PointNet) -> None:
     np.testing.assert_allclose(shipped.classify(points, proposals, rows[::-1]), together[::-1], atol=1e-5)
 
 
-def test_ground_of_the_proposals_overrides_the_profile(tmp_path: Path) -> None:
-    model = str(save(tmp_path, random_layers(3)))
-    low = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=0.4))
-    unknown = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=None))
+@pytest.mark.parametrize("likelihood", ["network", "pooled"])
+def test_ground_of_the_proposals_overrides_the_profile(likelihood: str) -> None:
+    config = ClassificationConfig(likelihood=likelihood)
+    low, unknown = (PointNet(config, SensorConfig(height_m=height_m)) for height_m in (0.4, None))
     points, proposals = blobs([40, 7, 200], np.random.default_rng(5))
     rows = np.arange(3)
     measured = dataclasses.replace(proposals, ground_z_m=np.full(3, -0.4))

@@ -13,7 +13,7 @@ from modt.classes import ObjectClass
 from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, NoBoxClassifier, proposal_features
 from modt.classification.pointnet import PointNet
 from modt.classification.pool import PoolWeights, log_pool, object_log_odds, pooled_prior
-from modt.classification.prior import BoxPrior, BoxScores, FrequencyPrior, make_prior
+from modt.classification.prior import BoxScores, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import ClassificationConfig, SensorConfig
 from modt.types import Proposals
@@ -64,14 +64,6 @@ def test_scores_are_of_the_frame_that_is_given() -> None:
         expected = BOXES.log_probability(proposal_features(proposals, SensorConfig(height_m=1.73)), proposals.cut)
         np.testing.assert_array_equal(log_box, expected)
         assert not log_reflectance.any()
-
-
-def test_ground_of_the_proposals_overrides_the_profile() -> None:
-    low, high = (BoxPrior(scores_of(BOXES, height_m), FREQUENCY) for height_m in (1.0, 2.0))
-    unknown = standing(40, 20.0, 4.0, 1.6, 1.4)
-    measured = dataclasses.replace(unknown, ground_z_m=np.array([-2.0]))
-    assert (low.probability(measured) == high.probability(unknown)).all()
-    assert (low.probability(measured) != low.probability(unknown)).all()
 
 
 @pytest.mark.parametrize("name", ["pointnet-kitti", "pointnet-synthetic"])
