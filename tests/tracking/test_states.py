@@ -31,17 +31,3 @@ def test_a_matched_proposal_and_its_track_end_in_one_state(machine):
     tracks = tracks[tracks != machine.proposal]
     after = machine.transition(tracks, Event.ASSOCIATED)
     np.testing.assert_array_equal(machine.joined(after), after)
-
-
-@pytest.mark.parametrize(
-    ("machine", "final", "wants_class"),
-    [
-        (EFFICIENT, {"tracked", "lost"}, {"unmatched"}),
-        (CONVENTIONAL, set(), {"unmatched"}),
-        (ACCURATE, {"tracked_classified", "lost_classified"}, {"unmatched", "tracked_unclassified"}),
-    ],
-    ids=MACHINES,
-)
-def test_states_whose_class_is_final_or_wanted(machine, final, wants_class):
-    assert {name for name, flag in zip(machine.names, machine.final, strict=True) if flag} == final
-    assert {name for name, flag in zip(machine.names, machine.wants_class, strict=True) if flag} == wants_class
