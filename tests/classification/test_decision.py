@@ -104,4 +104,4 @@ def test_frequencies_stay_a_distribution_within_bounds(weights):
         decision.decide(table)
     assert decision.frequency.sum() == pytest.approx(1.0)
     assert (decision.frequency > 0.05 * ASSUMED).all()
-    np.testing.assert_allclose(decision.adapted(posterior).sum(axis=1), 1.0)
+    np.testing.assert_allclose(decision.adapted(posterior.T).sum(axis=0), 1.0)

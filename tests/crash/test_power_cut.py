@@ -1,4 +1,4 @@
-"""After a power cut at any moment: what was synced is there, and a restart works and keeps to its limit."""
+"""A power cut at any moment keeps the synced records; a restart works and keeps to its limit."""
 
 import os
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ class State:
     files: dict[int, bytes]
 
     def write(self, root: int, target: Path) -> None:
-        """Lay it out below a folder; what has a name but never reached the disk is empty."""
+        """Write the state below a folder. A file whose content never reached the disk is empty."""
         target.mkdir()
         for name, number in self.folders.get(root, {}).items():
             if number in self.folders:
@@ -35,7 +35,7 @@ class State:
 
 @dataclass
 class PowerCuts:
-    """Watches a folder, and notes what a power cut would leave after every call that changes or syncs it.
+    """Watches a folder, and keeps the states that a power cut could leave after every call that changes or syncs it.
 
     Attributes:
         cuts: the states, each by what the disk did with what was not synced (lost all, kept the names, kept all), and
@@ -58,7 +58,7 @@ class PowerCuts:
         return self.root.stat().st_ino
 
     def note(self) -> None:
-        """A power cut may come now."""
+        """Keep the states that a power cut could leave now."""
         live, durable = self._live(), self._durable
         known = {number: {} for number in live.folders}
         lost = State({**known, **{n: dict(names) for n, names in durable.folders.items()}}, dict(durable.files))
@@ -68,7 +68,7 @@ class PowerCuts:
 
     @contextmanager
     def watch(self) -> Iterator[None]:
-        """Within it, calls of `os` are noted."""
+        """Context in which calls of `os` are watched."""
         names = ("rename", "replace", "mkdir", "unlink", "rmdir")
         calls: dict[str, Any] = {name: self._noted(getattr(os, name)) for name in names}
         with patch.multiple(os, fsync=self._synced(os.fsync), **calls):

@@ -253,7 +253,9 @@ def test_a_file_without_an_integer_is_lost_for_now(tmp_path, content):
 
 def test_without_meters_the_model_is_used(tmp_path):
     found = look(tmp_path)
-    assert model_meter(3.0, 7.0, lambda: 2 * 10**9, lambda: 10**9 // 2).read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
+    assert model_meter(
+        EnergyConfig(idle_W=3.0, busy_W=7.0), lambda: 2 * 10**9, lambda: 10**9 // 2
+    ).read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
     assert found.best.facts.kind is Kind.ESTIMATED
     unusable = [c for c in found.candidates if not c.usable]
     assert len(unusable) == 4

@@ -120,7 +120,7 @@ def test_parts_of_every_window_sum_to_it(tmp_path_factory, frames, tick_ns):
 def test_a_window_is_as_reliable_as_its_least_reliable_meter(metered):
     machine = metered.machine
     counter = find_powercap(machine.sys)[0].meters[0]
-    model = model_meter(3.0, 7.0, machine.clocks.monotonic_ns, machine.clocks.process_ns)
+    model = model_meter(EnergyConfig(), machine.clocks.monotonic_ns, machine.clocks.process_ns)
     for meters, found in (
         ((counter, model), (pytest.approx(6.0, abs=1e-3), "estimated")),
         ((), (None, "unavailable")),

@@ -36,6 +36,14 @@ class Node:
         )
 
 
+def put(monkeypatch, modules):
+    """Put modules of these contents in the place of those of their names."""
+    for name, content in modules.items():
+        module = ModuleType(name)
+        vars(module).update(content)
+        monkeypatch.setitem(sys.modules, name, module)
+
+
 def install(monkeypatch):
     """Put the fake in the place of rclpy, and return its one node."""
     node, spinning = Node(), threading.Event()
@@ -47,10 +55,7 @@ def install(monkeypatch):
         "rclpy.signals": {"SignalHandlerOptions": SimpleNamespace(NO=0)},
         "rclpy.utilities": {"remove_ros_args": lambda words: words[: words.index("--ros-args")]},
     }
-    for name, content in modules.items():
-        module = ModuleType(name)
-        vars(module).update(content)
-        monkeypatch.setitem(sys.modules, name, module)
+    put(monkeypatch, modules)
     for package in PACKAGES:
         monkeypatch.setitem(sys.modules, package, ModuleType(package))
         monkeypatch.setitem(sys.modules, f"{package}.msg", Types(f"{package}.msg"))

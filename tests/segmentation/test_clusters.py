@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.clustering import MAX_GAP_BEAMS, MAX_GAP_M, Clusterer
-from modt.segmentation.clusters import connect, occupied_cells
+from modt.segmentation.clustering import Clusterer
+from modt.segmentation.clusters import MAX_CELL_GAP_BEAMS, MAX_CELL_GAP_M, connect, occupied_cells
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from tests.segmentation import reference
 
@@ -33,7 +33,7 @@ def cells_of(grid, points, height):
 
 
 def components(grid, cells, beam_m):
-    gap_m = np.float32(MAX_GAP_M) + np.float32(MAX_GAP_BEAMS) * beam_m
+    gap_m = np.float32(MAX_CELL_GAP_M) + np.float32(MAX_CELL_GAP_BEAMS) * beam_m
     return connect(grid, cells, gap_m, np.ones(len(cells), np.bool_))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modt.segmentation import clustering
+from modt.segmentation import clusters
 from tests.segmentation import scans
 
 STEP_DEG = 0.17
@@ -15,7 +15,7 @@ def owners_with(boxes, seed=0, step_deg=STEP_DEG, **constants):
     """Points of each proposal by the box that they lie on, with other constants of clustering."""
     with pytest.MonkeyPatch.context() as patch:
         for name, value in constants.items():
-            patch.setattr(clustering, name, value)
+            patch.setattr(clusters, name, value)
         return scans.owners(boxes, seed, step_deg)
 
 

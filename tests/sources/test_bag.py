@@ -110,6 +110,14 @@ def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
     assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
 
 
+def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(write, tmp_path):
+    late = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + 3600))
+    recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())
+    frames = list(open_stream(write(tmp_path / "drive", recorded)))
+    assert [frame.index for frame in frames] == [1, 2, 3]
+    assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.1, 10.2, 10.3], abs=1e-5)
+
+
 def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):
     rows = np.zeros((1, 5), [("x", "i2"), ("y", "i2"), ("z", "i2"), ("intensity", "u1")])
     raw = messages.encode(messages.cloud(rows, stamp_s=BEGAN_S))

@@ -58,6 +58,7 @@ EVEN, TURNS = [0, 0.1, 0.2, 0.3], [0.1] * 4
          [r"2 frames have no time in .* \(the first is 0\): theirs are interpolated"]),
         ("", lambda lines: lines[:3], EVEN, TURNS,
          ["has 3 lines, the last scan is number 3.*restore", r"1 frames have no time .*\(the first is 3\)"]),
+        ("", lambda lines: lines[::-1], EVEN, TURNS, ["time stamps decrease: frames 0.1 s apart instead"]),
         ("_start", lambda lines: [*lines, lines[3]], EVEN, TURNS, ["has 5 lines, the last scan is number 3"]),
     ],
 )  # fmt: skip

@@ -114,7 +114,7 @@ def test_of_two_cars_the_older_takes_parts_and_proposals_of_the_younger(ahead_m,
 def test_the_reflectance_is_that_of_the_matched_proposal():
     tracks, reflectance = tracks_at([WHOLE], CAR), np.arange(10.0).reshape(2, 5)
     frame = frame_at_rest(tracks, [FRONT, REAR], 0)
-    after = regrouped(tracks, replace(frame, proposals=replace(frame.proposals, reflectance=reflectance)))
+    after = regrouped(tracks, frame._replace(proposals=replace(frame.proposals, reflectance=reflectance)))
     np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
 
 

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.geometry import inverse, transform_boxes
@@ -197,20 +195,6 @@ def test_the_first_track_takes_what_two_expect():
     after = split(tracks, wall_with(PERSON), rows=[2])
     assert after.proposals.count.tolist() == [WALL_POINTS, PERSON_POINTS]
     assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 1, 2: 0}
-
-
-@given(st.lists(st.floats(5, 19), min_size=0, max_size=3), st.integers(0, 2**16))
-def test_every_point_stays_in_one_proposal_and_no_proposal_is_empty(places, seed):
-    people = [box(x, 2.5, 0.6, 0.6, 1.7, z=-0.85) for x in places]
-    tracks = tracks_at([*people, WALL], *[PEDESTRIAN] * len(people))
-    tracks.points[:] = PERSON_POINTS
-    tracks.x[:, :2] += np.random.default_rng(seed).normal(0, 0.1, (len(tracks), 2))  # expected somewhere near
-    proposals = wall_with(*people)
-    after = split(tracks, proposals, rows=[len(people)])
-    np.testing.assert_array_equal(np.sort(after.proposals.members), np.sort(proposals.members))
-    assert (after.proposals.count > 0).all()
-    assert len(set(after.matches.proposals.tolist())) == len(after.matches.proposals)
-    assert len(after.proposals) == len(after.matches.rows)
 
 
 STEP_M, TOUCH = 0.14, 10

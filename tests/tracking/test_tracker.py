@@ -1,18 +1,15 @@
 """The tracker: births, prediction, updates, rest and deaths."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import wrap
 from modt.geometry.kdop import DIRECTIONS
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
-from modt.types import NONE, Cut
+from modt.types import NONE
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
 ASSOCIATIONS = ["kdop", "paper"]
@@ -110,22 +107,3 @@ def test_the_mean_kdop_follows_views_that_jitter_and_restarts_at_an_end_that_jum
     reach = tracks.kdop[0] - tracks.x[0, :2] @ DIRECTIONS
     assert tracks.mean_kdop[0, 0] == pytest.approx(reach[0], abs=0.15)
     np.testing.assert_allclose(tracks.mean_kdop[0][[2, 4, 6]], [0.5, 1.0, 0.5], atol=0.15)
-
-
-@pytest.mark.parametrize(
-    ("object_class", "cut", "height_m"),
-    [
-        (ObjectClass.PEDESTRIAN, Cut.TOP, 1.6),
-        (ObjectClass.PEDESTRIAN, Cut.BOTTOM, 0.6),  # what is seen whole above is no higher than that
-        (ObjectClass.CAR, Cut.TOP, 0.6),
-    ],
-)
-def test_a_person_of_whom_only_legs_are_left_is_as_high_as_before(object_class, cut, height_m):
-    tracker = Follower()
-    tracker.run([[box(2 - 0.1 * i, 0, 0.5, 0.4, 1.6, z=0.6)] for i in range(6)], object_class)
-    for i in (6, 7):
-        frame, proposals = frame_of([box(1.4, 0, 0.5, 0.4, 0.6, z=0.1)], i, EYE)
-        tracks = tracker.follow(frame, replace(proposals, cut=np.array([cut])))
-        assert len(tracks) == 1
-        for of in (tracks.box[0], tracker.proposals.box[0]):
-            assert (of[5], of[2] - of[5] / 2) == (pytest.approx(height_m), pytest.approx(-0.2))

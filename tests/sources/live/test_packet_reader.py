@@ -4,6 +4,7 @@ import socket
 import time
 from contextlib import ExitStack
 from itertools import islice
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,7 +13,6 @@ from modt.schemes import open_sensor
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
 from modt.sources.packets.hesai import HesaiDecoder
 from modt.sources.packets.livox import LivoxDecoder
-from modt.sources.stream import Reception
 from tests.sources.packets.simulated import decoded, packets
 from tools.send.loops import endless
 
@@ -37,16 +37,8 @@ def now():
     return pytest.approx(time.time(), abs=60.0)
 
 
-class EchoDecoder:
-    """Each packet is a sweep."""
-
-    name, profile, elevations_deg = "sensor", None, None
-
-    def decode(self, received_s: float, payload: bytes, reception: Reception) -> list[object]:
-        return [(received_s, payload)]
-
-    def pause(self, reception: Reception) -> list[object]:
-        return []
+ECHO = SimpleNamespace(name="sensor", decode=lambda *packet: [packet[:2]], pause=lambda reception: [])
+"""A decoder whose sweeps are the packets, with the times of their reception."""
 
 
 @pytest.fixture(name="listen")
@@ -55,7 +47,7 @@ def listening(port):
     with ExitStack() as stack:
 
         def listen(*group, **options):
-            reader = PacketReader(bound_socket("sensor", port, *group), EchoDecoder(), **options)
+            reader = PacketReader(bound_socket("sensor", port, *group), ECHO, **options)
             stack.callback(reader.close)
             return reader
 

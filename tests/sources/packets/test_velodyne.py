@@ -144,15 +144,3 @@ def test_real_captures(kitti_root, name, profile, n_sweeps, turn_s):
     assert all(s.complete for s in sweeps)
     assert (reception.lost, reception.refused) == (0, {})
     assert [s.turn_s for s in sweeps] == pytest.approx([turn_s] * n_sweeps, abs=2e-4)
-
-
-@pytest.mark.slow
-def test_another_model_is_adopted_once_the_one_before_is_silent(caplog):
-    other = packets("hdl-64e", 2)[:20]
-    later = [(at_s + 5.0, payload) for at_s, payload in packets("vlp-16", 20)]
-    decoder = VelodyneDecoder("sensor")
-    sweeps, reception = decoded(decoder, [*other, *later])
-    assert decoder.profile == "vlp-16"
-    assert len(sweeps) >= 17
-    assert reception.refused["of another model than the packets before"] == 20
-    assert "packets are of another model, and those of the one before have ended" in caplog.text

@@ -167,7 +167,7 @@ def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
 
 
 def _legend(axes: Axes, run: RecordedRun, at: int) -> Legend:
-    """Colours of the classes, the states and, where the frame has truth, of what became of it."""
+    """Colours of the classes and the states, and of the outcomes where the frame has truth."""
     outlines = theme.states(run.states) + (list(LEGEND.values()) if "truth" in run.frames[at] else [])
     entries = [(entry, True) for entry in theme.classes()] + [(entry, False) for entry in outlines]
     patches = [Patch(fill=f, color=e["colour"], linewidth=2, label=e["name"].replace("_", " ")) for e, f in entries]

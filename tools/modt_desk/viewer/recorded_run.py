@@ -16,7 +16,7 @@ from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
-from modt.profile.yaml_text import to_yaml
+from modt.profile import to_yaml
 from modt.sinks.records import BROKEN, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.types import Float64, Int
@@ -61,10 +61,11 @@ class RecordedRun:
         with records_of(run / LEDGER):
             costs = _costs(run / LEDGER, config.energy)
         frames, rows, states, poses = list[dict[str, Any]](), list[Float64](), list[str](), list[Float64]()
+        boxes: dict[int, Float64] = {}
         for number, (place, record) in enumerate(opened.records()):
             try:
                 result, classifications = recorded_result(record), int(record["classifications"])
-                rows.append(frame_rows(number, result, states))
+                rows.append(frame_rows(number, result, states, boxes))
                 poses.append(planar(result.T_world_sensor))
                 counts = {
                     "frame": result.frame.index,
@@ -77,8 +78,7 @@ class RecordedRun:
             except BROKEN as error:
                 raise broken(place, error) from None
         with records_of(run / TRACKS), np.errstate(over="raise", invalid="raise"):
-            placed = np.stack(poses)
-            return cls(opened, config, frames, states, track_table(rows, placed), placed)
+            return cls(opened, config, frames, states, track_table(rows), np.stack(poses))
 
     @property
     def facts(self) -> dict[str, Any]:

@@ -6,42 +6,34 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from modt.geometry import wrap
-from modt.types import Float64, FrameResult, Int
+from modt.types import NONE, Float64, FrameResult, Int
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE, result_rows, scaled
 
 
-def frame_rows(at: int, result: FrameResult, states: list[str]) -> Float64:
-    """(M, COLUMNS) rows of a recorded result; names of states are added to `states`."""
+def frame_rows(at: int, result: FrameResult, states: list[str], boxes: dict[int, Float64]) -> Float64:
+    """(M, COLUMNS) rows of a recorded result.
+
+    Args:
+        at: index of the frame.
+        result: recorded result, whose lost tracks get their last boxes.
+        states: names of the states so far; those of the result are added.
+        boxes: last box of each track in the world so far, by its id; those of the result are added.
+    """
     states += [name for name in result.state_names if name not in states]
-    number = np.array([states.index(name) for name in result.state_names], np.int64)
+    number, tracks = np.array([states.index(name) for name in result.state_names], np.int64), result.tracks
+    for id_, lost, box in zip(tracks.id.tolist(), (tracks.proposal == NONE).tolist(), tracks.box, strict=True):
+        box[:] = boxes.get(id_, box) if lost else box
+        boxes[id_] = box
     rows = result_rows(result)
-    rows[:, COLUMNS.index("at")], rows[:, COLUMNS.index("state")] = at, number[result.tracks.state]
+    rows[:, COLUMNS.index("at")], rows[:, COLUMNS.index("state")] = at, number[tracks.state]
     return rows
 
 
-def track_table(frames: Iterable[Float64], poses: Float64) -> Int:
-    """(R, COLUMNS) table of the rows of F frames, and of (F, 3) planar poses of the sensor."""
+def track_table(frames: Iterable[Float64]) -> Int:
+    """(R, COLUMNS) table of the rows of the frames."""
     rows = np.concatenate([np.zeros((0, len(COLUMNS))), *frames])
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-    _fill_lost(rows, poses)
-    return scaled(rows)
-
-
-def _fill_lost(rows: Float64, poses: Float64) -> None:
-    """Write the boxes of the lost tracks: their last ones, where the filter has them now."""
-    seen, x, yaw, world = (COLUMNS.index(name) for name in ("seen", "x", "yaw", "world_x"))
-    index = np.arange(len(rows))
-    first = np.append(True, np.diff(rows[:, 0]) != 0)[: len(rows)]
-    last = np.maximum.accumulate(np.where(first | (rows[:, seen] > 0), index, 0))
-    lost = np.flatnonzero(rows[:, seen] == 0)
-    pose, then = poses[rows[lost, 1].astype(int)], poses[rows[last[lost], 1].astype(int)]
-    rows[lost, x : yaw + 1] = rows[last[lost], x : yaw + 1]
-    dx, dy = (rows[lost, world : world + 2] - pose[:, :2]).T
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    rows[lost, x], rows[lost, x + 1] = c * dx + s * dy, c * dy - s * dx
-    rows[lost, yaw] = wrap(rows[lost, yaw] + then[:, 2] - pose[:, 2])
+    return scaled(rows[np.lexsort((rows[:, 1], rows[:, 0]))])
 
 
 _SIDE_M = 32.0

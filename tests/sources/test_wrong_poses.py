@@ -12,7 +12,7 @@ CONFIG = OdometryConfig()
 EMPTY = np.zeros((0, 4), np.float32)
 PERIOD_S = 0.1
 SPEED_MPS = 12.0
-KINDS = {  # lies, and the reason that they are refused for
+KINDS = {  # wrong poses, and the reason of their refusal
     "far ahead": (lambda t, x: (t + 59.0, x, 0.0), "early"),
     "beyond any lead": (lambda t, x: (t + 3e5, x, 0.0), "ahead"),
     "ahead": (lambda t, x: (t + 1.5, x, 0.0), "early"),
@@ -50,12 +50,12 @@ class Robot:
         self.sender_s = self.sensor_s = 0.0  # what they are off
         self.origin_m = 0.0  # of the sender's world
 
-    def send(self, lie=None):
-        """The next pose, or a lie in its place."""
+    def send(self, wrong=None):
+        """Send the next pose, changed by `wrong`."""
         self.sent += 1
         self.time_s = self.sent * self.interval_s
         true = self.time_s + self.sender_s, self.origin_m + SPEED_MPS * self.time_s
-        self.odometry.waiting.append(lie(*true) if lie else (*true, 0.0))
+        self.odometry.waiting.append(wrong(*true) if wrong else (*true, 0.0))
 
     def frame_error_m(self):
         """Error of the pose at a frame now, NaN without one; a turn counts at a distance of 5 m."""
@@ -82,12 +82,12 @@ def a_robot(request):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_one_lie_costs_no_frame_its_pose(robot, kind):
-    lie, reason = KINDS[kind]
+def test_one_wrong_pose_costs_no_frame_its_pose(robot, kind):
+    wrong, reason = KINDS[kind]
     assert robot.drive(1.0)[2:].max() < 0.01
     before = robot.odometry.report()
     assert before["used"] == robot.sent
-    robot.send(lie)
+    robot.send(wrong)
     assert robot.drive(2.0).max() < 0.01
     report = robot.odometry.report()
     assert report["refused"] == before["refused"] | {reason: 1}
@@ -96,7 +96,7 @@ def test_one_lie_costs_no_frame_its_pose(robot, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_sender_that_begins_with_a_lie_is_believed_within_a_second(robot, kind):
+def test_a_sender_that_begins_with_a_wrong_pose_is_believed_within_a_second(robot, kind):
     robot.send(KINDS[kind][0])
     errors = robot.drive(2.0)
     assert errors[3:].max() < 0.01
@@ -133,9 +133,8 @@ def test_a_source_that_fails_costs_poses_and_recovers(robot, broken, monkeypatch
 @pytest.mark.parametrize(
     ("clock_s", "factor", "cause"),
     [
-        (1.7e9, 1e9, "this one seems to be in nanoseconds; give seconds"),
-        (100.0, 1e3, "this one seems to be in milliseconds; give seconds"),
-        (1.7e9, 1e-3, "the sensor's seem to be in milliseconds; give seconds"),
+        (1.7e9, 1e9, "it seems to be in nanoseconds; give seconds"),
+        (100.0, 1e3, "it seems to be in milliseconds; give seconds"),
     ],
 )
 def test_the_unit_of_stamps_that_are_no_seconds_is_named(clock_s, factor, cause, caplog):
@@ -180,7 +179,7 @@ def test_a_sender_that_restarts_elsewhere_is_followed_and_the_first_time_is_logg
     assert caplog.text.count("odometry.max_speed_mps") == 1
 
 
-def test_silence_of_the_sender_is_no_lie(robot):
+def test_no_pose_is_refused_after_a_silence_of_the_sender(robot):
     robot.drive(1.0)
     robot.sent += round(5.0 / robot.interval_s)
     assert np.nanmax(robot.drive(1.0)) < 0.01
