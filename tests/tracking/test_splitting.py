@@ -106,17 +106,6 @@ def test_a_track_that_is_hardly_a_person_keeps_its_proposal():
     assert len(split(tracks, wall_with(PERSON), rows=[0]).proposals) == 1
 
 
-def test_two_people_in_one_proposal_keep_a_piece_and_the_rest():
-    other = box(10, 3.2, 0.6, 0.6, 1.7, z=-0.85)
-    proposals = joined(frame_of([PERSON, other], points=PERSON_POINTS)[1], [(0, 1)])
-    tracks = tracks_at([PERSON, other], PEDESTRIAN, PEDESTRIAN)
-    tracks.points[:] = PERSON_POINTS
-    for row in (0, 1):
-        after = split(tracks, proposals, rows=[row], matched=[0])
-        assert sorted(after.matches.rows) == [0, 1]
-        assert after.proposals.count == pytest.approx([PERSON_POINTS] * 2, abs=15)  # some lie where both are expected
-
-
 def test_the_reflectance_of_a_piece_is_unknown():
     proposals = replace(wall_with(PERSON), reflectance=np.full((1, 5), 0.3))
     after = split(tracks_of_person_and_wall(), proposals, rows=[1])

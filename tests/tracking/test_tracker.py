@@ -15,19 +15,6 @@ from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 ASSOCIATIONS = ["kdop", "paper"]
 
 
-@pytest.fixture(params=ASSOCIATIONS)
-def tracker(request):
-    return Follower(TrackingConfig(association=request.param))
-
-
-def test_a_stationary_box_keeps_its_track(tracker):
-    tracker.run([[box(10, 2)]] * 10)
-    tracks = tracker.tracks
-    assert len(tracks) == 1
-    assert (tracks.id[0], tracks.age[0], tracks.hits[0]) == (0, 10, 10)
-    assert tracks.x[0, 3] < 1.0
-
-
 @pytest.mark.parametrize("course", np.deg2rad([0, 90, 180, -45]))
 def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
     tracker, speed = Follower(), 8.0
@@ -38,7 +25,8 @@ def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
     assert abs(wrap(tracker.tracks.x[0, 2] - course)) < 0.1
 
 
-def test_conclude_returns_a_copy(tracker):
+def test_conclude_returns_a_copy():
+    tracker = Follower()
     tracker.follow(*frame_of([box(10, 0)], 0, EYE))
     tracks = tracker.conclude([0], [True])
     tracks.id[:] = 99
