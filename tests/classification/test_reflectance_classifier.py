@@ -150,12 +150,6 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
         assert prior.pool_weight == weight
 
 
-@pytest.mark.parametrize("key", [METADATA_KEY, box_classifier.METADATA_KEY])
-def test_model_with_malformed_metadata_is_misuse(tmp_path: Path, key: str) -> None:
-    with pytest.raises(MisuseError, match="reflectance classifier"):
-        PointNet(_with_metadata(tmp_path / "model.onnx", {key: "{}"}), SENSOR)
-
-
 def test_shipped_model_separates_number_plates_from_leaves() -> None:
     model = PointNet(ClassificationConfig(), SENSOR)
     reflectance = model.box_scores.reflectance
