@@ -35,24 +35,6 @@ def cost_model(max_points: int = 400, slow: float = 1.0) -> LinearCost:
     return cost
 
 
-@given(counts=COUNTS, budget=BUDGETS, seed=st.integers(0, 1000))
-def test_selection_is_within_budget_and_complete(counts: list[int], budget: Budget, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    _, proposals = blobs(counts, rng)
-    tracks = new_tracks(proposals)
-    tracks.waiting = rng.integers(0, 20, len(tracks))
-    asks = rng.random(len(tracks)) < 0.7
-    cost = cost_model()
-    chosen = Scheduler(cost).select(tracks, proposals, asks, budget)
-    assert asks[chosen.rows].all()
-    assert len(set(chosen.rows.tolist())) == len(chosen.rows)
-    assert len(chosen.rows) + chosen.deferred == asks.sum()
-    if budget.calls is not None:
-        assert len(chosen.rows) <= budget.calls
-    if budget.cpu_ms is not None and len(chosen.rows):
-        assert cost.cost_ms(proposals.count[chosen.rows]) <= budget.cpu_ms + 1e-9
-
-
 @given(counts=COUNTS, calls=st.none() | st.integers(1, 5), seed=st.integers(0, 100))
 def test_every_track_is_served_although_new_ones_keep_coming(counts: list[int], calls: int | None, seed: int) -> None:
     """By a number of calls, or by the CPU time of the largest one."""
