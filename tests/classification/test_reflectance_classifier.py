@@ -75,14 +75,6 @@ def test_a_sensor_has_the_classifier_of_its_scale() -> None:
         np.testing.assert_array_equal(reflectance.log_likelihood(features, REFLECTANCE), expected)
 
 
-def test_another_sensor_or_a_model_without_classifier_adds_nothing() -> None:
-    for metadata, sensor in ((METADATA, SensorConfig()), ({}, SENSOR)):
-        reflectance = from_metadata(metadata, sensor)
-        assert isinstance(reflectance, NoReflectanceClassifier)
-        assert reflectance.weights is None
-        assert not reflectance.log_likelihood(np.ones((3, N_FEATURES)), REFLECTANCE).any()
-
-
 def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.LogCaptureFixture) -> None:
     prior, bare = prior_with_reflectance(), blobs([10, 30], RNG)[1]
     with caplog.at_level(logging.WARNING):

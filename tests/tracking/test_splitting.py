@@ -112,18 +112,6 @@ def test_the_reflectance_of_a_piece_is_unknown():
     np.testing.assert_array_equal(after.proposals.reflectance, [[0.3] * 5, [np.nan] * 5])
 
 
-def test_other_matches_stay_as_they_are():
-    tracks = tracks_at([PERSON, WALL, box(30, -8)], PEDESTRIAN)
-    tracks.points[:] = PERSON_POINTS
-    frame = frame_of([PERSON, WALL, box(30, -8)], points=[PERSON_POINTS, WALL_POINTS, 60])[1]
-    proposals = joined(frame, [(2,), (0, 1)])
-    after = split(tracks, proposals, rows=[2, 1])
-    found = dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True))
-    assert found == {2: 0, 1: 1, 0: 2}
-    assert after.matches.covariance[after.matches.rows == 2, 0, 0] == pytest.approx(0.01)
-    assert after.proposals.count.tolist() == [60, WALL_POINTS, PERSON_POINTS]
-
-
 @pytest.mark.parametrize(
     ("object_class", "columns", "person", "points", "wall"),
     [
