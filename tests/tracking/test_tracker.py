@@ -7,8 +7,6 @@ from modt.geometry import wrap
 from modt.geometry.kdop import DIRECTIONS
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
-ASSOCIATIONS = ["kdop", "paper"]
-
 
 @pytest.mark.parametrize("course", np.deg2rad([0, 90, 180, -45]))
 def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
