@@ -115,9 +115,10 @@ def test_cost_model_converges(call: float, point: float, frame: float, seed: int
     assert max(excess) < 3.0
 
 
-@pytest.mark.parametrize("budget_ms", [0.3, 0.8, 2.0])
-def test_a_budget_is_kept_in_99_of_100_frames_and_starves_nobody(budget_ms: float) -> None:
-    times, calls = drive(Budget(cpu_ms=budget_ms), 2000)
+@pytest.mark.parametrize(("budget_ms", "slow"), [(0.3, 1.0), (0.8, 1.0), (2.0, 1.0), (1.5, 0.3), (1.5, 3.0)])
+def test_a_budget_is_kept_in_99_of_100_frames_and_starves_nobody(budget_ms: float, slow: float) -> None:
+    """Also where the warm-up measured another speed."""
+    times, calls = drive(Budget(cpu_ms=budget_ms), 2000, cost_model(slow=slow))
     assert (times > budget_ms).mean() <= 0.01
     assert calls[-110:].any()
     if budget_ms >= 1.0:
@@ -158,14 +159,6 @@ def test_a_large_proposal_is_saved_for_while_small_ones_ask() -> None:
         if len(rows):
             scheduler.paid(proposals.count[rows], work_ms(proposals.count[rows]))
     assert served.min() > 2
-
-
-@pytest.mark.parametrize("slow", [0.3, 3.0])
-def test_a_warm_up_that_was_wrong_is_corrected(slow: float) -> None:
-    times, calls = drive(Budget(cpu_ms=1.5), 1000, cost_model(slow=slow))
-    assert (times > 1.5).mean() <= 0.01 + 0.01
-    assert (times[500:] > 1.5).mean() <= 0.01
-    assert calls[500:].mean() > 2
 
 
 def test_one_spike_does_not_starve_the_next_frames() -> None:
