@@ -152,20 +152,6 @@ def test_points_beyond_the_expected_place_stay_with_the_rest(person, others):
     assert set(after.members[after.offsets[1] :]).isdisjoint(range(PERSON_POINTS, PERSON_POINTS + WALL_POINTS))
 
 
-@pytest.mark.parametrize("apart_m", [0.85, 1.0])
-def test_two_who_touch_a_wall_share_no_point(apart_m):
-    people = [PERSON, box(10, 2.5 - apart_m, 0.6, 0.6, 1.7, z=-0.85)]
-    tracks = tracks_at([*people, WALL], PEDESTRIAN, PEDESTRIAN)
-    tracks.points[:] = PERSON_POINTS, PERSON_POINTS, WALL_POINTS
-    after = split(tracks, wall_with(*people), rows=[2])
-    owner = np.full(3, -1)
-    owner[after.matches.rows] = after.matches.proposals
-    label = after.proposals.label(2 * PERSON_POINTS + WALL_POINTS)
-    for k, own in enumerate(np.split(label, [PERSON_POINTS, 2 * PERSON_POINTS])):
-        assert np.count_nonzero(own == owner[k]) > 0.95 * len(own)
-    assert sorted(after.proposals.members) == list(range(len(label)))
-
-
 def test_the_first_track_takes_what_two_expect():
     tracks = tracks_at([PERSON, PERSON, WALL], PEDESTRIAN, PEDESTRIAN)
     tracks.points[:] = PERSON_POINTS
@@ -208,11 +194,13 @@ def test_a_pedestrian_who_touches_a_wall_keeps_the_track(pose):
         assert len(follower.proposals) == 2
 
 
-def test_two_pedestrians_who_meet_keep_their_tracks():
-    follower, wall = Follower(), [12, 9, *WALL[2:]]
+@pytest.mark.parametrize(("wall_y", "together"), [(9.0, [(0, 1), (2,)]), (3.3, [(0, 1, 2)])])
+def test_two_pedestrians_who_meet_keep_their_tracks(wall_y, together):
+    """Also where they touch a wall: they share no point."""
+    follower, wall = Follower(), [12, wall_y, *WALL[2:]]
     for i in range(TOUCH + 12):
         bodies = [walker(i, y=2.0), box(12.2 - STEP_M * i, 2.85, 0.6, 0.6, 1.7, z=-0.85), wall]
-        ids, shares = follow(follower, bodies, i, together=[(0, 1), (2,)] if i in {14, 15} else ())
+        ids, shares = follow(follower, bodies, i, together=together if i in {14, 15} else ())
         assert ids == [0, 1, 2]
         assert min(shares) > 0.95
 
