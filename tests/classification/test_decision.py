@@ -1,8 +1,5 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from modt.classes import ObjectClass
 from modt.classification import decision as constants
@@ -82,15 +79,3 @@ def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_tea
     for _ in range(100):
         decision.decide(tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60)))
     assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)
-
-
-@given(arrays(np.float64, (20, 4), elements=st.floats(1e-4, 1.0)))
-def test_frequencies_stay_a_distribution_within_bounds(weights):
-    decision = Decision(DecisionConfig(), ASSUMED)
-    posterior = weights / weights.sum(axis=1, keepdims=True)
-    for _ in range(30):
-        table = tracks(*posterior)
-        decision.decide(table)
-    assert decision.frequency.sum() == pytest.approx(1.0)
-    assert (decision.frequency > 0.05 * ASSUMED).all()
-    np.testing.assert_allclose(decision.adapted(posterior.T).sum(axis=0), 1.0)
