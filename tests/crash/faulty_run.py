@@ -1,4 +1,4 @@
-"""A short run of a service whose calls of the system fail where a test says; it keeps time by a clock of its own.
+"""A short run of a service whose system calls fail at the numbers that a test gives, on a clock of the test.
 
 Everything runs in one thread, so that the calls of a run are always the same: a run without faults lists them, and
 each of the others fails some by their numbers.
@@ -34,7 +34,7 @@ from modt.energy.windows import Clocks, Windows
 from modt.errors import ModtError
 from modt.sinks import run_directory
 from modt.sinks.background import Background
-from modt.sinks.datagrams import Datagrams
+from modt.sinks.frame_lines import Datagrams
 from modt.sinks.output import LineFile
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import RunDirectory
@@ -58,7 +58,7 @@ BACK_S = 2.0
 
 
 class InTurn(Background[Any]):
-    """A background writer that works when it is given something."""
+    """A background writer that runs each job in the calling thread."""
 
     def __init__(self, name: str, writer: Any, faults: Faults, encode: Callable[[Any], Any] | None = None) -> None:
         with patch("threading.Thread.start"):
@@ -72,14 +72,14 @@ class InTurn(Background[Any]):
 
 
 class Turns(LiveStream):
-    """Receives when the loop takes, what the sensor and the odometry have sent until then."""
+    """A live stream that receives in the thread of the loop: each `take` reads the packets sent until then."""
 
     def __init__(self, faults: Faults, reader: PacketReader, send: Callable[[], None]) -> None:
         super().__init__(INFO, reader, clock=faults.monotonic, pause=lambda seconds: None)
         self._faults, self._send, self.turn = faults, send, 0
 
     def start(self) -> None:
-        """Nothing to start."""
+        """No effect."""
 
     def take(self, timeout_s: float) -> Any:
         """The sweep of the next turn."""
@@ -117,7 +117,7 @@ class FaultyRun:
         self._folder = folder
 
     def run(self) -> None:
-        """From the start to a signal.
+        """Run from the start to a signal.
 
         Raises:
             Exception: the error that has ended the run.
@@ -189,7 +189,7 @@ class FaultyRun:
 
             def reported(supervisor: Any) -> None:
                 report(supervisor)
-                self._look()
+                self._check_status()
                 if source.turn >= TURNS:
                     stop.signal = "SIGTERM"
 
@@ -229,8 +229,8 @@ class FaultyRun:
         clocks = Clocks(monotonic_ns, monotonic_ns, lambda: int(1e9 * self.faults.now_s))
         return Windows(meters, clocks, Conditions(0))
 
-    def _look(self) -> None:
-        """The status is there, and not old."""
+    def _check_status(self) -> None:
+        """Note a status that is missing or old."""
         self.faults.active = False
         try:
             age_s = self.faults.now_s + self.faults.calendar_s - read(self.out)["time_s"]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from modt import assets, profile
 from modt.config import EnergyConfig, ProfileConfig, SchedulerConfig
 from modt.errors import MisuseError
-from modt.segmentation.clustering import Clusterer
+from modt.segmentation.clusters import CellClusterer
 
 
 @pytest.fixture
@@ -96,8 +96,8 @@ def test_cells_that_take_all_memory_are_refused_and_others_take_little(cell_m, r
             profile.parse(text)
         return
     config = profile.parse(text)
-    clustering = Clusterer(config.sensor, config.segmentation)
-    assert clustering.coarse.number.nbytes + clustering.fine.number.nbytes < 2.5e8
+    clusterer = CellClusterer(config.sensor, config.segmentation)
+    assert clusterer.coarse.number.nbytes + clusterer.fine.number.nbytes < 2.5e8
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,8 @@ import numpy as np
 
 from modt import host, profile
 from modt.app import assembly
-from modt.config.stages import NATIVE
-from modt.config.stages import NUMPY as NUMPY_KERNELS
+from modt.config import NATIVE
+from modt.config import NUMPY as NUMPY_KERNELS
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
 from modt.pipeline import SEGMENTATION

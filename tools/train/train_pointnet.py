@@ -19,7 +19,7 @@ from scipy.special import softmax
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.crops import Crops, canonical
-from modt.config.profile import REFLECTANCE_SCALES
+from modt.config import REFLECTANCE_SCALES
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, parser
 from tools.train import train_box_classifier, train_reflectance_classifier

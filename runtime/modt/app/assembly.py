@@ -17,9 +17,8 @@ from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
-from modt.config import FusionConfig, ProfileConfig
-from modt.config.stages import KERNELS, NATIVE
-from modt.config.stages import NUMPY as NUMPY_NAME
+from modt.config import KERNELS, NATIVE, FusionConfig, ProfileConfig
+from modt.config import NUMPY as NUMPY_NAME
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView

@@ -242,9 +242,9 @@ class Session:
         window = self._windows.add(line)
         if window is not None:
             self._ledger(window)
-            watts = self.power.add(window, config.energy)
-            if watts is not None:
-                self.deadlines.power(watts, config.loop.power_W)
+            watts, limit_W = self.power.add(window, config.energy), config.loop.power_W
+            if watts is not None and limit_W is not None:
+                self.deadlines.power(watts, limit_W)
         misses = config.sensor.reflectance != "none" and result.proposals.reflectance is None
         self._without_reflectance += misses and len(result.proposals) > 0
         self._tick(result)

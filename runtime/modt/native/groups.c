@@ -44,27 +44,39 @@ EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i
         }
 }
 
-/* regrouped: rows by label, below n, in their order within it, and the count of each. Scratch: `next` of n. */
-EXPORT void modt_regrouped(const Rows *rows, const i64 *label, i64 n_rows, i64 n, i64 *next, i64 *count, Rows *sorted)
+/* regrouped: rows of n_groups groups by label, below n, in their order within it, and the count of each. A group has a
+ * label, but for the rows `moved`, ascending, which have their own. Scratch: `next` of n. */
+EXPORT void modt_regrouped(const Rows *rows, const i64 *offsets, i64 n_groups, const i64 *label, const i64 *moved,
+                           const i64 *own, i64 n_moved, i64 n, i64 *next, i64 *count, Rows *sorted)
 {
-    i64 end, total = 0;
+    i64 total = 0;
     for (i64 g = 0; g < n; g++)
         count[g] = 0;
-    for (i64 i = 0; i < n_rows; i++) {
-        PROVEN(label[i] >= 0 && label[i] < n);
-        count[label[i]]++;
+    for (i64 g = 0; g < n_groups; g++) {
+        PROVEN(label[g] >= 0 && label[g] < n);
+        count[label[g]] += offsets[g + 1] - offsets[g];
+    }
+    for (i64 m = 0, g = 0; m < n_moved; m++) {
+        PROVEN(own[m] >= 0 && own[m] < n);
+        while (offsets[g + 1] <= moved[m])
+            g++;
+        count[label[g]]--, count[own[m]]++;
     }
     for (i64 g = 0; g < n; total += count[g], g++)
         next[g] = total;
-    for (i64 i = 0; i < n_rows; i = end) { /* a run of rows of one label at a time */
-        i64 first = next[label[i]] - i;
-        for (end = i; end < n_rows && label[end] == label[i]; end++)
-            sorted->index[first + end] = rows->index[end];
-        for (int v = 0; v < 3; v++)
+    for (i64 g = 0, m = 0; g < n_groups; g++)
+        for (i64 i = offsets[g], end; i < offsets[g + 1]; i = end) { /* rows of one label at a time */
+            int moves = m < n_moved && moved[m] == i;
+            i64 *first = &next[moves ? own[m] : label[g]], to = *first;
+            m += moves;
+            end = moves ? i + 1 : m < n_moved && moved[m] < offsets[g + 1] ? moved[m] : offsets[g + 1];
+            *first += end - i;
             for (i64 k = i; k < end; k++)
-                sorted->xyz[v][first + k] = rows->xyz[v][k];
-        next[label[i]] += end - i;
-    }
+                sorted->index[to + k - i] = rows->index[k];
+            for (int v = 0; v < 3; v++)
+                for (i64 k = i; k < end; k++)
+                    sorted->xyz[v][to + k - i] = rows->xyz[v][k];
+        }
 }
 
 typedef struct {

@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.geometry.kernels import GeometryKernels
-from modt.segmentation.clusters import (
-    cluster_bounds,
-    connect,
-    connect_coarse,
-    members_of,
-    occupied_cells,
-)
+from modt.segmentation.clusters import CellClusterer, members_of, occupied_cells
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_sums
@@ -24,9 +18,7 @@ class Kernels(GeometryKernels):
 
     name = "numpy"
     occupied_cells = staticmethod(occupied_cells)
-    connect = staticmethod(connect)
-    connect_coarse = staticmethod(connect_coarse)
-    cluster_bounds = staticmethod(cluster_bounds)
+    cluster = staticmethod(CellClusterer.cluster)
     view_bounds = staticmethod(view_bounds)
     merge_strips = staticmethod(merge_strips)
     group = staticmethod(Groups.from_labels)

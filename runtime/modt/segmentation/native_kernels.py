@@ -9,23 +9,32 @@ from typing import Any
 
 import numpy as np
 
-from modt.class_sizes import STRIP_PERSON
+from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON
 from modt.geometry.native_kernels import NativeGeometryKernels
-from modt.native.library import BOOL, FLOAT32, INT32, INT64, Own, Signatures, declare, pointers, structure
-from modt.segmentation.clusters import Cells, ClusterBounds, Clusters, Members
+from modt.native.library import FLOAT32, INT32, INT64, Own, Signatures, declare, pointers, structure
+from modt.segmentation.clusters import (
+    MAX_CELL_GAP_BEAMS,
+    MAX_CELL_GAP_M,
+    MIN_PERSON_POINTS,
+    MIN_SPLIT_M,
+    CellClusterer,
+    Cells,
+    Clusters,
+    ClusterSizes,
+    Members,
+)
 from modt.segmentation.grids import FAR_M, RING_STEP, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, NOISE_M, SLOPE_GAIN, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
-from modt.types import NONE, Bool, Float32, Float64, Int
+from modt.types import NONE, Float32, Float64, Int
 
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
     "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, _L, Own, Own, FLOAT32, Own, Own)),
     "modt_occupied_cells": (_L, (Own, FLOAT32, _L, _F, _I, _I, INT32, Own, Own, Own, Own)),
-    "modt_connect": (None, (Own, FLOAT32, BOOL, _L, _I, _I, Own, Own)),
-    "modt_cluster_bounds": (None, (Own, FLOAT32, FLOAT32, INT64, _L, _L, Own)),
+    "modt_cluster": (_L, (Own, Own, Own, FLOAT32, _L, _I, _I, Own, Own, Own)),
     "modt_view_bounds": (None, (Own, Own, FLOAT32, INT64, INT64, _L, INT64, _L, Own, Own)),
     "modt_merge_strips": (None, (Own, Own, FLOAT32, FLOAT32, _L, INT64, Own, Own, Own)),
     "modt_group": (_L, (INT64, _L, _L, Own, Own)),
@@ -51,6 +60,8 @@ _STRIP_KEYS = (
 )
 _PERSON_KEYS = "max_extent_m", "min_top_m", "min_height_m"
 """Fields of CarLimits and of STRIP_PERSON, in the order of Strips of cells.c."""
+_PART_KEYS = "min_extent_m", "max_extent_m", "min_top_m", "max_top_m", "min_height_m"
+"""Fields of SPLIT_PERSON, in the order of Rules of cells.c."""
 
 
 class _GroundBuffers:
@@ -60,19 +71,9 @@ class _GroundBuffers:
         grid = ground.grid
         scales = FAR_M, 1 / RING_STEP, SECTORS / 4
         slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
-        self.constants = _Ground(
-            grid.rings,
-            SECTORS,
-            SECTORS.bit_length() - 1,
-            FLANK_SECTORS,
-            *scales,
-            *slopes,
-            NEAR_M,
-            SLOPE_GAIN,
-            NOISE_M,
-            MAX_GAP_M,
-            FLANK_M,
-        )
+        limits = NEAR_M, SLOPE_GAIN, NOISE_M, MAX_GAP_M, FLANK_M
+        sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS
+        self.constants = _Ground(grid.rings, *sectors, *scales, *slopes, *limits)
         self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
         self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
         self.points = np.empty((3, 0), np.float32)
@@ -136,27 +137,23 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         cells = Cells(row, column, low, high, entries[k - n :])
         return cells, sample[k - n :], PointColumns(*sampled[:, k - n :]), cell
 
-    def connect_coarse(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
-        """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
-        return self.connect(grid, cells, max_gap_m, np.ones(len(cells), np.bool_), 1)
-
-    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool, shift: int = 0) -> Int:
-        """(C,) connected component of the cell of the grid, 2^shift times as wide, in which each cell used lies.
-
-        They are in the order of their first cells; NONE for the other cells.
-        """
-        n, component = len(cells), np.empty(len(cells), np.int64)
-        if len(self._work) < grid.side + 9 * n:
-            self._work = np.empty(grid.side + 9 * n, np.int32)
-        self.library.modt_connect(self._cells(cells), max_gap_m, use, n, shift, grid.side, self._work, component)
-        return component
-
-    def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
-        """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
-        bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
-        out = pointers(bounds, counts)
-        self.library.modt_cluster_bounds(self._cells(cells), points.x, points.y, cluster, len(cells), n, out)
-        return ClusterBounds(*bounds, *counts)
+    def cluster(
+        self, clusterer: CellClusterer, cells: Cells, points: PointColumns, beam_m: Float32
+    ) -> tuple[Int, ClusterSizes]:
+        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
+        n, coarse, fine = len(cells), clusterer.coarse.side, clusterer.fine.side
+        if len(self._work) < fine + 18 * n:
+            self._work = np.empty(fine + 18 * n, np.int32)
+        limits = clusterer.max_extent_m, MIN_SPLIT_M, clusterer.max_split_sqrt_range, MIN_PERSON_POINTS
+        rules = array("f", (MAX_CELL_GAP_M, MAX_CELL_GAP_BEAMS, *limits, *attrgetter(*_PART_KEYS)(SPLIT_PERSON)))
+        cluster, counts = np.empty(n, np.int64), np.empty((2, 2 * n), np.int64)
+        sizes, is_part = np.empty((5, 2 * n), np.float32), np.empty(2 * n, np.bool_)
+        given, out = self._columns(points), pointers(counts, sizes, is_part)
+        g = self.library.modt_cluster(
+            rules, self._cells(cells), given, beam_m, n, coarse, fine, self._work, cluster, out
+        )
+        (count, cell), (extent_m, bottom_m, top_m, sqrt_range, beam_m) = counts[:, :g], sizes[:, :g]
+        return cluster, ClusterSizes(count, extent_m, bottom_m, top_m, sqrt_range, cell, beam_m, is_part[:g])
 
     def view_bounds(self, clusters: Clusters, number: Int, n: int) -> ViewBounds:
         """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""

@@ -111,17 +111,21 @@ class Background(Generic[T]):
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # real-time priority is for the loop alone
         while (job := self._next()) is not None:
-            try:
-                job()
-            except Exception as error:
-                self._fail(error)
-                continue
-            self._written += 1
-            if self._state != "ok":
-                log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
-                self._state = "ok"
+            self._attempt(job)
         with suppress(Exception):
             self._writer.close()
+
+    def _attempt(self, job: Callable[[], None]) -> None:
+        """Run a job in this thread, and count it by its outcome."""
+        try:
+            job()
+        except Exception as error:
+            self._fail(error)
+            return
+        self._written += 1
+        if self._state != "ok":
+            log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
+            self._state = "ok"
 
     def _next(self) -> Callable[[], None] | None:
         """Wait for the oldest job; None at the end."""

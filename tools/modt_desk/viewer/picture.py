@@ -32,8 +32,7 @@ from modt.viewer import theme
 from modt.viewer.packed import SIDE, Cells
 from modt.viewer.theme import LIGHT, REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.recorded_tracks import RINGS_M, reach_m
+from modt_desk.viewer.recorded_run import RINGS_M, RecordedRun, reach_m
 from modt_desk.viewer.truth_marks import LEGEND
 
 SIZE_IN = (12.8, 9.1)
@@ -167,7 +166,7 @@ def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
 
 
 def _legend(axes: Axes, run: RecordedRun, at: int) -> Legend:
-    """Colours of the classes, the states and, where the frame has truth, of what became of it."""
+    """Colours of the classes and the states, and of the outcomes where the frame has truth."""
     outlines = theme.states(run.states) + (list(LEGEND.values()) if "truth" in run.frames[at] else [])
     entries = [(entry, True) for entry in theme.classes()] + [(entry, False) for entry in outlines]
     patches = [Patch(fill=f, color=e["colour"], linewidth=2, label=e["name"].replace("_", " ")) for e, f in entries]

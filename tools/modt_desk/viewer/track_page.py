@@ -112,9 +112,7 @@ def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) ->
         if before is None or row["class"] != before["class"]:
             sentences.append(f"Reported as {_reported(row)}.")
         if row["final"] and not (before and before["final"]):
-            sentences.append(
-                f"The class is settled: {_reported(row)}. It is asked for again only if the view improves."
-            )
+            sentences.append(f"The class is settled: {_reported(row)}. A better view may still change it.")
         if before and before["final"] and not row["final"]:
             sentences.append("The class is open.")
         if sentences:

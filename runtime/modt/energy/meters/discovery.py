@@ -68,7 +68,7 @@ def find_powercap(sys: Path) -> list[Candidate]:
 
 
 def _packages(meters: list[Meter]) -> list[Candidate]:
-    """The packages as one candidate. A package whose readings lie between those of another shows the same counter."""
+    """All packages as one candidate. A package whose readings lie between those of another shows the same counter."""
     try:
         pairs = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
     except MeterLostError:
@@ -262,9 +262,6 @@ def rail_power_W(text: str, known: set[str]) -> float:
 
 FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Functions that search sysfs, mounted at a path, for candidates of one type of meter."""
-_KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
-_SCOPES = (Scope.CPU, Scope.CPU_RAIL, Scope.SOC, Scope.MODULE, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
-"""Order of preference: this program has a larger share of a narrower scope."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,7 +294,7 @@ class Discovery:
 
 def discover(board: EnergyConfig, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
     """Search for every type of meter. The model of the board is the last of the usable ones."""
-    model = model_meter(board.idle_W, board.busy_W, time.monotonic_ns, time.process_time_ns)
+    model = model_meter(board, time.monotonic_ns, time.process_time_ns)
     found = [candidate for find in FINDERS for candidate in find(sys)]
     found += [*find_pmic(vcgencmd), Candidate(model.facts.name, (model,))]
     return Discovery(tuple(sorted(found, key=_rank)))
@@ -307,4 +304,4 @@ def _rank(candidate: Candidate) -> tuple[int, int, int]:
     facts = candidate.facts
     if facts is None or not candidate.usable:
         return (1, 0 if facts else 1, 0)
-    return (0, _KINDS.index(facts.kind), _SCOPES.index(facts.scope))
+    return (0, list(Kind).index(facts.kind), list(Scope).index(facts.scope))
