@@ -57,11 +57,12 @@ class LiveStream:
         *,
         cores: frozenset[int] | None = None,
         clock: Callable[[], float] = time.monotonic,
+        pause: Callable[[float], None] = time.sleep,
     ) -> None:
         """`cores`: cores of the receiving thread; None leaves it where it is started."""
         self.info, self.reader, self.faults = info, reader, Faults()
         self.sweeps = self.incomplete = self.dropped = self.silences = 0
-        self._cores, self._clock = cores, clock
+        self._cores, self._clock, self._pause = cores, clock, pause
         self._arrived = threading.Condition()
         self._newest: tuple[Sweep, list[str], bool, float] | None = None  # sweep, flaws, usable, arrival [s]
         self._error: Exception | None = None
@@ -150,7 +151,7 @@ class LiveStream:
             if not self._ended and self.reader.reception.refuse(f"failed ({type(error).__name__})"):
                 remedy = "check its network interface" if isinstance(error, OSError) else "report this"
                 log.exception("%s: a message is left out: %s; later ones are counted", self.info.name, remedy)
-            time.sleep(0.001)  # leaves the CPU to others if each read fails
+            self._pause(0.001)  # leaves the CPU to others if each read fails
 
     def _put(self, sweep: Sweep) -> None:
         try:  # here, off the loop's thread
