@@ -1,7 +1,7 @@
 """PCAP files as streams, and the UDP datagrams in them.
 
-Files of either byte order with stamps in µs or ns are read; IPv4 over Ethernet, Linux cooked or raw IP, as live
-sensors are received.
+Files of either byte order with stamps in µs or ns are read; IPv4, as live sensors send it, over Ethernet, Linux
+cooked or raw IP.
 """
 
 from __future__ import annotations
