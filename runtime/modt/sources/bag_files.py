@@ -12,6 +12,8 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 from urllib.parse import quote
@@ -78,7 +80,7 @@ class BagFile(ABC):
             return {name: BagTopic(kind.replace("/msg/", "/"), count) for name, kind, count in self._topics()}
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """Messages of these topics in the order of their recording, of an MCAP file in the order of its chunks.
+        """Messages of these topics in the order of their recording.
 
         Raises:
             ModtError: the file cannot be read, or not beyond the messages yielded before.
@@ -201,14 +203,16 @@ class McapFile(BagFile):
                 yield channel.topic, message.log_time, message.data
 
     def _records(self, file: BinaryIO, summary: Any, topics: Collection[str] | None = None) -> Iterator[Any]:
-        """Schema, channel and message by their place in the file; chunks by the time of their first message."""
+        """Schema, channel and message, ordered by recorded time with an index, else by their place in the file."""
         from mcap.records import Channel, Chunk, Message, Schema
         from mcap.stream_reader import breakup_chunk
 
         schemas, channels = ({}, {}) if summary is None else (summary.schemas, summary.channels)
         known: dict[type, dict[int, Any]] = {Schema: schemas, Channel: channels}
-        left = self._most
-        for record in _parts(file, summary, topics):
+        left, waiting, order = self._most, list[Any](), count()
+        for begin_ns, record in _parts(file, summary, topics):
+            while waiting and waiting[0][0] < begin_ns:
+                yield heappop(waiting)[2]
             parts = [record]
             if isinstance(record, Chunk):
                 self._less(min(left, MAX_RECORD_BYTES), record.uncompressed_size)
@@ -220,7 +224,13 @@ class McapFile(BagFile):
                     known[type(part)][part.id] = part
                 elif isinstance(part, Message) and (topics is None or channels[part.channel_id].topic in topics):
                     channel = channels[part.channel_id]
-                    yield schemas.get(channel.schema_id), channel, part
+                    found = schemas.get(channel.schema_id), channel, part
+                    if isinstance(record, Chunk) and summary is not None:
+                        heappush(waiting, (part.log_time, next(order), found))
+                    else:
+                        yield found
+        while waiting:
+            yield heappop(waiting)[2]
 
 
 KINDS: dict[str, type[BagFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
@@ -272,15 +282,15 @@ def _summary(file: BinaryIO) -> Any:
     return None if summary.statistics is None else summary
 
 
-def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iterator[Any]:
-    """Chunks with messages of these topics; without an index, all records."""
+def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iterator[tuple[int, Any]]:
+    """Start [ns] and content of each chunk with messages of these topics; without an index, 0 and each record."""
     chunks = () if summary is None else summary.chunk_indexes
     for index in sorted(chunks, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
         held = {summary.channels[number].topic for number in index.message_index_offsets}
         if topics is None or not held or held & set(topics):
-            yield next(_from(file, index.chunk_start_offset))
+            yield index.message_start_time, next(_from(file, index.chunk_start_offset))
     if not chunks:
-        yield from _from(file, 0)
+        yield from ((0, record) for record in _from(file, 0))
 
 
 def _unpacked(compression: str, data: bytes, most: int) -> bytes:
