@@ -36,6 +36,8 @@ CONFIRM_S = 0.2
 """Time for which doubted poses must be mutually consistent to be believed [s]."""
 _LEVER_M = 5.0
 """Distance that stands for a turn of one radian [m]."""
+_UNKNOWN_INTERVAL_S = 0.5
+"""Assumed interval between poses until two are known [s]."""
 
 
 class PoseBuffer:
@@ -74,7 +76,9 @@ class PoseBuffer:
         dt_s = stamp_s - self.newest_s
         if dt_s <= 0:
             return "out_of_order" if dt_s < 0 else "repeated"
-        if min(dt_s, stamp_s - now_s) > MAX_AGE_S:
+        interval_s = self._stamps[-1] - self._stamps[-2] if len(self) > 1 else _UNKNOWN_INTERVAL_S
+        ahead_s = min(dt_s, stamp_s - now_s)
+        if ahead_s > max(MAX_AGE_S, 2 * interval_s):
             return "early"
         if self.leaps(stamp_s, T):
             return "leap"
@@ -100,7 +104,8 @@ class PoseBuffer:
             return b.copy()
         if max(abs(stamp_s - t1), min(stamp_s, t1) - t0) > MAX_AGE_S:
             return None
-        return interpolate(a, b, (stamp_s - t0) / (t1 - t0))
+        T = interpolate(a, b, (stamp_s - t0) / (t1 - t0))
+        return None if stamp_s > t1 and self.leaps(stamp_s, T) else T
 
     def _ends(self, stamp_s: float) -> list[tuple[float, Float64]] | None:
         """Stamp and pose of the two poses to interpolate; twice the same one if it has this time.

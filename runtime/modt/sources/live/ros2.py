@@ -38,9 +38,10 @@ class MissingSweeps:
         self._steps_s.append(step_s)
         if len(self._steps_s) < NEEDED:
             return 0
+        new = self._steps_s if len(self._steps_s) == NEEDED else (step_s,)
         lower_s = sorted(self._steps_s)[len(self._steps_s) // 4]  # single, even if half are missing
         period_s = fmean(known_s for known_s in self._steps_s if known_s < 1.5 * lower_s)
-        return max(round(step_s / period_s) - 1, 0)
+        return sum(max(round(step_s / period_s) - 1, 0) for step_s in new)
 
 
 log = logging.getLogger(__name__)
