@@ -88,10 +88,7 @@ class Stages:
         self.chosen = self._choose()
         self.pipeline = self._new_pipeline(self.chosen.config)
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
-        self._last_good: tuple[TrackTable, int] = (
-            TrackTable.blank(),
-            0,
-        )  # tracks and next id
+        self._last_good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id
 
     @property
     def info(self) -> StreamInfo:
