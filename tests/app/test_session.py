@@ -170,7 +170,7 @@ def test_failures_that_repeat_renew_the_stages_and_then_end_the_run():
 
 def test_a_replay_contains_no_failure():
     failures, gone = Containment(contains=False), ConnectionError("gone")
-    for failing in (lambda: failures.spare("sink", Mock(side_effect=gone)), lambda: failures.fail(gone, "frame")):
+    for failing in (lambda: failures.contain("sink", Mock(side_effect=gone)), lambda: failures.fail(gone, "frame")):
         with pytest.raises(ConnectionError):
             failing()
 

@@ -120,7 +120,7 @@ class Faults:
     def ours(self, place: Any) -> str:
         """File name of a path or descriptor of the run; empty for other files and those in memory."""
         try:
-            path = self._readlink(f"/proc/self/fd/{place}") if isinstance(place, int) else os.fspath(place)
+            path = os.readlink(f"/proc/self/fd/{place}") if isinstance(place, int) else os.fspath(place)
         except (OSError, TypeError):
             return ""
         path = path.decode() if isinstance(path, bytes) else path
@@ -129,8 +129,6 @@ class Faults:
         if path.startswith((self._folder, "/proc/")) or self._folder.startswith(path):
             return path.rpartition("/")[2] or "/"
         return ""
-
-    _readlink = staticmethod(os.readlink)
 
     @contextmanager
     def installed(self) -> Iterator[None]:

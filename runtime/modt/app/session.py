@@ -104,8 +104,8 @@ class Session:
             stack.callback(self._finish)
             stack.callback(close_together, self.sinks.values())
             for part in (self.stages.odometry, self.source, supervisor):
-                stack.callback(self.failures.spare, "end", part.close)
-            stack.callback(self.failures.spare, "records", lambda: self._ledger(self._windows.close()))
+                stack.callback(self.failures.contain, "end", part.close)
+            stack.callback(self.failures.contain, "records", lambda: self._ledger(self._windows.close()))
             stack.enter_context(self.stop.on_signals())
             self.source.start()
             self.follow(supervisor)
@@ -149,7 +149,7 @@ class Session:
             supervisor.alive()
             if self._clock() - reported_s >= REPORT_S:
                 reported_s = self._clock()
-                self.failures.spare("status", self._report, supervisor)
+                self.failures.contain("status", self._report, supervisor)
 
     def _process(self, received: Received) -> None:
         if not self.deadlines.admit(received.arrived_s):
@@ -173,9 +173,9 @@ class Session:
         budget = self.deadlines.budget(stages.budget, received.arrived_s, frame.index)
         result = stages.step(frame, budget, reduced=self.deadlines.reduced)
         for name, sink in self._outputs.items():
-            self.failures.spare(name, stages.ledger.run, SINK, sink.write, result)
+            self.failures.contain(name, stages.ledger.run, SINK, sink.write, result)
         line = stages.ledger.close_frame(frame.index)
-        self.failures.spare("records", self._observe, result, line)
+        self.failures.contain("records", self._observe, result, line)
         return line
 
     def _reload(self, supervisor: Supervisor) -> None:
@@ -193,7 +193,7 @@ class Session:
     def status(self) -> dict[str, Any]:
         """The document modt.status/1."""
         now_s, info = self._clock(), self.stages.info
-        resident_mb = self.failures.spare("host", lambda: round(host.resident_mb(), 1))
+        resident_mb = self.failures.contain("host", lambda: round(host.resident_mb(), 1))
         reloads = {"reloads": self._reloads, "refused_reloads": self._refused_reloads}
         return {
             "schema": SCHEMA,
@@ -275,7 +275,7 @@ class Session:
             },
             "odometry": stages.odometry.report(),
             "class_frequency": dict(zip(CLASS_NAMES, stages.pipeline.decision.frequency.tolist(), strict=True)),
-            "host": self.failures.spare("host", host.usage, self._core),
+            "host": self.failures.contain("host", host.usage, self._core),
             "sinks": self._sinks_health(),
             "faults": {
                 "count": faults.count,
@@ -356,5 +356,6 @@ def service(
 
     writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
     recording = Recording(RunDirectory(out), stages.config.recording, writer, describe)
-    kinds = Deadlines(source.info.period_s), Containment(), Stop(reload=True)
-    return Session(source, stages, recording, sinks, *kinds, meter.meters, core, refusals, metrics)
+    deadlines, failures, stop = Deadlines(source.info.period_s), Containment(), Stop(reload=True)
+    meters = meter.meters
+    return Session(source, stages, recording, sinks, deadlines, failures, stop, meters, core, refusals, metrics)

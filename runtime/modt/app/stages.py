@@ -86,9 +86,9 @@ class Stages:
         self.recognising: Thread | None = None
         self._recognised: list[ChosenProfile] = []  # profile chosen by the thread `recognising`
         self.chosen = self._choose()
-        self.pipeline = self._made(self.chosen.config)
+        self.pipeline = self._new_pipeline(self.chosen.config)
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
-        self._good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id after the last good frame
+        self._last_good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id
 
     @property
     def info(self) -> StreamInfo:
@@ -123,7 +123,7 @@ class Stages:
             frame = replace(frame, points=frame.points[near])
         result = self.pipeline.step(frame, budget)
         if isinstance(self.pipeline.tracker, Tracker) and isinstance(result.tracks, TrackTable):
-            self._good = result.tracks, self.pipeline.tracker.next_id
+            self._last_good = result.tracks, self.pipeline.tracker.next_id
         return result
 
     def watch(self, frame: Frame) -> None:
@@ -139,9 +139,9 @@ class Stages:
 
     def recover(self, *, anew: bool) -> None:
         """Restore the tracks of the last good frame; with `anew` make new stages without tracks."""
-        tracks, next_id = self._good
+        tracks, next_id = self._last_good
         if anew:
-            tracks, self.pipeline = TrackTable.blank(), self._made(self.config)
+            tracks, self.pipeline = TrackTable.blank(), self._new_pipeline(self.config)
         if isinstance(self.pipeline.tracker, Tracker):
             self.pipeline.tracker.restore(tracks, next_id)
 
@@ -193,14 +193,14 @@ class Stages:
     def _choose(self) -> ChosenProfile:
         return choose(self.request.profile, self._first, self._info)
 
-    def _made(self, config: ProfileConfig) -> Pipeline:
+    def _new_pipeline(self, config: ProfileConfig) -> Pipeline:
         mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
         fov = inputs.field_of_view(self.request, self._info, mount)
         return assembly.pipeline(self._mode, config, fov, self.ledger)
 
     def _use(self, chosen: ChosenProfile) -> None:
         """Exchange the stages for those of another profile; the tracks are kept."""
-        old, new = self.pipeline, self._made(chosen.config)
+        old, new = self.pipeline, self._new_pipeline(chosen.config)
         if isinstance(old.tracker, Tracker) and isinstance(new.tracker, Tracker):
             new.tracker.adopt(old.tracker)
         if isinstance(old.odometry, Odometry) and isinstance(new.odometry, Odometry):
