@@ -41,7 +41,8 @@ class Kernels(GeometryKernels):
         mask = (height > low) & (height < high)
         mask &= (sweep.sqrt_range > near) & (sweep.sqrt_range < far)
         rows = np.flatnonzero(mask)
-        return rows, sweep.take(rows), height[rows], histogram(height[rows], float(high))
+        height = height.take(rows)
+        return rows, sweep.take(rows), height, histogram(height, float(high))
 
 
 NUMPY = Kernels()
