@@ -10,7 +10,6 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from modt import assets
 from modt.classification import pointnet
 from modt.classification.pointnet import PointNet, read_model
 from modt.config import ClassificationConfig, SensorConfig
@@ -166,17 +165,3 @@ def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):
     monkeypatch.setattr(pointnet, "MAX_BYTES", 100)
     with pytest.raises(MisuseError, match="larger than"):
         read_model(saved(tmp_path, network()))
-
-
-@pytest.mark.parametrize(
-    "raw", [b"", b"no model", b"\x08", b"\x3a\xff\xff\xff\xff\x0f", b"\xff" * 20, b"\xba\x80\x80\x80\x10\x00"]
-)
-def test_what_is_no_message_is_refused(raw, tmp_path):
-    (tmp_path / "net.onnx").write_bytes(raw)
-    with pytest.raises(MisuseError, match="not an ONNX model"):
-        load(tmp_path / "net.onnx")
-
-
-def test_the_shipped_models_are_plain():
-    for path in assets.shipped("models", ".onnx"):
-        assert read_model(path)[0] == path.read_bytes()

@@ -64,17 +64,6 @@ def test_the_grid_lies_between_two_euclidean_radii(seed, n, sigma):
     assert reference.refines(fast, reference.within_distance(plane, 2 * STEP * 1.001))
 
 
-@given(seed=st.integers(0, 10_000), n=st.integers(1, 400))
-def test_points_of_one_index_share_a_cell(seed, n):
-    points = PointColumns.from_array(cloud(seed, n, 1.0))
-    grid = SqrtRangeGrid(STEP, 80.0)
-    place = grid.flat_index(*grid.row_column(points))
-    sample, cell = grid.occupied(place)
-    assert np.array_equal(place[sample][cell], place)
-    assert len(np.unique(place)) == len(sample)
-    assert (grid.occupied(place)[1] == cell).all(), "the grid is empty again"
-
-
 @pytest.mark.parametrize("n", [1, 2, 7])
 def test_points_of_no_height_are_no_cluster(n):
     points = np.tile(np.float32([[5.0, 1.0, -0.5]]), (n, 1))

@@ -45,20 +45,6 @@ def merged(tracks, boxes, rows):
     return groups, after
 
 
-def test_the_parts_of_a_car_become_one_proposal_with_its_box():
-    groups, after = merged(tracks_at([WHOLE], CAR), [REAR, FRONT], [0])
-    assert groups == [[0, 1]]
-    np.testing.assert_allclose(after.proposals.box[0], WHOLE, atol=0.05)
-    np.testing.assert_allclose(after.observations.box[0], WHOLE, atol=0.05)
-
-
-def test_the_match_of_a_part_is_dropped_and_proposals_are_renumbered():
-    tracks = tracks_at([WHOLE, FRONT, box(30, 0)], CAR)
-    groups, after = merged(tracks, [REAR, FRONT, box(30, 0)], [0, 1, 2])
-    assert groups == [[0, 1], [2]]
-    assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 0, 2: 1}
-
-
 @pytest.mark.parametrize(
     ("known", "classes", "seen", "columns", "is_part"),
     [

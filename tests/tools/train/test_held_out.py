@@ -31,12 +31,6 @@ def test_folds_split_real_scans_by_drive_and_leave_out_the_rest():
     assert len(set(fold[:3].tolist())) == 3  # the objects are spread
 
 
-def test_unknown_and_partial_crops_are_not_trainable():
-    partial, unknown = np.array([False, False, False, True]), np.array([True, False, True, False])
-    data = single_points(np.array([0, 0, 1, 0]), partial=partial, unknown=unknown)
-    assert data.trainable.tolist() == [False, True, True, False]
-
-
 def test_out_of_fold_models_predict_drives_unseen_in_training():
     drive = np.repeat(np.arange(6), 5)
     label = np.tile(np.arange(5) % 4, 6)
