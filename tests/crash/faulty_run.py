@@ -34,7 +34,7 @@ from modt.energy.windows import Clocks, Windows
 from modt.errors import ModtError
 from modt.sinks import run_directory
 from modt.sinks.background import Background
-from modt.sinks.datagrams import Datagrams
+from modt.sinks.frame_lines import Datagrams
 from modt.sinks.output import LineFile
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import RunDirectory

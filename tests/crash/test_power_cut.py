@@ -1,9 +1,8 @@
 """A power cut at any moment keeps the synced records; a restart works and keeps to its limit."""
 
 import os
-from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -13,14 +12,13 @@ import pytest
 from tests.sinks.recordings import begun, frame, frames, parts
 
 FRAMES, A_SECOND = 50, 5
-Entries = dict[str, int]
 
 
 @dataclass(frozen=True)
 class State:
     """Inodes by number: the names in folders, and the bytes of files."""
 
-    folders: dict[int, Entries]
+    folders: dict[int, dict[str, int]]
     files: dict[int, bytes]
 
     def write(self, root: int, target: Path) -> None:
@@ -33,68 +31,49 @@ class State:
                 (target / name).write_bytes(self.files.get(number, b""))
 
 
-@dataclass
 class PowerCuts:
     """Watches a folder, and keeps the states that a power cut could leave after every call that changes or syncs it.
 
     Attributes:
         cuts: the states, each by what the disk did with what was not synced (lost all, kept the names, kept all), and
             with what was safe then.
+        safe: number of items that must be there from now on; the test sets it.
     """
 
-    root: Path
-    cuts: list[tuple[str, State, int]] = field(default_factory=list)
-    safe: int = 0  # items that must be there from now on, as the test says
-    _durable: State = field(default_factory=lambda: State({}, {}))
-
-    def __post_init__(self) -> None:
-        live = self._live()
-        self._durable.folders.update(live.folders)
-        self._durable.files.update(live.files)
-
-    @property
-    def number(self) -> int:
-        """Inode of the root."""
-        return self.root.stat().st_ino
+    def __init__(self, root: Path) -> None:
+        self.root, self.cuts, self.safe = root, list[tuple[str, State, int]](), 0
+        self._durable = self._live()
 
     def note(self) -> None:
         """Keep the states that a power cut could leave now."""
         live, durable = self._live(), self._durable
-        known = {number: {} for number in live.folders}
-        lost = State({**known, **{n: dict(names) for n, names in durable.folders.items()}}, dict(durable.files))
-        named = State(live.folders, dict(durable.files))
-        cuts = [("lost", lost, self.safe), ("named", named, self.safe), ("kept", live, self.safe)]
+        synced = dict(durable.files)
+        lost = State({**{number: {} for number in live.folders}, **durable.folders}, synced)
+        states = {"lost": lost, "named": State(live.folders, synced), "kept": live}
+        cuts = [(kind, state, self.safe) for kind, state in states.items()]
         self.cuts += [cut for cut in cuts if cut not in self.cuts[-len(cuts) :]]
 
     @contextmanager
-    def watch(self) -> Iterator[None]:
+    def watch(self) -> Any:
         """Context in which calls of `os` are watched."""
-        names = ("rename", "replace", "mkdir", "unlink", "rmdir")
-        calls: dict[str, Any] = {name: self._noted(getattr(os, name)) for name in names}
-        with patch.multiple(os, fsync=self._synced(os.fsync), **calls):
+        names = ("fsync", "rename", "replace", "mkdir", "unlink", "rmdir")
+        with patch.multiple(os, **{name: self._watched(getattr(os, name)) for name in names}):
             yield
 
-    def _noted(self, call: Any) -> Any:
-        def noted(*arguments: Any, **options: Any) -> Any:
+    def _watched(self, call: Any) -> Any:
+        def watched(*arguments: Any, **options: Any) -> Any:
             self.note()
             result = call(*arguments, **options)
+            if call.__name__ == "fsync":
+                number, live = os.fstat(arguments[0]).st_ino, self._live()
+                if number in live.folders:
+                    self._durable.folders[number] = live.folders[number]
+                else:
+                    self._durable.files[number] = live.files[number]
             self.note()
             return result
 
-        return noted
-
-    def _synced(self, call: Any) -> Any:
-        def synced(number: int) -> None:
-            self.note()
-            call(number)
-            inode, live = os.fstat(number).st_ino, self._live()
-            if inode in live.folders:
-                self._durable.folders[inode] = live.folders[inode]
-            else:
-                self._durable.files[inode] = live.files[inode]
-            self.note()
-
-        return synced
+        return watched
 
     def _live(self) -> State:
         folders, files = {}, {}
@@ -131,7 +110,7 @@ def test_synced_records_survive_and_a_restart_works(disk, kind, tmp_path):
     assert len(cuts) > 20
     for number, (state, safe) in enumerate(cuts):
         folder = tmp_path / str(number)
-        state.write(disk.number, folder)
+        state.write(disk.root.stat().st_ino, folder)
         whole = frames(folder)
         assert whole == list(range(len(whole)))
         assert len(whole) >= safe

@@ -5,17 +5,11 @@ import pytest
 
 from modt.config import EnergyConfig
 from modt.energy.meters import meter as meter_module
-from modt.energy.meters.discovery import (
-    discover,
-    find_batteries,
-    find_hwmon,
-    find_pmic,
-    find_powercap,
-)
+from modt.energy.meters.discovery import discover, find_batteries, find_hwmon, find_pmic, find_powercap
 from modt.energy.meters.meter import Kind, MeterLostError, Scope, model_meter
 from modt.errors import MisuseError
 
-from .simulated import write_files, write_zone
+from .meter_files import write_files, write_zone
 
 PMIC = """ 3V7_WL_SW_A current(0)=0.08784000A
    VDD_CORE_A current(7)=2.10000000A
@@ -218,7 +212,7 @@ def script(folder, body):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("2.10000000A", "1.2.3A", "VDD_CORE is '1.2.3'"),
         ("2.10000000A", "A", "VDD_CORE is ''"),
@@ -229,7 +223,7 @@ def script(folder, body):
         (PMIC, "error=2 error_msg=Invalid arguments", "Raspberry Pi 5"),
     ],
 )
-def test_pmic_is_read_through_its_command_and_lost_for_now_where_it_is_garbled(tmp_path, old, new, said):
+def test_pmic_is_read_through_its_command_and_lost_for_now_where_it_is_garbled(tmp_path, old, new, message):
     (tmp_path / "adc").write_text(PMIC)
     (failing,) = find_pmic(script(tmp_path, "echo 'VCHI initialization failed' >&2; exit 255"))
     assert "VCHI initialization failed" in failing.why_not
@@ -237,7 +231,7 @@ def test_pmic_is_read_through_its_command_and_lost_for_now_where_it_is_garbled(t
     assert pmic.usable
     assert pmic.meters[0].read() == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
     (tmp_path / "adc").write_text(PMIC.replace(old, new))
-    with pytest.raises(MeterLostError, match=re.escape(said)):
+    with pytest.raises(MeterLostError, match=re.escape(message)):
         pmic.meters[0].read()
 
 
@@ -253,9 +247,8 @@ def test_a_file_without_an_integer_is_lost_for_now(tmp_path, content):
 
 def test_without_meters_the_model_is_used(tmp_path):
     found = look(tmp_path)
-    assert model_meter(
-        EnergyConfig(idle_W=3.0, busy_W=7.0), lambda: 2 * 10**9, lambda: 10**9 // 2
-    ).read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
+    model = model_meter(EnergyConfig(idle_W=3.0, busy_W=7.0), lambda: 2 * 10**9, lambda: 10**9 // 2)
+    assert model.read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
     assert found.best.facts.kind is Kind.ESTIMATED
     unusable = [c for c in found.candidates if not c.usable]
     assert len(unusable) == 4

@@ -124,14 +124,6 @@ def test_simulated_sweeps(kernels, name, front):
         assert len(found) > 3
 
 
-@pytest.mark.kitti
-def test_real_sweeps(kernels, kitti_root):
-    config = profile.load("hdl-64e")
-    for path in sorted((kitti_root / "odometry" / "00" / "velodyne").glob("*.bin"))[:4]:
-        points = np.fromfile(path, np.float32).reshape(-1, 4)
-        assert len(both(kernels, points, config.sensor, None, config.segmentation)) > 20
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [0, 1, 2, 1_000_000])
 def test_any_number_of_points(kernels, n):

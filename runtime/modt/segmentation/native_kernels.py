@@ -71,19 +71,9 @@ class _GroundBuffers:
         grid = ground.grid
         scales = FAR_M, 1 / RING_STEP, SECTORS / 4
         slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
-        self.constants = _Ground(
-            grid.rings,
-            SECTORS,
-            SECTORS.bit_length() - 1,
-            FLANK_SECTORS,
-            *scales,
-            *slopes,
-            NEAR_M,
-            SLOPE_GAIN,
-            NOISE_M,
-            MAX_GAP_M,
-            FLANK_M,
-        )
+        limits = NEAR_M, SLOPE_GAIN, NOISE_M, MAX_GAP_M, FLANK_M
+        sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS
+        self.constants = _Ground(grid.rings, *sectors, *scales, *slopes, *limits)
         self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
         self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
         self.points = np.empty((3, 0), np.float32)

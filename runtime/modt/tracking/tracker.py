@@ -122,10 +122,10 @@ class Tracker:
         if self._extended:  # the paper takes proposals as they are
             frame = self._regrouping.regroup(self._tracks, frame, located.placement)
         known = self._tracks.box.take(frame.matches.rows, axis=0)
+        self._associate(frame.matches.rows)
         self._update(frame.matches, frame.observations, dt_s)
         self._keep_top(frame, known)
         self._observe_rest(frame.matches.rows)
-        self._coast(frame.matches.rows)
         near = self._near_rest()
         self._withdraw(near)
         at_rest = self._background(near)
@@ -180,14 +180,23 @@ class Tracker:
         self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
+    def _associate(self, rows: Int) -> None:
+        """Count hits and misses; proposals take over the standing of their tracks, the other tracks coast."""
+        t = self._tracks
+        events = np.full(len(t), Event.UNASSOCIATED.value)
+        events[rows] = Event.ASSOCIATED.value
+        self._advance(np.arange(len(t)), events)
+        t.state[rows] = self.machine.joined(t.state[rows])
+        t.age += 1
+        t.hits[rows] += 1
+        t.missed += 1
+        t.missed[rows], t.unseen_s[rows] = 0, 0.0
+        t.proposal[:] = NONE
+
     def _update(self, matches: Matches, observations: Observations, dt_s: float) -> None:
-        """Equation 1's filter on the matched positions; the proposals take over the standing of their tracks."""
+        """Equation 1's filter on the matched positions, and what the proposals show of their tracks."""
         t, rows = self._tracks, matches.rows
         self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
-        self._advance(rows, Event.ASSOCIATED)
-        t.state[rows] = self.machine.joined(t.state[rows])
-        t.missed[rows], t.unseen_s[rows] = 0, 0.0
-        t.hits[rows] += 1
         t.end_variance[rows] = matches.end_variance
         self._observe(t, rows, matches.proposals, observations, matches.position, dt_s)
 
@@ -217,17 +226,6 @@ class Tracker:
         t.rest_position[rows] = position + (REST_GAIN * near)[:, None] * step
         if self._extended:
             self._filter.observe_speed(t.x, t.P, rows[near], 0.0, STATIONARY_SIGMA_MPS)
-
-    def _coast(self, matched: Int) -> None:
-        """Tracks without a proposal go on as predicted."""
-        t = self._tracks
-        t.age += 1
-        lost = np.ones(len(t), np.bool_)
-        lost[matched] = False
-        rows = lost.nonzero()[0]
-        t.proposal[rows] = NONE
-        t.missed[rows] += 1
-        self._advance(rows, Event.UNASSOCIATED)
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""

@@ -3,7 +3,7 @@ import pytest
 from scipy import optimize
 
 from modt_desk.energy.board_fit import CLASS, SEG, FitError, fit, nonnegative_fit, unit_energy_J
-from tests.energy.simulated import line_of
+from tests.energy.meter_files import line_of
 
 TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
 

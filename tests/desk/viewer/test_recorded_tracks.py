@@ -7,7 +7,7 @@ from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.evaluation.recorded_result import recorded_result
-from modt_desk.viewer.recorded_tracks import frame_rows, reach_m, track_table
+from modt_desk.viewer.recorded_run import frame_rows, reach_m, track_table
 
 
 def track(id_, box, world, state="tracked", class_="car"):
@@ -45,6 +45,7 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     assert [rows[1][key] for key in BOX_KEYS] == [600, 100, -100, 450, 180, 150, 500]
     assert [rows[0][f"p_{name}"] for name in CLASS_NAMES] == [100, 700, 150, 50]
     assert [rows[0][f"motion_{name}"] for name in CLASS_NAMES] == [0, 150, -60, 20]
+    assert [rows[1][f"world_{key}"] for key in WORLD_KEYS] == [0, 600, 0, 100]
 
 
 def rows(x, y=0.0, seen=1):

@@ -32,8 +32,7 @@ from modt.viewer import theme
 from modt.viewer.packed import SIDE, Cells
 from modt.viewer.theme import LIGHT, REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.recorded_tracks import RINGS_M, reach_m
+from modt_desk.viewer.recorded_run import RINGS_M, RecordedRun, reach_m
 from modt_desk.viewer.truth_marks import LEGEND
 
 SIZE_IN = (12.8, 9.1)

@@ -27,8 +27,7 @@ from modt_desk.evaluation.run_record import FramesByNumber
 from modt_desk.evaluation.truth import by_stamp
 from modt_desk.evaluation.truth_files import labels_beside, open_truth
 from modt_desk.reporting.document import save
-from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.recorded_tracks import reach_m
+from modt_desk.viewer.recorded_run import RecordedRun, reach_m
 from modt_desk.viewer.track_page import rows_of, track_page, views
 from modt_desk.viewer.truth_marks import LEGEND, truth_marks
 
