@@ -16,7 +16,8 @@ from modt.sinks.foxglove_sinks import FoxgloveServer
 from modt.sinks.messages import topics
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
 
-CDR_HEAD = b"\0\1\0\0"
+SHOWN = topics(world_frame_id="world", points=True)
+"""Topics of a frame; those of energy and CPU time are beside them."""
 
 
 class Client:
@@ -63,6 +64,15 @@ class Client:
         self.socket.close()
 
 
+def by_schema(channel, data):
+    """Content of a message, by the definition that its channel advertises and another implementation's decoder."""
+    typesys = pytest.importorskip("rosbags.typesys")
+    name = channel["schemaName"]
+    store = typesys.get_typestore(typesys.Stores.EMPTY)
+    store.register(typesys.get_types_from_msg(channel["schema"], name))
+    return store.deserialize_cdr(data, name)
+
+
 @pytest.fixture
 def server():
     made = FoxgloveServer("127.0.0.1", 0, points=True)
@@ -73,24 +83,29 @@ def server():
 def test_a_client_sees_objects_points_and_energy(server):
     client = Client(server.port)
     channels = client.channels()
+    wanted = {topic.name for topic in SHOWN} | {"/modt/energy/watts", "/modt/cpu_ms/tracking"}
+    assert {channel["topic"] for channel in channels.values()} >= wanted
+    assert {(channel["encoding"], channel["schemaEncoding"]) for channel in channels.values()} == {("cdr", "ros2msg")}
     client.subscribe(channels)
-    wanted = {topic.name: topic.encode(moving(3)) for topic in topics(world_frame_id="world", points=True)}
-    wanted |= {
-        f"/modt/{name}": CDR_HEAD + struct.pack("<d", v)
-        for name, v in (("energy/watts", 0.5), ("cpu_ms/tracking", 2))
-    }
     seen = {}
     for _ in range(1000):  # the subscription takes its time
         server.write(moving(3))
         server.ledger(WINDOW)
         server.ledger(LEDGER)
-        while select.select([client.socket], [], [], 0.01)[0] and not seen.keys() >= wanted.keys():
+        while select.select([client.socket], [], [], 0.01)[0] and not seen.keys() >= wanted:
             id_, data = client.message()
             seen[channels[id_]["topic"]] = data
-        if seen.keys() >= wanted.keys():
+        if seen.keys() >= wanted:
             break
     client.close()
-    assert {name: seen[name] for name in wanted} == wanted
+    for topic in SHOWN:
+        assert seen[topic.name] == topic.encode(moving(3))
+    decoded = {c["topic"]: by_schema(c, seen[c["topic"]]) for c in channels.values() if c["topic"] in wanted}
+    assert [found.id for found in decoded["/modt/detections"].detections] == ["11", "12"]
+    assert decoded["/modt/points"].width == len(moving(3).frame.points)
+    assert decoded["/modt/energy/watts"].data == 0.5
+    assert seen["/modt/energy/watts"][4:] == struct.pack("<d", 0.5)
+    assert seen["/modt/cpu_ms/tracking"][4:] == struct.pack("<d", 2.0)
 
 
 def listening():
