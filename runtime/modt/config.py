@@ -138,7 +138,7 @@ class ClassificationConfig(StageConfig):
 
     @property
     def min_points(self) -> int:
-        """Points of a proposal to which it is repeated, which costs more and changes no class."""
+        """Number of points to which a smaller proposal is repeated; more costs CPU time and changes no class."""
         return 1 if self.likelihood == "pooled" else self.max_points
 
 
@@ -162,8 +162,8 @@ class DecisionConfig(StageConfig):
     rule: str = choice(
         "adapted",
         ("adapted", "likeliest"),
-        "How the class is chosen. adapted: posteriors are adapted to the class frequency of the stream, and a "
-        "reported class is kept down to a fraction of its threshold. likeliest: the class of the greatest posterior.",
+        "How the class is chosen. adapted: posteriors are adapted to the class frequency of the stream, and a class "
+        "is kept down to a posterior of 0.4. likeliest: the likeliest object, from its threshold on.",
     )
     missed_cost: tuple[float, ...] = per_class(
         "missed_cost",
@@ -263,7 +263,7 @@ class SensorConfig(StageConfig):
     pitch_deg: float | None = number(
         None, -90.0, 90.0, "deg", "Pitch of the mount, nose down. Null: measured in the first sweep."
     )
-    min_range_m: float = number(2.0, 0.0, 20.0, "m", "Nearer points are left out, as they are on the robot.")
+    min_range_m: float = number(2.0, 0.0, 20.0, "m", "Nearer points are left out, as they may be the robot's own.")
     max_range_m: float = number(80.0, 1.0, 400.0, "m", "Farther points are left out.")
     elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "Angle between neighbouring beams, evenly spaced.")
     elevations_deg: tuple[float, ...] | None = numbers(
@@ -319,7 +319,7 @@ class EnergyConfig(StageConfig):
     board: str = field(default="unknown", metadata={"meaning": "Name of the board in reports."})
     idle_W: float = number(3.0, 0.0, 1000.0, "W", "Power of the board while modt waits.")
     busy_W: float = number(7.0, 0.0, 1000.0, "W", "Power of the board while modt computes on one core.")
-    meter: str = field(default="none", metadata={"meaning": "Meter of the calibration."})
+    meter: str = field(default="none", metadata={"meaning": "Name of the meter that the calibration read."})
     seg_J: float | None = number(None, -1000.0, 1000.0, "J", "Energy of one segmentation. Null: not calibrated.")
     class_J: float | None = number(
         None, -1000.0, 1000.0, "J", "Energy of one classification, without its points. Null: not calibrated."
