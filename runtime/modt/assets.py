@@ -1,4 +1,4 @@
-"""Files of the package: models/, profiles/ and systemd/, and the models of the desk if it is installed.
+"""Files of the package: models/, profiles/ and systemd/, and the models of modt_desk if it is installed.
 
 They lie beside runtime/ in a checkout and an editable install, and inside the package in a wheel.
 """

@@ -83,7 +83,7 @@ def threads_on(cores: frozenset[int] | None) -> Iterator[None]:
 def take_real_time_priority(priority: int = 10) -> list[str]:
     """Give this thread real-time priority (SCHED_FIFO), and keep the memory of the process from being swapped out.
 
-    Threads that are started later have ordinary priority. Returns a line on each refusal, with its remedy.
+    Threads that are started later have ordinary priority. Returns one line for each refusal, with its remedy.
     """
     sys.setswitchinterval(SWITCH_S)
     refusals = []

@@ -80,7 +80,7 @@ class Observations:
 
 
 def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Observations:
-    """Proposals of a frame taken to the world by T_world_sensor (4, 4)."""
+    """Transform the proposals of a frame to the world by T_world_sensor (4, 4)."""
     box = transform_boxes(T_world_sensor, proposals.box)
     return Observations(
         box=box,

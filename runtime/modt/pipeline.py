@@ -109,7 +109,7 @@ class Pipeline:
     mount: Mount = LEVEL
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
-        """One frame, within a budget of classifications (Figs. 2 and 5)."""
+        """Process a frame within a budget of classifications (Figs. 2 and 5)."""
         run, frame = self.ledger.run, self.mount.level(frame)
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)

@@ -46,7 +46,7 @@ class Mount:
         return replace(frame, points=self.turn(frame.points), T_world_sensor=pose, turn_s=turn_s, R_level_sensor=R)
 
     def camera(self, camera: Camera) -> Camera:
-        """A camera beside the sensor, for points in the level frame."""
+        """The camera, changed to take points in the level frame instead of the sensor frame."""
         if self.R_level_sensor is None:
             return camera
         T = inverse(se3(self.R_level_sensor, np.zeros(3)))

@@ -88,7 +88,7 @@ class Cut(IntFlag):
 class Proposals:
     """The segments of one frame that could be objects.
 
-    Reflectance is the mean, standard deviation and greatest of a proposal's returns, and the share of bright and of
+    Reflectance is the mean, standard deviation and maximum of a proposal's returns, and the share of bright and of
     dark ones; NaN where none of them has any, None where the sweep carries none.
     """
 

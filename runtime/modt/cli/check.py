@@ -26,7 +26,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a line a check; 0 if none fails, else 1."""
+    """Print one line for each check; returns 0 if none fails, else 1."""
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.

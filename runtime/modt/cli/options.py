@@ -17,7 +17,7 @@ CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
 
 
 def capture(text: str) -> tuple[str, str]:
-    """Parse KEY=VALUE of a capture."""
+    """Parse KEY=VALUE of --capture."""
     key, equals, value = text.partition("=")
     if not equals or key not in CAPTURE_KEYS:
         raise argparse.ArgumentTypeError(f"{text!r}: write KEY=VALUE, KEY one of {', '.join(CAPTURE_KEYS)}")

@@ -116,7 +116,7 @@ Fields = tuple[tuple[str, ...], tuple[float | bytes, ...]]
 
 
 def text_fields(text: str) -> Fields:
-    """A string."""
+    """Length and bytes of a string."""
     octets = text.encode() + b"\0"
     return ("I", f"{len(octets)}s"), (len(octets), octets)
 
