@@ -152,7 +152,7 @@ class FaultyReader:
             self._now, self._rest_s = None, now_s + REST_S + float(self._rng.uniform(0, 2))
 
     def _send(self, fault: Fault) -> None:
-        """Have packets sent with a fault."""
+        """Make the sender apply a fault to its packets."""
         assert self._sender.stdin is not None
         print(fault.name, file=self._sender.stdin, flush=True)
 

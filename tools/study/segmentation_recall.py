@@ -58,7 +58,7 @@ class Tally:
             self.detected[kind] += bool(len(union)) and (shared / union).max() > 0.5
 
     def row(self, name: str) -> str:
-        """Markdown."""
+        """Row of a Markdown table: share of the objects detected by class, and proposals a scan."""
         cells = [f"{100 * f / n:.1f} of {n}" if n else "-" for f, n in zip(self.detected, self.objects, strict=True)]
         return f"| {name} | {' | '.join(cells[1:])} | {self.proposals / self.scans:.0f} |"
 

@@ -107,7 +107,7 @@ def cross_validate(
 
 
 def calibrated(data: Dataset, sensor: str, network: Float64, boxes: Layers) -> tuple[Layers, dict[str, Any]] | None:
-    """Calibrated layers of a sensor and their report; None without crops of it to validate by.
+    """Calibrated layers of a sensor and their report; None if there are no crops of it to validate with.
 
     Args:
         data: all R crops.

@@ -94,7 +94,7 @@ def confident(found: TrackedBoxes, least: float) -> TrackedBoxes:
 
 
 def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
-    """Remove tracks most of whose boxes lie on a more confident track of another class; classes are (n,)."""
+    """Remove tracks whose boxes mostly lie on a more confident track of another class; classes are (n,)."""
     mean = _mean(found.id, found.confidence)
     place = np.column_stack([found.box[:, :2], 2 * REACH_M * found.frame])
     a, b = cKDTree(place).query_pairs(REACH_M, output_type="ndarray").T

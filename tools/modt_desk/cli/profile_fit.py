@@ -57,7 +57,7 @@ def class_frequencies(recording: Recording, config: ProfileConfig) -> Iterator[F
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fit."""
+    """Fit a profile and write it."""
     from itertools import islice
 
     from modt.sinks.output import writing

@@ -42,7 +42,7 @@ class RunCosts:
         return cls(counts[middle, frames], cost[middle, frames])
 
     def take(self, frames: Int) -> RunCosts:
-        """The given frames."""
+        """Costs of the given frames."""
         return RunCosts(self.counts[frames], self.cost[frames])
 
 

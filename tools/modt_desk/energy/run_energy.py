@@ -59,7 +59,7 @@ class EnergySums:
         return 1e9 * joules / sum(self._cpu_ns[stage] for stage in ran) if ran else 0.0
 
     def stage_watts(self, stages: Iterable[str]) -> dict[str, float]:
-        """The same of each of these stages, without those that have no part."""
+        """Power of each of these stages as by `watts` [W]; stages without a part of the energy are left out."""
         return {stage: watts for stage in stages if not math.isnan(watts := self.watts(stage))}
 
     def _add(self, window: Line) -> None:

@@ -89,7 +89,7 @@ class FrameTruth:
 
     @classmethod
     def of(cls, types: Types, id_: Sequence[int], type_: Sequence[str], box: ArrayLike, **more: Any) -> FrameTruth:
-        """Objects of labelled types; `more` sets fields that have a default."""
+        """Make objects from their labelled types and boxes; `more` sets fields that have a default."""
         table = np.array([types.get(name, (0, Role.COUNTED)) for name in type_], np.int64).reshape(-1, 2)
         boxes = np.asarray(box, np.float64).reshape(-1, 7)
         return cls(np.asarray(id_, np.int64), tuple(type_), table[:, 0], table[:, 1], boxes, **more)

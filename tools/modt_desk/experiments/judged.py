@@ -53,7 +53,7 @@ class LabelReplay:
     """Ideal detector and tracker: every labelled object is detected and followed by itself."""
 
     def judged(self, drive: Drive) -> Judged:
-        """Tables of the labels alone."""
+        """Tables of the labelled objects, without proposals and classifications."""
         rows = [np.zeros(0, OBJECT)]
         for frame, truth in sorted(drive.labels().items()):
             wanted = (truth.object_class > 0) & (truth.role != Role.IGNORED)

@@ -68,7 +68,7 @@ class Solids:
 
     @classmethod
     def join(cls, groups: Iterable[Self]) -> Self:
-        """All groups, in order."""
+        """Join all groups into one, in order."""
         listed = list(groups) or [cls.none()]
         return cls(*(np.concatenate([getattr(g, f.name) for g in listed]) for f in fields(cls)))
 

@@ -44,7 +44,7 @@ def views(run: RecordedRun, rows: list[Row], stream: Stream | None) -> dict[int,
 
 
 def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> str:
-    """HTML of the page."""
+    """HTML of the page that explains the class of a track."""
     first, last = rows[0], rows[-1]
     number = {int(row["at"]): run.numbers[int(row["at"])] for row in rows}
     classified = [row for row in rows if row["classified"]]
