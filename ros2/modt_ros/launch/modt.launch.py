@@ -17,14 +17,14 @@ from launch_ros.substitutions import FindPackageShare
 
 ARGUMENTS = {
     "points": ("/points", "topic of the sensor's sensor_msgs/PointCloud2"),
-    "source": ("", "another SOURCE of modt run, as velodyne://, in place of points"),
+    "source": ("", "another SOURCE of modt run, such as velodyne://, instead of points"),
     "odometry": ("none", "--odometry of modt run: none, or the topic of a nav_msgs/Odometry"),
     "base_to_sensor": ("", "x,y,z,roll,pitch,yaw of the sensor on the robot [m, rad], for odometry"),
     "profile": ("", "--profile of modt run: the sensor (default: what the first sweep shows)"),
     "mode": ("accurate", "--mode of modt run"),
     "core": ("last", "--core of modt run"),
     "out": ("runs/live", "--out of modt run: directory of the records"),
-    "prefix": ("modt", "begins the names of the topics"),
+    "prefix": ("modt", "first part of the names of the topics"),
     "frame_id": ("", "frame of the results (default: that of the input)"),
     "world_frame_id": ("", "frame of the poses; publishes /tf from it to frame_id"),
     "tracks": ("objects", "tracks among the detections: objects, or all"),

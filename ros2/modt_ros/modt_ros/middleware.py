@@ -46,7 +46,7 @@ def _node(cores: frozenset[int] | None) -> Participant:
 
 
 def participant(domain_id: int, cores: frozenset[int] | None = None) -> Participant:
-    """The node; its domain is that of ROS_DOMAIN_ID, as of all nodes.
+    """The node. Its domain is the one of ROS_DOMAIN_ID, as for every node.
 
     Raises:
         MisuseError: another domain is asked for.

@@ -2,7 +2,7 @@
 
     ros2 run modt_ros modt run ros2:///points --sink ros2:///modt
 
-Every command of modt works so; Cyclone DDS for Python is not needed.
+Every command of modt works this way, without Cyclone DDS for Python.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from modt_ros import middleware
 
 
 def main() -> None:
-    """Run a command of modt; arguments behind --ros-args are those of the node."""
+    """Run a command of modt. Arguments after --ros-args belong to the node."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
