@@ -118,31 +118,26 @@ def test_an_attribute_of_another_name_may_have_the_number_of_the_type_of_text(tm
 
 
 def large(*nodes: onnx.NodeProto, **numbers: list[int]) -> onnx.ModelProto:
-    """A small file that makes large tensors."""
+    """A small file that makes a large tensor of what is pooled, and cuts it to the probabilities."""
     model = network()
     del model.graph.node[:], model.graph.initializer[:]
-    model.graph.node.extend(nodes)
+    pooled = helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0)
+    cut = helper.make_node("Slice", ["wide", "begin", "end", "axis"], ["probability"])
+    model.graph.node.extend([pooled, *nodes, cut])
+    numbers |= {"begin": [0], "end": [4], "axis": [1]}
     model.graph.initializer.extend(
         numpy_helper.from_array(np.array(value, np.int64), name) for name, value in numbers.items()
     )
     return model
 
 
-POOLED = helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0)
 LARGE = {
     "constants": large(
-        POOLED,
         helper.make_node("ConstantOfShape", ["shape"], ["weight"]),
         helper.make_node("MatMul", ["pooled", "weight"], ["wide"]),
-        helper.make_node("Slice", ["wide", "begin", "end", "axis"], ["probability"]),
-        **{"shape": [3, 1 << 28], "begin": [0], "end": [4], "axis": [1]},
+        shape=[3, 1 << 28],
     ),
-    "results": large(
-        POOLED,
-        helper.make_node("Tile", ["pooled", "repeats"], ["wide"]),
-        helper.make_node("Slice", ["wide", "begin", "end", "axis"], ["probability"]),
-        **{"repeats": [1, 1 << 28], "begin": [0], "end": [4], "axis": [1]},
-    ),
+    "results": large(helper.make_node("Tile", ["pooled", "repeats"], ["wide"]), repeats=[1, 1 << 28]),
 }
 
 

@@ -21,11 +21,12 @@ from tests.classification.scenes import blobs
 RNG = np.random.default_rng(5)
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 LAYERS = [(RNG.normal(size=shape), RNG.normal(size=shape[1])) for shape in pairwise((N_FEATURES, 5, 4))]
+SENSOR = SensorConfig(height_m=1.73)
 BOXES = MlpBoxClassifier(LAYERS, PoolWeights(network=0.8, box=0.4))
 
 
-def scores_of(boxes: MlpBoxClassifier | NoBoxClassifier, height_m: float = 1.73) -> BoxScores:
-    return BoxScores(boxes, NoReflectanceClassifier(), SensorConfig(height_m=height_m))
+def scores_of(boxes: MlpBoxClassifier | NoBoxClassifier) -> BoxScores:
+    return BoxScores(boxes, NoReflectanceClassifier(), SENSOR)
 
 
 def standing(points: int, distance_m: float, length_m: float, width_m: float, height_m: float) -> Proposals:
@@ -60,7 +61,7 @@ def test_scores_are_of_the_frame_that_is_given() -> None:
     first, second = (blobs(counts, RNG)[1] for counts in ([10, 30], [20, 5, 7]))
     for proposals in (first, first, second, first):
         log_box, log_reflectance = scores.of(proposals)
-        expected = BOXES.log_probability(proposal_features(proposals, SensorConfig(height_m=1.73)), proposals.cut)
+        expected = BOXES.log_probability(proposal_features(proposals, SENSOR), proposals.cut)
         np.testing.assert_array_equal(log_box, expected)
         assert not log_reflectance.any()
 

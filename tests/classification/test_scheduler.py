@@ -15,11 +15,6 @@ from modt.types import NONE, UNLIMITED, Budget, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
 
 COUNTS = st.lists(st.integers(1, 400), min_size=1, max_size=20)
-BUDGETS = st.builds(
-    Budget,
-    calls=st.none() | st.integers(0, 10),
-    cpu_ms=st.none() | st.floats(0.0, 3.0),
-)
 
 
 def work_ms(points: Int, slow: float = 1.0) -> float:

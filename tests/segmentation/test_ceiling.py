@@ -8,7 +8,7 @@ import pytest
 from modt.config import SegmentationConfig
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m
+from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m, histogram
 from modt.segmentation.segmenter import Segmenter
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
@@ -17,8 +17,9 @@ WALLS = RNG.uniform(0.3, 2.6, 2000)
 
 
 def heights(ceiling_m, n):
+    """Histogram of the heights of returns on walls and a ceiling."""
     ceiling = RNG.normal(ceiling_m, 0.02, n)
-    return np.concatenate([WALLS, ceiling[ceiling < 2.6]]).astype(np.float32)
+    return histogram(np.concatenate([WALLS, ceiling[ceiling < 2.6]]).astype(np.float32), 2.6)
 
 
 @pytest.mark.parametrize("ceiling_m", [2.3, 2.4, 2.5, 2.62])
@@ -30,7 +31,7 @@ def test_a_ceiling_is_cut_just_below(ceiling_m):
 @pytest.mark.parametrize(("ceiling_m", "n"), [(2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000)])
 def test_few_returns_doors_and_what_is_higher_are_no_ceiling(ceiling_m, n):
     assert below_ceiling_m(heights(ceiling_m, n)) is None
-    assert below_ceiling_m(np.zeros(0, np.float32)) is None
+    assert below_ceiling_m(histogram(np.zeros(0, np.float32), 2.6)) is None
 
 
 @pytest.mark.parametrize("ceiling_m", [2.55, 2.65, 2.75, 2.85])

@@ -179,7 +179,7 @@ def test_groups(kernels, seed, sizes, extra):
     assert same(*(k.upright_boxes(xyz, groups.offsets, yaw) for k in (NUMPY, kernels)))
     assert same(*(k.group_sums(xyz, groups.offsets) for k in (NUMPY, kernels)))
     points = rng.choice([UNRECORDED, 0.0, 0.001, 0.5, 0.85], (len(labels), 4)).astype(np.float32)
-    assert same(*(k.reflectance_sums(points, groups.rows, groups.offsets) for k in (NUMPY, kernels)))
+    assert same(*(k.reflectance_statistics(points, groups.rows, groups.offsets) for k in (NUMPY, kernels)))
 
 
 def some_strips(rng, n):

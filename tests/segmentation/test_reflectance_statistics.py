@@ -9,13 +9,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.groups import (
-    BRIGHT,
-    DARK,
-    has_reflectance,
-    reflectance_statistics,
-    reflectance_sums,
-)
+from modt.segmentation.groups import BRIGHT, DARK, has_reflectance, reflectance_statistics
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import scans
@@ -30,7 +24,7 @@ def test_statistics_of_each_group_are_of_the_returns_with_reflectance(groups: li
     points = np.zeros((sum(map(len, groups)), 4), np.float32)
     points[:, 3] = [value for group in groups for value in group]
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
-    found = reflectance_statistics(*reflectance_sums(points, np.arange(len(points)), offsets))
+    found = reflectance_statistics(points, np.arange(len(points)), offsets)
     assert found.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(found, groups, strict=True):
         own, expected = np.array([v for v in group if v != UNRECORDED], np.float32), [np.nan] * N_REFLECTANCE

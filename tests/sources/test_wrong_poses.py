@@ -22,6 +22,7 @@ KINDS = {  # wrong poses, and the reason of their refusal
     "teleported": (lambda t, x: (t, x + 80.0, 0.0), "leap"),
     "teleported a little": (lambda t, x: (t, x - 2.0, 0.0), "leap"),
     "turned": (lambda t, x: (t, x, 2.0), "leap"),
+    "turned a little": (lambda t, x: (t, x, 0.3), "leap"),
 }
 
 

@@ -22,8 +22,6 @@ def ranked(boxes, *classes, points=None, hits=3):
 def reunited(tracks, boxes, rows, points):
     """Proposal of each track after regrouping, where the first proposals were matched with the rows given."""
     matches = regrouped(tracks, associated(frame_of(boxes, points=points)[1], rows)).matches
-    assert len(set(matches.rows.tolist())) == len(matches.rows)
-    assert len(set(matches.proposals.tolist())) == len(matches.proposals)
     proposal = np.full(len(tracks), NONE)
     proposal[matches.rows] = matches.proposals
     return proposal.tolist(), matches

@@ -38,7 +38,6 @@ def merged(tracks, boxes, rows):
     """Original proposals of each one after merging, and the frame; the first are matched with the rows."""
     after, n = regrouped(tracks, frame_at_rest(tracks, boxes, *rows)), len(boxes)
     label = after.proposals.label(n * POINTS)
-    assert sorted(after.proposals.members) == list(range(n * POINTS))
     per_box = label.reshape(n, POINTS)
     assert (per_box == per_box[:, :1]).all()
     groups = [np.flatnonzero(per_box[:, 0] == k).tolist() for k in range(len(after.proposals))]

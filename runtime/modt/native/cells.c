@@ -117,25 +117,25 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
     i32 above = 0;
     for (i32 k = 0; k < n; k++) {
         i32 place = span[k].place;
-        i32 of = parent[k] = k;
+        i32 own = parent[k] = k;
         if (k && span[k - 1].place == place - 1 && near(&span[k - 1], &span[k]))
-            of = parent[k - 1];
+            own = parent[k - 1];
         while (span[above].place < place - side - 1)
             above++;
         for (i32 a = above; span[a].place <= place - side + 1; a++) /* ends at k */
-            if (parent[a] != of && near(&span[a], &span[k])) {
-                join(parent, parent[a], of);
-                of = parent[of];
+            if (parent[a] != own && near(&span[a], &span[k])) {
+                join(parent, parent[a], own);
+                own = parent[own];
             }
-        parent[k] = of;
+        parent[k] = own;
     }
     for (i32 k = 0; k < n; k++)
         parent[k] = parent[parent[k]];
 }
 
-/* connect and connect_coarse, and the number of components: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
+/* connect and connect_coarse: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
  * used lies, NONE for the others; in the order of the first of their wide cells, those in the order of their last
- * cells. Scratch: `next`, of side + 9 n_cells. */
+ * cells. Returns how many components there are. Scratch: `next`, of side + 9 n_cells. */
 static i64 connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift, i32 side,
                    i32 *next, i64 *component)
 {

@@ -5,6 +5,7 @@ typedef struct {
     i32 rings, sectors, sector_bits, flank_sectors;
     float far_m, ring_scale, sector_scale;
     float min_sqrt_range, max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
+    float upper_m, bin_m;
 } Ground;
 
 /* Scratch of the caller: rings * sectors each, then one a point. */
@@ -172,11 +173,11 @@ static void median_across(i32 sectors, i32 step, const float *row, float *median
 }
 
 /* Kernels.above_ground: of n points in rows of `width`, those within bounds of height and of square root of
- * range; returns how many. Their rows are written, and x, y, z, square root of range, and height. `range_m` and
- * `flat_m` are by ring; a ray has 4 * sectors floats. */
+ * range; returns how many. Their rows are written, and x, y, z, square root of range, and height, and those from upper_m
+ * up are counted in bins of height. `range_m` and `flat_m` are by ring; a ray has 4 * sectors floats. */
 EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float *flat_m, float height_m,
                              const float *points, i64 n, i64 width, Scratch *s, float *ray, const float bounds[4],
-                             i64 *rows, float *kept[5])
+                             i64 *rows, float *kept[5], i64 *bins)
 {
     float *highest = s->other;
     for (i32 i = 0; i < g->rings * g->sectors; i++) {
@@ -235,6 +236,8 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
         kept[1][k] = point[1];
         kept[2][k] = point[2];
         kept[3][k] = s->sqrt_range[rows[k]];
+        if (kept[4][k] > g->upper_m)
+            bins[(i32)((kept[4][k] - g->upper_m) / g->bin_m)]++;
     }
     return count;
 }

@@ -8,23 +8,20 @@ EXPORT const char *modt_sources(void) { return MODT_SOURCES; }
 /* Groups.from_labels: n groups of the rows labelled 0 to n - 1; returns how many rows that is. */
 EXPORT i64 modt_group(const i64 *labels, i64 n_rows, i64 n, i64 *rows, i64 *offsets)
 {
+    i64 *next = offsets + 1; /* of each group, the place of its next row; its end, when all are placed */
     for (i64 g = 0; g <= n; g++)
         offsets[g] = 0;
     for (i64 i = 0; i < n_rows; i++) {
         PROVEN(labels[i] >= NONE && labels[i] < n);
-        if (labels[i] != NONE)
-            offsets[labels[i] + 1]++;
+        if (labels[i] != NONE && labels[i] + 1 < n)
+            next[labels[i] + 1]++;
     }
-    for (i64 g = 0; g < n; g++)
-        offsets[g + 1] += offsets[g];
-    i64 total = offsets[n];
+    for (i64 g = 1; g < n; g++)
+        next[g] += next[g - 1];
     for (i64 i = 0; i < n_rows; i++)
         if (labels[i] != NONE)
-            rows[offsets[labels[i]]++] = i;
-    for (i64 g = n; g > 0; g--)
-        offsets[g] = offsets[g - 1];
-    offsets[0] = 0;
-    return total;
+            rows[next[labels[i]]++] = i;
+    return offsets[n];
 }
 
 typedef struct {
@@ -180,14 +177,13 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
     }
 }
 
-/* reflectance_sums: number, sum, sum of squares, bright and dark ones of the measured reflectances of each group,
- * five rows of n, and the greatest; points are rows of `width`. */
-EXPORT void modt_reflectance_sums(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
-                                  float bright, float dark, double *sums, float *greatest)
+/* reflectance_statistics: of the measured reflectances of each group; points are rows of `width`. */
+EXPORT void modt_reflectance_statistics(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
+                                        float bright, float dark, double (*statistics)[5])
 {
     i64 last = offsets[n];
     for (i64 g = 0; g < n; g++) {
-        double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0;
+        double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0, *own = statistics[g];
         float high = -INFINITY;
         for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
             __builtin_prefetch(&points[index[i + AHEAD < last ? i + AHEAD : i] * width + 3]);
@@ -201,8 +197,8 @@ EXPORT void modt_reflectance_sums(const float *points, i64 width, const i64 *ind
             darks += r < dark;
             high = most(r, high);
         }
-        sums[g] = number, sums[n + g] = total, sums[2 * n + g] = squares, sums[3 * n + g] = brights;
-        sums[4 * n + g] = darks;
-        greatest[g] = high;
+        double mean = total / number, variance = squares / number - mean * mean; /* not a number without any */
+        own[0] = mean, own[1] = __builtin_sqrt(variance < 0.0 ? 0.0 : variance);
+        own[2] = number > 0.0 ? (double)high : mean, own[3] = brights / number, own[4] = darks / number;
     }
 }

@@ -95,14 +95,15 @@ class ClusterSizes:
     def of_cells(cls, cells: Cells, points: PointColumns, beam_m: Float32, cluster: Int) -> Self:
         """Sizes of clusters by (C,) a point of each cell, the distance of beams there [m], its cluster or NONE."""
         n, has = int(cluster.max(initial=NONE)) + 1, np.flatnonzero(cluster != NONE)
-        label, x, y, cell = cluster[has], points.x[has], points.y[has], np.zeros(n, np.int64)
+        label, cell = cluster.take(has), np.zeros(n, np.int64)
         cell[label] = has
+        x, y, low, high = (v.take(has) for v in (points.x, points.y, cells.low, cells.high))
         width, depth = (label_max(v, label, n) - label_min(v, label, n) for v in (x, y))
         return cls(
-            points=np.bincount(label, cells.entries[has], n).astype(np.int64),
+            points=np.bincount(label, cells.entries.take(has), n).astype(np.int64),
             extent_m=np.sqrt(np.square(width) + np.square(depth)),
-            bottom_m=label_min(cells.low[has], label, n),
-            top_m=label_max(cells.high[has], label, n),
+            bottom_m=label_min(low, label, n),
+            top_m=label_max(high, label, n),
             sqrt_range=points.sqrt_range.take(cell),
             cell=cell,
             beam_m=beam_m.take(cell),

@@ -12,6 +12,7 @@ import numpy as np
 from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native.library import FLOAT32, INT32, INT64, Own, Signatures, declare, pointers, structure
+from modt.segmentation.ceiling import ABOVE_M, BIN_M, bins_up_to
 from modt.segmentation.clusters import (
     MAX_CELL_GAP_BEAMS,
     MAX_CELL_GAP_M,
@@ -28,11 +29,11 @@ from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, 
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
-from modt.types import NONE, Float32, Float64, Int
+from modt.types import N_REFLECTANCE, NONE, Float32, Float64, Int
 
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, _L, Own, Own, FLOAT32, Own, Own)),
+    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, _L, Own, Own, FLOAT32, *[Own] * 3)),
     "modt_occupied_cells": (_L, (Own, FLOAT32, _L, _F, _I, _I, INT32, Own, Own, Own, Own)),
     "modt_cluster": (_L, (Own, Own, Own, FLOAT32, _L, _I, _I, Own, Own, Own)),
     "modt_view_bounds": (None, (Own, Own, FLOAT32, INT64, INT64, _L, INT64, _L, Own, Own)),
@@ -40,7 +41,7 @@ _SIGNATURES: Signatures = {
     "modt_group": (_L, (INT64, _L, _L, Own, Own)),
     "modt_members": (None, (Own, INT64, _L, INT64, INT64, _L, _L, Own)),
     "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, Own)),
-    "modt_reflectance_sums": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, Own, Own)),
+    "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, Own)),
 }
 
 
@@ -50,7 +51,10 @@ class _Ground(ctypes.Structure):
     _fields_ = (
         *((name, _I) for name in ("rings", "sectors", "sector_bits", "flank_sectors")),
         *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope")),
-        *((name, _F) for name in ("ramp_slope", "near_m", "slope_gain", "noise_m", "max_gap_m", "flank_m")),
+        *(
+            (name, _F)
+            for name in ("ramp_slope", "near_m", "slope_gain", "noise_m", "max_gap_m", "flank_m", "upper_m", "bin_m")
+        ),
     )
 
 
@@ -71,7 +75,7 @@ class _GroundBuffers:
         grid = ground.grid
         scales = FAR_M, 1 / RING_STEP, SECTORS / 4
         slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
-        limits = NEAR_M, SLOPE_GAIN, NOISE_M, MAX_GAP_M, FLANK_M
+        limits = NEAR_M, SLOPE_GAIN, NOISE_M, MAX_GAP_M, FLANK_M, ABOVE_M, BIN_M
         sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS
         self.constants = _Ground(grid.rings, *sectors, *scales, *slopes, *limits)
         self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
@@ -107,19 +111,19 @@ class NativeKernels(NativeGeometryKernels, Kernels):
 
     def above_ground(
         self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
-    ) -> tuple[Int, PointColumns, Float32]:
-        """(K,) rows of the points within bounds, those points, and their (K,) heights above ground [m]."""
+    ) -> tuple[Int, PointColumns, Float32, Int]:
+        """(K,) rows of the points within bounds, those points, their (K,) heights above ground [m] and histogram."""
         buffers = self._ground.get(ground) or self._ground.setdefault(ground, _GroundBuffers(ground))
         points = np.ascontiguousarray(points, np.float32)
         n, width = points.shape
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
-        scratch, out = buffers.scratch(n), pointers(kept)
+        scratch, out, count = buffers.scratch(n), pointers(kept), np.zeros(bins_up_to(float(bounds[1])), np.int64)
         k = self.library.modt_above_ground(
             buffers.constants, ground.grid.range_m, buffers.flat_m, sensor_height_m, points, n, width, scratch,
-            buffers.rays, bounds, rows, out,
+            buffers.rays, bounds, rows, out, count,
         )  # fmt: skip
         x, y, z, sqrt_range, height = kept[:, :k]
-        return rows[:k], PointColumns(x, y, z, sqrt_range), height
+        return rows[:k], PointColumns(x, y, z, sqrt_range), height, count
 
     def occupied_cells(
         self, grid: SqrtRangeGrid, points: PointColumns, height: Float32
@@ -199,13 +203,13 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         self.library.modt_best_headings(*given, *AXES, len(HEADINGS), noise_m, best)
         return best
 
-    def reflectance_sums(self, points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
-        """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
+    def reflectance_statistics(self, points: Float32, index: Int, offsets: Int) -> Float64:
+        """(G, 5) mean, standard deviation, maximum, share of bright and share of dark returns of each group."""
         points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
-        sums, greatest = np.empty((5, n), np.float64), np.empty(n, np.float32)
+        statistics = np.empty((n, N_REFLECTANCE))
         given = points, points.shape[1], index, offsets, n
-        self.library.modt_reflectance_sums(*given, BRIGHT, DARK, sums, greatest)
-        return sums, greatest
+        self.library.modt_reflectance_statistics(*given, BRIGHT, DARK, statistics)
+        return statistics
 
     @staticmethod
     def _columns(points: PointColumns) -> array[int]:

@@ -61,7 +61,7 @@ def read_datagram(raw: bytes) -> tuple[float, Float64]:
         T = _matrix(message["pose"])
     else:
         x, y, yaw = (_number(message[key], key) for key in PLANAR)
-        T = se3(rotation_zyx(0.0, 0.0, math.remainder(yaw, 2 * math.pi)), np.array([x, y, 0.0]))
+        T = se3(rotation_zyx(0.0, 0.0, yaw), np.array([x, y, 0.0]))
     return stamp, T
 
 

@@ -3,14 +3,15 @@
 import struct
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture
+from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture, Fragments
 from tools.send.pcap_writer import ethernet, ipv4, udp
 
 PAYLOADS = [b"first", b"", bytes(range(256)) * 5]
 DATAGRAM = ipv4(udp(b"payload", 2368))
-IP = b"\x08\x00"
 
 
 RECORD = struct.pack("<IIII", 8, 0, len(ethernet(DATAGRAM)), len(ethernet(DATAGRAM))) + ethernet(DATAGRAM)
@@ -38,30 +39,62 @@ def test_either_byte_order_and_unit(tmp_path, order, magic, stamp_s):
     assert {(d.source, d.port) for d in read} == {("192.0.2.1", 2368)}
 
 
+SOURCES = {4: "192.0.2.1", 6: "fe80::c901"}
+SOURCE = bytes.fromhex("fe80000000000000000000000000c901")
+WHOLE = udp(bytes(i % 251 for i in range(4000)), 7502)
+EXTENSIONS = bytes((60, 0)) + bytes(6) + bytes((17, 1)) + bytes(14)
+
+
+def ipv6(payload, *, kind=17):
+    head = struct.pack(">IHBB", 6 << 28, len(payload), kind, 64)
+    return head + SOURCE + bytes.fromhex("ff020000000000000000000000000001") + payload
+
+
+PACKETS = {4: DATAGRAM, 6: ipv6(udp(b"payload", 2368))}
+TYPES = {4: b"\x08\x00", 6: b"\x86\xdd"}
+
+
+@pytest.mark.parametrize("version", [4, 6])
 @pytest.mark.parametrize(
     ("link", "frame"),
     [
-        (ETHERNET, lambda packet: bytes(12) + IP + packet + b"padding"),
-        (ETHERNET, lambda packet: bytes(12) + b"\x81\x00\x00\x05" + IP + packet),
-        (ETHERNET, lambda packet: bytes(12) + b"\x88\xa8\x00\x05\x81\x00\x00\x06" + IP + packet),
-        (RAW_IP, lambda packet: packet),
-        (COOKED, lambda packet: bytes(14) + IP + packet),
-        (COOKED_2, lambda packet: IP + bytes(18) + packet),
+        (ETHERNET, lambda kind, packet: bytes(12) + kind + packet + b"padding"),
+        (ETHERNET, lambda kind, packet: bytes(12) + b"\x81\x00\x00\x05" + kind + packet),
+        (ETHERNET, lambda kind, packet: bytes(12) + b"\x88\xa8\x00\x05\x81\x00\x00\x06" + kind + packet),
+        (RAW_IP, lambda kind, packet: packet),
+        (COOKED, lambda kind, packet: bytes(14) + kind + packet),
+        (COOKED_2, lambda kind, packet: kind + bytes(18) + packet),
     ],
     ids=["Ethernet", "VLAN", "two VLAN tags", "raw IP", "cooked", "cooked 2"],
 )
-def test_link_layers(tmp_path, link, frame):
-    (read,) = Capture(file_of(tmp_path / "a.pcap", [frame(DATAGRAM)], link=link))
-    assert (read.source, read.port, read.payload) == ("192.0.2.1", 2368, b"payload")
+def test_link_layers(tmp_path, link, frame, version):
+    (read,) = Capture(file_of(tmp_path / "a.pcap", [frame(TYPES[version], PACKETS[version])], link=link))
+    assert (read.source, read.port, read.payload) == (SOURCES[version], 2368, b"payload")
 
 
-def test_fragments_are_put_together_in_any_order(tmp_path):
-    whole = udp(bytes(i % 251 for i in range(4000)), 7502)
-    starts = range(0, len(whole), 1480)
-    parts = [ipv4(whole[at : at + 1480], identity=9, offset=at, more=at != starts[-1]) for at in starts]
+def test_extension_headers_of_ipv6_are_skipped(tmp_path):
+    path = file_of(tmp_path / "a.pcap", [ipv6(EXTENSIONS + udp(b"payload", 2368), kind=0)], link=RAW_IP)
+    assert payloads(path) == [b"payload"]
+
+
+def fragment(version, at):
+    piece, more = WHOLE[at : at + 1480], at + 1480 < len(WHOLE)
+    if version == 4:
+        return ipv4(piece, identity=9, offset=at, more=more)
+    return ipv6(struct.pack(">BBHI", 17, 0, at | more, 9) + piece, kind=44)
+
+
+@pytest.mark.parametrize("version", [4, 6])
+def test_fragments_are_put_together_in_any_order(tmp_path, version):
+    parts = [fragment(version, at) for at in range(0, 4008, 1480)]
     between = ipv4(udp(b"between", 7502))
     path = file_of(tmp_path / "a.pcap", [parts[2], parts[0], between, parts[1], parts[0]], link=RAW_IP)
-    assert payloads(path) == [b"between", whole[8:]]
+    assert payloads(path) == [b"between", WHOLE[8:]]
+
+
+@given(st.binary(max_size=200), st.sampled_from([0x45, 0x60, 0x6F]))
+def test_any_bytes_are_a_packet_or_none(raw, first):
+    Fragments().whole(bytes([first]) + raw)
 
 
 def test_packets_that_hold_no_datagram_are_skipped(tmp_path):

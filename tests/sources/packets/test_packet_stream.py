@@ -55,6 +55,7 @@ def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(
     assert stamps_s == sorted(stamps_s)
     assert len(stamps_s) >= 8
     assert stream.faults.skipped == 0
+    assert stream.faults.first[-1].cause == "1 packets refused: its stamp leaps: the clock was set, or lies"
 
 
 def test_invalid_options_are_refused(path):

@@ -1,11 +1,11 @@
 """PCAP files as streams, and the UDP datagrams in them.
 
-Files of either byte order with stamps in µs or ns are read; IPv4 over Ethernet, Linux cooked or raw IP, as live
-sensors are received.
+Files of either byte order with stamps in µs or ns are read; IPv4 and IPv6 over Ethernet, Linux cooked or raw IP.
 """
 
 from __future__ import annotations
 
+import socket
 import struct
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -25,6 +25,9 @@ MAX_PENDING = 64
 """Greatest number of incomplete packets; beyond it the oldest one is dropped."""
 MORE, OFFSET = 0x2000, 0x1FFF
 MAX_PACKET_BYTES = 65_535
+IPV6_BYTES, FRAGMENT = 40, 44
+EXTENSIONS = (0, 43, FRAGMENT, 60)
+"""Extension headers of IPv6: hop by hop, routing, fragment, destination."""
 
 
 Packet = tuple[str, int, bytes]
@@ -38,14 +41,27 @@ class Fragments:
         self._pending: dict[bytes, dict[int, tuple[bytes, bool]]] = {}
 
     def whole(self, raw: bytes) -> Packet | None:
-        """Packet that these bytes complete; None while a part is missing, or if they are no packet of IPv4."""
-        if len(raw) < 20 or raw[0] >> 4 != 4:
+        """Packet that these bytes complete; None while a part is missing, or if they are no IP packet."""
+        version = raw[0] >> 4 if raw else 0
+        if version == 6 and len(raw) >= IPV6_BYTES:
+            return self._whole_of_ipv6(raw)
+        if version != 4 or len(raw) < 20:
             return None
         start, length = 4 * (raw[0] & 15), int.from_bytes(raw[2:4], "big")
         flags = struct.unpack_from(">H", raw, 6)[0]
         key = raw[12:20] + raw[4:6] + raw[9:10]
         payload = self._joined(key, 8 * (flags & OFFSET), raw[start : length or None], bool(flags & MORE))
         return None if payload is None else (".".join(map(str, raw[12:16])), raw[9], payload)
+
+    def _whole_of_ipv6(self, raw: bytes) -> Packet | None:
+        length, kind, payload = int.from_bytes(raw[4:6], "big"), raw[6], raw[IPV6_BYTES:]
+        whole: bytes | None = payload[: length or None]
+        while whole and kind in EXTENSIONS and len(whole) >= 8:
+            kind, extension, size = whole[0], kind, 8 if kind == FRAGMENT else 8 * (whole[1] + 1)
+            where, key, whole = int.from_bytes(whole[2:4], "big"), raw[8:IPV6_BYTES] + whole[4:8], whole[size:]
+            if extension == FRAGMENT:
+                whole = self._joined(key, where & ~7, whole, bool(where & 1))
+        return None if whole is None else (socket.inet_ntop(socket.AF_INET6, raw[8:24]), kind, whole)
 
     def _joined(self, key: bytes, offset: int, payload: bytes, more: bool) -> bytes | None:
         """Payload that a fragment completes, None while a part is missing."""
@@ -78,7 +94,7 @@ PCAPNG = b"\x0a\x0d\x0d\x0a"
 ETHERNET, RAW_IP, COOKED, COOKED_2 = 1, 101, 113, 276
 LINK_HEADERS = {ETHERNET: (12, 14), COOKED: (14, 16), COOKED_2: (0, 20)}
 """Offsets of the protocol and of the payload by link type."""
-IPV4, VLAN_TAGS, UDP = 0x0800, (0x8100, 0x88A8, 0x9100), 17
+IPS, VLAN_TAGS, UDP = (0x0800, 0x86DD), (0x8100, 0x88A8, 0x9100), 17
 MAX_RECORD_BYTES = 262_144
 """Greatest snapshot length of tcpdump; a record that promises more is broken."""
 
@@ -169,7 +185,7 @@ class Capture:
         while len(frame) >= start:
             protocol = int.from_bytes(frame[protocol_at : protocol_at + 2], "big")
             if protocol not in VLAN_TAGS:
-                return start if protocol == IPV4 else None
+                return start if protocol in IPS else None
             protocol_at, start = start + 2, start + 4
         return None
 
