@@ -105,8 +105,8 @@ _POINTS, _DETECTIONS = frozenset({"points"}), frozenset({"domain", "frame_id", "
 SINKS = {
     "stdout": Scheme("stdout://", _opener("sinks.frame_lines", "open_stdout")),
     "file": Scheme("file:///PATH", _opener("sinks.frame_lines", "open_file")),
-    "unix": Scheme("unix:///PATH", _opener("sinks.datagrams", "open_unix")),
-    "udp": Scheme("udp://HOST:PORT", _opener("sinks.datagrams", "open_udp")),
+    "unix": Scheme("unix:///PATH", _opener("sinks.frame_lines", "open_unix")),
+    "udp": Scheme("udp://HOST:PORT", _opener("sinks.frame_lines", "open_udp")),
     "mcap": Scheme(
         "mcap:///PATH", _background("sinks.foxglove_sinks", "open_mcap", 4), _POINTS | {"max_mb"}, "foxglove"
     ),

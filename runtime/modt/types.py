@@ -170,8 +170,16 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
     )
 
 
-def regrouped(members: Int, coordinates: Float32, label: Int, n: int) -> tuple[Int, Float32, Int]:
-    """Members (K,) and (3, K) coordinates by label (K,), below n, each in its order; (n,) count of each label."""
+def regrouped(
+    members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int
+) -> tuple[Int, Float32, Int]:
+    """Members (K,) and (3, K) coordinates by label, below n, each in its order; (n,) count of each label.
+
+    Those of a group, by offsets (G + 1,), have its label (G,), but for the ones moved: rows (S,), ascending, and the
+    label (S,) of each.
+    """
+    label = label.repeat(offsets[1:] - offsets[:-1])
+    label[moved[0]] = moved[1]
     # Sixteen bits hold every number of a proposal, and are sorted by radix.
     order = label.astype(np.uint16).argsort(kind="stable")
     return members.take(order), coordinates.take(order, axis=1), np.bincount(label, minlength=n)

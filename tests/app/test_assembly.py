@@ -1,4 +1,4 @@
-"""Assembly of the pipeline: it is warmed up, and its budget buys something."""
+"""Assembly of the pipeline: `segmentation.kernels`, warming up, and a budget that buys something."""
 
 import dataclasses
 import itertools
@@ -9,7 +9,10 @@ import pytest
 from modt import profile
 from modt.app import assembly
 from modt.classification.pointnet import PointNet
+from modt.errors import MisuseError
 from modt.geometry import FieldOfView
+from modt.native.library import NotAvailableError
+from modt.segmentation.kernels import NUMPY
 
 BASE = profile.load("vlp-16")
 
@@ -50,3 +53,22 @@ def test_a_budget_below_the_price_of_a_call_is_warned_of(mode, scheduler, warned
         pipeline(mode, **scheduler)
     assert len(caplog.records) == warned
     assert ("raise" in caplog.text) is warned
+
+
+def test_numpy_takes_the_place_of_missing_kernels_and_the_environment_wins(monkeypatch, caplog):
+    def load():
+        raise NotAvailableError("not compiled for riscv64; install modt again")
+
+    monkeypatch.delenv(assembly.VARIABLE, raising=False)
+    monkeypatch.setattr(assembly, "load", load)
+    assert assembly.chosen_kernels("numpy") is NUMPY
+    assert not caplog.records
+    assert assembly.chosen_kernels("auto") is NUMPY
+    assert "not compiled for riscv64" in caplog.text
+    with pytest.raises(MisuseError, match="native: not compiled for riscv64"):
+        assembly.chosen_kernels("native")
+    monkeypatch.setenv(assembly.VARIABLE, "numpy")
+    assert assembly.chosen_kernels("native") is NUMPY
+    monkeypatch.setenv(assembly.VARIABLE, "fast")
+    with pytest.raises(MisuseError, match=r"MODT_KERNELS: no kernels .fast.; use one of"):
+        assembly.chosen_kernels("numpy")

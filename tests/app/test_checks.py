@@ -12,18 +12,16 @@ from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, Scope
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.stream import Reception, StreamInfo, Sweep
+from tests.energy.meter_files import write_files
 
 
 def core(sys, isolated, number):
-    (sys / "devices/system/cpu").mkdir(parents=True)
-    (sys / "devices/system/cpu/isolated").write_text(isolated)
+    write_files(sys / "devices/system/cpu", isolated=isolated)
     return checks.core(number, sys)
 
 
 def governor(sys, name):
-    folder = sys / "devices/system/cpu/cpu3/cpufreq"
-    folder.mkdir(parents=True)
-    (folder / "scaling_governor").write_text(f"{name}\n")
+    write_files(sys / "devices/system/cpu/cpu3/cpufreq", scaling_governor=name)
     return checks.governor(3, sys)
 
 

@@ -18,8 +18,8 @@ from modt.types import Budget
 class Frames:
     """Frames at 10 Hz on a made-up clock."""
 
-    def __init__(self, power_W=None):
-        self.ladder, self.now, self.changes = Ladder(power_W), 0.0, []
+    def __init__(self):
+        self.ladder, self.now, self.changes = Ladder(), 0.0, []
 
     def run(self, seconds, share):
         end = self.now + seconds
@@ -65,12 +65,12 @@ def test_trials_that_fail_become_rare():
 
 def test_a_power_limit_is_kept_by_the_same_steps():
     """Watts fall by a fifth with each step."""
-    frames, over = Frames(power_W=5.0), 0
+    frames, over = Frames(), 0
     for _second in range(120):
         frames.run(1.0, 0.3)
         watts = 7.0 - 1.4 * frames.ladder.step
         over += watts > 5.0
-        frames.ladder.power(frames.now, watts)
+        frames.ladder.power(frames.now, watts, 5.0)
     assert over < 20  # of 120 windows: the first ones, and trials
     assert frames.ladder.step in (Step.DEFERRED, Step.REDUCED)
 

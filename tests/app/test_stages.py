@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from modt import profile
+from modt.app.chosen_profile import FOUND, choose
 from modt.app.inputs import Request
-from modt.app.stages import RANGE_SHARE, SWEEPS, SensorWatch, Stages, within
+from modt.app.stages import RANGE_SHARE, SWEEPS, SensorWatch, Stages
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED, Frame
@@ -126,7 +127,6 @@ def test_a_reduced_frame_holds_what_is_near():
     distance_m = np.hypot(*result.frame.points[:, :2].T)
     assert distance_m.max() <= reach_m
     assert len(result.frame.points) == np.count_nonzero(np.hypot(*frame.points[:, :2].T) <= reach_m)
-    assert len(within(frame.points, 1e9)) == len(frame.points)
 
 
 @pytest.mark.slow
@@ -138,8 +138,8 @@ def test_another_sensor_is_noticed_and_followed(caplog):
     for frame in frames():
         stages.step(frame, UNLIMITED, reduced=False)
         stages.watch(frame)
-        if stages.looking is not None:
-            stages.looking.join()
+        if stages.recognising is not None:
+            stages.recognising.join()
     assert stages.misfits == 1
     assert stages.chosen.name == "as found"
     assert stages.config.sensor.elevation_step_deg > 1.0 or stages.config.sensor.elevations_deg
@@ -152,15 +152,15 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
         looks.append(frame.index)
         may_end.wait(60)
 
-    monkeypatch.setattr(stages, "_look_again", look)
+    monkeypatch.setattr(stages, "_recognise_again", look)
     for k in range(100):
         few = frames()[0].points[:: 8 if k // 10 % 2 else 1]
         stages.watch(Frame(k, 0.1 * k, few))
     assert len(looks) == 1
     may_end.set()
-    stages.looking.join()
+    stages.recognising.join()
     stages.watch(Frame(100, 10.0, few))
-    stages.looking.join()
+    stages.recognising.join()
     assert looks[1:] == [100]  # what it could not look at meanwhile
 
 
@@ -178,4 +178,24 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
 def test_sweeps_of_another_size_are_noticed_once_when_they_stay(sizes, noticed):
     watch, points = SensorWatch(), np.zeros((1000, 4), np.float32)
     points[:, 0] = 5.0
-    assert [k for k, size in enumerate(sizes) if watch.unlike(points[:size])] == noticed
+    assert [k for k, size in enumerate(sizes) if watch.changed(points[:size])] == noticed
+
+
+BEAMS_DEG = (-15.1, *(float(v) for v in range(-13, 14, 2)), 15.2)
+
+
+@pytest.mark.parametrize(
+    ("asked", "named", "sensor", "beams"),
+    [
+        ((), "vlp-16", "vlp-16", BEAMS_DEG),
+        ((), None, FOUND, BEAMS_DEG),
+        (("vlp-16",), None, "vlp-16", profile.load("vlp-16").sensor.elevations_deg),
+    ],
+    ids=["a known sensor", "an unknown one", "a profile that was asked for"],
+)
+def test_beams_that_the_source_knows_are_used_unless_a_sensor_is_asked_for(asked, named, sensor, beams):
+    info = dataclasses.replace(INFO, profile=named, elevations_deg=BEAMS_DEG)
+    for first in (None, frames()[0]):
+        chosen = choose(asked, first, info)
+        assert chosen.config.sensor.elevations_deg == beams
+    assert chosen.sensor == sensor

@@ -3,7 +3,7 @@
 import logging
 import os
 import socket
-from contextlib import closing, suppress
+from contextlib import contextmanager, suppress
 
 import pytest
 
@@ -11,24 +11,21 @@ from modt.app.supervisor import supervisor_of
 from modt.errors import MisuseError
 
 
-class Systemd:
-    """A socket that stands in for systemd's."""
+@contextmanager
+def systemd(address):
+    """A socket that stands in for systemd's: a function that returns the messages since its last call."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as bound:
+        bound.bind(str(address))
+        bound.setblocking(False)
 
-    def __init__(self, address):
-        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self.socket.bind(address)
-        self.socket.setblocking(False)
+        def heard():
+            messages = []
+            with suppress(BlockingIOError):
+                while True:
+                    messages.append(bound.recv(4096).decode())
+            return messages
 
-    def heard(self):
-        """Messages since the last call."""
-        messages = []
-        with suppress(BlockingIOError):
-            while True:
-                messages.append(self.socket.recv(4096).decode())
-        return messages
-
-    def close(self):
-        self.socket.close()
+        yield heard
 
 
 @pytest.mark.parametrize("place", ["notify", "/", "@", "vsock:2:1234"])
@@ -40,14 +37,14 @@ def test_an_invalid_address_is_named(place):
 @pytest.mark.parametrize("abstract", [False, True])
 def test_ready_is_sent_first_and_the_watchdog_served(tmp_path, abstract):
     name = f"@modt-test-{os.getpid()}" if abstract else str(tmp_path / "notify")
-    with closing(Systemd(name.replace("@", "\0"))) as systemd:
+    with systemd(name.replace("@", "\0")) as heard:
         supervisor = supervisor_of({"NOTIFY_SOCKET": name})
-        assert systemd.heard() == []
+        assert heard() == []
         for expected in ("READY=1\nWATCHDOG=1", "WATCHDOG=1"):
             supervisor.alive()
-            assert systemd.heard() == [expected]
+            assert heard() == [expected]
         supervisor.close()
-        assert systemd.heard() == ["STOPPING=1"]
+        assert heard() == ["STOPPING=1"]
 
 
 def test_unreachable_supervisor_is_logged_once_and_retried(tmp_path, caplog):
@@ -56,18 +53,18 @@ def test_unreachable_supervisor_is_logged_once_and_retried(tmp_path, caplog):
         supervisor.alive()
         supervisor.alive()
     assert [r.levelname for r in caplog.records] == ["WARNING"]
-    with closing(Systemd(str(tmp_path / "notify"))) as systemd:
+    with systemd(tmp_path / "notify") as heard:
         supervisor.alive()
-        assert systemd.heard() == ["READY=1\nWATCHDOG=1"]
+        assert heard() == ["READY=1\nWATCHDOG=1"]
         supervisor.close()
 
 
 def test_slow_supervisor_does_not_block(tmp_path):
     supervisor = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
-    with closing(Systemd(str(tmp_path / "notify"))) as systemd:
+    with systemd(tmp_path / "notify") as heard:
         for _ in range(10_000):  # far more than a socket holds
             supervisor.alive()
-        assert 1 < len(systemd.heard()) < 10_000
+        assert 1 < len(heard()) < 10_000
         supervisor.alive()
-        assert systemd.heard() == ["WATCHDOG=1"]
+        assert heard() == ["WATCHDOG=1"]
         supervisor.close()

@@ -65,33 +65,27 @@ def test_a_model_keeps_layers_in_single_precision_and_weights() -> None:
     assert not from_metadata({}).log_probability(features, whole).any()
 
 
+def layer(value: float, inputs: int = N_FEATURES, outputs: int = 4) -> list[object]:
+    return [[[[value] * outputs] * inputs, [0.0] * outputs]]
+
+
 @pytest.mark.parametrize(
-    "layers",
+    "text",
     [
-        [],
-        [[[[1]], [1]]],
-        [[[[float("nan")] * 4] * N_FEATURES, [0.0] * 4]],
-        [[[[1e300] * 4] * N_FEATURES, [0.0] * 4]],
-        [[[[0.0] * 4] * (N_FEATURES - 1), [0.0] * 4]],
-        [[[[0.0] * 3] * N_FEATURES, [0.0] * 3]],
-        {},
-        3,
+        *("[]", "{}", "no json"),
+        *(
+            json.dumps({"weights": WEIGHTS.as_dict(), "layers": layers})
+            for layers in ([], layer(np.nan), layer(1e300), layer(0.0, N_FEATURES - 1), layer(0.0, outputs=3), {}, 3)
+        ),
+        *(
+            json.dumps({"weights": weights, "layers": to_lists(LAYERS)})
+            for weights in (WEIGHTS.as_dict() | {"network": 1.5}, {"network": 0.5, "box": 0.5}, None)
+        ),
     ],
 )
-def test_malformed_layers_are_rejected(layers: object) -> None:
-    text = json.dumps({"weights": WEIGHTS.as_dict(), "layers": layers})
-    with pytest.raises((TypeError, ValueError)):
+def test_malformed_metadata_is_rejected(text: str) -> None:
+    with pytest.raises((KeyError, TypeError, ValueError)):
         from_metadata({METADATA_KEY: text})
-
-
-@pytest.mark.parametrize(
-    "weights", [{"network": 1.5, "box": 0.5, "reflectance": 0}, {"network": 0.5, "box": 0.5}, None]
-)
-def test_malformed_metadata_is_rejected(weights: dict[str, float] | None) -> None:
-    entry = {"weights": weights, "layers": to_lists(LAYERS)}
-    for text in (json.dumps(entry), "[]", "{}", "no json"):
-        with pytest.raises((KeyError, TypeError, ValueError)):
-            from_metadata({METADATA_KEY: text})
 
 
 def test_features_are_independent_of_the_resolution() -> None:

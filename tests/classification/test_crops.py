@@ -35,20 +35,6 @@ def test_canonical_agrees_with_the_reference(counts: list[int], seed: int) -> No
         np.testing.assert_allclose(crops.xyz[crops.offsets[i] : crops.offsets[i + 1]], expected, atol=2e-4)
 
 
-@given(angle=st.floats(-3.1, 3.1), seed=st.integers(0, 100))
-def test_canonical_crops_are_independent_of_azimuth(angle: float, seed: int) -> None:
-    points, proposals = blobs([30, 5], np.random.default_rng(seed))
-    c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
-    turned = points.copy()
-    turned[:, 0], turned[:, 1] = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
-    rows, ground_z_m = np.arange(2), np.array([-1.0, -1.0])
-    np.testing.assert_allclose(
-        canonical(gather(turned, proposals, rows, 100), ground_z_m).xyz,
-        canonical(gather(points, proposals, rows, 100), ground_z_m).xyz,
-        atol=1e-3,
-    )
-
-
 @given(own=st.integers(1, 500), most=st.integers(1, 100))
 def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
     points, proposals = blobs([own], np.random.default_rng(own))

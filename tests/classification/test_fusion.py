@@ -58,13 +58,6 @@ def test_posterior_stays_a_distribution_for_any_likelihood(fusion: Fusion, views
         np.testing.assert_allclose(subject.tracks.posterior.sum(axis=1), 1.0)
 
 
-@pytest.mark.parametrize("fusion", ALL)
-def test_no_tracks(fusion: Fusion) -> None:
-    subject = Fused(fusion)
-    assert subject.asks() == []
-    assert len(subject.fuse(*CLEARLY_A_CAR, rows=np.zeros(0, np.int64))) == 0
-
-
 def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     subject = Fused(EveryFrame(), 50, 50)
     subject.tracks.final[:] = True

@@ -1,4 +1,4 @@
-"""Priors by class frequency and by box, and their pool with the network."""
+"""Priors by class frequency and by box."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.special import softmax
 
 from modt.classes import ObjectClass
 from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, NoBoxClassifier, proposal_features
 from modt.classification.pointnet import PointNet
-from modt.classification.pool import PoolWeights, log_pool, object_log_odds, pooled_prior
-from modt.classification.prior import BoxPrior, BoxScores, FrequencyPrior, make_prior
+from modt.classification.pool import PoolWeights
+from modt.classification.prior import BoxScores, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import ClassificationConfig, FusionConfig, SensorConfig
 from modt.types import Proposals
@@ -22,11 +21,12 @@ from tests.classification.scenes import blobs
 RNG = np.random.default_rng(5)
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 LAYERS = [(RNG.normal(size=shape), RNG.normal(size=shape[1])) for shape in pairwise((N_FEATURES, 5, 4))]
+SENSOR = SensorConfig(height_m=1.73)
 BOXES = MlpBoxClassifier(LAYERS, PoolWeights(network=0.8, box=0.4))
 
 
-def scores_of(boxes: MlpBoxClassifier | NoBoxClassifier, height_m: float = 1.73) -> BoxScores:
-    return BoxScores(boxes, NoReflectanceClassifier(), SensorConfig(height_m=height_m))
+def scores_of(boxes: MlpBoxClassifier | NoBoxClassifier) -> BoxScores:
+    return BoxScores(boxes, NoReflectanceClassifier(), SENSOR)
 
 
 def standing(points: int, distance_m: float, length_m: float, width_m: float, height_m: float) -> Proposals:
@@ -61,17 +61,9 @@ def test_scores_are_of_the_frame_that_is_given() -> None:
     first, second = (blobs(counts, RNG)[1] for counts in ([10, 30], [20, 5, 7]))
     for proposals in (first, first, second, first):
         log_box, log_reflectance = scores.of(proposals)
-        expected = BOXES.log_probability(proposal_features(proposals, SensorConfig(height_m=1.73)), proposals.cut)
+        expected = BOXES.log_probability(proposal_features(proposals, SENSOR), proposals.cut)
         np.testing.assert_array_equal(log_box, expected)
         assert not log_reflectance.any()
-
-
-def test_ground_of_the_proposals_overrides_the_profile() -> None:
-    low, high = (BoxPrior(scores_of(BOXES, height_m), FREQUENCY) for height_m in (1.0, 2.0))
-    unknown = standing(40, 20.0, 4.0, 1.6, 1.4)
-    measured = dataclasses.replace(unknown, ground_z_m=np.array([-2.0]))
-    assert (low.probability(measured) == high.probability(unknown)).all()
-    assert (low.probability(measured) != low.probability(unknown)).all()
 
 
 @pytest.mark.parametrize("name", ["pointnet-kitti", "pointnet-synthetic"])
@@ -91,26 +83,3 @@ def test_a_tall_person_who_seems_to_stand_above_the_ground_is_worth_a_classifica
     prior = make_prior(PointNet(ClassificationConfig(), SensorConfig()).box_scores, FREQUENCY)
     probability = prior.probability(standing(300, 8.0, 0.5, 0.25, 1.65))
     assert prior.may_be_object(probability, FusionConfig().min_object_probability).all()
-
-
-ASSUMED = np.array([0.8, 0.1, 0.06, 0.04])
-LOG_BOX = np.log(
-    [[0.8, 0.1, 0.06, 0.04], [1.0, 0.98, 0.01, 0.01], [0.5, 0.005, 0.005, 0.49], [0.9997, 1e-4, 1e-4, 1e-4]]
-)
-"""Log posteriors by the box, up to a constant a row."""
-
-
-def test_the_box_tells_objects_from_background_and_not_from_each_other() -> None:
-    odds = object_log_odds(LOG_BOX, np.log(ASSUMED))
-    np.testing.assert_allclose(odds, np.log([1.0, 4.0, 4.0, 3e-4 / 0.9997 * 4.0]), atol=1e-12)
-    np.testing.assert_allclose(softmax(pooled_prior(LOG_BOX[:2], np.log(ASSUMED), 1.0), axis=1)[0], ASSUMED)
-    np.testing.assert_allclose(softmax(pooled_prior(LOG_BOX, np.log(ASSUMED), 0.0), axis=1), np.tile(ASSUMED, (4, 1)))
-
-
-@pytest.mark.parametrize("weight", [0.0, 0.5, 1.0])
-def test_evidence_multiplies_the_class_frequency_once(weight: float) -> None:
-    none = np.zeros((4, 4))
-    frequency = np.tile(ASSUMED, (4, 1))
-    weights = PoolWeights(weight, weight, weight)
-    pool = softmax(log_pool(frequency, np.log(frequency), none, np.log(ASSUMED), weights), axis=1)
-    np.testing.assert_allclose(pool, frequency)

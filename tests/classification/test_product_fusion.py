@@ -67,24 +67,16 @@ def test_point_change_is_that_of_the_most_probable_class() -> None:
     assert subject.asks() == [True]
 
 
-def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
-    subject, misled = key_views(start_frame=3), [0.1, 0.1, 0.7, 0.1]
-    subject.fuse(*misled)
+def test_a_view_before_the_start_frame_is_not_final_however_distinct_and_replaced_there() -> None:
+    subject, misled, distinct = key_views(start_frame=3), [0.005, 0.01, 0.98, 0.005], [0.98, 0.01, 0.005, 0.005]
+    assert not subject.fuse(*misled).any()
     np.testing.assert_allclose(subject.tracks.posterior[0], misled, rtol=1e-6)
     subject.tracks.age[:] = 2
     assert subject.asks() == [False]
     subject.tracks.age[:] = 3
     assert subject.asks() == [True]
-    subject.fuse(*CAR)
-    np.testing.assert_allclose(subject.tracks.posterior[0], CAR, rtol=1e-6)
-
-
-def test_no_class_is_final_before_the_start_frame_however_distinct_a_view() -> None:
-    subject, distinct = key_views(start_frame=4), [0.98, 0.01, 0.005, 0.005]
-    assert not subject.fuse(*distinct).any()
-    subject.tracks.age[:] = 4
-    assert subject.asks() == [True]
     assert subject.fuse(*distinct).all()
+    np.testing.assert_allclose(subject.tracks.posterior[0], distinct, rtol=1e-6)
     assert subject.tracks.views.tolist() == [1]
 
 

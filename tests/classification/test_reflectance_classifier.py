@@ -75,14 +75,6 @@ def test_a_sensor_has_the_classifier_of_its_scale() -> None:
         np.testing.assert_array_equal(reflectance.log_likelihood(features, REFLECTANCE), expected)
 
 
-def test_another_sensor_or_a_model_without_classifier_adds_nothing() -> None:
-    for metadata, sensor in ((METADATA, SensorConfig()), ({}, SENSOR)):
-        reflectance = from_metadata(metadata, sensor)
-        assert isinstance(reflectance, NoReflectanceClassifier)
-        assert reflectance.weights is None
-        assert not reflectance.log_likelihood(np.ones((3, N_FEATURES)), REFLECTANCE).any()
-
-
 def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.LogCaptureFixture) -> None:
     prior, bare = prior_with_reflectance(), blobs([10, 30], RNG)[1]
     with caplog.at_level(logging.WARNING):
@@ -104,19 +96,10 @@ def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
     np.testing.assert_array_equal(probability[[0, 2]], prior.probability(whole)[[0, 2]])
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "{}",
-        "[]",
-        "no json",
-        json.dumps({"hdl-64e": {"weights": WEIGHTS.as_dict() | {"reflectance": 2.0}, "layers": []}}),
-        json.dumps({"hdl-64e": {"weights": WEIGHTS.as_dict() | {"box": -0.5}, "layers": []}}),
-        json.dumps({"hdl-64e": {"weights": WEIGHTS.as_dict(), "layers": []}}),
-        json.dumps({"hdl-64e": None}),
-        to_metadata({"hdl-46e": (LAYERS, WEIGHTS)}),
-    ],
-)
+MALFORMED = "{}", "[]", "no json", '{"hdl-64e": null}', to_metadata({"hdl-46e": (LAYERS, WEIGHTS)})
+
+
+@pytest.mark.parametrize("text", [*MALFORMED, to_metadata({"hdl-64e": (LAYERS, PoolWeights(reflectance=2.0))})])
 def test_malformed_metadata_is_rejected(text: str) -> None:
     with pytest.raises((KeyError, TypeError, ValueError)):
         from_metadata({METADATA_KEY: text}, SENSOR)
@@ -157,12 +140,6 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
         np.testing.assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
         prior = make_prior(network.box_scores, FREQUENCY)
         assert prior.pool_weight == weight
-
-
-@pytest.mark.parametrize("key", [METADATA_KEY, box_classifier.METADATA_KEY])
-def test_model_with_malformed_metadata_is_misuse(tmp_path: Path, key: str) -> None:
-    with pytest.raises(MisuseError, match="reflectance classifier"):
-        PointNet(_with_metadata(tmp_path / "model.onnx", {key: "{}"}), SENSOR)
 
 
 def test_shipped_model_separates_number_plates_from_leaves() -> None:

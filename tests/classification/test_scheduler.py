@@ -15,11 +15,6 @@ from modt.types import NONE, UNLIMITED, Budget, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
 
 COUNTS = st.lists(st.integers(1, 400), min_size=1, max_size=20)
-BUDGETS = st.builds(
-    Budget,
-    calls=st.none() | st.integers(0, 10),
-    cpu_ms=st.none() | st.floats(0.0, 3.0),
-)
 
 
 def work_ms(points: Int, slow: float = 1.0) -> float:
@@ -35,47 +30,19 @@ def cost_model(max_points: int = 400, slow: float = 1.0) -> LinearCost:
     return cost
 
 
-@given(counts=COUNTS, budget=BUDGETS, seed=st.integers(0, 1000))
-def test_selection_is_within_budget_and_complete(counts: list[int], budget: Budget, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    _, proposals = blobs(counts, rng)
-    tracks = new_tracks(proposals)
-    tracks.waiting = rng.integers(0, 20, len(tracks))
-    asks = rng.random(len(tracks)) < 0.7
-    cost = cost_model()
-    chosen = Scheduler(cost).select(tracks, proposals, asks, budget)
-    assert asks[chosen.rows].all()
-    assert len(set(chosen.rows.tolist())) == len(chosen.rows)
-    assert len(chosen.rows) + chosen.deferred == asks.sum()
-    if budget.calls is not None:
-        assert len(chosen.rows) <= budget.calls
-    if budget.cpu_ms is not None and len(chosen.rows):
-        assert cost.cost_ms(proposals.count[chosen.rows]) <= budget.cpu_ms + 1e-9
-
-
-@given(counts=COUNTS, calls=st.integers(1, 5), seed=st.integers(0, 100))
-def test_every_track_is_served_although_new_ones_keep_coming(counts: list[int], calls: int, seed: int) -> None:
+@given(counts=COUNTS, calls=st.none() | st.integers(1, 5), seed=st.integers(0, 100))
+def test_every_track_is_served_although_new_ones_keep_coming(counts: list[int], calls: int | None, seed: int) -> None:
+    """By a number of calls, or by the CPU time of the largest one."""
     _, proposals = blobs(counts, np.random.default_rng(seed))
-    tracks = new_tracks(proposals)
+    tracks, cost = new_tracks(proposals), cost_model()
+    budget = Budget(calls=calls) if calls else Budget(cpu_ms=cost.cost_ms(np.array([max(counts)])) + 1e-9)
     newcomers = len(tracks) // 2  # a track of this half that was served is replaced by a new one at once
     served = np.zeros(len(tracks), np.bool_)
-    scheduler = Scheduler(cost_model())
+    scheduler = Scheduler(cost)
     for _ in range(20 + 2 * len(tracks)):
         asks = ~served | (np.arange(len(tracks)) < newcomers)
-        chosen = scheduler.select(tracks, proposals, asks, Budget(calls=calls))
+        chosen = scheduler.select(tracks, proposals, asks, budget)
         served[chosen.rows] = True
-    assert served.all()
-
-
-@given(counts=COUNTS, seed=st.integers(0, 100))
-def test_a_tight_time_budget_serves_every_call_that_fits(counts: list[int], seed: int) -> None:
-    _, proposals = blobs(counts, np.random.default_rng(seed))
-    tracks = new_tracks(proposals)
-    cost = cost_model()
-    budget = Budget(cpu_ms=cost.cost_ms(np.array([max(counts)])) + 1e-9)
-    served = np.zeros(len(tracks), np.bool_)
-    for _ in range(2 * len(tracks)):
-        served[Scheduler(cost).select(tracks, proposals, ~served, budget).rows] = True
     assert served.all()
 
 
@@ -143,9 +110,10 @@ def test_cost_model_converges(call: float, point: float, frame: float, seed: int
     assert max(excess) < 3.0
 
 
-@pytest.mark.parametrize("budget_ms", [0.3, 0.8, 2.0])
-def test_a_budget_is_kept_in_99_of_100_frames_and_starves_nobody(budget_ms: float) -> None:
-    times, calls = drive(Budget(cpu_ms=budget_ms), 2000)
+@pytest.mark.parametrize(("budget_ms", "slow"), [(0.3, 1.0), (0.8, 1.0), (2.0, 1.0), (1.5, 0.3), (1.5, 3.0)])
+def test_a_budget_is_kept_in_99_of_100_frames_and_starves_nobody(budget_ms: float, slow: float) -> None:
+    """Also where the warm-up measured another speed."""
+    times, calls = drive(Budget(cpu_ms=budget_ms), 2000, cost_model(slow=slow))
     assert (times > budget_ms).mean() <= 0.01
     assert calls[-110:].any()
     if budget_ms >= 1.0:
@@ -188,28 +156,14 @@ def test_a_large_proposal_is_saved_for_while_small_ones_ask() -> None:
     assert served.min() > 2
 
 
-@pytest.mark.parametrize("slow", [0.3, 3.0])
-def test_a_warm_up_that_was_wrong_is_corrected(slow: float) -> None:
-    times, calls = drive(Budget(cpu_ms=1.5), 1000, cost_model(slow=slow))
-    assert (times > 1.5).mean() <= 0.01 + 0.01
-    assert (times[500:] > 1.5).mean() <= 0.01
-    assert calls[500:].mean() > 2
-
-
-def test_one_spike_does_not_starve_the_next_frames() -> None:
-    cost = cost_model()
-    _, before = drive(Budget(cpu_ms=1.2), 300, cost)
-    cost.update(np.array([20]), 30.0)
-    _, after = drive(Budget(cpu_ms=1.2), 50, cost, seed=1)
-    assert after.mean() > 0.5 * before[-100:].mean() > 0
-
-
-def test_a_machine_that_was_slow_for_a_while_is_used_again() -> None:
+@pytest.mark.parametrize(("n", "slow", "settled"), [(1, 20.0, 0), (300, 3.0, 200)])
+def test_a_machine_that_was_slow_is_used_again(n: int, slow: float, settled: int) -> None:
+    """At once after one frame, after some time where it was slow for a while."""
     cost = cost_model()
     _, before = drive(Budget(cpu_ms=2.0), 300, cost)
-    drive(Budget(cpu_ms=2.0), 300, cost, seed=1, slow=3.0)
-    _, after = drive(Budget(cpu_ms=2.0), 400, cost, seed=2)
-    assert after[200:].mean() > 0.5 * before[-100:].mean()
+    drive(Budget(cpu_ms=2.0), n, cost, seed=1, slow=slow)
+    _, after = drive(Budget(cpu_ms=2.0), settled + 50, cost, seed=2)
+    assert after[settled:].mean() > 0.5 * before[-100:].mean() > 0
 
 
 def test_a_starved_frame_after_a_hundred_finds_out_by_one_call() -> None:

@@ -12,7 +12,7 @@ from modt.geometry import inverse, rotation_zyx, se3
 from modt.ros2 import odometry
 from modt.types import Frame
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.ros2.network import FAR, NEAR, until
+from tests.ros2.network import FAR, NEAR, has_sender, until
 from tests.sources import layouts
 
 from .commands import refusal, session
@@ -73,7 +73,7 @@ def test_the_poses_of_a_topic_place_the_sweeps(tmp_path, street, loopback):
 
     made = session(tmp_path / "run", FRAMES, odometry=f"ros2:///odom?domain={NEAR}")
     sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
-    until(lambda: sent.receivers and made.stages.odometry._subscription.senders)
+    until(lambda: sent.receivers and has_sender(made.stages.odometry._subscription))
     for stamp_s, T in street:
         sent.write(odometry.write_odometry(stamp_s, "odom", "lidar", T))
     first = Frame(0, street[0][0], np.zeros((0, 4), np.float32))

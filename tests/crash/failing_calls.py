@@ -1,4 +1,4 @@
-"""Calls of the system that fail where a test says, on clocks of the test."""
+"""System calls that fail at the numbers that a test gives, and clocks that the test sets."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class File:
 
 
 class Faults:
-    """Counts the calls of the system that a run makes, and fails those that are given by their numbers.
+    """Counts the system calls of a run, and fails those whose numbers are given.
 
     Attributes:
         calls: names of the calls, in order.
@@ -73,7 +73,7 @@ class Faults:
     """
 
     def __init__(self, folder: Path, failing: Mapping[int, int], lasting_s: float = 0.0) -> None:
-        """`failing`: for the numbers of calls, which of the ways to fail; `lasting_s`: likewise afterwards."""
+        """`failing`: way to fail, by the number of a call; calls of its kind fail for `lasting_s` after it."""
         self.calls = list[str]()
         self.now_s, self.calendar_s, self.last_s = 100.0, 1.7e9, -np.inf
         self.active = False
@@ -81,7 +81,7 @@ class Faults:
         self._lasting = dict[str, tuple[float, int]]()
 
     def call(self, name: str, call: Callable[..., Any], *given: Any, **options: Any) -> Any:
-        """Make a call, unless it is to fail."""
+        """Make a call, or fail it."""
         if not self.active:
             return call(*given, **options)
         way = self._failing.get(len(self.calls))
@@ -118,9 +118,9 @@ class Faults:
         return call(*given, **options)
 
     def ours(self, place: Any) -> str:
-        """Name of a path or a descriptor in the list of calls; empty if it is none of the run's, or is in memory."""
+        """File name of a path or descriptor of the run; empty for other files and those in memory."""
         try:
-            path = self._readlink(f"/proc/self/fd/{place}") if isinstance(place, int) else os.fspath(place)
+            path = os.readlink(f"/proc/self/fd/{place}") if isinstance(place, int) else os.fspath(place)
         except (OSError, TypeError):
             return ""
         path = path.decode() if isinstance(path, bytes) else path
@@ -130,11 +130,9 @@ class Faults:
             return path.rpartition("/")[2] or "/"
         return ""
 
-    _readlink = staticmethod(os.readlink)
-
     @contextmanager
     def installed(self) -> Iterator[None]:
-        """Take the place of the system's calls, and of its clocks."""
+        """Context in which the system calls and the clocks are replaced."""
         with ExitStack() as stack:
             for name in FILES:
                 stack.enter_context(patch.object(os, name, self._file_call(name, getattr(os, name))))
@@ -148,12 +146,12 @@ class Faults:
             yield
 
     def monotonic(self) -> float:
-        """The clock that nobody sets; it may leap, as when the process was stopped."""
+        """Monotonic clock, which leaps as after a stop of the process."""
         self.call("monotonic", lambda: None)
         return self.now_s
 
     def calendar(self) -> float:
-        """The clock that may be set."""
+        """Calendar clock, which steps as when it is set."""
         self.call("calendar", lambda: None)
         return self.now_s + self.calendar_s
 

@@ -1,4 +1,4 @@
-"""A short run of a service whose calls of the system fail where a test says; it keeps time by a clock of its own.
+"""A short run of a service whose system calls fail at the numbers that a test gives, on a clock of the test.
 
 Everything runs in one thread, so that the calls of a run are always the same: a run without faults lists them, and
 each of the others fails some by their numbers.
@@ -13,16 +13,16 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import patch
+from unittest.mock import Mock, patch
 
 import numpy as np
 
-from modt.app import metering
+from modt.app import session as sessions
 from modt.app.containment import Containment
 from modt.app.deadlines import Deadlines
-from modt.app.loop import Stop
 from modt.app.session import Session
 from modt.app.status import STALE_S
+from modt.app.stop import Stop
 from modt.app.supervisor import Supervisor
 from modt.cli.status import read
 from modt.config import ProfileConfig, RecordingConfig
@@ -32,10 +32,9 @@ from modt.energy.meters.meter import Conditions, Facts, Kind, Meter, Scope
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.energy.windows import Clocks, Windows
 from modt.errors import ModtError
-from modt.reporting.summary import Summary
 from modt.sinks import run_directory
 from modt.sinks.background import Background
-from modt.sinks.datagrams import Datagrams
+from modt.sinks.frame_lines import Datagrams
 from modt.sinks.output import LineFile
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import RunDirectory
@@ -53,12 +52,13 @@ from tests.results import CAR, result
 from tests.sequences.makers import MAKERS
 
 TURNS, TURN_S = 40, 0.1
+INFO = StreamInfo("sensor", "test", 0, None, TURN_S, None, has_poses=False)
 BACK_S = 2.0
 """Time from the end of a fault until everything is recorded [s]."""
 
 
 class InTurn(Background[Any]):
-    """A background writer that works when it is given something."""
+    """A background writer that runs each job in the calling thread."""
 
     def __init__(self, name: str, writer: Any, faults: Faults, encode: Callable[[Any], Any] | None = None) -> None:
         with patch("threading.Thread.start"):
@@ -72,15 +72,14 @@ class InTurn(Background[Any]):
 
 
 class Turns(LiveStream):
-    """Receives when the loop takes, what the sensor and the odometry have sent until then."""
+    """A live stream that receives in the thread of the loop: each `take` reads the packets sent until then."""
 
     def __init__(self, faults: Faults, reader: PacketReader, send: Callable[[], None]) -> None:
-        info = StreamInfo("sensor", "test", 0, None, TURN_S, None, has_poses=False)
-        super().__init__(info, reader, clock=faults.monotonic, pause=lambda seconds: None)
+        super().__init__(INFO, reader, clock=faults.monotonic, pause=lambda seconds: None)
         self._faults, self._send, self.turn = faults, send, 0
 
     def start(self) -> None:
-        """Nothing to start."""
+        """No effect."""
 
     def take(self, timeout_s: float) -> Any:
         """The sweep of the next turn."""
@@ -92,34 +91,20 @@ class Turns(LiveStream):
         return super().take(0.0)
 
 
-class Stages:
-    """Stages that are no part of the test, and the poses, which are."""
+def stages_with(odometry: PoseSocket) -> Mock:
+    """Stages that see a car and are no part of the test, and the poses, which are."""
 
-    info = StreamInfo("sensor", "test", 0, None, TURN_S, None, has_poses=False)
-    request = SimpleNamespace(mode="accurate", fov="full")
-    chosen = SimpleNamespace(name="default", config=ProfileConfig())
-    config, misfits = chosen.config, 0
-    budget = UNLIMITED
-
-    def __init__(self, odometry: PoseSocket) -> None:
-        self.odometry, self.ledger = odometry, Ledger()
-        decision = SimpleNamespace(frequency=np.full(4, 0.25))
-        self.pipeline = SimpleNamespace(segmenter=SimpleNamespace(facts=dict), decision=decision)
-
-    def recognise(self, first: Frame, named: str | None) -> None:
-        """It is the sensor that was expected."""
-
-    def step(self, frame: Frame, budget: Any, *, reduced: bool) -> Any:
-        """A car."""
-        self.odometry.place(frame)
+    def step(frame: Frame, budget: Any, *, reduced: bool) -> Any:
+        odometry.place(frame)
         return result(frame.index, [5, 4], {0: 1, 1: 2}, {1: CAR})
 
-    def watch(self, frame: Frame) -> None:
-        """It stays the same sensor."""
-
-    def recover(self, *, anew: bool) -> None:
-        """No frame fails here."""
-        raise AssertionError("a frame failed")
+    request, config = SimpleNamespace(mode="accurate", fov="full"), ProfileConfig()
+    chosen, decision = SimpleNamespace(name="default", config=config), SimpleNamespace(frequency=np.full(4, 0.25))
+    pipeline = SimpleNamespace(segmenter=SimpleNamespace(facts=dict), decision=decision)
+    stages = Mock(info=INFO, request=request, chosen=chosen, config=config, misfits=0, budget=UNLIMITED, step=step)
+    stages.configure_mock(odometry=odometry, ledger=Ledger(), pipeline=pipeline)
+    stages.recover.side_effect = AssertionError("a frame failed")
+    return stages
 
 
 class FaultyRun:
@@ -127,13 +112,12 @@ class FaultyRun:
 
     def __init__(self, folder: Path, failing: Mapping[int, int], lasting_s: float = 0.0) -> None:
         self.out, self.faults = folder / "state" / "run", Faults(folder, failing, lasting_s)
-        self.handed = {SCHEMA: 0, LEDGER_SCHEMA: 0, ENERGY_SCHEMA: 0}
         self.unread = list[str]()
         self.frames: dict[int, float] = {}
         self._folder = folder
 
     def run(self) -> None:
-        """From the start to a signal.
+        """Run from the start to a signal.
 
         Raises:
             Exception: the error that has ended the run.
@@ -175,21 +159,22 @@ class FaultyRun:
                 lambda: "schema: modt.run/1\nservice: true\n",
                 lambda: faults.now_s,
             )
-            self._count(recording)
+            for name in ("write", "ledger"):
+                setattr(recording, name, Mock(wraps=getattr(recording, name)))
             deadlines, stop = Deadlines(TURN_S, lambda: faults.now_s), Stop()
             meter = Meter(
                 Facts("test", "J", 1e-6, 100.0, Scope.BOARD, Kind.MEASURED),
-                lambda: faults.call("meter", self._joules),
+                lambda: faults.call("meter", lambda: 5.0 * faults.now_s),
             )
-            stages: Any = Stages(poses)
+            stages = stages_with(poses)
             supervisor = Supervisor(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
-            stack.enter_context(patch.object(metering, "windows", self._windows))
+            stack.enter_context(patch.object(sessions, "Windows", self._windows))
             stack.enter_context(patch.object(live_stream, "READ_S", PAUSE_S))
             (folder / "memory").mkdir()
             stack.enter_context(patch.object(run_directory, "MEMORY", folder / "memory"))
             stack.enter_context(faults.installed())
             session = Session(
-                source, stages, recording, sinks, deadlines, Containment(), stop, Summary(), [meter], None,
+                source, stages, recording, sinks, deadlines, Containment(), stop, [meter], None,
                 metrics=folder / "modt.prom", clock=lambda: faults.now_s,
             )  # fmt: skip
             self.session = session
@@ -200,15 +185,15 @@ class FaultyRun:
                     while True:
                         socket.socket.__base__.recv(notified, 65_536)  # type: ignore[union-attr]
 
-            report = session.loop._report
+            report = session._report
 
             def reported(supervisor: Any) -> None:
                 report(supervisor)
-                self._look()
+                self._check_status()
                 if source.turn >= TURNS:
                     stop.signal = "SIGTERM"
 
-            session.loop._report = reported
+            session._report = reported  # type: ignore[method-assign]
             faults.active = True
             try:
                 session.run(supervisor, tick)
@@ -227,7 +212,8 @@ class FaultyRun:
                 kept = read_records(part / "ledger.jsonl", ENERGY_SCHEMA, (LEDGER_SCHEMA,))
                 records[ENERGY_SCHEMA] += [r["window"] for r in kept]
         health = self.session.recording.health()
-        missing = sum(self.handed.values()) - sum(map(len, records.values()))
+        recording: Any = self.session.recording
+        missing = recording.write.call_count + recording.ledger.call_count - sum(map(len, records.values()))
         for schema, numbers in records.items():
             assert len(numbers) == len({*numbers}), f"{schema} twice"
         assert missing <= health["lost_lines"], f"{missing} lines are missing, {health['lost_lines']} are counted"
@@ -236,33 +222,15 @@ class FaultyRun:
         if self.faults.last_s + BACK_S < self.faults.now_s - 1.0:
             assert late, "no frame after the fault"
 
-    def _count(self, recording: Recording) -> None:
-        write, ledger = recording.write, recording.ledger
+    def _windows(self, meters: Any, *_machine: object) -> Windows:
+        def monotonic_ns() -> int:
+            return int(1e9 * self.faults.monotonic())
 
-        def write_counted(taken: Any) -> None:
-            self.handed[SCHEMA] += 1
-            write(taken)
-
-        def ledger_counted(record: Any) -> None:
-            self.handed[record["schema"]] += 1
-            ledger(record)
-
-        recording.write, recording.ledger = write_counted, ledger_counted  # type: ignore[method-assign]
-
-    def _windows(self, meters: Any, core: int | None) -> Windows:
-        faults = self.faults
-        clocks = Clocks(
-            lambda: int(1e9 * faults.monotonic()),
-            lambda: int(1e9 * faults.monotonic()),
-            lambda: int(1e9 * faults.now_s),
-        )
+        clocks = Clocks(monotonic_ns, monotonic_ns, lambda: int(1e9 * self.faults.now_s))
         return Windows(meters, clocks, Conditions(0))
 
-    def _joules(self) -> float:
-        return 5.0 * self.faults.now_s
-
-    def _look(self) -> None:
-        """The status is there, and not old."""
+    def _check_status(self) -> None:
+        """Note a status that is missing or old."""
         self.faults.active = False
         try:
             age_s = self.faults.now_s + self.faults.calendar_s - read(self.out)["time_s"]

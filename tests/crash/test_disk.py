@@ -1,4 +1,4 @@
-"""Full, read-only, removed and unmounted disks as the system itself has them: lines are lost and counted."""
+"""Full, read-only, removed and unmounted disks: each lost line is counted."""
 
 import json
 import shutil
@@ -16,7 +16,7 @@ from tests.sinks.recordings import OURS, Time, begun, frame, frames
 
 @pytest.fixture(autouse=True)
 def memory(tmp_path, monkeypatch):
-    """A folder in the place of that in memory."""
+    """A folder instead of the one in memory."""
     (tmp_path / "memory").mkdir()
     monkeypatch.setattr("modt.sinks.run_directory.MEMORY", tmp_path / "memory")
 
@@ -38,7 +38,7 @@ def disks(tmp_path):
 
 
 class Service:
-    """A recording of ten frames a second, and what became of them."""
+    """A recording of ten frames a second, and the frames that it lost."""
 
     def __init__(self, folder):
         self.time, self.n = Time(), 0

@@ -3,10 +3,10 @@
 import time
 from pathlib import Path
 
-from modt.app import metering
 from modt.config import EnergyConfig
 from modt.energy.meters import discovery
-from modt.energy.meters.meter import Candidate, Facts, Kind, Scope, file_meter, probe
+from modt.energy.meters.meter import Candidate, Conditions, Facts, Kind, Scope, file_meter, probe
+from modt.energy.windows import Clocks, Windows
 
 FACTS = Facts(
     name="coulomb counter",
@@ -30,9 +30,9 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
     counter.parent.mkdir()
     counter.write_text("1000")
     monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
-    found = metering.discovery(EnergyConfig())
+    found = discovery.discover(EnergyConfig())
     assert found.best.name == "coulomb counter"
-    windows = metering.windows(found.choose("coulomb").meters, None)
+    windows = Windows(found.choose("coulomb").meters, Clocks(), Conditions())
     for reading_mJ in (1004, 1008):
         time.sleep(0.05)
         counter.write_text(str(reading_mJ))
@@ -43,6 +43,6 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
 
 def test_a_machine_without_the_meter_names_the_cause(tmp_path, monkeypatch):
     monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
-    found = metering.discovery(EnergyConfig())
+    found = discovery.discover(EnergyConfig())
     assert found.best.name != "coulomb counter"
     assert "energy_mJ" in next(c.why_not for c in found.candidates if c.name == "coulomb counter")

@@ -39,8 +39,7 @@ def ply(folder: Path) -> Feed:
     path = folder / "a.ply"
     encodings = ("binary_little_endian", "binary_big_endian", "ascii")
     rows = point_clouds.table(x="f4", y="f4", z="f8", intensity="u1")
-    before = "element range_grid 0\nproperty float a\n"
-    seeds = (point_clouds.ply(rows, data, before) for data in encodings)
+    seeds = (point_clouds.ply(rows, data) for data in encodings)
     return of_file(path, lambda: read_scan(path), *seeds)
 
 

@@ -58,9 +58,8 @@ class Connection:
 @target()
 def requests(_: Path) -> Feed:
     """Requests to the live page."""
-    ended = SimpleNamespace(take=lambda: None)
-    names = {"localhost", "127.0.0.1"}
-    server = SimpleNamespace(page=b"<p>", names=names, enter=lambda: ended, leave=lambda client: None)
+    events = {"enter": lambda: 0, "event_after": lambda number: None, "leave": lambda: None}
+    server = SimpleNamespace(page=b"<p>", names={"localhost", "127.0.0.1"}, **events)
     heads = ("GET / HTTP/1.1", "GET /events HTTP/1.0", "GET /favicon.ico HTTP/1.1", "POST /x HTTP/1.1", "GET /")
     seeds = [f"{head}\r\nHost: localhost:8766\r\nConnection: keep-alive\r\n\r\n".encode() for head in heads]
     return seeds, lambda raw: _Handler(Connection(raw), ("127.0.0.1", 9), server)

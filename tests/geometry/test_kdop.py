@@ -81,7 +81,9 @@ def test_widths_and_centres(n, seed):
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_coverage_is_the_lesser_of_both_squares(n, seed):
     (low, high), (low_position, high_position) = random_ends(n, seed, 9), random_ends(n, seed + 1, 30)
-    found = coverage(kdop(low, high), kdop(low_position, high_position))
+    rows, columns = np.random.default_rng(seed).integers(0, max(n, 1), (2, n))
+    found = coverage(kdop(low, high), kdop(low_position, high_position), rows, columns)
+    low, high, low_position, high_position = low[rows], high[rows], low_position[columns], high_position[columns]
     for i in range(n):
         part = [
             max(min(high[i, k], high_position[i, k] + PAD_M) - max(low[i, k], low_position[i, k] - PAD_M), 0.0)

@@ -112,7 +112,7 @@ def test_the_path_is_found_through_skewed_sweeps(turn_s):
         error = inverse(T) @ tracker.T_world_sensor
         off.append((abs(np.rad2deg(yaw_of(error))), np.hypot(*error[:2, 3])))
     assert off[0][0] < 0.3
-    assert off[0][1] < 0.02 * 8 * 1.9
+    assert off[0][1] < 0.08  # of 15 m; a sweep is registered a second time where the first one moves it far
     assert off[1][0] > 2 * off[0][0]
 
 

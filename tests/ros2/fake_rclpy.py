@@ -21,7 +21,7 @@ class Node:
     """A node whose topics hand bytes from publishers to subscriptions."""
 
     def __init__(self):
-        self.subscribed, self.published, self.types = defaultdict(list), defaultdict(int), {}
+        self.subscribed, self.types = defaultdict(list), {}
 
     def create_subscription(self, kind, topic, callback, qos, *, raw):
         assert raw
@@ -29,15 +29,19 @@ class Node:
         self.types[topic] = f"{kind.__module__}.{kind.__name__}"
 
     def create_publisher(self, kind, topic, qos):
-        self.published[topic] += 1
         self.types[topic] = f"{kind.__module__}.{kind.__name__}"
         return SimpleNamespace(
             publish=lambda data: [receive(data) for receive in self.subscribed[topic]],
             get_subscription_count=lambda: len(self.subscribed[topic]),
         )
 
-    def count_publishers(self, topic):
-        return self.published[topic]
+
+def put(monkeypatch, modules):
+    """Put modules of these contents in the place of those of their names."""
+    for name, content in modules.items():
+        module = ModuleType(name)
+        vars(module).update(content)
+        monkeypatch.setitem(sys.modules, name, module)
 
 
 def install(monkeypatch):
@@ -51,10 +55,7 @@ def install(monkeypatch):
         "rclpy.signals": {"SignalHandlerOptions": SimpleNamespace(NO=0)},
         "rclpy.utilities": {"remove_ros_args": lambda words: words[: words.index("--ros-args")]},
     }
-    for name, content in modules.items():
-        module = ModuleType(name)
-        vars(module).update(content)
-        monkeypatch.setitem(sys.modules, name, module)
+    put(monkeypatch, modules)
     for package in PACKAGES:
         monkeypatch.setitem(sys.modules, package, ModuleType(package))
         monkeypatch.setitem(sys.modules, f"{package}.msg", Types(f"{package}.msg"))

@@ -45,33 +45,29 @@ def decode(message: bytes, name: str) -> Any:
 
 
 def made(kind: str, /, **values: Any) -> Any:
-    """A message of a named type, such as `nav_msgs/Odometry`. Fields that are not given are zero or empty."""
+    """A message of a named type, such as `nav_msgs/Odometry`. Fields that are not given are zero or empty.
+
+    A message within it may be given as a dictionary of its fields.
+    """
     full = kind.replace("/", "/msg/") if "/msg/" not in kind else kind
-    return store().types[full](**{name: values.get(name, _blank(*form)) for name, form in store().fielddefs[full][1]})
+    fields = store().fielddefs[full][1]
+    return store().types[full](**{name: _value(*form, values.get(name)) for name, form in fields})
 
 
-def _blank(form: Any, of: Any) -> Any:
-    if form.name == "NAME":
-        return made(of)
+def _value(form: Any, of: Any, given: Any) -> Any:
+    if isinstance(given, dict) or (given is None and form.name == "NAME"):
+        return made(of, **(given or {}))
+    if given is not None:
+        return given
     if form.name == "BASE":
         return {"string": "", "bool": False}.get(of[0], 0)
     (kind, (element, *_)), n = of
     return [] if kind.name == "NAME" else np.zeros(n or 0, "u1" if element == "octet" else element)
 
 
-def header(stamp_s: float, frame_id: str) -> Any:
+def header(stamp_s: float, frame_id: str) -> dict[str, Any]:
     seconds, nanoseconds = divmod(round(stamp_s * 1e9), 10**9)
-    stamp = made("builtin_interfaces/Time", sec=seconds, nanosec=nanoseconds)
-    return made("std_msgs/Header", stamp=stamp, frame_id=frame_id)
-
-
-def placed(kind: str, position: list[float], quaternion: list[float]) -> Any:
-    """A geometry_msgs/Pose or Transform."""
-    at, turned = dict(zip("xyz", position, strict=True)), dict(zip("xyzw", quaternion, strict=True))
-    orientation = made("geometry_msgs/Quaternion", **turned)
-    if kind == "Pose":
-        return made("geometry_msgs/Pose", position=made("geometry_msgs/Point", **at), orientation=orientation)
-    return made("geometry_msgs/Transform", translation=made("geometry_msgs/Vector3", **at), rotation=orientation)
+    return {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": frame_id}
 
 
 def cloud(data: np.ndarray, *, stamp_s: float = 1.0, frame_id: str = "lidar", padding: int = 0) -> Any:
@@ -110,18 +106,17 @@ def xyzi(n: int, kind: Any = None) -> np.ndarray:
 
 def odometry(stamp_s: float, position: list[float], quaternion: list[float], child: str = "base_link") -> Any:
     """An Odometry message."""
-    pose = made("geometry_msgs/PoseWithCovariance", pose=placed("Pose", position, quaternion))
+    at, turned = dict(zip("xyz", position, strict=True)), dict(zip("xyzw", quaternion, strict=True))
+    pose = {"pose": {"position": at, "orientation": turned}}
     return made("nav_msgs/Odometry", header=header(stamp_s, "odom"), child_frame_id=child, pose=pose)
 
 
 def transforms(*edges: tuple[str, str, list[float], list[float]]) -> Any:
     """A TFMessage of (parent, child, translation, quaternion)."""
     stamped = []
-    for parent, child, at, turned in edges:
-        values = {
-            "header": header(0.0, parent),
-            "child_frame_id": child,
-            "transform": placed("Transform", at, turned),
-        }
+    for parent, child, position, quaternion in edges:
+        at, turned = dict(zip("xyz", position, strict=True)), dict(zip("xyzw", quaternion, strict=True))
+        placed = {"translation": at, "rotation": turned}
+        values = {"header": header(0.0, parent), "child_frame_id": child, "transform": placed}
         stamped.append(made("geometry_msgs/TransformStamped", **values))
     return made("tf2_msgs/TFMessage", transforms=stamped)

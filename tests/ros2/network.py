@@ -45,6 +45,11 @@ def loopback(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     del joined
 
 
+def has_sender(subscription: object) -> bool:
+    """Whether a sender of its topic is known to a subscription."""
+    return bool(subscription._reader.get_matched_publications())
+
+
 def until(condition: Callable[[], object]) -> None:
     """Wait for a condition, at most DEADLINE_S."""
     end_s = time.monotonic() + DEADLINE_S

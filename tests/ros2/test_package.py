@@ -8,7 +8,7 @@ import sys
 import threading
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -76,10 +76,7 @@ def launch_file(monkeypatch):
         "launch_ros.actions": {"Node": made},
         "launch_ros.substitutions": {"FindPackageShare": lambda name: made(perform=lambda _: f"/share/{name}")},
     }
-    for name, content in stubs.items():
-        module = ModuleType(name)
-        vars(module).update(content)
-        monkeypatch.setitem(sys.modules, name, module)
+    fake_rclpy.put(monkeypatch, stubs)
     *declared, nodes = runpy.run_path(str(PACKAGE / "launch" / "modt.launch.py"))["generate_launch_description"]()
     defaults = {argument.name: argument.default_value for argument in declared}
     return lambda **given: nodes.function(defaults | given)

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from modt.class_sizes import STRIP_PERSON
 from modt.segmentation import ground
-from modt.segmentation.clustering import MAX_GAP_BEAMS, MAX_GAP_M
+from modt.segmentation.clusters import MAX_CELL_GAP_BEAMS, MAX_CELL_GAP_M
 from modt.segmentation.grids import SECTORS
 from modt.segmentation.groups import HEADINGS
 
@@ -34,7 +34,7 @@ def flood_fill(cells, beam_m):
                 if j is not None and component[j] < 0:
                     first = min(i, j, key=lambda k: (row[k], column[k]))
                     gap = max(low[i], low[j]) - min(high[i], high[j])
-                    if gap < MAX_GAP_M + MAX_GAP_BEAMS * beam_m[first]:
+                    if gap < MAX_CELL_GAP_M + MAX_CELL_GAP_BEAMS * beam_m[first]:
                         todo.append(j)
     return component
 

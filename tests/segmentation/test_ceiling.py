@@ -8,7 +8,7 @@ import pytest
 from modt.config import SegmentationConfig
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m
+from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m, histogram
 from modt.segmentation.segmenter import Segmenter
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
@@ -17,8 +17,9 @@ WALLS = RNG.uniform(0.3, 2.6, 2000)
 
 
 def heights(ceiling_m, n):
+    """Histogram of the heights of returns on walls and a ceiling."""
     ceiling = RNG.normal(ceiling_m, 0.02, n)
-    return np.concatenate([WALLS, ceiling[ceiling < 2.6]]).astype(np.float32)
+    return histogram(np.concatenate([WALLS, ceiling[ceiling < 2.6]]).astype(np.float32), 2.6)
 
 
 @pytest.mark.parametrize("ceiling_m", [2.3, 2.4, 2.5, 2.62])
@@ -30,7 +31,7 @@ def test_a_ceiling_is_cut_just_below(ceiling_m):
 @pytest.mark.parametrize(("ceiling_m", "n"), [(2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000)])
 def test_few_returns_doors_and_what_is_higher_are_no_ceiling(ceiling_m, n):
     assert below_ceiling_m(heights(ceiling_m, n)) is None
-    assert below_ceiling_m(np.zeros(0, np.float32)) is None
+    assert below_ceiling_m(histogram(np.zeros(0, np.float32), 2.6)) is None
 
 
 @pytest.mark.parametrize("ceiling_m", [2.55, 2.65, 2.75, 2.85])
@@ -45,19 +46,24 @@ def test_a_high_ceiling_or_few_returns_about_the_greatest_height_used_are_none(c
     assert below_grazed_m(level[::SAMPLED], 0.0, 2.6) is None
 
 
+def stage_of(sensor, height_m):
+    """The segmenter of a shipped profile, at a known height."""
+    return Segmenter(load(sensor).segmentation, replace(load(sensor).sensor, height_m=height_m), FieldOfView())
+
+
 def test_the_lowest_returns_of_a_ceiling_above_the_greatest_height_used_join_nobody():
     """The ceiling is 2.65 to 2.7 m high, and some of its returns are lower than 2.6 m, over a walking person too."""
-    stage = Segmenter(load("mid-360").segmentation, load("mid-360").sensor, FieldOfView())
-    stage.sensor = replace(stage.sensor, height_m=0.3)
+    stage = stage_of("mid-360", 0.3)
     for frame in SyntheticStream("hall", "mid-360", 4.0, 2101, height_m=0.3).between(8, 10):
         assert stage.above_ground(frame.points)[2].max() < 2.5
 
 
-def found_of(scene, sensor, height_m, config):
-    """People of 20 points or more, and those that a proposal shares more than half of the points with."""
-    stage, people, found = Segmenter(config, load(sensor).sensor, FieldOfView()), 0, 0
-    stage.sensor = replace(stage.sensor, height_m=height_m)
-    simulator = SyntheticStream(scene, sensor, 3.0, 901, height_m=height_m).simulator
+@pytest.mark.slow
+@pytest.mark.parametrize(("sensor", "height_m"), [("vlp-16", 0.8), ("os1-64", 0.5), ("mid-360", 0.3)])
+def test_people_under_a_low_ceiling_are_found_by_the_profile_of_the_sensor(sensor, height_m):
+    """Of 20 points or more, more than half of which they share with a proposal, in a hall 2.5 m high."""
+    stage, people, found = stage_of(sensor, height_m), 0, 0
+    simulator = SyntheticStream("hall", sensor, 3.0, 901, height_m=height_m).simulator
     for frame, truth in (simulator.sweep(6 * k) for k in range(5)):
         proposals = stage.segment(frame.points)
         label = proposals.label(len(frame.points))
@@ -66,14 +72,6 @@ def found_of(scene, sensor, height_m, config):
             shared = np.bincount(label[own][label[own] >= 0], minlength=len(proposals))
             people += 1
             found += bool((shared > 0.5 * (own.sum() + proposals.count - shared)).any())
-    return people, found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("sensor", "height_m"), [("vlp-16", 0.8), ("os1-64", 0.5), ("mid-360", 0.3)])
-def test_people_under_a_low_ceiling_are_found_by_the_profile_of_the_sensor(sensor, height_m):
-    config = load(sensor).segmentation
-    people, found = found_of("hall", sensor, height_m, config)  # 2.5 m high
     assert found >= 0.95 * people > 0
 
 

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.clustering import MAX_GAP_BEAMS, MAX_GAP_M, Clusterer
-from modt.segmentation.clusters import connect, occupied_cells
+from modt.segmentation.clustering import Clusterer
+from modt.segmentation.clusters import MAX_CELL_GAP_BEAMS, MAX_CELL_GAP_M, connect, occupied_cells
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from tests.segmentation import reference
 
@@ -33,7 +33,7 @@ def cells_of(grid, points, height):
 
 
 def components(grid, cells, beam_m):
-    gap_m = np.float32(MAX_GAP_M) + np.float32(MAX_GAP_BEAMS) * beam_m
+    gap_m = np.float32(MAX_CELL_GAP_M) + np.float32(MAX_CELL_GAP_BEAMS) * beam_m
     return connect(grid, cells, gap_m, np.ones(len(cells), np.bool_))
 
 
@@ -62,17 +62,6 @@ def test_the_grid_lies_between_two_euclidean_radii(seed, n, sigma):
     plane = np.stack([points.x, points.y], axis=1).astype(np.float64) / points.sqrt_range[:, None]
     assert reference.refines(reference.within_distance(plane, STEP * 0.999), fast)
     assert reference.refines(fast, reference.within_distance(plane, 2 * STEP * 1.001))
-
-
-@given(seed=st.integers(0, 10_000), n=st.integers(1, 400))
-def test_points_of_one_index_share_a_cell(seed, n):
-    points = PointColumns.from_array(cloud(seed, n, 1.0))
-    grid = SqrtRangeGrid(STEP, 80.0)
-    place = grid.flat_index(*grid.row_column(points))
-    sample, cell = grid.occupied(place)
-    assert np.array_equal(place[sample][cell], place)
-    assert len(np.unique(place)) == len(sample)
-    assert (grid.occupied(place)[1] == cell).all(), "the grid is empty again"
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])

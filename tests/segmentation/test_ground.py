@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid, pseudo_angle
+from modt.segmentation.grids import SECTORS, PointColumns, pseudo_angle
 from modt.segmentation.ground import DEFAULT_HEIGHT_M, GroundEstimator, HeightEstimator
 from tests.segmentation import reference, scans
 
@@ -141,15 +141,6 @@ def test_the_pseudo_angle_is_monotonic(angle, other):
     assert values[0] <= values[1] + 1e-4
     assert (values >= 0).all()
     assert (values <= 4).all()
-
-
-def test_cells_of_the_polar_grid_are_inside_it():
-    rng = np.random.default_rng(0)
-    points = PointColumns.from_array(rng.normal(0, 60, (5000, 4)).astype(np.float32))
-    grid = PolarGrid(80.0)
-    cell = grid.cell(points)
-    assert cell.min() >= 0
-    assert cell.max() < grid.size
 
 
 @pytest.mark.parametrize("true_m", [0.3, 0.8, 1.73, 2.5])

@@ -17,8 +17,9 @@ from modt.geometry import FieldOfView
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native import build
 from modt.native.library import NotAvailableError, load
+from modt.observations import observe
 from modt.odometry.odometry import Odometry
-from modt.segmentation.clusters import Clusters
+from modt.segmentation.clusters import CellClusterer, Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
@@ -27,12 +28,15 @@ from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.strips import CarLimits
 from modt.tracking.kalman import filter_of
 from modt.tracking.states import ACCURATE
+from modt.tracking.track_table import NativeObserve
+from modt.tracking.track_table import observe as observe_tracks
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, UNRECORDED
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.geometry.test_kdop import WEIGHTS, random_pairs
+from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_clusters import cloud
+from tests.tracking.tracking_scenes import frame_of, tracks_at
 
 SANITIZED = "MODT_SANITIZED" in os.environ
 """Set by `python -m tools.sanitize`."""
@@ -120,14 +124,6 @@ def test_simulated_sweeps(kernels, name, front):
         assert len(found) > 3
 
 
-@pytest.mark.kitti
-def test_real_sweeps(kernels, kitti_root):
-    config = profile.load("hdl-64e")
-    for path in sorted((kitti_root / "odometry" / "00" / "velodyne").glob("*.bin"))[:4]:
-        points = np.fromfile(path, np.float32).reshape(-1, 4)
-        assert len(both(kernels, points, config.sensor, None, config.segmentation)) > 20
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [0, 1, 2, 1_000_000])
 def test_any_number_of_points(kernels, n):
@@ -151,19 +147,18 @@ def test_cells_and_components(kernels, seed, n, sigma):
     expected, found = (k.occupied_cells(grid, points, height) for k in (NUMPY, kernels))
     assert same(expected, found)
     cells, sample, sampled, cell = expected
-    rng = np.random.default_rng(seed)
-    gap_m, use = (
-        rng.uniform(0, 1, len(cells)).astype(np.float32),
-        rng.random(len(cells)) < rng.choice([0.0, 0.7, 1.0]),
-    )
-    component = NUMPY.connect(grid, cells, gap_m, use)
-    assert same(component, kernels.connect(grid, cells, gap_m, use))
-    assert ((component == NONE) == ~use).all()
     assert (grid.number == NONE).all(), "the grid is empty again"
-    assert same(*(k.connect_coarse(SqrtRangeGrid(0.06, 80.0), cells, gap_m) for k in (NUMPY, kernels)))
-    n = int(component.max()) + 1
-    assert same(*(k.cluster_bounds(cells, sampled, component, n) for k in (NUMPY, kernels)))
-    used = np.where(use, component, n)
+    rng = np.random.default_rng(seed)
+    step_deg, max_extent_m = rng.choice([0.05, 0.2, 2.0]), rng.uniform(1.0, 9.0)
+    config = SegmentationConfig(cell_m=0.06 * np.sqrt(10), max_extent_m=max_extent_m)
+    clusterer = CellClusterer(SensorConfig(max_range_m=80.0, azimuth_step_deg=step_deg), config)
+    beam_m = rng.choice([0.0, 0.05, 0.4], len(cells)).astype(np.float32)
+    clustered = [k.cluster(clusterer, cells, sampled, beam_m) for k in (NUMPY, kernels)]
+    assert same(*clustered)
+    use = rng.random(len(cells)) < rng.choice([0.0, 0.7, 1.0])
+    kept, own = np.unique(clustered[0][0][use], return_inverse=True)
+    n, used = len(kept), np.full(len(cells), len(kept))
+    used[use] = own
     clusters = Clusters(points, height, cell, cells, sample, sampled, used, n + 1)
     number = consecutive(np.append(rng.random(n) < 0.7, [False]))
     assert same(*(k.view_bounds(clusters, number, number.max() + 1) for k in (NUMPY, kernels)))
@@ -184,7 +179,7 @@ def test_groups(kernels, seed, sizes, extra):
     assert same(*(k.upright_boxes(xyz, groups.offsets, yaw) for k in (NUMPY, kernels)))
     assert same(*(k.group_sums(xyz, groups.offsets) for k in (NUMPY, kernels)))
     points = rng.choice([UNRECORDED, 0.0, 0.001, 0.5, 0.85], (len(labels), 4)).astype(np.float32)
-    assert same(*(k.reflectance_sums(points, groups.rows, groups.offsets) for k in (NUMPY, kernels)))
+    assert same(*(k.reflectance_statistics(points, groups.rows, groups.offsets) for k in (NUMPY, kernels)))
 
 
 def some_strips(rng, n):
@@ -206,10 +201,21 @@ def some_pairs(rng, n):
     return *random_pairs(int(rng.integers(2**16)), n % 13), WEIGHTS
 
 
+def some_covered(rng, n):
+    a, b = random_kdops(rng, 1 + n % 13)
+    return a, b, *rng.integers(0, a.shape[1], (2, n))
+
+
+def some_displacements(rng, n):
+    return *random_kdops(rng, n), rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
+
+
 PASSES = {
     "merge_strips": some_strips,
     "kdop_ends": some_kdops,
     "copy_runs": some_runs,
+    "coverage": some_covered,
+    "measured": some_displacements,
     "pair_costs": some_pairs,
 }
 
@@ -222,11 +228,17 @@ def test_passes_on_random_input(kernels, name, arguments, seed, n):
     assert same(*(getattr(each, name)(*given) for each in (NUMPY, kernels)))
 
 
-@given(seed=st.integers(0, 10_000), n=st.integers(0, 40), k=st.integers(0, 40), spread=st.integers(0, 60))
-@settings(max_examples=100, deadline=None)
-def test_overlapping_pairs(kernels, seed, n, k, spread):
+@given(
+    seed=st.integers(0, 10_000),
+    n=st.integers(0, 40),
+    k=st.integers(0, 40),
+    spread=st.integers(0, 60),
+    scale=st.sampled_from([1e-3, 1.0, 100.0]),
+)
+@settings(max_examples=200, deadline=None)
+def test_overlapping_pairs(kernels, seed, n, k, spread, scale):
     rng = np.random.default_rng(seed)
-    a, b = (rng.integers(-spread, spread + 1, (8, m)).astype(np.float64) for m in (n, k))
+    a, b = (rng.integers(-spread, spread + 1, (8, m)) * scale for m in (n, k))
     a[:, :1], a[:, 1:2] = np.inf, np.nan  # overlaps all, overlaps nothing
     one, other = (each.overlapping_pairs(a, b) for each in (NUMPY, kernels))
     assert same(one, other)
@@ -247,9 +259,11 @@ def test_assignment(kernels, seed, n, k, ties):
 @given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(0, 9), max_size=8), n=st.integers(1, 9))
 def test_regrouped_members(kernels, seed, sizes, n):
     rng = np.random.default_rng(seed)
-    label = np.repeat(rng.integers(0, n, len(sizes)), sizes)
-    members, xyz = rng.permutation(len(label)), rng.normal(0, 9, (3, len(label))).astype(np.float32)
-    assert same(*(each.regrouped(members, xyz, label, n) for each in (NUMPY, kernels)))
+    offsets, label = np.cumsum([0, *sizes]), rng.integers(0, n, len(sizes))
+    members, xyz = rng.permutation(offsets[-1]), rng.normal(0, 9, (3, offsets[-1])).astype(np.float32)
+    moved = (rng.random(offsets[-1]) < rng.choice([0.0, 0.3, 1.0])).nonzero()[0]
+    own = rng.integers(0, n, len(moved))
+    assert same(*(each.regrouped(members, xyz, offsets, label, (moved, own), n) for each in (NUMPY, kernels)))
 
 
 @given(seed=st.integers(0, 10_000), m=st.integers(0, 9), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
@@ -270,6 +284,21 @@ def test_filter(kernels, seed, m, dt_s):
         tables += [own, covariance]
     for one, other in zip(tables[:2], tables[2:], strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 6), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
+@settings(max_examples=60, deadline=None)
+def test_observed_tracks(kernels, seed, n, dt_s):
+    rng = np.random.default_rng(seed)
+    boxes = rng.uniform(-20, 20, (n, 7))
+    boxes[:, 3:6] = rng.uniform(0.1, 9.0, (n, 3))
+    seen, rows = observe(frame_of(boxes)[1], np.eye(4)), rng.permutation(n)
+    few = rows[: n // 2 + 1]
+    tables = [tracks_at(np.roll(boxes, 1, axis=0), *range(min(n, 4))) for _ in range(2)]
+    for table, each in zip(tables, (observe_tracks, NativeObserve(kernels.library)), strict=True):
+        table.final[::2] = False
+        each(table, few, np.arange(len(few)), seen, seen.position[: len(few)].copy(), dt_s)
+    assert same(*tables)
 
 
 @pytest.mark.parametrize("name", ["vlp-16", "hdl-64e"])

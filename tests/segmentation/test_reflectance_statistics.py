@@ -9,13 +9,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.groups import (
-    BRIGHT,
-    DARK,
-    has_reflectance,
-    reflectance_statistics,
-    reflectance_sums,
-)
+from modt.segmentation.groups import BRIGHT, DARK, has_reflectance, reflectance_statistics
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import scans
@@ -30,7 +24,7 @@ def test_statistics_of_each_group_are_of_the_returns_with_reflectance(groups: li
     points = np.zeros((sum(map(len, groups)), 4), np.float32)
     points[:, 3] = [value for group in groups for value in group]
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
-    found = reflectance_statistics(*reflectance_sums(points, np.arange(len(points)), offsets))
+    found = reflectance_statistics(points, np.arange(len(points)), offsets)
     assert found.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(found, groups, strict=True):
         own, expected = np.array([v for v in group if v != UNRECORDED], np.float32), [np.nan] * N_REFLECTANCE
@@ -40,40 +34,27 @@ def test_statistics_of_each_group_are_of_the_returns_with_reflectance(groups: li
 
 
 @pytest.mark.parametrize("fov", [FieldOfView(), FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))], ids=["full", "left"])
-def test_points_without_reflectance_are_segmented(fov: FieldOfView) -> None:
+def test_proposals_have_the_statistics_of_their_returns_with_reflectance(fov: FieldOfView) -> None:
     points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8), (9.0, 8.0, 0.5, 0.5, 0.0, 1.75)])
     points[:, 3] = np.linspace(0.1, 0.7, len(points))
     stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), fov)
     whole = stage.segment(points)
+    assert whole.reflectance is not None
+    means = [points[own, 3].mean() for own in np.split(whole.members, whole.offsets[1:-1])]
+    np.testing.assert_allclose(whole.reflectance[:, 0], means, atol=1e-5)
     points[on == 1, 3] = UNRECORDED
     partly = stage.segment(points)
     np.testing.assert_array_equal(partly.members, whole.members)
     np.testing.assert_array_equal(partly.box, whole.box)
-    assert whole.reflectance is not None
     assert partly.reflectance is not None
     bare = on[whole.members[whole.offsets[:-1]]] == 1
     assert bare.any()
     assert np.isnan(partly.reflectance[bare]).all()
     np.testing.assert_array_equal(partly.reflectance[~bare], whole.reflectance[~bare])
-    points[:, 3] = UNRECORDED
-    assert stage.segment(points).reflectance is None
-
-
-def test_proposals_have_statistics_where_the_profile_names_a_scale() -> None:
-    points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8), (-9.0, 4.0, 0.5, 0.5, 0.0, 1.75)])
-    points[:, 3] = np.where(on == 1, 0.25, 0.5)
-    stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), FieldOfView())
-    proposals = stage.segment(points)
-    assert proposals.reflectance is not None
-    owner = on[proposals.members[proposals.offsets[:-1]]]
-    np.testing.assert_allclose(proposals.reflectance[:, 0], np.where(owner == 1, 0.25, 0.5))
-    assert Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView()).segment(points).reflectance is None
-    points[:, 3] = np.where(on == 1, 0.0, 0.3)
-    dark = stage.segment(points)
-    assert dark.reflectance is not None
-    np.testing.assert_array_equal(dark.reflectance[owner == 1][0], [0, 0, 0, 0, 1])
-    points[:, 3] = 0.0
-    assert stage.segment(points).reflectance is None
+    assert Segmenter(SegmentationConfig(), SensorConfig(), fov).segment(points).reflectance is None  # of no scale
+    for nothing in (UNRECORDED, 0.0):
+        points[:, 3] = nothing
+        assert stage.segment(points).reflectance is None
 
 
 @given(st.integers(1, 5000), st.floats(0, 1, width=32))

@@ -83,11 +83,3 @@ def test_the_view_of_a_tilted_sensor_ends_where_its_own_beams_do(roll_deg, pitch
     above = mount.turn(np.ascontiguousarray(upright[:, upright[2] > 0].T)).T
     cut_above = Cut.TOP if roll_deg < 90 else Cut.BOTTOM
     assert flags(*parts, above, sensor=tilted) == [Cut.TOP | Cut.BOTTOM, Cut(0), cut_above]
-
-
-@pytest.mark.parametrize(("pitch_deg", "cut"), [(12.0, Cut.TOP), (0.0, Cut(0))])
-def test_the_beams_of_a_tilted_sensor_end_on_people_farther_away(pitch_deg, cut):
-    """A level sensor 1 m above the floor shows the head of everybody 7 m away."""
-    tilted = replace(SENSOR, height_m=1.0, pitch_deg=pitch_deg)
-    board = np.ascontiguousarray(person(7.0, tilted, height_m=4.0).T)
-    assert flags(Mount.of(0.0, pitch_deg).turn(board).T, sensor=tilted) == [cut]

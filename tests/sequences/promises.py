@@ -55,6 +55,7 @@ class Watched:
         chosen = self._scheduler.select(tracks, proposals, asks, budget)
         points = proposals.count[tracks.proposal[chosen.rows]]
         assert len(set(chosen.rows.tolist())) == len(chosen.rows)
+        assert asks[chosen.rows].all()
         assert len(chosen.rows) + chosen.deferred == np.count_nonzero(asks & (tracks.proposal != NONE))
         assert budget.calls is None or len(chosen.rows) <= budget.calls
         if budget.cpu_ms is not None and len(points):
@@ -133,6 +134,7 @@ class Run:
         own = tracks.proposal[tracks.proposal != NONE]
         assert sorted(own.tolist()) == list(range(len(result.proposals)))  # every proposal has one track
         assert len(set(ids)) == len(ids)
+        assert ((tracks.missed > 0) == (tracks.proposal == NONE)).all()
         new = set(ids) - self._before
         assert all(number >= self._next_id for number in new)  # no identity comes back
         self._before, self._next_id = frozenset(ids), max([self._next_id - 1, *ids]) + 1

@@ -88,8 +88,8 @@ def test_a_message_that_cannot_be_used_is_counted_and_skipped(write, tmp_path, c
     stream = open_stream(write(tmp_path / "drive", recorded))
     assert [frame.index for frame in stream] == [0, 2]
     assert stream.faults.skipped == 2
-    assert "/points 1: 6 bytes end within a field; frame skipped" in caplog.text
-    assert "/points 3: stamped 5.000 s before the last sweep; frame skipped" in caplog.text
+    assert "/points: frame 1: 6 bytes end within a field; frame skipped" in caplog.text
+    assert "/points: frame 3: stamped 5.000 s before the last sweep; frame skipped" in caplog.text
 
 
 def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
@@ -108,6 +108,14 @@ def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
         recorded.append((topic, kind, recorded_s, messages.encode(message)))
     frames = list(open_stream(write(tmp_path / "drive", by_time(clouds(), recorded))))
     assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+
+
+def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(write, tmp_path):
+    late = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + 3600))
+    recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())
+    frames = list(open_stream(write(tmp_path / "drive", recorded)))
+    assert [frame.index for frame in frames] == [1, 2, 3]
+    assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.1, 10.2, 10.3], abs=1e-5)
 
 
 def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):

@@ -6,8 +6,6 @@ import socket
 from datetime import datetime, timezone
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.errors import MisuseError
 from modt.sources.file_names import times_ns
@@ -81,12 +79,6 @@ def test_times_are_stamps(tmp_path, name, step_ns):
 )
 def test_names_without_a_time_give_none(names):
     assert times_ns(names) is None
-
-
-@given(st.lists(st.text(min_size=1, max_size=30), max_size=8))
-def test_any_names_have_a_time_each_or_none(names):
-    times = times_ns(names)
-    assert times is None or len(times) == len(names)
 
 
 @pytest.mark.parametrize("names", [["²", "³"], ["1", "01"], ["0", "9999999999"], ["9" * 30, "1" * 60]])

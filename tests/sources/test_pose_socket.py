@@ -114,9 +114,7 @@ def test_both_forms_give_the_same_pose():
         (b'{"stamp": 1, "x": 0, "yaw": 0}', "malformed", "no y"),
         (b'{"stamp": 1, "x": NaN, "y": 0, "yaw": 0}', "non_finite", "x is not finite"),
         (b'{"stamp": 1, "x": 1%s, "y": 0, "yaw": 0}' % (b"0" * 400), "non_finite", "x is not finite"),
-        (b'{"stamp": 1, "x": 6e8, "y": 0, "yaw": 0}', "malformed", "100000 km"),
         (b'{"stamp": 1, "pose": [1, 2]}', "malformed", "12 or 16"),
-        (b'{"stamp": 1, "pose": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}', "malformed", "no rotation"),
         (b'{"stamp": 1, "pose": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1]}', "malformed", "last row"),
         (planar(1) + b" " * 5000, "malformed", "4096 bytes"),
     ],
@@ -127,13 +125,25 @@ def test_the_reason_of_a_refusal_is_given(raw, reason, cause):
     assert caught.value.reason == reason
 
 
-def test_poses_are_extrapolated(pair):
+@pytest.mark.parametrize(
+    ("poses", "asked", "x"),
+    [
+        ([], [0.0], None),
+        ([(0.1, 1.0)], [0.1], 1.0),
+        ([(0.1, 1.0)], [0.15], None),
+        ([(0.1, 0.0), (1.0, 5.0)], [0.5, 0.95, 1.05], None),  # a long gap
+        ([(0.1 * k, 1.0 * k) for k in range(5)], [0.5], 5.0),
+        ([(0.1 * k, 1.0 * k) for k in range(5)], [0.4 + MAX_AGE_S - 0.01], 6.9),
+        ([(0.1 * k, 1.0 * k) for k in range(5)], [0.4 + MAX_AGE_S + 0.01], None),
+    ],
+)
+def test_a_frame_near_enough_to_two_poses_has_one(pair, poses, asked, x):
     there, odometry = pair
-    for k in range(5):
-        there.send(planar(0.1 * k, 1.0 * k, 0.0, 0.02 * k))
-    np.testing.assert_allclose(pose_of(odometry, frame(0.5)), matrix([5.0, 0.0, 0.1]), atol=1e-9)
-    assert pose_of(odometry, frame(0.4 + MAX_AGE_S + 0.01)) is None
-    assert pose_of(odometry, frame(0.4 + MAX_AGE_S - 0.01)) is not None
+    for stamp_s, at_m in poses:
+        there.send(planar(stamp_s, at_m))
+    for stamp_s in asked:
+        T = pose_of(odometry, frame(stamp_s))
+        assert (None if T is None else T[0, 3]) == (None if x is None else pytest.approx(x))
 
 
 def test_extrapolation_does_not_amplify_noise():
@@ -144,52 +154,21 @@ def test_extrapolation_does_not_amplify_noise():
     assert abs(T[0, 3] - 10 * 1.095) < 0.05
 
 
-def test_one_pose_or_a_long_gap_gives_no_pose_at_other_times(pair):
-    there, odometry = pair
-    assert pose_of(odometry, frame(0.0)) is None
-    there.send(planar(0.1))
-    assert pose_of(odometry, frame(0.1)) is not None
-    assert pose_of(odometry, frame(0.15)) is None
-    there.send(planar(1.0, 5.0))
-    assert pose_of(odometry, frame(0.5)) is None
-    assert pose_of(odometry, frame(0.95)) is None
-    assert pose_of(odometry, frame(1.05)) is None
-
-
 def test_each_reason_is_counted_and_logged_once(pair, caplog):
     there, odometry = pair
-    bad = [b"nonsense", b'{"stamp": NaN, "x": 0, "y": 0, "yaw": 0}', planar(9.0), planar(10.0), planar(1e9)]
+    unlike = b'{"stamp": 10, "pose": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}'
+    bad = [b'{"stamp": NaN, "x": 0, "y": 0, "yaw": 0}', planar(9.0), planar(10.0), planar(1e9)]
+    bad += [b"nonsense", planar(10.0, 6e8), unlike]
     with caplog.at_level(logging.WARNING):
         for raw in [planar(10.0), *bad, *bad]:
             there.send(raw)
         pose_of(odometry, frame(10.0))
     report = odometry.report()
     counts = {reason: n for reason, n in report["refused"].items() if n}
-    assert counts == dict.fromkeys(("malformed", "non_finite", "stale", "repeated", "ahead"), 2)
-    assert (report["received"], report["used"], report["frames_posed"], report["frames_unposed"]) == (11, 1, 1, 0)
+    assert counts == dict.fromkeys(("non_finite", "stale", "repeated", "ahead"), 2) | {"malformed": 6}
+    assert (report["received"], report["used"], report["frames_posed"], report["frames_unposed"]) == (15, 1, 1, 0)
     assert len(caplog.records) == 5
     assert "is it the stream's clock?" in caplog.text
-
-
-def test_a_restarted_sender_is_detected_by_poses_that_go_on_after_a_leap(pair, caplog):
-    there, odometry = pair
-
-    def placed(numbers):
-        for k in numbers:
-            there.send(planar(0.05 * k, (20 if k < 5 else 500 if k > 12 else 0) + 0.1 * k))  # 20 m back in 0.05 s
-        return odometry.place(frame(0.05 * numbers[-1] + 0.02))
-
-    with caplog.at_level(logging.WARNING):
-        first, doubted, second = (placed(range(*r)) for r in ((5,), (5, 9), (9, 11)))
-    assert [p.restarts for p in (first, doubted, second)] == [0, 0, 1]
-    x = [p.T_world_sensor[0, 3] for p in (first, doubted, second)]
-    np.testing.assert_allclose(x, [20.44, 20.84, 1.04])  # the world before, until the new one is believed
-    report = odometry.report()
-    assert (report["restarts"], report["used"], report["refused"]["leap"]) == (1, 7, 4)
-    assert "odometry.max_speed_mps" in caplog.text
-    warnings = len(caplog.records)
-    assert placed(range(13, 18)).restarts == 2
-    assert len(caplog.records) == warnings
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 2), st.floats(-1, 1), st.floats(-1, 1)), max_size=40))
@@ -242,23 +221,9 @@ def test_what_the_kernel_drops_is_counted():
     odometry.close()
 
 
-FAR_M = st.sampled_from([0.0, 458_000.0, 5_430_000.0])
-
-
-@given(
-    FAR_M,
-    st.tuples(*[st.floats(-50, 50)] * 2, st.floats(-3, 3)),
-    st.tuples(*[st.floats(-50, 50)] * 2, st.floats(-3, 3)),
-    st.floats(-1, 2),
-)
-def test_planar_interpolation_equals_the_closed_form(origin_m, a, b, share):
-    """Reference: each coordinate by itself, the angle along the shorter arc."""
-    turn = (b[2] - a[2] + np.pi) % (2 * np.pi) - np.pi
-    if abs(abs(turn) - np.pi) < 1e-6:
-        return  # both ways round are as short
-    a, b = ((origin_m + x, origin_m + y, yaw) for x, y, yaw in (a, b))
-    expected = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * turn]
-    np.testing.assert_allclose(interpolate(matrix(a), matrix(b), share), matrix(expected), rtol=0, atol=1e-6)
+def test_a_turn_is_interpolated_along_the_shorter_way():
+    a, b = matrix([458_000.0, 5_430_000.0, 3.0]), matrix([458_001.0, 5_430_000.0, -3.0])
+    np.testing.assert_allclose(interpolate(a, b, 0.5), matrix([458_000.5, 5_430_000.0, np.pi]), rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("path", ["", "127.0.0.1", "127.0.0.1:99999", "127.0.0.1:x", "[::1:5"])

@@ -3,7 +3,6 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from scipy.optimize import linear_sum_assignment
 
 from modt.geometry.kernels import assign
@@ -18,19 +17,7 @@ def assigned(cost, limit):
     return rows, columns
 
 
-@given(arrays(np.float64, (6, 5), elements=st.floats(0, 2)))
-def test_a_high_limit_assigns_as_many_pairs_as_possible(cost):
-    limit = 1e6
-    rows, columns = np.nonzero(cost < 1)
-    kept = assign(rows, columns, cost[rows, columns], limit)
-    dense = np.where(cost < 1, cost, limit)
-    i, j = linear_sum_assignment(dense)
-    real = dense[i, j] < limit
-    assert len(kept) == real.sum()
-    np.testing.assert_allclose(cost[rows, columns][kept].sum(), dense[i, j][real].sum(), atol=1e-9)
-
-
-@given(st.integers(1, 12), st.integers(1, 12), st.floats(0.5, 8), st.integers(0, 2**16))
+@given(st.integers(0, 12), st.integers(0, 12), st.floats(0.5, 8), st.integers(0, 2**16))
 def test_the_sparse_assignment_is_the_dense_one(n, k, limit, seed):
     cost = np.random.default_rng(seed).uniform(0, 8, (n, k))
     i, j = linear_sum_assignment(np.minimum(cost, limit))
@@ -38,22 +25,3 @@ def test_the_sparse_assignment_is_the_dense_one(n, k, limit, seed):
     rows, columns = assigned(cost, limit)
     np.testing.assert_array_equal(rows, i[real])
     np.testing.assert_array_equal(columns, j[real])
-
-
-def greatest_saving(cost, limit):
-    """Most that any set of pairs saves below the limit, by exhaustive search."""
-    if not len(cost):
-        return 0.0
-    alone = greatest_saving(cost[1:], limit)
-    paired = [
-        limit - cost[0, j] + greatest_saving(np.delete(cost[1:], j, axis=1), limit)
-        for j in np.flatnonzero(cost[0] < limit)
-    ]
-    return max([alone, *paired])
-
-
-@given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 2**16))
-def test_no_other_assignment_saves_more(n, k, seed):
-    cost = np.random.default_rng(seed).uniform(0, 2, (n, k))
-    rows, columns = assigned(cost, 1.0)
-    np.testing.assert_allclose((1 - cost[rows, columns]).sum(), greatest_saving(cost, 1.0), atol=1e-9)

@@ -64,28 +64,22 @@ def test_the_oldest_places_beyond_the_capacity_are_forgotten():
     assert recalled(map_of(POST, capacity=0), [POST], tracks_at([POST]), np.arange(1)) == [False]
 
 
-def gone(machine=EFFICIENT, object_class=BACKGROUND, **options):
-    """A follower of FAR, and of POST until it expired."""
-    follower = Follower(TrackingConfig(max_missed=2, **options), machine)
+@pytest.mark.parametrize(
+    ("object_class", "extensions", "machine", "remembered"),
+    [
+        (BACKGROUND, "all", EFFICIENT, True),
+        (BACKGROUND, "all", ACCURATE, True),
+        (BACKGROUND, "all", CONVENTIONAL, False),  # no class is final
+        (BACKGROUND, "none", EFFICIENT, False),
+        (CAR, "all", EFFICIENT, False),
+    ],
+)
+def test_the_heir_of_background_is_final_at_once(object_class, extensions, machine, remembered):
+    follower = Follower(TrackingConfig(max_missed=2, extensions=extensions), machine)
     follower.run([[FAR, POST]] * 4 + [[FAR]] * 5, object_class)
     assert follower.tracks.id.tolist() == [0]
-    return follower
-
-
-@pytest.mark.parametrize(("machine", "state"), [(EFFICIENT, "tracked"), (ACCURATE, "tracked_classified")])
-def test_an_heir_is_final_background_at_once(machine, state):
-    follower = gone(machine)
-    assert follower.run([[FAR, POST]]) == 0
-    tracks = follower.tracks
-    assert follower.states == [state] * 2
-    assert tracks.id.tolist() == [0, 2]
-    assert tracks.inherited.tolist() == [False, True]
-    assert tracks.final.all()
-
-
-@pytest.mark.parametrize("options", [{"object_class": CAR}, {"machine": CONVENTIONAL}, {"extensions": "none"}])
-def test_an_object_or_background_that_is_not_final_is_not_remembered(options):
-    assert gone(**options).run([[FAR, POST]]) == 1
+    assert follower.run([[FAR, POST]]) == (not remembered)
+    assert follower.tracks.inherited.tolist() == [False, remembered]
 
 
 WALL = [[box(10, 3, 12, 2.0, 1.8)]] * 4

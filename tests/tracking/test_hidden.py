@@ -35,13 +35,18 @@ def followed(object_class=PEDESTRIAN):
         (Cut.TOP, LOWER, PEDESTRIAN, True),
         (Cut.TOP | Cut.NEAR, LOWER, PEDESTRIAN, True),
         (Cut(0), LOWER, PEDESTRIAN, False),
+        (Cut.BOTTOM, LOWER, PEDESTRIAN, False),
         (Cut.TOP, box(1.0, 0.0, 0.6, 0.6, 1.2, z=-0.4), PEDESTRIAN, False),
         (Cut.TOP, LOWER, BACKGROUND, False),
     ],
 )
 def test_a_person_is_hidden_while_the_view_cuts_off_the_upper_half(cut, lower, object_class, hidden):
     follower = followed(object_class)
-    assert follow(follower, [lower], 6, cut).hidden.tolist() == [hidden]
+    tracks = follow(follower, [lower], 6, cut)
+    assert tracks.hidden.tolist() == [hidden]
+    height_m = WHOLE[5] if object_class == PEDESTRIAN and cut & Cut.TOP else lower[5]  # as before, or as it is seen
+    for of in (tracks.box[0], follower.proposals.box[0]):
+        assert (of[5], of[2] - of[5] / 2) == (pytest.approx(height_m), pytest.approx(-1.0))
     assert not follow(follower, [WHOLE], 7).hidden.any()
 
 

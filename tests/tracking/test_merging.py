@@ -38,25 +38,10 @@ def merged(tracks, boxes, rows):
     """Original proposals of each one after merging, and the frame; the first are matched with the rows."""
     after, n = regrouped(tracks, frame_at_rest(tracks, boxes, *rows)), len(boxes)
     label = after.proposals.label(n * POINTS)
-    assert sorted(after.proposals.members) == list(range(n * POINTS))
     per_box = label.reshape(n, POINTS)
     assert (per_box == per_box[:, :1]).all()
     groups = [np.flatnonzero(per_box[:, 0] == k).tolist() for k in range(len(after.proposals))]
     return groups, after
-
-
-def test_the_parts_of_a_car_become_one_proposal_with_its_box():
-    groups, after = merged(tracks_at([WHOLE], CAR), [REAR, FRONT], [0])
-    assert groups == [[0, 1]]
-    np.testing.assert_allclose(after.proposals.box[0], WHOLE, atol=0.05)
-    np.testing.assert_allclose(after.observations.box[0], WHOLE, atol=0.05)
-
-
-def test_the_match_of_a_part_is_dropped_and_proposals_are_renumbered():
-    tracks = tracks_at([WHOLE, FRONT, box(30, 0)], CAR)
-    groups, after = merged(tracks, [REAR, FRONT, box(30, 0)], [0, 1, 2])
-    assert groups == [[0, 1], [2]]
-    assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 0, 2: 1}
 
 
 @pytest.mark.parametrize(
@@ -114,7 +99,7 @@ def test_of_two_cars_the_older_takes_parts_and_proposals_of_the_younger(ahead_m,
 def test_the_reflectance_is_that_of_the_matched_proposal():
     tracks, reflectance = tracks_at([WHOLE], CAR), np.arange(10.0).reshape(2, 5)
     frame = frame_at_rest(tracks, [FRONT, REAR], 0)
-    after = regrouped(tracks, replace(frame, proposals=replace(frame.proposals, reflectance=reflectance)))
+    after = regrouped(tracks, frame._replace(proposals=replace(frame.proposals, reflectance=reflectance)))
     np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
 
 

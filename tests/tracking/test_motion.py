@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.tracking.track_table import LAG_S, TrackTable
-from tests.tracking.tracking_scenes import Follower, box
+from modt.observations import observe as observe_proposals
+from modt.tracking.track_table import LAG_S, TrackTable, observe
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
 
 def displacement(boxes):
@@ -41,10 +42,11 @@ def test_a_cyclist_who_passes_by_a_wall_is_not_as_large_as_it():
     widths_m = []
     for confirmed in (ObjectClass.CYCLIST, ObjectClass.BACKGROUND):
         tracks = TrackTable.blank(1)
-        tracks.final[:], tracks.last_class[:], tracks.size_m[:] = True, confirmed, [1.5, 0.7, 1.7]
+        tracks.final[:], tracks.object_class[:], tracks.size_m[:] = True, confirmed, [1.5, 0.7, 1.7]
+        tracks.hits[:] = 1
         for width_m in (2.3, *[0.7] * 10):
-            tracks.box[:, 3:6] = 1.5, width_m, 1.7
-            tracks.observe_motion(np.array([0]), 0.1)
+            frame = observe_proposals(frame_of([box(10, 0, 1.5, width_m, 1.7)])[1], EYE)
+            observe(tracks, np.array([0]), np.array([0]), frame, frame.position, 0.1)
         widths_m.append(tracks.size_m[0, 1])
     assert widths_m[0] < 0.9 < 1.2 < widths_m[1]
 

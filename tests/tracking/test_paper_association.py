@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.config import PaperAssociationConfig
 from modt.observations import observe
+from modt.tracking import paper_association
 from modt.tracking.paper_association import PaperAssociation
 from tests.tracking.tracking_scenes import EYE, box, frame_of, tracks_at
 
@@ -23,7 +23,7 @@ def pair(before, after, points=60):
 def cost(before, after, points=60):
     """Cost of such a pair."""
     zero = np.array([0])
-    return PaperAssociation(PaperAssociationConfig()).cost(*pair(before, after, points), zero, zero)[0]
+    return PaperAssociation().cost(*pair(before, after, points), zero, zero)[0]
 
 
 @pytest.mark.parametrize(
@@ -45,9 +45,9 @@ def test_no_pair_costs_less_than_one_of_equals(shift, length, points):
 
 
 @pytest.mark.parametrize(("x", "t_da", "n"), [(11, 0.95, 1), (12, 0.95, 0), (12, 2.0, 1)])
-def test_pairs_above_the_threshold_are_not_matched(x, t_da, n):
-    association = PaperAssociation(PaperAssociationConfig(t_da=t_da))
-    assert len(association.match(*pair(box(10, 0), box(x, 0))).rows) == n
+def test_pairs_above_the_threshold_are_not_matched(x, t_da, n, monkeypatch):
+    monkeypatch.setattr(paper_association, "T_DA", t_da)
+    assert len(PaperAssociation().match(*pair(box(10, 0), box(x, 0))).rows) == n
 
 
 def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it():
@@ -55,14 +55,15 @@ def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it
     tracks, observations = pair(box(10, 0), box(12, 0))
     tracks.x[0, 0] += 2.0
     tracks.box[0, :2] += 3.0
-    matches = PaperAssociation(PaperAssociationConfig()).match(tracks, observations)
+    matches = PaperAssociation().match(tracks, observations)
     assert matches.rows.tolist() == [0]
     np.testing.assert_allclose(matches.position, observations.centroid)
 
 
-def test_pairs_above_the_threshold_compete():
+def test_pairs_above_the_threshold_compete(monkeypatch):
     """Crosswise both tracks cost least together, one pair of them too much."""
     tracks, observations = tracks_at([box(10, 0)] * 2), observe(frame_of([box(10, 0)] * 2)[1], EYE)
-    association = PaperAssociation(PaperAssociationConfig(t_da=0.3))
+    monkeypatch.setattr(paper_association, "T_DA", 0.3)
+    association = PaperAssociation()
     association.cost = lambda *_: np.array([0.1, 0.4, 0.2, 0.9])
     assert association.match(tracks, observations).rows.tolist() == [1]

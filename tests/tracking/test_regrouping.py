@@ -44,19 +44,15 @@ def scenes(draw):
 
 
 @given(scenes())
-def test_every_member_stays_once_with_its_coordinates(scene):
-    before, after = scene[1].proposals, regrouped(*scene).proposals
+def test_every_member_stays_once_with_its_coordinates_and_proposals_and_tracks_are_pairs(scene):
+    frame = regrouped(*scene)
+    before, after = scene[1].proposals, frame.proposals
     assert (after.count > 0).all()
+    for rows in (frame.matches.rows, frame.matches.proposals):
+        assert len(np.unique(rows)) == len(rows)
     old, new = before.members.argsort(), after.members.argsort()
     np.testing.assert_array_equal(before.members[old], after.members[new])
     np.testing.assert_array_equal(before.coordinates[:, old], after.coordinates[:, new])
-
-
-@given(scenes())
-def test_a_track_has_one_proposal_and_a_proposal_one_track(scene):
-    matches = regrouped(*scene).matches
-    assert len(set(matches.rows.tolist())) == len(matches.rows)
-    assert len(set(matches.proposals.tolist())) == len(matches.proposals)
 
 
 @given(scenes())

@@ -1,15 +1,94 @@
-"""The state machines; test_lifecycle.py leads a track over every row of their tables."""
+"""The state machines, and a track led over every row of their tables."""
 
 import itertools
 
 import numpy as np
 import pytest
 
-from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, Event, UndefinedTransitionError
+from modt.classes import ObjectClass
+from modt.config import TrackingConfig
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, Event, StateMachine, UndefinedTransitionError
 from modt.types import NONE
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, set_class
 
-MACHINES = {"efficient": EFFICIENT, "conventional": CONVENTIONAL, "accurate": ACCURATE}
-each_machine = pytest.mark.parametrize("machine", MACHINES.values(), ids=MACHINES)
+
+class RecordedMachine(StateMachine):
+    """A state machine that records the rows it is driven through."""
+
+    def __init__(self, machine):
+        super().__init__(machine.title, machine.states, machine.transitions)
+        self.__dict__["rows"] = set()
+
+    def transition(self, states, events):
+        after = super().transition(states, events)
+        for source, event, target in zip(states, np.broadcast_to(events, len(states)), after, strict=True):
+            self.rows.add((self.names[source], Event(event), self.names[target]))
+        return after
+
+
+WANT_A_CLASS = {"unmatched", "tracked_unclassified"}
+FINAL = {"tracked", "lost", "tracked_classified", "lost_classified"}
+"""States whose class is final, but in mode conventional."""
+
+
+def live(machine, script):
+    """State after every frame of a scene with one object, "gone" when its track is deleted.
+
+    A step says whether the object is seen, seen 1 m further on ("moved"), hidden, or classified as certain or not.
+    """
+    follower, states = Follower(TrackingConfig(max_missed=2), machine), []
+    for step in script:
+        boxes = [] if step == "hidden" else [box(11 if step == "moved" else 10, 2)]
+        tracks = follower.follow(*frame_of(boxes, follower.frames, EYE))
+        assert follower.wants_class.tolist() == [name in WANT_A_CLASS for name in follower.states]
+        if step in {"certain", "uncertain"}:
+            set_class(tracks, 0, ObjectClass.BACKGROUND)
+            follower.conclude([0], [step == "certain"])
+        assert tracks.final.tolist() == [name in FINAL and machine.final.any() for name in follower.states]
+        assert len(tracks) <= 1
+        states.extend(follower.states or ["gone"])
+    return states
+
+
+WAITING = """seen unmatched, seen unmatched, hidden lost_unmatched, hidden lost_unmatched, seen unmatched,
+    hidden lost_unmatched, hidden lost_unmatched, hidden gone"""
+UNCERTAIN_ONCE = "uncertain unmatched, seen unmatched, certain tracked"
+CLASSIFIED_ONCE = """certain tracked, seen tracked, hidden lost, hidden lost, seen tracked,
+    hidden lost, hidden lost, hidden gone"""
+REMEMBERED_ONCE = f"{CLASSIFIED_ONCE}, seen tracked, moved unmatched"
+NOT_REMEMBERED = f"{CLASSIFIED_ONCE}, seen unmatched, moved unmatched"
+CLASSIFIED_ALWAYS = "certain tracked, certain tracked, hidden lost, certain tracked"
+UNCERTAIN_UNTIL_FUSED = """uncertain tracked_unclassified, seen tracked_unclassified, uncertain tracked_unclassified,
+    hidden lost_unclassified, hidden lost_unclassified, seen tracked_unclassified,
+    certain tracked_classified, seen tracked_classified"""
+UNCERTAIN_AND_LOST = """uncertain tracked_unclassified, hidden lost_unclassified, hidden lost_unclassified,
+    hidden gone"""
+CERTAIN_AT_ONCE = """certain tracked_classified, hidden lost_classified, hidden lost_classified,
+    seen tracked_classified, hidden lost_classified, hidden lost_classified, hidden gone"""
+CLASSIFIED_AGAIN = """certain tracked_classified, certain tracked_classified, uncertain tracked_unclassified,
+    certain tracked_classified"""
+REMEMBERED = f"{CERTAIN_AT_ONCE}, seen tracked_classified, moved unmatched"
+LIVES = {
+    "efficient": (EFFICIENT, [WAITING, UNCERTAIN_ONCE, CLASSIFIED_ONCE, REMEMBERED_ONCE]),
+    "conventional": (CONVENTIONAL, [WAITING, CLASSIFIED_ONCE, CLASSIFIED_ALWAYS, NOT_REMEMBERED]),
+    "accurate": (
+        ACCURATE,
+        [WAITING, UNCERTAIN_UNTIL_FUSED, UNCERTAIN_AND_LOST, CERTAIN_AT_ONCE, CLASSIFIED_AGAIN, REMEMBERED],
+    ),
+}
+"""Lives of one object: what happens to it in each frame, and the state that follows."""
+
+
+@pytest.mark.parametrize(("machine", "lives"), LIVES.values(), ids=LIVES)
+def test_lives_reach_every_row_of_the_table(machine, lives):
+    recorded = RecordedMachine(machine)
+    for life in lives:
+        steps, states = zip(*(entry.split() for entry in life.split(",")), strict=True)
+        assert live(recorded, steps) == list(states)
+    assert recorded.rows == {(t.source, t.event, t.target) for t in machine.transitions}
+
+
+each_machine = pytest.mark.parametrize("machine", [machine for machine, _ in LIVES.values()], ids=LIVES)
 
 
 @each_machine
@@ -31,17 +110,3 @@ def test_a_matched_proposal_and_its_track_end_in_one_state(machine):
     tracks = tracks[tracks != machine.proposal]
     after = machine.transition(tracks, Event.ASSOCIATED)
     np.testing.assert_array_equal(machine.joined(after), after)
-
-
-@pytest.mark.parametrize(
-    ("machine", "final", "wants_class"),
-    [
-        (EFFICIENT, {"tracked", "lost"}, {"unmatched"}),
-        (CONVENTIONAL, set(), {"unmatched"}),
-        (ACCURATE, {"tracked_classified", "lost_classified"}, {"unmatched", "tracked_unclassified"}),
-    ],
-    ids=MACHINES,
-)
-def test_states_whose_class_is_final_or_wanted(machine, final, wants_class):
-    assert {name for name, flag in zip(machine.names, machine.final, strict=True) if flag} == final
-    assert {name for name, flag in zip(machine.names, machine.wants_class, strict=True) if flag} == wants_class

@@ -1,34 +1,11 @@
 """The tracker: births, prediction, updates, rest and deaths."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from modt.classes import ObjectClass
-from modt.config import TrackingConfig
 from modt.geometry import wrap
 from modt.geometry.kdop import DIRECTIONS
-from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
-from modt.types import NONE, Cut
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
-
-ASSOCIATIONS = ["kdop", "paper"]
-
-
-@pytest.fixture(params=ASSOCIATIONS)
-def tracker(request):
-    return Follower(TrackingConfig(association=request.param))
-
-
-def test_a_stationary_box_keeps_its_track(tracker):
-    tracker.run([[box(10, 2)]] * 10)
-    tracks = tracker.tracks
-    assert len(tracks) == 1
-    assert (tracks.id[0], tracks.age[0], tracks.hits[0]) == (0, 10, 10)
-    assert tracks.x[0, 3] < 1.0
 
 
 @pytest.mark.parametrize("course", np.deg2rad([0, 90, 180, -45]))
@@ -41,53 +18,12 @@ def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
     assert abs(wrap(tracker.tracks.x[0, 2] - course)) < 0.1
 
 
-def test_conclude_returns_a_copy(tracker):
+def test_conclude_returns_a_copy():
+    tracker = Follower()
     tracker.follow(*frame_of([box(10, 0)], 0, EYE))
     tracks = tracker.conclude([0], [True])
     tracks.id[:] = 99
     assert tracker.tracks.id.tolist() == [0]
-
-
-@settings(max_examples=40)
-@given(
-    st.lists(
-        st.lists(
-            st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(0.3, 6), st.floats(0.3, 3), st.floats(-3, 3)),
-            max_size=6,
-        ),
-        min_size=1,
-        max_size=8,
-    ),
-    st.sampled_from(ASSOCIATIONS),
-    st.sampled_from([EFFICIENT, CONVENTIONAL, ACCURATE]),
-    st.booleans(),
-)
-def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine, posed):
-    tracker = Follower(TrackingConfig(association=association, max_missed=2), machine)
-    known = set()
-    for i, boxes in enumerate(scene):
-        frame, proposals = frame_of(
-            [box(x, y, max(a, b), min(a, b), yaw=c) for x, y, a, b, c in boxes], i, EYE if posed else None
-        )
-        tracks = tracker.follow(frame, proposals)
-        owned = np.sort(tracks.proposal[tracks.proposal != NONE])
-        np.testing.assert_array_equal(owned, np.arange(len(proposals)))
-        assert len(set(tracks.id)) == len(tracks)
-        born = set(tracks.id[tracks.age == 1].tolist())
-        assert not born & known  # an id is never used twice
-        known |= born
-        assert known.issuperset(tracks.id.tolist())
-        assert (tracks.missed <= 2).all()
-        assert ((tracks.missed > 0) == (tracks.proposal == NONE)).all()
-        wants_class = machine.wants_class[tracks.state] & (tracks.missed == 0)
-        np.testing.assert_array_equal(tracker.wants_class, wants_class)
-        assert np.isfinite(tracks.x).all()
-        assert np.isfinite(tracks.P).all()
-        assert tracker.tracks is tracks
-        rows = np.flatnonzero(tracker.wants_class)
-        certain = np.arange(len(rows)) % 2 == 0 if machine is ACCURATE else np.ones(len(rows), np.bool_)
-        tracker.conclude(rows, certain)
-        np.testing.assert_array_equal(tracks.final, machine.final[tracks.state])
 
 
 def test_a_track_at_rest_is_stationary_until_it_leaves_its_rest_position():
@@ -110,22 +46,3 @@ def test_the_mean_kdop_follows_views_that_jitter_and_restarts_at_an_end_that_jum
     reach = tracks.kdop[0] - tracks.x[0, :2] @ DIRECTIONS
     assert tracks.mean_kdop[0, 0] == pytest.approx(reach[0], abs=0.15)
     np.testing.assert_allclose(tracks.mean_kdop[0][[2, 4, 6]], [0.5, 1.0, 0.5], atol=0.15)
-
-
-@pytest.mark.parametrize(
-    ("object_class", "cut", "height_m"),
-    [
-        (ObjectClass.PEDESTRIAN, Cut.TOP, 1.6),
-        (ObjectClass.PEDESTRIAN, Cut.BOTTOM, 0.6),  # what is seen whole above is no higher than that
-        (ObjectClass.CAR, Cut.TOP, 0.6),
-    ],
-)
-def test_a_person_of_whom_only_legs_are_left_is_as_high_as_before(object_class, cut, height_m):
-    tracker = Follower()
-    tracker.run([[box(2 - 0.1 * i, 0, 0.5, 0.4, 1.6, z=0.6)] for i in range(6)], object_class)
-    for i in (6, 7):
-        frame, proposals = frame_of([box(1.4, 0, 0.5, 0.4, 0.6, z=0.1)], i, EYE)
-        tracks = tracker.follow(frame, replace(proposals, cut=np.array([cut])))
-        assert len(tracks) == 1
-        for of in (tracks.box[0], tracker.proposals.box[0]):
-            assert (of[5], of[2] - of[5] / 2) == (pytest.approx(height_m), pytest.approx(-0.2))

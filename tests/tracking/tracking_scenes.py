@@ -137,9 +137,8 @@ def tracks_at(boxes, *classes, points=60, **columns):
     t.bottom[:], t.top[:] = observations.bottom, observations.top
     t.envelope[:] = t.mean_kdop[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
     t.final[:] = True
-    t.last_class[:] = [*classes, *[ObjectClass.BACKGROUND] * (n - len(classes))]
     for row in range(n):
-        set_class(t, row, t.last_class[row])
+        set_class(t, row, classes[row] if row < len(classes) else ObjectClass.BACKGROUND)
     for column, value in columns.items():
         getattr(t, column)[:] = value
     return t

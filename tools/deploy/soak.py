@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from modt import host
-from modt.app import metering
+from modt.app import session as sessions
 from modt.app.deadlines import Deadlines
 from modt.app.inputs import Request
 from modt.app.ladder import Step
@@ -234,7 +234,7 @@ def main(arguments: list[str] | None = None) -> int:
         host.take_real_time_priority()
     world = World(core, given.hogs, fifo=given.fifo)
     world.install()
-    metering.discovery = lambda config: world.meters(time.monotonic)  # type: ignore[attr-defined]
+    sessions.discover = lambda board: world.meters(time.monotonic)  # type: ignore[attr-defined,assignment,misc]
     port = str(free_port())
     command = [sys.executable, "-m", "tools.deploy.sender", port, *([str(given.drive)] if given.drive else [])]
     with host.threads_on(others):

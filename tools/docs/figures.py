@@ -17,6 +17,7 @@ import numpy as np
 
 from modt import host
 from modt.app import assembly
+from modt.classes import CLASS_NAMES
 from modt_desk.evaluation.evaluation import ALL, Evaluation, collect, evaluation
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.experiments.catalogue import chosen
@@ -26,7 +27,7 @@ from modt_desk.experiments.study import Study
 from tools.docs.paper_page import NAMES, section
 from tools.docs.sections import replace_section
 from tools.options import parser
-from tools.study import drives, sensors
+from tools.study import drives
 
 ROOT = Path(__file__).resolve().parents[2]
 MARK = "tools.docs.figures"
@@ -50,12 +51,11 @@ def readme(kitti: Path, further: Path | None, pandaset: Path | None) -> str:
     lines = [f"| at commit `{commit()}` | {' | '.join(kinds)} |", "|---|" + "---|" * len(kinds)]
     for sensor, name in SENSORS.items():
         made = [drives.simulated(scene, sensor, SECONDS, seed) for seed in SEEDS for scene in SCENES]
-        rows = [sensors.run(drive, drive.profile, MODE, drive.fov, k) for k, drive in enumerate(made)]
+        rows = [drives.judged(drive, MODE, k) for k, drive in enumerate(made)]
         lines.append(_row(f"{name}, simulated", evaluation(rows)))
     if pandaset is not None:
         drive = drives.labelled(pandaset, PANDASET_PROFILE)
-        rows = [sensors.run(drive, drive.profile, MODE, drive.fov, 0)]
-        lines.append(_row("Pandar64, PandaSet (development)", evaluation(rows)))
+        lines.append(_row("Pandar64, PandaSet (development)", evaluation([drives.judged(drive, MODE)])))
     return "\n".join([*lines, "", *on_kitti(drives.labelled(kitti, further=further))])
 
 
@@ -76,7 +76,7 @@ def on_kitti(drive: drives.Drive) -> Iterator[str]:
             if name == MODE:
                 judged.append(JudgedFrame.of_result(result, truth, drive.fov))
     scores = evaluation([collect(judged, drive.rules)]).ranges[ALL].classification
-    of = [scores[c] for c in sensors.CLASSES]
+    of = [scores[c] for c in CLASS_NAMES[1:]]
     precision, recall = _shares([s.average_precision for s in of]), _shares([s.objects_called for s in of])
     yield f"On drive {DRIVE} of KITTI, in the camera's view, average precision is {precision} and the recall of all"
     yield f"{' / '.join(str(s.objects) for s in of)} labelled objects {recall}. CPU time there, relative to mode"
@@ -85,14 +85,16 @@ def on_kitti(drive: drives.Drive) -> Iterator[str]:
 
 
 def _row(name: str, found: Evaluation) -> str:
-    detected, recall, precision, _ = sensors.by_class(found)
-    tracks = found.tracks.get(ALL)
-    length = "-" if tracks is None else sensors.percent(tracks.life.ratio)
-    return f"| {name} | {_shares(detected)} | {_shares(recall)} | {_shares(precision)} | {length} |"
+    whole, tracks = found.ranges[ALL], found.tracks.get(ALL)
+    detected = [whole.segmentation[c].recall if c in whole.segmentation else None for c in CLASS_NAMES[1:]]
+    scores = [whole.classification[c] for c in CLASS_NAMES[1:]]
+    length = None if tracks is None else tracks.life.ratio
+    columns = detected, [s.recall for s in scores], [s.precision for s in scores], [length]
+    return f"| {name} | {' | '.join(_shares(column) for column in columns)} |"
 
 
 def _shares(values: Sequence[float | None]) -> str:
-    return " / ".join(map(sensors.percent, values))
+    return " / ".join("-" if share is None else f"{100 * share:.0f}" for share in values)
 
 
 def paper_page(drive: KittiDrive, further: Path | None) -> str:

@@ -11,12 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES
 from modt.types import Float64
 from modt_desk.evaluation.class_score import class_scores
 from modt_desk.evaluation.evaluation import DriveRows
 from modt_desk.experiments.markdown import commit
 from tools.docs.sections import DOCS, replace_section, write
-from tools.study import drives, sensors
+from tools.study import drives
 
 PAGE, MARK = DOCS / "paper.md", "tools.docs.paired_modes"
 SENSORS = "vlp-16", "os1-64", "hdl-64e", "mid-360", "pandar64", "xt-32"
@@ -31,14 +32,14 @@ Rows = Mapping[str, Sequence[DriveRows]]
 
 
 def table() -> Iterator[str]:
-    """Markdown: the mean over sensors with its 95 % interval, and each sensor."""
+    """The mean over sensors with its 95 % interval, and each sensor, as Markdown."""
     judged = {sensor: _judged(sensor) for sensor in SENSORS}
     yield f"Commit {commit()}; made by `python -m {MARK}`."
     yield ""
     number = len(SEEDS) * len(SCENES)
     title = f"AP less that of `{BASELINE}`, {number} simulated drives a sensor, paired [points]"
-    yield f"| {title} | {' | '.join(sensors.CLASSES)} |"
-    yield "|---|" + "---|" * len(sensors.CLASSES)
+    yield f"| {title} | {' | '.join(CLASS_NAMES[1:])} |"
+    yield "|---|" + "---|" * len(CLASS_NAMES[1:])
     for mode in MODES:
         mean, low, high = interval(list(judged.values()), mode, np.random.default_rng(0))
         cells = [f"{m:+.1f} ({a:+.1f}, {b:+.1f})" for m, a, b in zip(mean, low, high, strict=True)]
@@ -62,7 +63,7 @@ def difference(rows: Rows, mode: str) -> Float64:
 
 
 def _drawn(rows: Rows, rng: np.random.Generator) -> Rows:
-    """As many drives drawn with replacement, the same of every mode."""
+    """Draw as many drives with replacement, the same ones for every mode."""
     n = len(rows[BASELINE])
     index = rng.integers(n, size=n).tolist()
     return {mode: [drives[k] for k in index] for mode, drives in rows.items()}
@@ -71,16 +72,16 @@ def _drawn(rows: Rows, rng: np.random.Generator) -> Rows:
 def _precisions(rows: Sequence[DriveRows]) -> Float64:
     tables = (np.concatenate([getattr(drive, name) for drive in rows]) for name in ("objects", "proposals"))
     scores = class_scores(*tables)
-    return np.array([100.0 * (scores[name].average_precision or 0.0) for name in sensors.CLASSES])
+    return np.array([100.0 * (scores[name].average_precision or 0.0) for name in CLASS_NAMES[1:]])
 
 
 def _judged(sensor: str) -> Rows:
-    """Every mode on the drives of a sensor."""
+    """Judged drives of a sensor in every mode."""
     found: dict[str, list[DriveRows]] = {mode: [] for mode in (BASELINE, *MODES)}
     for number, (seed, scene) in enumerate((seed, scene) for seed in SEEDS for scene in SCENES):
         drive = drives.simulated(scene, sensor, SECONDS, seed)
         for mode, rows in found.items():
-            rows.append(sensors.run(drive, drive.profile, mode, drive.fov, number))
+            rows.append(drives.judged(drive, mode, number))
     return found
 
 

@@ -96,7 +96,7 @@ def work_of(sensor: str, mode_name: str, seeds: Sequence[int], seconds: float) -
 
 
 def table(works: Sequence[Work], rating: int) -> str:
-    """Markdown: the work, its CPU time here, and that expected on each board [ms]."""
+    """The work, its CPU time here, and the expected CPU time on each board [ms], as Markdown."""
     lines = [
         f"| sensor, mode | points | proposals | calls | measured ({rating} MIPS) | {' | '.join(BOARDS)} |",
         "|" + "---|" * (5 + len(BOARDS)),

@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from modt.app import assembly
 from modt.config import ProfileConfig
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
 from modt.sources.recognise import open_stream
 from modt.types import Frame
+from modt_desk.evaluation.evaluation import DriveRows, collect
+from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.further_objects import with_further
 from modt_desk.evaluation.rules import CUBOID_RULES, Rules
-from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
 from modt_desk.evaluation.truth_files import open_truth
-from modt_desk.simulation.kinds import TRUCK
+from modt_desk.experiments.drives import SIMULATED_TYPES
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-
-TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTRAL)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +35,10 @@ class Drive:
 
 def simulated(scene: str, sensor: str, seconds: float, seed: int) -> Drive:
     """A simulated drive, labelled all round."""
-    stream = SyntheticStream(scene, sensor, seconds, seed)
-    frames = [
-        (frame, FrameTruth.of(TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], truth.boxes))
-        for frame, truth in stream.sweeps()
-    ]
+    stream, frames = SyntheticStream(scene, sensor, seconds, seed), []
+    for frame, truth in stream.sweeps():
+        names = [kind.name for kind in truth.kinds]
+        frames.append((frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), names, truth.boxes)))
     return Drive(stream.info.name, load(sensor), frames)
 
 
@@ -57,3 +57,12 @@ def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None)
     fov = FieldOfView() if stream.info.camera is None else FieldOfView.of_camera(stream.info.camera)
     frames = [(frame, truth.frames[frame.index]) for frame in stream if frame.index in truth.frames]
     return Drive(path.name, load(profile), frames, truth.rules, fov)
+
+
+def judged(drive: Drive, mode_name: str, number: int = 0) -> DriveRows:
+    """Run a drive in a mode and judge it. Drives that are pooled need different numbers."""
+    mode = assembly.MODES[mode_name]
+    pipeline, budget = assembly.pipeline(mode, drive.profile, drive.fov), mode.budget(drive.profile)
+    results = ((pipeline.step(frame, budget), truth) for frame, truth in drive.frames)
+    frames = (JudgedFrame.of_result(result, truth, drive.fov) for result, truth in results)
+    return collect(frames, drive.rules, number)

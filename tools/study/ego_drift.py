@@ -1,6 +1,6 @@
 """Drift of ego-motion estimated from proposals, compared with KISS-ICP where installed (extra `kiss`).
 
-    python -m tools.study.ego_drift DRIVE [DRIVE ...] [--frames A:B] [--no-kiss]
+    python -m tools.study.ego_drift DRIVE [DRIVE ...] [--frames A:B]
 
 DRIVE is a KITTI raw drive, recorded or written by `modt simulate`. Each estimate is compared with the positions
 of the OXTS records and with their velocities, integrated over time. The errors are those of the last pose, with the
@@ -101,7 +101,7 @@ def integrated(drive: Path, indices: Iterable[int]) -> Float64:
     return np.array([se3(rotation_zyx(*angles), at) @ T_imu_sensor for angles, at in poses])
 
 
-def study(drive: Path, span: tuple[int, int | None], *, kiss: bool) -> dict[str, dict[str, float]]:
+def study(drive: Path, span: tuple[int, int | None]) -> dict[str, dict[str, float]]:
     """Drift of each estimate against each reference, by name."""
     stream = open_scans(drive).between(*span)
     poses = [(s.index, s.T_world_sensor) for s in stream.scans if s.T_world_sensor is not None]
@@ -110,15 +110,13 @@ def study(drive: Path, span: tuple[int, int | None], *, kiss: bool) -> dict[str,
         "velocities": integrated(drive, [i for i, _ in poses]),
     }
     estimates = {f"proposals, {fov}": by_proposals(stream, camera=fov == "camera") for fov in ("full", "camera")}
-    if kiss:
+    if find_spec("kiss_icp"):
         estimates["KISS-ICP"] = by_kiss_icp(stream)
     out = {f"OXTS {name}": {"path_m": path_m(T)} for name, T in references.items()}
     for name, T in estimates.items():
         out[name] = {"path_m": path_m(T)}
         for against, reference in references.items():
             out[f"{name} against OXTS {against}"] = drift(T, reference)
-        if kiss and name != "KISS-ICP":
-            out[f"{name} against KISS-ICP"] = drift(T, estimates["KISS-ICP"])
     return out
 
 
@@ -126,15 +124,13 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("drives", type=Path, nargs="+", metavar="DRIVE")
     options.add_argument("--frames", type=frame_range, default=(0, None), metavar="A:B")
-    options.add_argument("--no-kiss", action="store_true", help="without KISS-ICP")
     arguments = options.parse_args()
-    kiss = find_spec("kiss_icp") is not None and not arguments.no_kiss
-    if not kiss:
-        print("without KISS-ICP" + ("" if arguments.no_kiss else ": not installed; pip install '.[kiss]'"))
+    if not find_spec("kiss_icp"):
+        print("without KISS-ICP: not installed; pip install '.[kiss]'")
     magnitudes: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for drive in arguments.drives:
         print(drive)
-        for name, figures in study(drive.resolve(), arguments.frames, kiss=kiss).items():
+        for name, figures in study(drive.resolve(), arguments.frames).items():
             print(f"  {name:<42}", json.dumps({k: round(v, 3) for k, v in figures.items()}), flush=True)
             for key, value in figures.items():
                 magnitudes[name][key].append(abs(value))

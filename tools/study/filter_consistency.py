@@ -1,7 +1,7 @@
 """Consistency of the tracking filter: normalised estimation error squared (NEES) on simulated drives.
 
     python -m tools.study.filter_consistency [--scene street crossing] [--seeds 0:4] [--seconds 10]
-                         [--sensor hdl-64e] [--fov full]
+                                              [--sensor hdl-64e]
 
 The reference point of a track on its body is unknown; it is taken as the mean position of the track in the body
 frame. The position error is relative to that point (2 degrees of freedom), the motion error is that of heading and
@@ -46,7 +46,7 @@ class BodyTrack:
 
     Attributes:
         kind: class and motion, as in "car, moving".
-        x, P: (n, 4), (n, 4, 4) of the filter.
+        x, P: (n, 4) state and (n, 4, 4) covariance of the filter.
         pose: (n, 4) true x, y [m], heading [rad] and speed [m/s], world frame.
     """
 
@@ -56,12 +56,10 @@ class BodyTrack:
     pose: Float64
 
 
-def body_tracks(stream: SyntheticStream, profile_name: str, *, camera: bool = False) -> list[BodyTrack]:
+def body_tracks(stream: SyntheticStream, profile_name: str) -> list[BodyTrack]:
     """Tracks that were on one body for at least MIN_FRAMES frames, in mode `efficient`."""
     profile, mode, world = load(profile_name), assembly.MODES["efficient"], stream.simulator.world
-    assert stream.info.camera is not None
-    fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline, budget = assembly.pipeline(mode, profile, fov), mode.budget(profile)
+    pipeline, budget = assembly.pipeline(mode, profile, FieldOfView()), mode.budget(profile)
     records: dict[tuple[int, int, bool], list[tuple[Float64, Float64, Float64]]] = defaultdict(list)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, budget)
@@ -162,13 +160,12 @@ def main() -> None:
     options.add_argument("--sensor", default="hdl-64e", help="sensor with a profile of the same name")
     options.add_argument("--seconds", type=float, default=10.0)
     options.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
-    options.add_argument("--fov", choices=("camera", "full"), default="full")
     arguments = options.parse_args()
     found: list[BodyTrack] = []
     for seed in range(*arguments.seeds):
         for scene in arguments.scene:
             stream = SyntheticStream(scene, arguments.sensor, arguments.seconds, seed)
-            found += body_tracks(stream, arguments.sensor, camera=arguments.fov == "camera")
+            found += body_tracks(stream, arguments.sensor)
     for kind, parts in study(found).items():
         for part, c in parts.items():
             line: dict[str, Any] = {"tracks": c.tracks, "samples": c.samples, "nees": round(c.mean, 3)}

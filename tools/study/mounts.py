@@ -30,10 +30,10 @@ from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.rows import Outcome
 from modt_desk.evaluation.rules import CUBOID_RULES
 from modt_desk.evaluation.truth import FrameTruth, Role
+from modt_desk.experiments.drives import SIMULATED_TYPES
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.synthetic_stream import SCENES, SyntheticStream
 from tools.options import parser
-from tools.study.drives import TYPES
 
 BANDS_M = ((0.5, 3.0), (3.0, 8.0), (8.0, 20.0), (20.0, 60.0))
 EVERYWHERE_M = (0.0, float("inf"))
@@ -54,7 +54,7 @@ def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig, mount: M
             pose = mount.level(frame).T_world_sensor
             assert pose is not None
             boxes = transform_boxes(inverse(pose), stream.simulator.world.boxes(frame.stamp_s)[truth.bodies])
-            labels = FrameTruth.of(TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], boxes)
+            labels = FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], boxes)
             result = JudgedFrame.of_result(pipeline.step(frame, budget), labels)
             yield replace(result, points=mount.turn(frame.points))
 

@@ -21,9 +21,9 @@ MIN_POINTS = 6
 
 
 BEAM_STEPS, BEAM_STEP_SHARE = (1, 2, 4), (0.5, 0.3, 0.2)
-"""One beam in so many is kept of a crop, and the share of the crops."""
+"""Every n-th beam of a crop is kept, with each n for a share of the crops."""
 MAX_ELEVATION_DEG = 2.0
-"""Between the beams that are kept."""
+"""Greatest angle between two beams that are kept."""
 
 
 def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sensors]:

@@ -44,17 +44,17 @@ from tools.train.synthetic_scans import label_files, scans_from_labels, simulate
 CELL_SCALES = (0.75, 1.4)
 """Cell sizes relative to the profile's, for training alone."""
 SYNTHETIC_CELL_SCALES = (0.75, 1.0, 1.0, 1.4)
-"""Those of simulated sweeps, one after another."""
+"""Cell sizes of simulated sweeps, in turn, relative to the profile's."""
 SCENES, TIMES_S = ("street", "crossing"), (0.0, 2.5)
 PASTES = 120
 """Pasting attempts in each scan of KITTI."""
 MIN_HOST_POINTS = 60_000
-"""Points of a scan that objects are pasted into: more."""
+"""Objects are pasted into scans of more points."""
 SEEDS_APART = 100_000
-"""Between the first worlds of two seeds."""
+"""Number of worlds between the first ones of two seeds."""
 MAX_POINTS = 1200
 UNLABELLED_SHARE, FOREIGN_SHARE = 0.2, 0.2
-"""Shares of a proposal's points: more without a label make it unknown, more of another object make it partial."""
+"""A greater share of points without a label makes a proposal unknown, of another object's points partial."""
 MIN_BOX_POINTS, MIN_DETECTABLE_POINTS = 5, 10
 """Minimum points of an object for training, and for the ground truth of the validation."""
 TALL_M = 1.85

@@ -22,7 +22,7 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
 """Simulated worlds of each kind."""
 NEAR_WORLDS, NEAR_STEPS = {1: 3000, 2: 550}, 4000
-"""Seed and number of the worlds near the sensor: to train on, and for the card; steps."""
+"""Seed and number of the worlds near the sensor, first for training, then for the card; training steps."""
 RAMP_SEED, RAMP_WORLDS = 3, 330
 """Seed and number of the worlds with a ramp, which the box classifier of pointnet-kitti is trained on as well."""
 KITTI_DATA = (

@@ -38,7 +38,7 @@ for the classes that are rare in real scans."""
 TALL_SHARE = 0.3
 """Share of vans among the cars."""
 BATCH_SIZE = 128
-"""Labelled crops of a step."""
+"""Number of labelled crops of a training step."""
 Pools = list[tuple[Int, Float64 | None]]
 """Rows of each class, and the probability of each row, None where they are equal."""
 CHUNK = 2000
@@ -72,13 +72,13 @@ class Sensors:
         return np.deg2rad(self.azimuth_deg) * np.deg2rad(self.elevation_deg)
 
     def followed_by(self, other: Sensors) -> Sensors:
-        """These, then others."""
+        """The sensors of these crops and of others after them."""
         return Sensors(
             *(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True))
         )
 
     def take(self, rows: Int) -> Sensors:
-        """Those of rows."""
+        """The sensors of some rows."""
         return Sensors(self.ground_z_m[rows], self.azimuth_deg[rows], self.elevation_deg[rows])
 
 
@@ -99,7 +99,7 @@ class LabelledObjects:
     row: Int
 
     def take(self, rows: Bool) -> LabelledObjects:
-        """Those of a mask (T,)."""
+        """The objects of a mask (T,)."""
         return LabelledObjects(*(column[rows] for column in vars(self).values()))
 
 

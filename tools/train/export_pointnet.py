@@ -55,49 +55,30 @@ class GraphWriter:
         self.weights.append(numpy_helper.from_array(value.astype(np.float16) if half else value, name))
         return self.add("Cast", name, to=TensorProto.FLOAT) if half else name
 
-    def pointnet(
-        self, points: str, layers: Sequence[Layer], shared: int, *, pool_first: bool, prefix: str = ""
-    ) -> str:
-        """Name of the (batch, out) logits; the first `shared` layers are applied to every point."""
-        value = self.add("Transpose", points, perm=[0, 2, 1]) if pool_first else points
-        for i, (weight, bias) in enumerate(layers):
-            columns, last_shared = pool_first and i < shared, i == shared - 1
-            weights = self.constant(f"{prefix}weight{i}", weight.T.copy() if columns else weight)
-            value = self.add("MatMul", *((weights, value) if columns else (value, weights)))
-            if columns and last_shared:
-                value = self.add("ReduceMax", value, axes=[2], keepdims=0)
-            biases = bias[:, None] if columns and not last_shared else bias
-            value = self.add("Add", value, self.constant(f"{prefix}bias{i}", biases))
-            if i < len(layers) - 1:
-                value = self.add("Relu", value)
-            if last_shared and not pool_first:
-                value = self.add("ReduceMax", value, axes=[1], keepdims=0)
-        return value
 
-
-def graph(
-    layers: Sequence[Layer],
-    *,
-    pool_first: bool = True,
-    shared: int = N_SHARED,
-    transform: tuple[Sequence[Layer], int] | None = None,
-    half: bool = False,
-) -> onnx.ModelProto:
+def graph(layers: Sequence[Layer], *, pool_first: bool = True, half: bool = False) -> onnx.ModelProto:
     """The ONNX graph of a PointNet.
 
     Args:
-        layers: first to last.
+        layers: first to last; the first N_SHARED are applied to every point.
         pool_first: False for the textbook order: a point a row, bias and ReLU on every one.
-        shared: number of layers applied to every point.
-        transform: layers of a PointNet that finds a matrix (3, 3) for the points, and how many of them are shared.
         half: store weights in half precision.
     """
-    write, points = GraphWriter(half=half), "points"
-    if transform:
-        matrix = write.pointnet(points, *transform, pool_first=pool_first, prefix="transform_")
-        matrix = write.add("Reshape", matrix, write.constant("shape", np.array([-1, 3, 3])))
-        points = write.add("MatMul", points, matrix)
-    write.add("Softmax", write.pointnet(points, layers, shared, pool_first=pool_first), axis=-1)
+    write = GraphWriter(half=half)
+    value = write.add("Transpose", "points", perm=[0, 2, 1]) if pool_first else "points"
+    for i, (weight, bias) in enumerate(layers):
+        columns, last_shared = pool_first and i < N_SHARED, i == N_SHARED - 1
+        weights = write.constant(f"weight{i}", weight.T.copy() if columns else weight)
+        value = write.add("MatMul", *((weights, value) if columns else (value, weights)))
+        if columns and last_shared:
+            value = write.add("ReduceMax", value, axes=[2], keepdims=0)
+        biases = bias[:, None] if columns and not last_shared else bias
+        value = write.add("Add", value, write.constant(f"bias{i}", biases))
+        if i < len(layers) - 1:
+            value = write.add("Relu", value)
+        if last_shared and not pool_first:
+            value = write.add("ReduceMax", value, axes=[1], keepdims=0)
+    write.add("Softmax", value, axis=-1)
     write.nodes[-1].output[0] = "probability"
     ends = (
         [helper.make_tensor_value_info("points", TensorProto.FLOAT, ["batch", "points", 3])],
@@ -145,8 +126,8 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
         "",
         *_threshold_table(report["boxes"]["ruled_out"]),
     ]
-    for told in report["reflectance"]:
-        lines += [f"From box and reflectance, {told['sensor']}:", "", *_threshold_table(told["ruled_out"])]
+    for facts in report["reflectance"]:
+        lines += [f"From box and reflectance, {facts['sensor']}:", "", *_threshold_table(facts["ruled_out"])]
     return "\n".join(lines)
 
 
@@ -167,11 +148,11 @@ def _by_sensor(report: dict[str, Any]) -> list[str]:
         "box": boxes["cross_validation"],
         _pool_name(boxes["weights"]): boxes["pool"],
     }
-    for told in report["reflectance"]:
-        of_sensor = f", reflectance of the {told['sensor']}"
+    for facts in report["reflectance"]:
+        of_sensor = f", reflectance of the {facts['sensor']}"
         methods |= {
-            f"box{of_sensor}": told["cross_validation"],
-            _pool_name(told["weights"]) + of_sensor: told["pool"],
+            f"box{of_sensor}": facts["cross_validation"],
+            _pool_name(facts["weights"]) + of_sensor: facts["pool"],
         }
     lines = [
         "## Out of fold, by sensor (drives never split)",
@@ -248,8 +229,8 @@ def export(
     if reflectance:
         metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
             {
-                told["sensor"]: (own, PoolWeights.from_dict(told["weights"]))
-                for own, told in zip(reflectance, report["reflectance"], strict=True)
+                facts["sensor"]: (own, PoolWeights.from_dict(facts["weights"]))
+                for own, facts in zip(reflectance, report["reflectance"], strict=True)
             }
         )
     metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(

@@ -92,7 +92,7 @@ class Validation:
     def of(cls, data: Dataset) -> Validation:
         """Validation part of a data set."""
         rows = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
-        place = np.full(len(data) + 1, NONE)  # the last one is that of NONE
+        place = np.full(len(data) + 1, NONE)  # index -1, NONE, is the last one
         place[rows] = np.arange(len(rows))
         truth = data.truth.take(np.isin(data.truth.drive, data.drive[rows]))
         return cls(
@@ -107,18 +107,18 @@ class Validation:
 
     @property
     def weight(self) -> Float64:
-        """(R,) of the clear crops; every sensor counts as much as the others."""
+        """(R,) weight of each clear crop, the same in total for every sensor."""
         number = np.bincount(self.sensor[self.clear], minlength=len(self.sensor_names))
         weight: Float64 = self.clear / number[self.sensor].clip(1)
         return weight / weight.sum()
 
     @property
     def class_frequency(self) -> Float64:
-        """(4,) of the weighted crops: what a posterior calibrated to them assumes."""
+        """(4,) frequency of the classes among the weighted crops, which a posterior calibrated to them assumes."""
         return np.asarray(np.bincount(self.label, self.weight, N_CLASSES), np.float64)
 
     def weight_of(self, rows: Bool) -> Float64:
-        """(R,) of clear crops of a mask, by class as frequent as all are."""
+        """(R,) weight of the clear crops of a mask, with the class frequency of all crops."""
         weight = self.weight * rows
         frequency = np.bincount(self.label, weight, N_CLASSES)
         weight *= (self.class_frequency / np.where(frequency > 0, frequency, 1.0))[self.label]
@@ -141,7 +141,7 @@ class HeldOut:
 
     @property
     def probability(self) -> Float64:
-        """(R, 4) calibrated."""
+        """(R, 4) calibrated probabilities."""
         return self.calibration.apply(self.logits)
 
 

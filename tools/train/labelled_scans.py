@@ -32,7 +32,7 @@ ARGOVERSE = ProfileConfig(
 )
 """Two heads of 32 beams, one between the beams of the other."""
 ARGOVERSE_SENSOR_M = np.array([1.35, 0.0, 1.57], np.float32)
-"""Between the heads, in the frame of the vehicle."""
+"""Middle between the heads, in the frame of the vehicle."""
 PANDAR64 = profile.load("pandar64")
 PANDASET_SENSOR_M = {
     "world-000040": (-30.0, 34.1, 1.79),
@@ -55,11 +55,11 @@ PANDASET_UNKNOWN = (
     "Animals - Other", "Emergency Vehicle", "Motorized Scooter", "Other Vehicle - Pedicab",
     "Personal Mobility Device", "Tram / Subway",
 )  # fmt: skip
-"""Types between the classes."""
+"""Types that are between the classes."""
 TWO_WHEELERS, RIDDEN_M = ("Bicycle", "Motorcycle", "TYPE_CYCLIST"), 1.5
 """Cuboids of both parked and ridden ones; these are taller than RIDDEN_M."""
 MISMATCHED = ("002894",)
-"""Scans of `training_more` that are not those of their labels: boxes in plain view are empty, cars have no box."""
+"""Scans of `training_more` whose labels belong to others: boxes in plain view are empty, and cars have no box."""
 THINNED = {2: 0.12, 4: 0.14}
 """Side of a cell at 10 m [m] where every n-th beam of an HDL-64E is kept."""
 FULL_SCAN_BEAMS = 64
@@ -130,7 +130,7 @@ def points_in_box(points: Float32, box: Float64) -> Bool:
 
 
 def on_bottom(boxes: Float64) -> Float64:
-    """(..., 7) boxes about the centres of their bottom faces, of boxes about their centres."""
+    """(..., 7) boxes by the centres of their bottom faces, from boxes by their centres."""
     out = boxes.copy()
     out[..., 2] -= boxes[..., 5] / 2
     return out

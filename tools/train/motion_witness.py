@@ -21,7 +21,7 @@ from tools.study.drives import Drive, simulated
 
 CELLS = len(YOUNG_S) + 1 + len(MOVED_M)
 WEIGHT, MOST = 0.5, 1.5
-"""Weight of the witness beside network and box; its greatest absolute logarithm."""
+"""Weight of the witness beside network and box, and its greatest absolute log likelihood ratio."""
 SMOOTHING = 200
 """Counts of a class over all lengths that are added to those of one length."""
 FRAGMENTS, JOINT_SMOOTHING = 0, 50

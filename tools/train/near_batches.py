@@ -29,7 +29,7 @@ HIDDEN_SHARE, MAX_HIDDEN, MIN_POINTS = 0.2, 0.45, 8
 """Crops hidden at a side, how much of one may be hidden, and points that are left of it."""
 MAX_HEIGHT_M = SegmentationConfig().max_height_m
 MIN_CUT_POINTS = 20
-"""A crop of which the beams show fewer points is left out."""
+"""A crop with fewer points between the beams is left out."""
 LOG_RANGE = math.log(RANGE_M[0]), math.log(RANGE_M[1])
 SPANS: Float64 = np.tan(np.deg2rad([s for s in (profile.load(n).sensor.span_deg for n in SENSORS) if s is not None]))
 """(S, 2) rise over distance of the lowest and the highest beam, sensor by sensor."""
@@ -62,7 +62,7 @@ class NearSource:
         self._cuttable = _by_class(streets, np.flatnonzero(shown & (real | ~real.any())))
 
     def draw(self, rng: Generator) -> NearBatch:
-        """A batch."""
+        """Draw a batch."""
         rows = draw_batch(self._pools, rng, NEAR_BATCH, SHARE)
         street = draw_batch(self._cuttable, rng, CUT_BATCH, SHARE)
         simulated, side = varied(self._near.take(rows), rng)
@@ -147,7 +147,7 @@ def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sen
     count = np.bincount(owner[keep], minlength=n)
     rows = np.flatnonzero((count >= MIN_CUT_POINTS) & (cut > 0))
     kept = keep & np.isin(owner, rows)
-    wider = np.square(np.maximum(nearest, 1.0) / np.maximum(near_m, 1.0))  # the same area a point
+    wider = np.square(np.maximum(nearest, 1.0) / np.maximum(near_m, 1.0))  # each point covers the same area
     near = replace(sensors, ground_z_m=-mount_m, elevation_deg=sensors.elevation_deg * wider)
     out = Crops(xyz[kept].astype(np.float32), np.append(0, np.cumsum(count[rows])))
     return out, near.take(rows), rows, cut[rows]

@@ -26,7 +26,7 @@ from tools.train.labelled_scans import Scan
 from tools.train.synthetic_scans import labelled_scan
 
 HEIGHT_M, RANGE_M = (0.2, 1.0), (0.5, 6.0)
-"""Mounts of the sensor, and distances of what stands around it."""
+"""Heights of the sensor's mount, and distances of people and things around it."""
 SLOTS = 14
 """Directions in which something may stand."""
 PERSON_SHARE, CAR_SHARE, EMPTY_SHARE = 0.32, 0.05, 0.15

@@ -20,12 +20,14 @@ from modt.classification.box_classifier import Layers
 from modt.types import Float64, Int
 from tools.train.export_pointnet import Layer
 
-SHARED = (3, 32, 64, 512)
-HEAD = (512, 256, 128, 4)
+SHARED, HEAD = (3, 32, 64, 512), (512, 256, 128, 4)
+"""Widths of the layers over points, and of those after the maximum."""
+DROPOUT = 0.3
+"""Share of the last hidden layer that a training step leaves out."""
 HIDDEN = (32, 32)
 """Widths of the small networks."""
 Batch = tuple[Float64, Int, Float64 | float]
-"""(R, F) features of crops, (R,) their classes, and (R, 4) logits that those of the network are added to, or zero."""
+"""(R, F) features of crops, (R,) classes, and (R, 4) logits to which the network's are added, or zero."""
 
 
 class MaxPooledLinear(torch.autograd.Function):
@@ -77,15 +79,15 @@ class PositiveScaleNorm(nn.Module):
 
 
 class PointNet(nn.Module):
-    """Shared layers over points, maximum over points, fully connected head; `shared` and `head` are their widths."""
+    """Shared layers over points, maximum over points, fully connected head."""
 
-    def __init__(self, dropout: float = 0.3, shared: tuple[int, ...] = SHARED, head: tuple[int, ...] = HEAD) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.shared = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(shared))
-        self.head = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(head[:-1]))
-        self.norms = nn.ModuleList(PositiveScaleNorm(width) for width in (*shared[1:], *head[1:-1]))
-        self.last = nn.Linear(*head[-2:])
-        self.dropout = nn.Dropout(dropout)
+        self.shared = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(SHARED))
+        self.head = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(HEAD[:-1]))
+        self.norms = nn.ModuleList(PositiveScaleNorm(width) for width in (*SHARED[1:], *HEAD[1:-1]))
+        self.last = nn.Linear(*HEAD[-2:])
+        self.dropout = nn.Dropout(DROPOUT)
 
     def forward(self, xyz: Tensor, count: Tensor) -> Tensor:
         """(R, 4) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
@@ -106,31 +108,6 @@ class PointNet(nn.Module):
         ]
         folded.append((self.last.weight.double(), self.last.bias.double()))
         return [(w.detach().T.float().numpy().copy(), b.detach().float().numpy().copy()) for w, b in folded]
-
-
-class TransformedPointNet(nn.Module):
-    """The PointNet of its authors, at full width: each crop is first turned by a matrix that a PointNet finds for it.
-
-    Dearer by a factor of eight. The second transform, of features, is left out: its last layer alone has a million
-    weights.
-    """
-
-    SHARED, HEAD = (3, 64, 64, 64, 128, 1024), (1024, 256, 128, 4)
-    TRANSFORM_SHARED, TRANSFORM_HEAD = (3, 64, 128, 1024), (1024, 256, 9)
-
-    def __init__(self, dropout: float = 0.3) -> None:
-        super().__init__()
-        self.transform = PointNet(0.0, self.TRANSFORM_SHARED, self.TRANSFORM_HEAD)
-        self.classifier = PointNet(dropout, self.SHARED, self.HEAD)
-        nn.init.zeros_(self.transform.last.weight)
-        with torch.no_grad():
-            self.transform.last.bias.copy_(torch.eye(3).flatten())
-
-    def forward(self, xyz: Tensor, count: Tensor) -> Tensor:
-        """(R, 4) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
-        matrix = self.transform(xyz, count).reshape(-1, 3, 3).repeat_interleave(count, dim=0)
-        logits: Tensor = self.classifier((xyz[:, None] @ matrix)[:, 0], count)
-        return logits
 
 
 def train_mlp(batch: Callable[[], Batch], sample: Float64, steps: int, rate: float, decay: float) -> Layers:

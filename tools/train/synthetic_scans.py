@@ -28,7 +28,7 @@ CAMERA_AHEAD_M = 0.27
 KINDS = {
     kind.name: kind for kind in (kinds.CAR, kinds.VAN, kinds.TRUCK, kinds.PEDESTRIAN, kinds.SITTER, kinds.CYCLIST)
 } | {"Tram": kinds.TRUCK}
-"""Kind that a KITTI object type is simulated by."""
+"""Simulated kind of each KITTI object type."""
 
 
 def labelled_scan(

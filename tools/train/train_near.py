@@ -43,11 +43,11 @@ FREQUENCY = np.array([0.86, 0.03, 0.1, 0.01])
 RATE = 5e-4
 """Greatest learning rate."""
 BOUND_CROPS, BOUND_STEPS = 60_000, 3000
-"""Crops that the classifier of bounds is trained on, and steps."""
+"""Number of crops for the training of the classifier of bounds, and its steps."""
 SMOOTHING = 0.01
 """Label smoothing: probability spread evenly over the classes."""
 EVERY = 100
-"""Steps whose mean loss is printed."""
+"""Number of steps over which the printed loss is averaged."""
 RANGES_M = ((0.5, 1.0), (1.0, 1.5), (1.5, 3.0), (3.0, 7.0))
 """Rows of the card's table."""
 
@@ -129,7 +129,7 @@ def train_bounds(source: NearSource, seed: int) -> Layers:
 
 @torch.no_grad()
 def network_posterior(network: Student, data: Dataset, rows: Int) -> Float64:
-    """(R, 4) of rows of a data set by a network."""
+    """(R, 4) posteriors of rows of a data set by a network."""
     rng = np.random.default_rng(0)
     parts = [(data.take(part), data.sensors.take(part)) for part in np.array_split(rows, max(1, len(rows) // 500))]
     logits = [network(*tensors(subsample(crops, POINTS, rng), sensors)).double().numpy() for crops, sensors in parts]

@@ -19,7 +19,7 @@ from scipy.special import softmax
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.crops import Crops, canonical
-from modt.config.profile import REFLECTANCE_SCALES
+from modt.config import REFLECTANCE_SCALES
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, parser
 from tools.train import train_box_classifier, train_reflectance_classifier
@@ -44,13 +44,13 @@ from tools.train.scores import by_sensor
 POINTS, MAX_POINTS = 128, 400
 """Maximum number of points of a crop in a batch, and before augmentation."""
 MIN_FREQUENCY = 1e-4
-"""Stated of a class that the validation has no crop of."""
+"""Frequency stated for a class without a crop in the validation."""
 PRINTED_STEPS = 1000
 """Steps between two printed losses."""
 SMOOTHING = 0.02
 """Label smoothing: probability spread evenly over the classes."""
 BOX_STEPS, MIN_WORTH = 600, 0.03
-"""Training steps of the box classifier that tells which background is worth drawing, and its least relative share."""
+"""Training steps of the box classifier that rates how often to draw background, and the least relative rate."""
 
 
 def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]:
@@ -60,7 +60,7 @@ def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]
 
 
 def worth(data: Dataset, box: Float64, rows: Int, seed: int) -> Float64:
-    """(R,) how often to draw each crop, relatively: background by how much its box is like an object's.
+    """(R,) relative frequency with which to draw each crop, for background by the likeness of its box to an object's.
 
     The pool with the box rules most background out, and the network judges only the rest.
 
@@ -108,7 +108,7 @@ def train(data: Dataset, box: Float64, rows: Int, steps: int, seed: int) -> Poin
 
 @torch.no_grad()
 def logits(net: torch.nn.Module, data: Dataset, rows: Int) -> Float64:
-    """(R, 4) of rows of the data set, without augmentation."""
+    """(R, 4) logits of rows of the data set, without augmentation."""
     rng = np.random.default_rng(0)
     parts = np.split(rows, np.arange(BATCH_SIZE, len(rows), BATCH_SIZE))
     out: Float64 = (
@@ -150,7 +150,7 @@ def main() -> None:
         for sensor in sorted(REFLECTANCE_SCALES)
     )
     trained = [pair for pair in each if pair]
-    reflectance, report["reflectance"] = [layers for layers, _ in trained], [told for _, told in trained]
+    reflectance, report["reflectance"] = [layers for layers, _ in trained], [facts for _, facts in trained]
     layers = held.calibration.fold_into(net.layers())
     export(args.out, layers, boxes, reflectance, report, args.data, args.licence)
 

@@ -1,11 +1,11 @@
 """Train and export the networks of the paper's experiments (extra [train]).
 
-    python -m tools.train.train_textbook MODELS_DIR CROPS.npz [--dear]
+    python -m tools.train.train_textbook MODELS_DIR CROPS.npz
 
-Writes pointnet-paper-40 and pointnet-paper, the network of section V-A after 40 and after 100 epochs of one training;
-with --dear pointnet-dear, one that costs eight times as much, after 4. They are networks alone, without calibration,
-class frequency or box classifier. One drive in five is held out; the card has its scores. An epoch is as many crops
-as the scans show under the default segmentation, drawn by class among all.
+Writes pointnet-paper-40 and pointnet-paper, the network of section V-A after 40 and after 100 epochs of one training.
+They are networks alone, without calibration, class frequency or box classifier. One drive in five is held out; the
+card has its scores. An epoch is as many crops as the scans show under the default segmentation, drawn by class among
+all.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 import torch
 from scipy.special import softmax
 
@@ -28,26 +27,21 @@ from tools.train.build_models import KITTI_LICENCE
 from tools.train.dataset import BATCH_SIZE, SEED, SHIPPED, Dataset, folds, load, sampling_pools
 from tools.train.export_pointnet import graph
 from tools.train.held_out import Validation
-from tools.train.network import PointNet, TransformedPointNet
+from tools.train.network import PointNet
 from tools.train.train_pointnet import batch_loss, logits
 
-EPOCHS = {"pointnet-paper-40": 40, "pointnet-paper": 100}
-DEAR = {"pointnet-dear": 4}
+EPOCHS = {40: "pointnet-paper-40", 100: "pointnet-paper"}
 FOLDS, HELD_OUT = 5, 4
 RATE, DECAY, DECAY_EPOCHS = 1e-3, 0.7, 20
 """Learning rate of Adam, its decay, and the epochs between two decays, as PointNet's authors have them."""
-KINDS = {
-    PointNet: "PointNet of section V-A of the paper (400 x 3; 32, 64, 512 shared; maximum; 256, 128, 4)",
-    TransformedPointNet: "PointNet of full width with input transform (64, 64, 64, 128, 1024 shared; 256, 128, 4)",
-}
 
 
 def crops_of_epoch(data: Dataset) -> int:
-    """As many as the scans show."""
+    """Number of crops that the scans show, those of one epoch."""
     return int((data.trainable & (data.variant == SHIPPED)).sum())
 
 
-def trained(net: torch.nn.Module, data: Dataset, epochs: int) -> Iterator[tuple[int, float]]:
+def trained(net: PointNet, data: Dataset, epochs: int) -> Iterator[tuple[int, float]]:
     """Train a network; yields the epochs done, and the mean loss of the last one."""
     rng, fold = np.random.default_rng(SEED), folds(data, FOLDS)
     pools = sampling_pools(data, np.flatnonzero(data.trainable & (fold[data.drive] != HELD_OUT)))
@@ -66,16 +60,7 @@ def trained(net: torch.nn.Module, data: Dataset, epochs: int) -> Iterator[tuple[
         yield epoch, total / steps
 
 
-def exported(net: torch.nn.Module) -> onnx.ModelProto:
-    """The network in the textbook order, weights in half precision."""
-    transform = None
-    if isinstance(net, TransformedPointNet):
-        net, transform = net.classifier, (net.transform.layers(), len(net.transform.shared))
-    assert isinstance(net, PointNet)
-    return graph(net.layers(), pool_first=False, shared=len(net.shared), transform=transform, half=True)
-
-
-def held_out_scores(net: torch.nn.Module, data: Dataset) -> dict[str, tuple[list[int], dict[str, float]]]:
+def held_out_scores(net: PointNet, data: Dataset) -> dict[str, tuple[list[int], dict[str, float]]]:
     """Objects and average precision by class, by sensor, of the drives that are held out."""
     valid, fold = Validation.of(data), folds(data, FOLDS)
     rows = np.flatnonzero(fold[data.drive[valid.rows]] == HELD_OUT)
@@ -90,7 +75,7 @@ def held_out_scores(net: torch.nn.Module, data: Dataset) -> dict[str, tuple[list
     return scores
 
 
-def card(name: str, model: bytes, net: torch.nn.Module, facts: dict[str, Any]) -> str:
+def card(name: str, model: bytes, facts: dict[str, Any]) -> str:
     """Model card in Markdown."""
     rows = []
     for sensor, (objects, precision) in facts["scores"].items():
@@ -100,7 +85,8 @@ def card(name: str, model: bytes, net: torch.nn.Module, facts: dict[str, Any]) -
         [
             f"# {name}",
             "",
-            f"{KINDS[type(net)]}, in the textbook order, ONNX, weights in half precision.",
+            "PointNet of section V-A of the paper (400 x 3; 32, 64, 512 shared; maximum; 256, 128, 4), in the "
+            "textbook order, ONNX, weights in half precision.",
             "For the paper's experiments (profile `paper`): the network alone, not calibrated, no box classifier.",
             "",
             f"- sha256: {hashlib.sha256(model).hexdigest()}",
@@ -127,23 +113,20 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("out", type=Path, help="folder of the models")
     options.add_argument("data", type=Path, help="data set of crops (.npz)")
-    options.add_argument("--dear", action="store_true", help="the dearer network")
     args = options.parse_args()
     make_torch_deterministic()
     torch.manual_seed(SEED)
-    data, started = load(args.data), time.process_time()
-    net: torch.nn.Module = TransformedPointNet() if args.dear else PointNet()
-    names = {epoch: name for name, epoch in (DEAR if args.dear else EPOCHS).items()}
-    for epoch, loss in trained(net, data, max(names)):
+    data, started, net = load(args.data), time.process_time(), PointNet()
+    for epoch, loss in trained(net, data, max(EPOCHS)):
         print(epoch, round(loss, 4), round(time.process_time() - started), flush=True)
-        if epoch not in names:
+        if epoch not in EPOCHS:
             continue
         facts = {"epochs": epoch, "loss": loss, "crops": crops_of_epoch(data), "sha256": data.sha256}
         facts |= {"cpu_s": round(time.process_time() - started), "scores": held_out_scores(net, data)}
-        model = exported(net.eval()).SerializeToString(deterministic=True)
-        (args.out / f"{names[epoch]}.onnx").write_bytes(model)
-        text = card(names[epoch], model, net, facts)
-        (args.out / f"{names[epoch]}.md").write_text(text, encoding="utf-8")
+        network = graph(net.eval().layers(), pool_first=False, half=True)
+        model, out = network.SerializeToString(deterministic=True), args.out / f"{EPOCHS[epoch]}.onnx"
+        out.write_bytes(model)
+        out.with_suffix(".md").write_text(card(out.stem, model, facts), encoding="utf-8")
 
 
 if __name__ == "__main__":

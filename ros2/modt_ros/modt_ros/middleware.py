@@ -60,10 +60,9 @@ class Subscription:
     """The messages of a topic, the last `depth` of them; read by one thread."""
 
     def __init__(self, joined: Participant, name: str, kind: str, *, depth: int, reliable: bool = False) -> None:
-        self._name, self._node = _absolute(name), joined.node
         self._messages: deque[Message] = deque(maxlen=depth)
         self._arrival = threading.Condition()
-        joined.node.create_subscription(_type(kind), self._name, self._receive, _qos(depth, reliable), raw=True)
+        joined.node.create_subscription(_type(kind), _absolute(name), self._receive, _qos(depth, reliable), raw=True)
 
     def take(self, timeout_s: float = 0.0) -> list[Message]:
         """The messages that have arrived, oldest first, waited for at most `timeout_s`."""
@@ -72,11 +71,6 @@ class Subscription:
             taken = list(self._messages)
             self._messages.clear()
         return taken
-
-    @property
-    def senders(self) -> int:
-        """Publishers of the topic."""
-        return int(self._node.count_publishers(self._name))
 
     def _receive(self, data: bytes) -> None:
         with self._arrival:

@@ -1,1 +1,1 @@
-"""A run: its session, stages and loop, and what is known of it."""
+"""A run: its session, its stages, and its status."""

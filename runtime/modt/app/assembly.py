@@ -7,7 +7,6 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
@@ -16,10 +15,10 @@ from modt.classification.decision import Decision, LikeliestClass
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
+from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
-from modt.config import FusionConfig, ProfileConfig
-from modt.config.stages import KERNELS, NATIVE
-from modt.config.stages import NUMPY as NUMPY_NAME
+from modt.config import KERNELS, NATIVE, FusionConfig, ProfileConfig
+from modt.config import NUMPY as NUMPY_NAME
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
@@ -59,25 +58,18 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
     return Budget(profile.scheduler.calls_per_frame, mean_ms=profile.classification_ms)
 
 
-def _views(usual: Callable[[FusionConfig, Prior], Fusion], product: str) -> Callable[[FusionConfig, Prior], Fusion]:
-    """A fusion, or the one of this name for the rule `product`, whose module is loaded on demand."""
+Rule = Callable[[FusionConfig, Prior], Fusion]
 
-    def made(config: FusionConfig, prior: Prior) -> Fusion:
-        rule = (
-            getattr(import_module("modt.classification.product_fusion"), product)
-            if config.rule == "product"
-            else usual
-        )
-        fusion: Fusion = rule(config, prior)
-        return fusion
 
-    return made
+def _by_rule(mean: Rule, product: Rule) -> Rule:
+    """The fusion of the rule that the profile names."""
+    return lambda config, prior: (product if config.rule == "product" else mean)(config, prior)
 
 
 MODES = {
     "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, _views(FirstViews, "AnyView"), _profile_budget),
-    "accurate": Mode(ACCURATE, _views(FurtherViews, "KeyViews"), _profile_budget),
+    "efficient": Mode(EFFICIENT, _by_rule(FirstViews, AnyView), _profile_budget),
+    "accurate": Mode(ACCURATE, _by_rule(FurtherViews, KeyViews), _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 

@@ -152,10 +152,10 @@ def sensor(open_source: Callable[[], LiveStream], timeout_s: float = REACH_S) ->
         return [Finding(FAIL, "sensor", f"{stream.info.name}: {error}", "check its address")]
     finally:
         stream.close()
-    return [_heard(stream.info.name, health, None if received is None else len(received.frame.points))]
+    return [_sensor_finding(stream.info.name, health, None if received is None else len(received.frame.points))]
 
 
-def _heard(name: str, health: dict[str, Any], points: int | None) -> Finding:
+def _sensor_finding(name: str, health: dict[str, Any], points: int | None) -> Finding:
     if points is not None:
         return Finding(OK, "sensor", f"{name}: a sweep of {points} points")
     messages, refused = health["messages"], health["refused_messages"]

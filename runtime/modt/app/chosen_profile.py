@@ -41,7 +41,7 @@ class ChosenProfile:
         return " + ".join(self.names)
 
 
-def choose(asked_for: profile.Names | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:
+def choose(requested: profile.Names | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:
     """Choose the profile of a stream by its first frame, and log the differences as warnings.
 
     The findings of the first frame replace the default profile, or the profile that the source names. They never
@@ -51,19 +51,19 @@ def choose(asked_for: profile.Names | ProfileConfig, first: Frame | None, info: 
     Raises:
         MisuseError: a profile that cannot be used.
     """
-    if isinstance(asked_for, ProfileConfig):
-        recognition = _compared(first, asked_for, GIVEN, replaced=False)
-        return ChosenProfile(recognition.mounted(asked_for), GIVEN, (GIVEN,), recognition)
-    asked = profile.resolve(asked_for)
-    if asked.sensor:
-        recognition = _compared(first, asked.config, asked.sensor, replaced=False)
-        return ChosenProfile(recognition.mounted(asked.config), asked.sensor, asked.used(""), recognition)
+    if isinstance(requested, ProfileConfig):
+        recognition = _compared(first, requested, GIVEN, replaced=False)
+        return ChosenProfile(recognition.mounted(requested), GIVEN, (GIVEN,), recognition)
+    profiles = profile.resolve(requested)
+    if profiles.sensor:
+        recognition = _compared(first, profiles.config, profiles.sensor, replaced=False)
+        return ChosenProfile(recognition.mounted(profiles.config), profiles.sensor, profiles.used(""), recognition)
     base = info.profile if info and info.profile else profile.DEFAULT
     name = base if info and info.profile else f"{base} (the default)"
-    recognition = _compared(first, _with_beams(asked.over(profile.load(base)), info), name, replaced=True)
+    recognition = _compared(first, _with_beams(profiles.over(profile.load(base)), info), name, replaced=True)
     sensor = FOUND if recognition.differences else base
-    config = _with_beams(asked.over(recognition.fitted), info)
-    return ChosenProfile(config, sensor, asked.used(sensor), recognition)
+    config = _with_beams(profiles.over(recognition.fitted), info)
+    return ChosenProfile(config, sensor, profiles.used(sensor), recognition)
 
 
 def _compared(first: Frame | None, config: ProfileConfig, name: str, *, replaced: bool) -> Recognition:

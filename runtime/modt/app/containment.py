@@ -48,7 +48,7 @@ class Containment:
             cause = f"{self.in_a_row} failures in a row, the last one {type(error).__name__}: {error}"
             raise ModtError(where, cause, "report it, with the traceback above") from error
 
-    def spare(self, where: str, call: Callable[P, R], /, *arguments: P.args, **options: P.kwargs) -> R | None:
+    def contain(self, where: str, call: Callable[P, R], /, *arguments: P.args, **options: P.kwargs) -> R | None:
         """Result of a call that is not essential. A failure is counted, and the result is None."""
         try:
             return call(*arguments, **options)

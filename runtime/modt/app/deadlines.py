@@ -117,10 +117,9 @@ class Deadlines:
         share = self.timing.add(arrived_s, self._start_s, now_s, self._period_s)
         self._changed(self.ladder.frame(now_s, share))
 
-    def power(self, watts: float, limit_W: float | None) -> None:
+    def power(self, watts: float, limit_W: float) -> None:
         """Judge the power of a window of the meters."""
-        self.ladder.power_W = limit_W
-        self._changed(self.ladder.power(self._clock(), watts))
+        self._changed(self.ladder.power(self._clock(), watts, limit_W))
 
     def report(self) -> dict[str, Any]:
         """Figures for the status."""
@@ -142,8 +141,8 @@ class Deadlines:
 class NoDeadlines:
     """Every frame of a replay is processed, and may spend the budget of its profile.
 
-    Attributes:
-        report: report of the pace.
+    Args:
+        report: report of the playback.
     """
 
     reduced = False
@@ -162,7 +161,7 @@ class NoDeadlines:
     def finish(self, arrived_s: float, line: dict[str, Any]) -> None:
         """No effect."""
 
-    def power(self, watts: float, limit_W: float | None) -> None:
+    def power(self, watts: float, limit_W: float) -> None:
         """No effect."""
 
 

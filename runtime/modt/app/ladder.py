@@ -33,13 +33,13 @@ class Step(IntEnum):
 GIVEN_UP = {
     Step.ALL: "nothing is given up",
     Step.DEFERRED: "classification is deferred",
-    Step.REDUCED: "what is far is left out",
+    Step.REDUCED: "distant points are left out",
     Step.DROPPED: "every second sweep is left out",
 }
 
 
 class Event(Enum):
-    """Load as seen by a frame or by a window of the meters."""
+    """Load that a frame or a window of the meters shows."""
 
     OVERRUN = "the result came after its deadline"
     OVER_POWER = "more power than the limit"
@@ -58,14 +58,10 @@ class Ladder:
     """Present step, by the times of the frames and the power. All times are monotonic [s].
 
     `frame` and `power` return the event that has changed the step, None where it stays.
-
-    Args:
-        power_W: limit; None without one.
     """
 
-    def __init__(self, power_W: float | None = None) -> None:
+    def __init__(self) -> None:
         self.step = Step.ALL
-        self.power_W = power_W
         self.patience_s = CALM_S
         self._cause = Event.OVERRUN  # cause of the last step up
         # start of slack, start of ample slack, time of the last step down
@@ -85,12 +81,12 @@ class Ladder:
             return self._fire(Event.SLACK, now_s)
         return None
 
-    def power(self, now_s: float, watts: float) -> Event | None:
+    def power(self, now_s: float, watts: float, limit_W: float) -> Event | None:
         """A window of the meters."""
-        if self.power_W is None or watts <= NEAR_SHARE * self.power_W:
+        if watts <= NEAR_SHARE * limit_W:
             return None
         self._calm_s = self._ample_s = now_s
-        return self._fire(Event.OVER_POWER, now_s) if watts > self.power_W else None
+        return self._fire(Event.OVER_POWER, now_s) if watts > limit_W else None
 
     def _fire(self, event: Event, now_s: float) -> Event | None:
         before = self.step

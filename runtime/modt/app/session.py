@@ -2,32 +2,39 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import logging
 import os
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from modt import host, profile
-from modt.app import inputs, metering
-from modt.app.containment import Containment
+from modt.app import inputs
+from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.deadlines import Deadlines, NoDeadlines
-from modt.app.loop import Loop, Stop
-from modt.app.playback import Pace, Playback
+from modt.app.playback import Playback
 from modt.app.stages import SensorWatch, Stages
 from modt.app.status import SCHEMA, Counts, Power, one_line
+from modt.app.stop import Stop
 from modt.app.supervisor import Supervisor
 from modt.classes import CLASS_NAMES
-from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Kind, Meter
+from modt.energy.ledger import Ledger, Line
+from modt.energy.meters.discovery import discover
+from modt.energy.meters.meter import Conditions, Kind, Meter
+from modt.energy.windows import Clocks, Windows
+from modt.errors import ModtError
+from modt.pipeline import SINK
 from modt.reporting.summary import Summary
 from modt.sinks.output import LedgerSink, Sink, close_together
 from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecording
 from modt.sinks.run_directory import SUMMARY, RunDirectory
+from modt.sources.stream import Received, StreamEndedError
 from modt.types import FrameResult, Tracks
 
 if TYPE_CHECKING:
@@ -35,16 +42,23 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+WAIT_S = 0.2
+"""Longest wait for a sweep without a check of the signals and the watchdog [s]."""
+REPORT_S = 1.0
+"""Time between two reports of the status [s]."""
 Tick = Callable[[FrameResult], None]
 """Called after every frame."""
 
 
 class Session:
-    """A run, put together by `replay` or `service`.
+    """A run, put together by `replay` or `service`: drives the stages by the frames of a source.
 
     Attributes:
-        source, stages, recording, sinks, deadlines, failures, stop: its parts.
+        source, stages, recording: give the frames, process them, and keep the records.
+        sinks: sinks of the results, by their addresses.
+        deadlines, failures, stop: decide which sweeps are processed, which failures are contained, and when to end.
         power: power by the windows of the meters.
+        summary: the summary as written; empty before the end.
     """
 
     def __init__(
@@ -56,7 +70,6 @@ class Session:
         deadlines: Deadlines | NoDeadlines,
         failures: Containment,
         stop: Stop,
-        totals: Summary,
         meters: Sequence[Meter],
         core: int | None,
         refusals: Sequence[str] = (),
@@ -66,15 +79,15 @@ class Session:
         self._clock = clock
         self.source, self.stages, self.recording, self.sinks = source, stages, recording, sinks
         self.deadlines, self.failures, self.stop = deadlines, failures, stop
-        self._totals, self._core, self._refusals, self._metrics = totals, core, list(refusals), metrics
-        outputs = {**sinks, "recording": recording}
-        self.loop = Loop(source, stages, outputs, self._observe, self._report, deadlines, failures, stop, clock)
-        self._ledgers = [sink for sink in outputs.values() if isinstance(sink, LedgerSink)]
+        self._totals, self._core, self._refusals, self._metrics = Summary(), core, list(refusals), metrics
+        self._outputs = {**sinks, "recording": recording}
+        self._ledgers = [sink for sink in self._outputs.values() if isinstance(sink, LedgerSink)]
         self._followed = stages.chosen
         self.power, self.summary = Power(), dict[str, Any]()
-        self._windows = metering.windows(meters, core)
+        self._windows = Windows(meters, Clocks(), Conditions(core or 0))
         self._began_s = clock()
-        self._counts = Counts(totals, self._began_s)
+        self._counts = Counts(self._totals, self._began_s)
+        self._reloads = self._refused_reloads = 0
         self._without_reflectance = 0
         self._tracks: Tracks | None = None  # tracks of the last frame
         self._tick: Tick = lambda result: None
@@ -91,22 +104,97 @@ class Session:
             stack.callback(self._finish)
             stack.callback(close_together, self.sinks.values())
             for part in (self.stages.odometry, self.source, supervisor):
-                stack.callback(self.failures.spare, "end", part.close)
-            stack.callback(self.failures.spare, "records", lambda: self._ledger(self._windows.close()))
+                stack.callback(self.failures.contain, "end", part.close)
+            stack.callback(self.failures.contain, "records", lambda: self._ledger(self._windows.close()))
             stack.enter_context(self.stop.on_signals())
             self.source.start()
-            self.loop.run(supervisor)
+            self.follow(supervisor)
         return self.summary
+
+    def follow(self, supervisor: Supervisor) -> None:
+        """Process frames until a signal, or the end of the source. The first one identifies the sensor.
+
+        Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
+
+        Raises:
+            ModtError: a failure that cannot be contained.
+        """
+        gc.collect()
+        gc.freeze()
+        supervisor.ready()
+        frames = self._frames(supervisor)
+        first = next(frames, None)
+        if first is not None:
+            self.stages.recognise(first.frame, self.source.profile)
+            for received in chain([first], frames):
+                self._process(received)
+
+    def _frames(self, supervisor: Supervisor) -> Iterator[Received]:
+        """Frames as they arrive. Reloads, watchdog and reports are served between them."""
+        reported_s = float("-inf")
+        while self.stop.signal is None:
+            if self.stop.take_reload():
+                self._reload(supervisor)
+            try:
+                received = self.source.take(WAIT_S)
+            except StreamEndedError:
+                return
+            except ModtError:
+                raise
+            except Exception as error:
+                self.failures.fail(error, "source")
+                received = None
+            if received is not None and self.stop.signal is None:
+                yield received
+            supervisor.alive()
+            if self._clock() - reported_s >= REPORT_S:
+                reported_s = self._clock()
+                self.failures.contain("status", self._report, supervisor)
+
+    def _process(self, received: Received) -> None:
+        if not self.deadlines.admit(received.arrived_s):
+            return
+        try:
+            line = self._step(received)
+        except ModtError:
+            raise
+        except Exception as error:
+            self.stages.ledger.close_frame(received.frame.index)
+            self.failures.fail(error, "frame")
+            self.stages.recover(anew=self.failures.in_a_row == RENEW_AFTER)
+            return
+        self.failures.succeed()
+        self.deadlines.finish(received.arrived_s, line)
+        self.stages.watch(received.frame)
+
+    def _step(self, received: Received) -> Line:
+        """Process a frame; returns its ledger line."""
+        stages, frame = self.stages, received.frame
+        budget = self.deadlines.budget(stages.budget, received.arrived_s, frame.index)
+        result = stages.step(frame, budget, reduced=self.deadlines.reduced)
+        for name, sink in self._outputs.items():
+            self.failures.contain(name, stages.ledger.run, SINK, sink.write, result)
+        line = stages.ledger.close_frame(frame.index)
+        self.failures.contain("records", self._observe, result, line)
+        return line
+
+    def _reload(self, supervisor: Supervisor) -> None:
+        supervisor.reloading()
+        try:
+            self.stages.reload()
+        except ModtError as error:
+            self._refused_reloads += 1
+            log.error("%s; the profile before stays in use", error)
+        else:
+            self._reloads += 1
+            log.warning("profile loaded again")
+        supervisor.ready()
 
     def status(self) -> dict[str, Any]:
         """The document modt.status/1."""
         now_s, info = self._clock(), self.stages.info
-        resident_mb = self.failures.spare("host", lambda: round(host.resident_mb(), 1))
-        loop = {
-            "failures": dict(self.failures.counts),
-            "reloads": self.loop.reloads,
-            "refused_reloads": self.loop.refused_reloads,
-        }
+        resident_mb = self.failures.contain("host", lambda: round(host.resident_mb(), 1))
+        reloads = {"reloads": self._reloads, "refused_reloads": self._refused_reloads}
         return {
             "schema": SCHEMA,
             "time_s": time.time(),
@@ -117,7 +205,7 @@ class Session:
             "profile": self.stages.chosen.name,
             "period_s": info.period_s,
             "counts": self._counts.report(now_s, self._tracks),
-            "loop": self.deadlines.report() | loop,
+            "loop": self.deadlines.report() | {"failures": dict(self.failures.counts)} | reloads,
             "power": self.power.report() | {"limit_W": self.stages.config.loop.power_W},
             "sensor": self.source.health()
             | {"faults": self.source.faults.count, "misfits": self.stages.misfits}
@@ -142,7 +230,7 @@ class Session:
 
             write_metrics(self._metrics, status)
 
-    def _observe(self, result: FrameResult, line: dict[str, Any]) -> None:
+    def _observe(self, result: FrameResult, line: Line) -> None:
         if self.stages.chosen is not self._followed:
             self._followed = self.stages.chosen
             self.recording.follow(self._followed.config.recording)
@@ -154,14 +242,14 @@ class Session:
         window = self._windows.add(line)
         if window is not None:
             self._ledger(window)
-            watts = self.power.add(window, config.energy)
-            if watts is not None:
-                self.deadlines.power(watts, config.loop.power_W)
+            watts, limit_W = self.power.add(window, config.energy), config.loop.power_W
+            if watts is not None and limit_W is not None:
+                self.deadlines.power(watts, limit_W)
         misses = config.sensor.reflectance != "none" and result.proposals.reflectance is None
         self._without_reflectance += misses and len(result.proposals) > 0
         self._tick(result)
 
-    def _ledger(self, line: dict[str, Any]) -> None:
+    def _ledger(self, line: Line) -> None:
         for sink in self._ledgers:
             sink.ledger(line)
 
@@ -187,7 +275,7 @@ class Session:
             },
             "odometry": stages.odometry.report(),
             "class_frequency": dict(zip(CLASS_NAMES, stages.pipeline.decision.frequency.tolist(), strict=True)),
-            "host": self.failures.spare("host", host.usage, self._core),
+            "host": self.failures.contain("host", host.usage, self._core),
             "sinks": self._sinks_health(),
             "faults": {
                 "count": faults.count,
@@ -216,8 +304,7 @@ def replay(
         MisuseError: an invalid request.
     """
     stop, ledger = Stop(), Ledger()
-    pace = Pace(request.rate_hz, sleep=stop.sleep)
-    source = Playback(inputs.stream(request), pace, ledger)
+    source = Playback(inputs.stream(request), ledger, request.rate_hz, stop.sleep)
     stages = Stages(request, source.info, ledger)
     name = re.sub(r"[^\w.]+", "-", source.info.name)
     recording = WholeRecording(
@@ -227,9 +314,9 @@ def replay(
         source.info.camera,
         labels=request.labels,
     )
-    meters = metering.discovery(stages.config.energy).best.meters
-    deadlines, failures = NoDeadlines(pace.report), Containment(contains=False)
-    return Session(source, stages, recording, sinks, deadlines, failures, stop, Summary(), meters, core)
+    meters = discover(stages.config.energy).best.meters
+    deadlines, failures = NoDeadlines(source.report), Containment(contains=False)
+    return Session(source, stages, recording, sinks, deadlines, failures, stop, meters, core)
 
 
 def service(
@@ -260,7 +347,7 @@ def service(
     from modt.sinks.background import Background
 
     stages = Stages(request, source.info, Ledger(), SensorWatch())
-    meter = metering.discovery(stages.config.energy).best
+    meter = discover(stages.config.energy).best
     if stages.config.loop.power_W is not None and meter.facts is not None and meter.facts.kind is Kind.ESTIMATED:
         log.warning("loop.power_W is kept by the %s: an estimate, as no meter can be read", meter.name)
 
@@ -269,5 +356,6 @@ def service(
 
     writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
     recording = Recording(RunDirectory(out), stages.config.recording, writer, describe)
-    kinds = Deadlines(source.info.period_s), Containment(), Stop(reload=True)
-    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, refusals, metrics)
+    deadlines, failures, stop = Deadlines(source.info.period_s), Containment(), Stop(reload=True)
+    meters = meter.meters
+    return Session(source, stages, recording, sinks, deadlines, failures, stop, meters, core, refusals, metrics)

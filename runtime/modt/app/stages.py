@@ -39,7 +39,7 @@ class SensorWatch:
         self._usual: float | None = None
         self._in_a_row = 0
 
-    def unlike(self, points: Float32) -> bool:
+    def changed(self, points: Float32) -> bool:
         """Whether this is the last of SWEEPS sweeps in a row of another size, which then becomes the usual one."""
         returns = max(int(np.count_nonzero(points[:, 0])), 1)
         if self._usual is None:
@@ -68,7 +68,7 @@ class Stages:
         chosen: the present profile.
         pipeline: its stages.
         odometry: source of the poses.
-        looking: thread that compares a sweep with the profile. None before it is started once.
+        recognising: thread that compares a sweep with the profile; None before the first comparison.
         misfits: number of times that sweeps were found to be of another sensor than before.
 
     Raises:
@@ -82,13 +82,13 @@ class Stages:
         self._mode = assembly.MODES[request.mode]
         self._first: Frame | None = None  # identifies the sensor
         self.misfits = 0
-        self._unlike = False  # sweeps of another size wait for a comparison
-        self.looking: Thread | None = None
-        self._found: list[ChosenProfile] = []  # profile chosen by the thread `looking`
+        self._changed = False  # sweeps of another size wait for a comparison
+        self.recognising: Thread | None = None
+        self._recognised: list[ChosenProfile] = []  # profile chosen by the thread `recognising`
         self.chosen = self._choose()
-        self.pipeline = self._made(self.chosen.config)
+        self.pipeline = self._new_pipeline(self.chosen.config)
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
-        self._good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id after the last good frame
+        self._last_good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id
 
     @property
     def info(self) -> StreamInfo:
@@ -118,29 +118,30 @@ class Stages:
         """Process a frame; `reduced` leaves out distant points."""
         frame = self.odometry.place(frame)
         if reduced:
-            config = self.config
-            frame = replace(frame, points=within(frame.points, RANGE_SHARE * config.sensor.max_range_m))
+            x, y = frame.points[:, 0], frame.points[:, 1]
+            near = np.square(x) + np.square(y) <= (RANGE_SHARE * self.config.sensor.max_range_m) ** 2
+            frame = replace(frame, points=frame.points[near])
         result = self.pipeline.step(frame, budget)
         if isinstance(self.pipeline.tracker, Tracker) and isinstance(result.tracks, TrackTable):
-            self._good = result.tracks, self.pipeline.tracker.next_id
+            self._last_good = result.tracks, self.pipeline.tracker.next_id
         return result
 
     def watch(self, frame: Frame) -> None:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it."""
-        self._unlike |= self._watch is not None and self._watch.unlike(frame.points)
-        if self._found:
+        self._changed |= self._watch is not None and self._watch.changed(frame.points)
+        if self._recognised:
             self.misfits += 1
-            self._use(self._found.pop())
-        elif self._unlike and not (self.looking and self.looking.is_alive()):
-            self._unlike = False
-            self.looking = Thread(target=self._look_again, args=(frame,), name="recognition", daemon=True)
-            self.looking.start()
+            self._use(self._recognised.pop())
+        elif self._changed and not (self.recognising and self.recognising.is_alive()):
+            self._changed = False
+            self.recognising = Thread(target=self._recognise_again, args=(frame,), name="recognition", daemon=True)
+            self.recognising.start()
 
     def recover(self, *, anew: bool) -> None:
         """Restore the tracks of the last good frame; with `anew` make new stages without tracks."""
-        tracks, next_id = self._good
+        tracks, next_id = self._last_good
         if anew:
-            tracks, self.pipeline = TrackTable.blank(), self._made(self.config)
+            tracks, self.pipeline = TrackTable.blank(), self._new_pipeline(self.config)
         if isinstance(self.pipeline.tracker, Tracker):
             self.pipeline.tracker.restore(tracks, next_id)
 
@@ -183,31 +184,26 @@ class Stages:
             "profile": profile.dump(chosen.config),
         }
 
-    def _look_again(self, frame: Frame) -> None:
+    def _recognise_again(self, frame: Frame) -> None:
         """Choose a profile anew if a changed sweep does not fit the present one."""
         if recognise(frame.points, self.config).differences:
             self._first = frame
-            self._found.append(self._choose())
+            self._recognised.append(self._choose())
 
     def _choose(self) -> ChosenProfile:
         return choose(self.request.profile, self._first, self._info)
 
-    def _made(self, config: ProfileConfig) -> Pipeline:
+    def _new_pipeline(self, config: ProfileConfig) -> Pipeline:
         mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
         fov = inputs.field_of_view(self.request, self._info, mount)
         return assembly.pipeline(self._mode, config, fov, self.ledger)
 
     def _use(self, chosen: ChosenProfile) -> None:
         """Exchange the stages for those of another profile; the tracks are kept."""
-        old, new = self.pipeline, self._made(chosen.config)
+        old, new = self.pipeline, self._new_pipeline(chosen.config)
         if isinstance(old.tracker, Tracker) and isinstance(new.tracker, Tracker):
             new.tracker.adopt(old.tracker)
         if isinstance(old.odometry, Odometry) and isinstance(new.odometry, Odometry):
             new.odometry.adopt(old.odometry)
         self.chosen, self.pipeline = chosen, new
         host.release_freed_pages()
-
-
-def within(points: Float32, range_m: float) -> Float32:
-    """The points (N, 4) within a range of the sensor."""
-    return points[np.square(points[:, 0]) + np.square(points[:, 1]) <= range_m**2]

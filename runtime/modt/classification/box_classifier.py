@@ -127,6 +127,8 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
 
 def is_bound(features: Float64, cut: Int) -> Bool:
     """(R,) boxes of (R, 7) features that are cut where a person may go on: at least so high, not so high."""
+    if not (cut & (Cut.TOP | Cut.BOTTOM).value).any():  # most frames
+        return np.zeros(len(cut), np.bool_)
     is_bound: Bool = ((cut & Cut.TOP) > 0) & (features[:, -1] < PERSON_TOP_M)
     is_bound |= ((cut & Cut.BOTTOM) > 0) & (features[:, -2] > LEGS_M)
     return is_bound

@@ -61,9 +61,9 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
     kept = np.minimum(own, max_points)
     offsets = np.zeros(len(kept) + 1, np.int64)
     kept.cumsum(out=offsets[1:])
-    step = np.arange(offsets[-1]) - np.repeat(offsets[:-1], kept)
-    inside = step * np.repeat(own, kept) // np.repeat(kept, kept)
-    members = proposals.members[np.repeat(proposals.offsets[which], kept) + inside]
+    crop = np.stack([offsets[:-1], own, kept, proposals.offsets[which]])
+    first, size, taken, at = crop.repeat(kept, axis=1)
+    members = proposals.members[at + (np.arange(offsets[-1]) - first) * size // taken]
     return Crops(points[members, :3], offsets)
 
 
@@ -86,13 +86,8 @@ def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
     mean_x, mean_y = np.add.reduceat(x, starts) / count, np.add.reduceat(y, starts) / count
     azimuth, bound = np.arctan2(mean_y, mean_x), _GROUND_OFFSET_M + _GROUND_SLOPE * np.hypot(mean_x, mean_y)
     rise = np.clip(np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M, -bound, bound)
-    ground = np.repeat(rise + ground_z_m, count)
-    c, s = np.repeat(np.cos(azimuth), count), np.repeat(np.sin(azimuth), count)
-    along, across = c * x + s * y, c * y - s * x
-    xyz = [along - _middle(along, starts, count), across - _middle(across, starts, count), z - ground]
-    return Crops(np.stack(xyz, axis=1, dtype=np.float32), crops.offsets)
-
-
-def _middle(value: Float32, starts: Int, count: Int) -> Float32:
-    low, high = np.minimum.reduceat(value, starts), np.maximum.reduceat(value, starts)
-    return np.repeat((low + high) / 2, count)
+    c, s, ground = np.stack([np.cos(azimuth), np.sin(azimuth), rise + ground_z_m]).repeat(count, axis=1)
+    level = np.stack([c * x + s * y, c * y - s * x])
+    ends = np.minimum.reduceat(level, starts, axis=1) + np.maximum.reduceat(level, starts, axis=1)
+    level -= (ends / 2).repeat(count, axis=1)
+    return Crops(np.stack([*level, z - ground], axis=1, dtype=np.float32), crops.offsets)

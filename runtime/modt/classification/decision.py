@@ -1,11 +1,11 @@
-"""The class that is said of a track: what a missed object costs, and how frequent the classes are in this stream.
+"""The reported class of a track: what a missed object costs, and how frequent the classes are in this stream.
 
 A posterior holds for the class frequencies that the model was trained to assume. Those of the stream are estimated
 from the posteriors themselves (M. Saerens et al., "Adjusting the outputs of a classifier to new a priori
 probabilities", Neural Computation 2002), slowly and within bounds: no object becomes rarer than the model assumes,
-since the first of its class may still come. An object is said where its expected cost, if it were missed, exceeds
-that of a false one. The class that was said last needs less: a posterior that falls because the object is half
-hidden says little against what was seen before.
+since the first of its class may yet come. An object is reported where its expected cost, if it were missed, exceeds
+that of a false one. The class that was reported last needs less, since a posterior also falls while the object is
+half hidden.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MIN_BACKGROUND = 0.1
 KEPT_FROM = 0.4
 """A reported class is kept down to this probability if its threshold is higher; less: doubtful classes linger."""
 START_PROPOSALS, MEMORY_PROPOSALS = 2000, 20_000
-"""Proposals that the frequency at the start counts for, and from which that of the stream is estimated."""
+"""Weight of the frequency at the start, and of the memory of the stream, as numbers of proposals."""
 MAX_CHANGE = 5.0
 """A class becomes at most so many times as frequent as the model assumes."""
 
@@ -31,10 +31,7 @@ class LikeliestClass:
 
     Args:
         config: costs.
-        frequency: (4,) frequencies of the classes among proposals that the posteriors assume.
-
-    Attributes:
-        frequency: the same.
+        frequency: (4,) frequencies of the classes among proposals that the posteriors assume; also an attribute.
     """
 
     def __init__(self, config: DecisionConfig, frequency: Float64) -> None:
@@ -43,13 +40,13 @@ class LikeliestClass:
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track."""
-        self._say(tracks, tracks.posterior)
+        self._report(tracks, tracks.posterior.T)
 
-    def _say(self, tracks: Tracks, weighed: Float64) -> None:
-        """Write the class of every track, of its weight (M, 4)."""
-        likeliest = weighed[:, 1:].argmax(axis=1) + 1
-        said = weighed[np.arange(len(weighed)), likeliest] >= self._threshold[likeliest - 1]
-        tracks.object_class = np.where(said, likeliest, 0)
+    def _report(self, tracks: Tracks, weighed: Float64) -> None:
+        """Write the class of every track by the weights (4, M) of its classes."""
+        likeliest = weighed[1:].argmax(axis=0) + 1
+        reported = weighed[likeliest, np.arange(len(likeliest))] >= self._threshold[likeliest - 1]
+        tracks.object_class = np.where(reported, likeliest, 0)
 
 
 class Decision(LikeliestClass):
@@ -74,26 +71,26 @@ class Decision(LikeliestClass):
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
-        adapted = self.adapted(tracks.posterior)
-        weighed = adapted.copy()
-        weighed[np.arange(len(weighed)), tracks.object_class] /= self._kept[tracks.object_class]
-        self._say(tracks, weighed)
-        self._learn(adapted[tracks.proposal != NONE])
+        adapted = self.adapted(tracks.posterior.T.copy())
+        weighed, last = adapted.copy(), tracks.object_class
+        weighed[last, np.arange(len(last))] /= self._kept[last]
+        self._report(tracks, weighed)
+        self._learn(adapted.take((tracks.proposal != NONE).nonzero()[0], axis=1))
 
     def adapted(self, posterior: Float64) -> Float64:
-        """(M, 4) posteriors under the frequencies of the stream."""
-        weighted = posterior * (self.frequency / self._assumed)
-        adapted: Float64 = weighted / weighted.sum(axis=1, keepdims=True)
+        """(4, M) posteriors under the frequencies of the stream."""
+        weighted = posterior * (self.frequency / self._assumed)[:, None]
+        adapted: Float64 = weighted / weighted.sum(axis=0)
         return adapted
 
     def _learn(self, adapted: Float64) -> None:
-        """The mean of the adapted posteriors, the frequency at the start counting as START_PROPOSALS."""
-        self._mass += adapted.sum(axis=0)
+        """The mean of the adapted posteriors (4, R), the frequency at the start counting as START_PROPOSALS."""
+        self._mass += adapted.sum(axis=1)
         total = self._mass.sum()
         if total > MEMORY_PROPOSALS:
             self._mass *= MEMORY_PROPOSALS / total
-        frequency = START_PROPOSALS * self._start + self._mass
-        frequency /= frequency.sum()
-        frequency[1:] = np.minimum(np.maximum(frequency, self._assumed), self._assumed * MAX_CHANGE)[1:]
-        frequency[0] = max(1.0 - frequency[1:].sum(), MIN_BACKGROUND)
-        self.frequency = frequency / frequency.sum()
+        mass, assumed = (START_PROPOSALS * self._start + self._mass).tolist(), self._assumed.tolist()
+        n = sum(mass)  # lists are faster than arrays of four
+        objects = [min(max(m / n, a), a * MAX_CHANGE) for m, a in zip(mass[1:], assumed[1:], strict=True)]
+        frequency = [max(1.0 - sum(objects), MIN_BACKGROUND), *objects]
+        self.frequency = np.array(frequency) / sum(frequency)

@@ -15,6 +15,8 @@ multiplied: n of them weigh n^GROWTH. Both means forget the past; a view counts 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_PERSON_M
@@ -32,7 +34,7 @@ FORGETTING, GROWTH = 0.72, 0.22
 BOX_FORGETTING, BOX_WEIGHT = 0.5, 0.75
 """Weight of the boxes so far at a further one, and of their mean."""
 MISMATCH_PROBABILITY = 0.05
-"""That a proposal is not the object of its track: the posterior is then the prior of its box."""
+"""Probability that a proposal is not the object of its track, whose posterior is then the prior of the box."""
 MORE_POINTS, FAR_MORE_POINTS, MORE_POINTS_BY = 1.25, 2.0, 5
 """An uncertain track is classified again at MORE_POINTS times the points of its last view, a certain one that may be
 an object at FAR_MORE_POINTS times; each by MORE_POINTS_BY more, which is random variation."""
@@ -48,7 +50,7 @@ LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
 """Posterior from which an uncertain track is probably background, and UNSURE_GROWTH of such a track."""
 MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 """Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
-a view of a few points says little, and many of them are right."""
+one view of a few points is weak evidence, and many of them are right."""
 NEAR_M = 3.0
 """Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
@@ -56,20 +58,20 @@ _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 def normalise(probability: Float64) -> Float64:
     """(R, 4) rows scaled to sum 1 with entries of at least MIN_PROBABILITY; uniform where no entry is above 0."""
-    finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0)
-    greatest = finite.max(axis=1, keepdims=True, initial=0.0)
-    return _floored(np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0))
+    finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0).T
+    greatest = finite.max(axis=0, initial=0.0)
+    return _floored(np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0)).T
 
 
 def from_log_weights(log_weight: Float64) -> Float64:
-    """(R, 4) softmax of each row of finite numbers, with the floor of `normalise`."""
-    return _floored(np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf)))
+    """(4, R) softmax of each column of finite numbers, with the floor of `normalise`."""
+    return _floored(np.exp(log_weight - log_weight.max(axis=0)))
 
 
 def _floored(weight: Float64) -> Float64:
-    """(R, 4) rows of positive sum scaled to sum 1 with entries of at least MIN_PROBABILITY."""
-    floored = np.maximum(weight / weight.sum(axis=1, keepdims=True), MIN_PROBABILITY)
-    normalised: Float64 = floored / floored.sum(axis=1, keepdims=True)
+    """(4, R) columns of positive sum scaled to sum 1 with entries of at least MIN_PROBABILITY."""
+    floored = np.maximum(weight / weight.sum(axis=0), MIN_PROBABILITY)
+    normalised: Float64 = floored / floored.sum(axis=0)
     return normalised
 
 
@@ -81,7 +83,7 @@ def log_frequency_of(prior: Prior) -> Float64:
 
 
 class Certainty:
-    """Whether the posterior of an object, or the evidence for background, reaches its threshold.
+    """Test whether the posterior of an object, or the evidence for background, reaches its threshold.
 
     Background is the most frequent class and has a high posterior before any view, so its threshold applies to the
     posterior under equal class frequencies.
@@ -96,11 +98,19 @@ class Certainty:
         self._object, self._background = object_threshold, background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
-        """(R,) of posteriors (R, 4)."""
-        objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self._object
-        evidence = posterior / self._frequency
-        background: Bool = evidence[:, ObjectClass.BACKGROUND] >= self._background * evidence.sum(axis=1)
+        """(R,) of posteriors (4, R)."""
+        objects: Bool = posterior[1:].max(axis=0) >= self._object
+        evidence = posterior / self._frequency[:, None]
+        background: Bool = evidence[ObjectClass.BACKGROUND] >= self._background * evidence.sum(axis=0)
         return objects | background
+
+
+class Seen(NamedTuple):
+    """The R tracks with a proposal."""
+
+    rows: Int
+    posterior: Float64  # (4, R)
+    may_be_object: Bool  # probable enough for a classification, by box and motion
 
 
 class EveryFrame:
@@ -134,16 +144,19 @@ class FusedTracks:
         self.config, self.prior, self._log_frequency = config, prior, log_frequency_of(prior)
         self.certain = Certainty(self._log_frequency, config.object_threshold, background_threshold)
 
-    def observe(self, tracks: Tracks, proposals: Proposals) -> None:
+    def observe(self, tracks: Tracks, proposals: Proposals) -> Seen:
         """Add the box and the motion of every track with a proposal to what is known of it."""
         rows = (tracks.proposal != NONE).nonzero()[0]
-        prior = self.prior.probability(proposals)[tracks.proposal[rows]]
-        tracks.prior[rows] = prior
-        evidence, known = _log(prior) - self._log_frequency, tracks.box_evidence.take(rows, axis=0)
-        gain = (np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows])[:, None]
-        tracks.box_evidence[rows] = known + gain * (evidence - known)
-        tracks.witness[rows] = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m[rows])
-        self._conclude(tracks, rows)
+        prior = self.prior.probability(proposals).T.take(tracks.proposal[rows], axis=1)
+        evidence, known = _log(prior) - self._log_frequency[:, None], _by_class(tracks.box_evidence, rows)
+        gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows]
+        witness = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m.take(rows, axis=0)).T
+        tracks.prior[rows], tracks.witness[rows] = prior.T, witness.T
+        tracks.box_evidence[rows] = (known + gain * (evidence - known)).T
+        weighed = prior * np.exp(witness)
+        probability = (weighed / weighed.sum(axis=0)).T
+        may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
+        return Seen(rows, self._conclude(tracks, rows), may_be_object)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows; (R,) which are certain now.
@@ -160,23 +173,19 @@ class FusedTracks:
         tracks.weight[rows] = total
         tracks.views[rows] += 1
         tracks.key_points[rows], tracks.key_age[rows] = count, tracks.age[rows]
-        self._conclude(tracks, rows)
-        return self.certain(tracks.posterior[rows])
+        return self.certain(self._conclude(tracks, rows))
 
-    def _may_be_object(self, tracks: Tracks) -> Bool:
-        """(M,) tracks whose box and motion leave an object probable enough for a classification."""
-        weighed = tracks.prior * np.exp(tracks.witness)
-        probability = weighed / weighed.sum(axis=1, keepdims=True)
-        return self.prior.may_be_object(probability, self.config.min_object_probability)
-
-    def _conclude(self, tracks: Tracks, rows: Int) -> None:
-        """Write the posterior of the rows; the class of a remembered place has probability 1."""
+    def _conclude(self, tracks: Tracks, rows: Int) -> Float64:
+        """Posterior (4, R) of the rows, which is written; the class of a remembered place has probability 1."""
         weight = tracks.views[rows] ** GROWTH
-        known = self._log_frequency + weight[:, None] * tracks.evidence.take(rows, axis=0)
-        known += BOX_WEIGHT * tracks.box_evidence.take(rows, axis=0) + tracks.witness.take(rows, axis=0)
+        known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
+        known += BOX_WEIGHT * _by_class(tracks.box_evidence, rows) + _by_class(tracks.witness, rows)
         posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
-        posterior += MISMATCH_PROBABILITY * tracks.prior.take(rows, axis=0)
-        tracks.posterior[rows] = np.where(tracks.inherited[rows, None], _BACKGROUND, posterior)
+        posterior += MISMATCH_PROBABILITY * _by_class(tracks.prior, rows)
+        inherited = tracks.inherited[rows].nonzero()[0]
+        posterior[:, inherited] = _BACKGROUND[:, None]
+        tracks.posterior[rows] = posterior.T
+        return posterior
 
 
 class FirstViews(FusedTracks):
@@ -193,9 +202,13 @@ class FirstViews(FusedTracks):
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
-        self.observe(tracks, proposals)
-        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
-        return asks & self._may_be_object(tracks) & (~tracks.viewed | _shows_more(tracks) | _person_waits(tracks))
+        rows, posterior, may_be_object = self.observe(tracks, proposals)
+        waits = wants_class & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
+        asks = np.zeros(len(tracks), np.bool_)
+        asks[rows] = may_be_object & (
+            (~tracks.viewed | _shows_more(tracks))[rows] | _person_waits(tracks, rows, posterior)
+        )
+        return asks & waits
 
 
 class FurtherViews(FusedTracks):
@@ -209,39 +222,45 @@ class FurtherViews(FusedTracks):
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
-        self.observe(tracks, proposals)
-        first = self._may_be_object(tracks) | _near(tracks, proposals)
-        object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
-        review = object_ & (tracks.age >= REVIEW_GROWTH * tracks.key_age + REVIEW_FRAMES)
-        review |= first & _shows_more(tracks, FAR_MORE_POINTS)
-        likely_background = tracks.posterior[:, ObjectClass.BACKGROUND] > LIKELY_BACKGROUND
-        growth = np.where(likely_background, BACKGROUND_GROWTH, UNSURE_GROWTH)
-        unsure = _shows_more(tracks) | (tracks.age >= growth * tracks.key_age + UNSURE_FRAMES) | _person_waits(tracks)
-        further = np.where(self.certain(tracks.posterior), review, unsure)
-        asks: Bool = (tracks.proposal != NONE) & ~tracks.hidden & np.where(tracks.viewed, further, first)
+        rows, posterior, may_be_object = self.observe(tracks, proposals)
+        background, age, key_age = posterior[ObjectClass.BACKGROUND], tracks.age[rows], tracks.key_age[rows]
+        first = may_be_object | _near(proposals)[tracks.proposal[rows]]
+        review = (background < 0.5) & (age >= REVIEW_GROWTH * key_age + REVIEW_FRAMES)
+        review |= first & _shows_more(tracks, FAR_MORE_POINTS)[rows]
+        growth = np.where(background > LIKELY_BACKGROUND, BACKGROUND_GROWTH, UNSURE_GROWTH)
+        unsure = _shows_more(tracks)[rows] | (age >= growth * key_age + UNSURE_FRAMES)
+        unsure |= _person_waits(tracks, rows, posterior)
+        further = np.where(self.certain(posterior), review, unsure)
+        asks = np.zeros(len(tracks), np.bool_)
+        asks[rows] = ~tracks.hidden[rows] & np.where(tracks.viewed[rows], further, first)
         return asks
 
 
-def _near(tracks: Tracks, proposals: Proposals) -> Bool:
-    """(M,) tracks whose proposal is near, and as long and as high as a person may be."""
+def _near(proposals: Proposals) -> Bool:
+    """(P,) proposals that are near, and as long and as high as a person may be."""
     x, y, _, length_m, _, height_m, _ = proposals.box.T
-    near = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
-    return np.append(near, False)[tracks.proposal]  # the last is that of NONE
+    near: Bool = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
+    return near
 
 
-def _log(probability: Float64) -> Float64:
-    """Logarithm, of MIN_PROBABILITY at least."""
-    logarithm: Float64 = np.log(np.maximum(probability, MIN_PROBABILITY))
-    return logarithm
-
-
-def _person_waits(tracks: Tracks) -> Bool:
-    """(M,) tracks that may be people and were last classified PERSON_FRAMES ago."""
-    waits: Bool = tracks.posterior[:, IS_PERSON].sum(axis=1) > MAYBE_PERSON
-    return waits & (tracks.age >= tracks.key_age + PERSON_FRAMES)
+def _person_waits(tracks: Tracks, rows: Int, posterior: Float64) -> Bool:
+    """(R,) rows that may be people by their posterior (4, R), and were last classified PERSON_FRAMES ago."""
+    waits: Bool = posterior[IS_PERSON].sum(axis=0) > MAYBE_PERSON
+    return waits & (tracks.age >= tracks.key_age + PERSON_FRAMES)[rows]
 
 
 def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:
     """(M,) tracks whose last proposal shows clearly more of them than their last view."""
     more: Bool = tracks.points > ratio * tracks.key_points + MORE_POINTS_BY
     return more
+
+
+def _by_class(column: Float64, rows: Int) -> Float64:
+    """(4, R) rows of a column (M, 4), a contiguous row a class: arithmetic along axes of four would be slow."""
+    return column.T.take(rows, axis=1)
+
+
+def _log(probability: Float64) -> Float64:
+    """Logarithm, of MIN_PROBABILITY at least."""
+    logarithm: Float64 = np.log(np.maximum(probability, MIN_PROBABILITY))
+    return logarithm

@@ -12,11 +12,11 @@ from modt.class_sizes import MAX_SIZE_M
 from modt.classes import N_CLASSES, ObjectClass
 from modt.types import Float64, Int
 
-YOUNG_S = 0.5, 1.5
+YOUNG_S: Float64 = np.array((0.5, 1.5))
 """Ages [s] that part tracks which stay where they are."""
-MOVED_M = 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0
+MOVED_M: Float64 = np.array((0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0))
 """Displacements [m] that part the others."""
-LENGTH_M = 0.4, 1.3, 2.6
+LENGTH_M: Float64 = np.array((0.4, 1.3, 2.6))
 """Lengths [m] that part the tables. What is never seen longer than the first is a fragment."""
 TOO_LARGE = 3.0
 """Log-likelihood that a cyclist loses where the track is larger than one; less: hidden cars are cyclists."""
@@ -55,6 +55,10 @@ That of fragments is of P(cell, length | class). Halved, since box and motion ar
 `python -m tools.train.motion_witness`.
 """
 
+_BY_CLASS: Float64 = np.zeros((N_CLASSES, LOG_LIKELIHOOD_RATIO[:, 0].size))
+"""(4, 40) the same of every class, 0 of one without a table, for each cell of each length in turn."""
+_BY_CLASS[1 : 1 + LOG_LIKELIHOOD_RATIO.shape[1]] = np.concatenate([*LOG_LIKELIHOOD_RATIO], axis=1)
+
 
 def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int, Int]:
     """(R,) band of the length and (R,) cell of the motion: its displacement, or the age of what is still.
@@ -78,7 +82,7 @@ def log_likelihood(moved_m: Float64, observed_s: Float64, size_m: Float64) -> Fl
         size_m: (R, 3) length, width and height of the track [m].
     """
     length, cell = cells(moved_m, observed_s, size_m[:, 0])
-    out = np.zeros((len(cell), N_CLASSES))
-    out[:, 1 : 1 + LOG_LIKELIHOOD_RATIO.shape[1]] = LOG_LIKELIHOOD_RATIO[length, :, cell]
-    out[:, ObjectClass.CYCLIST] -= TOO_LARGE * (size_m[:, :2] > CYCLIST_M).any(axis=1)
-    return out
+    out: Float64 = _BY_CLASS.take(length * LOG_LIKELIHOOD_RATIO.shape[2] + cell, axis=1)
+    too_large = (size_m[:, 0] > CYCLIST_M[0]) | (size_m[:, 1] > CYCLIST_M[1])
+    out[ObjectClass.CYCLIST] -= TOO_LARGE * too_large
+    return out.T

@@ -1,4 +1,4 @@
-"""The pool of network, box and reflectance: the box says whether there is an object, not which."""
+"""The pool of network, box and reflectance. The box tells objects from background, not one class from another."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _log_odds(log_probability: Float64) -> Float64:
 
 
 def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Float64:
-    """(R, 4) logarithm of the class frequency and of what log P(class | box) (R, 4) says, up to a constant.
+    """(R, 4) logarithm of the class frequency times the likelihood of an object by its box, up to a constant.
 
     Args:
         log_box: (R, 4) log P(class | box), up to a constant a row.
@@ -90,8 +90,9 @@ def log_pool(
 
 def softmax(log_probability: Float64) -> Float64:
     """(R, 4) probabilities whose logarithms are given up to a constant a row."""
-    likelihood = np.exp(log_probability - log_probability.max(axis=1, keepdims=True))
-    probability: Float64 = likelihood / likelihood.sum(axis=1, keepdims=True)
+    by_class = log_probability.T.copy()  # arithmetic along axes of four would be slow
+    likelihood = np.exp(by_class - by_class.max(axis=0))
+    probability: Float64 = (likelihood / likelihood.sum(axis=0)).T
     return probability
 
 

@@ -22,7 +22,7 @@ class AnyView:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiply the view into the posterior; (R,) True."""
-        posterior = from_log_weights(tracks.evidence[rows] + np.log(normalise(likelihood)))
+        posterior = from_log_weights((tracks.evidence[rows] + np.log(normalise(likelihood))).T).T
         tracks.posterior[rows], tracks.evidence[rows] = posterior, np.log(posterior) - self._log_frequency
         tracks.views[rows] += 1
         tracks.key_points[rows] = proposals.count[tracks.proposal[rows]]
@@ -57,4 +57,4 @@ class KeyViews(AnyView):
         super().fuse(tracks, proposals, rows, likelihood)
         started: Bool = tracks.age[rows] >= self._start_frame
         tracks.views[rows] -= ~started
-        return self._certain(tracks.posterior[rows]) & started
+        return self._certain(tracks.posterior[rows].T) & started

@@ -18,8 +18,7 @@ import numpy as np
 from modt.classes import N_CLASSES
 from modt.classification.box_classifier import N_FEATURES, Layers, from_lists, logits, to_lists
 from modt.classification.pool import PoolWeights
-from modt.config import SensorConfig
-from modt.config.profile import REFLECTANCE_SCALES
+from modt.config import REFLECTANCE_SCALES, SensorConfig
 from modt.types import N_REFLECTANCE, Float64
 
 log = logging.getLogger(__name__)

@@ -69,7 +69,7 @@ class LinearCost:
 
     @property
     def outdated(self) -> bool:
-        """Whether so many frames went without a call that a measurement is worth exceeding the budget."""
+        """True after so many frames without a call that a measurement is worth exceeding the budget."""
         return self._starved >= _STARVED_FRAMES
 
     def cost_ms(self, points: Int) -> float:

@@ -31,9 +31,10 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt import profile
-    from modt.app import assembly, checks, metering
+    from modt.app import assembly, checks
     from modt.app.inputs import live_source
     from modt.classification.pointnet import PointNet
+    from modt.energy.meters.discovery import discover
 
     config = profile.load(arguments.profile)
     limits = config.classification
@@ -41,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         checks.core(pinned),
         checks.governor(pinned),
         *checks.permissions(),
-        checks.meters(metering.discovery(config.energy)),
+        checks.meters(discover(config.energy)),
         checks.kernels(lambda: assembly.chosen_kernels(config.segmentation.kernels).name),
         checks.model(limits, lambda: PointNet(limits, config.sensor).facts()),
         checks.near(config.sensor),

@@ -7,10 +7,9 @@ import json
 from typing import Any
 
 from modt import profile
-from modt.app import metering
 from modt.cli import options
-from modt.energy.meters.discovery import Discovery
-from modt.energy.meters.meter import Candidate, Kind, Measurand, MeterLostError
+from modt.energy.meters.discovery import Discovery, discover
+from modt.energy.meters.meter import Candidate, Kind, MeterLostError
 
 SCHEMA = "modt.meters/1"
 
@@ -30,7 +29,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """List the meters."""
-    found = metering.discovery(profile.load(arguments.profile).energy)
+    found = discover(profile.load(arguments.profile).energy)
     tree = {"schema": SCHEMA, "meters": [_entry(c, used=c is found.best) for c in found.candidates]}
     print(json.dumps(tree, indent=2) if arguments.json else text(found))
     return 0
@@ -45,7 +44,7 @@ def text(found: Discovery) -> str:
             lines += [f"  no  {candidate.name}: {candidate.why_not}", f"      to use it: {candidate.remedy}"]
             continue
         used = "used" if candidate is found.best else "    "
-        unit = "J" if facts.measurand is Measurand.ENERGY else "W"
+        unit, quantity = ("J", "energy") if facts.counts else ("W", "power")
         try:
             reading = f"{sum(meter.read() for meter in candidate.meters):.3f} {unit}"
         except MeterLostError as error:
@@ -53,7 +52,7 @@ def text(found: Discovery) -> str:
         wrap = f", wraps after {facts.wrap_J:.0f} J" if facts.wrap_J else ""
         lines += [
             f"{used}  {candidate.name}: {facts.kind}, now {reading}",
-            f"      covers {facts.scope}; {facts.measurand} in {facts.unit}, steps of "
+            f"      covers {facts.scope}; {quantity} in {facts.unit}, steps of "
             f"{facts.resolution:g} {unit}{wrap}; privilege: {facts.privilege}",
         ]
     return "\n".join(lines)
@@ -69,7 +68,7 @@ def _entry(candidate: Candidate, *, used: bool) -> dict[str, Any]:
         "remedy": candidate.remedy or None,
         "kind": facts.kind if facts and candidate.usable else Kind.UNAVAILABLE,
         "scope": facts and facts.scope,
-        "quantity": facts and facts.measurand,
+        "quantity": facts and ("energy" if facts.counts else "power"),
         "resolution": facts and facts.resolution,
         "wrap_J": facts and facts.wrap_J,
         "privilege": facts and facts.privilege,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from modt.energy.meters.meter import Facts, Kind, Measurand
+from modt.energy.meters.meter import Facts, Kind
 
 SURGE = 4.0
 """A reading is accepted at once up to this factor beyond the lowest and the highest power shown."""
@@ -56,9 +56,13 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     meter has shown), "reset" (counter decreased), "negative" (power below zero), "stuck" (nothing is drawn),
     "ambiguous" (long enough for a full range of the counter).
     """
-    shown, counts = (before.low_W, before.high_W), facts.measurand is Measurand.ENERGY
+    shown = before.low_W, before.high_W
     unsettled = replace(before, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None)
-    if reading is None or not math.isfinite(reading) or (counts and not 0 <= reading <= (facts.wrap_J or reading)):
+    if (
+        reading is None
+        or not math.isfinite(reading)
+        or (facts.counts and not 0 <= reading <= (facts.wrap_J or reading))
+    ):
         return replace(unsettled, accepted=False), None, "lost"
     if facts.kind is Kind.ESTIMATED:  # computed by a formula, which is never wrong
         return History(True, reading), None if before.base is None else reading - before.base, ""
@@ -82,14 +86,14 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     if not measured:
         return after, None, "back"
     start = before.base if fits else before.doubtful
-    joules = step.joules if counts else 0.5 * seconds * (max(start or 0.0, 0.0) + reading)
+    joules = step.joules if facts.counts else 0.5 * seconds * (max(start or 0.0, 0.0) + reading)
     return after, max(joules, 0.0), step.mark
 
 
 def _step(facts: Facts, before: History, start: float | None, end: float, seconds: float) -> _Step:
     """Change from one reading of a counter to another. A power sample stands alone, as the joules of a second."""
-    counts, fault, mark, tick_s = facts.measurand is Measurand.ENERGY, "", "", TICK_S
-    if not counts:
+    fault, mark, tick_s = "", "", TICK_S
+    if not facts.counts:
         start, seconds, tick_s = 0.0, 1.0, 0.0
     elif start is None:
         return _Step(0.0, None, 0.0, 0.0, "first")
@@ -100,7 +104,7 @@ def _step(facts: Facts, before: History, start: float | None, end: float, second
     most_W = (joules + facts.resolution) / (seconds - tick_s) if seconds > tick_s else math.inf
     # A wrap that implies another power than was shown may as well be a reset.
     if joules < -facts.resolution or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
-        fault = "reset" if counts else "negative"
+        fault = "reset" if facts.counts else "negative"
     elif seconds * min(facts.max_W, SURGE * before.high_W if before.base is not None else math.inf) >= wrap_J:
         fault = "ambiguous"
     elif joules <= 0 and seconds > 10 * tick_s and facts.must_draw:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from modt.energy.ledger import Clock, Line
-from modt.energy.meters.meter import Conditions, Kind, Measurand, Meter, MeterLostError, worst
+from modt.energy.meters.meter import Conditions, Kind, Meter, MeterLostError, worst
 from modt.energy.readings import History, judge
 
 SCHEMA = "modt.energy/1"
@@ -74,7 +74,7 @@ class Windows:
             marks += [mark] if mark else []
             facts = meter.facts
             readings.append({"name": facts.name, "kind": facts.kind.value, "scope": facts.scope.value, "J": energy_J})
-            resolution_J += facts.resolution * (seconds if facts.measurand is Measurand.POWER else 1.0)
+            resolution_J += facts.resolution * (1.0 if facts.counts else seconds)
         spans_ns = sum(row["wall_ns"] for row in self._stages.values())
         if wall_ns < spans_ns + self._overhead_ns:
             marks.append("clock")

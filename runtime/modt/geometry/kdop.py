@@ -22,7 +22,7 @@ AXES = np.stack([np.cos(_BEARINGS_RAD), np.sin(_BEARINGS_RAD)])
 """(2, 4) unit vectors of the axes, world frame."""
 DIRECTIONS = np.concatenate([AXES, -AXES], axis=1)
 """(2, 8) the directions: each axis forth, then each axis back."""
-_PAD_M = 0.15
+JITTER_M = 0.15
 """Jitter of the ends of k-DOPs."""
 
 
@@ -64,10 +64,18 @@ def centres(kdop: Float64) -> Float64:
     return centre
 
 
-def coverage(kdop: Float64, other: Float64) -> Float64:
-    """(n,) part of each k-DOP (8, n) that the other (8, n) covers: the lesser for the two rectangles around it."""
-    common = np.maximum(widths(np.minimum(kdop, other + _PAD_M)), 0.0)
-    part = common / np.maximum(widths(kdop), _PAD_M)
+def coverage(a: Float64, b: Float64, rows: Int, columns: Int) -> Float64:
+    """(K,) part of a k-DOP of a (8, n) that one of b (8, k) covers: the lesser for the two rectangles around it.
+
+    Args:
+        a: n k-DOPs.
+        b: k others.
+        rows: (K,) index of each pair among a.
+        columns: (K,) its index among b.
+    """
+    kdop = a.take(rows, axis=1)
+    common = np.maximum(widths(np.minimum(kdop, b.take(columns, axis=1) + JITTER_M)), 0.0)
+    part = common / np.maximum(widths(kdop), JITTER_M)
     least: Float64 = np.minimum(part[0] * part[2], part[1] * part[3])
     return least
 
@@ -207,12 +215,10 @@ def _two_best(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
 
 AGREE_M = 0.6
 """Ends whose displacements differ by less agree, of a k-DOP up to a metre long; the limit falls with the length."""
-_DISAGREEMENT = 0.3
+DISAGREEMENT = 0.3
 """Standard deviation of a displacement by ends that disagree, relative to the disagreement or the width, if less."""
-_DECAY = 0.97
+DECAY = 0.97
 """Share of that variance that is left a frame later."""
-_PRODUCTS = np.stack([AXES[0] * AXES[0], AXES[1] * AXES[1], AXES[0] * AXES[1]])
-"""(3, 4) xx, yy and xy of the axes."""
 
 
 def shift_between(a: Float64, b: Float64) -> Float64:
@@ -243,11 +249,15 @@ def measured(a: Float64, b: Float64, variance: float, before: Float64) -> tuple[
     """
     width = widths(b)
     moved, unlike, apart = _moved(a, b)
-    end_variance = np.maximum(_DISAGREEMENT**2 * unlike * np.square(apart), _DECAY * before)
-    np.minimum(end_variance, np.square(_DISAGREEMENT * width.max(axis=0)), out=end_variance)
+    end_variance = np.maximum(DISAGREEMENT**2 * unlike * np.square(apart), DECAY * before)
+    np.minimum(end_variance, DISAGREEMENT**2 * np.square(width.max(axis=0)), out=end_variance)
     # The four axes together weigh as much as one measurement in each direction.
     weight = 0.5 / (variance + end_variance)
-    (xx, yy, xy), (x, y) = _PRODUCTS @ weight, AXES @ (weight * moved)
+    east, north_east, north, north_west = weight
+    xx, yy = east + (north_east + north_west) / 2, north + (north_east + north_west) / 2
+    xy = (north_east - north_west) / 2
+    east, north_east, north, north_west = weight * moved
+    x, y = east + HALF_ROOT * (north_east - north_west), north + HALF_ROOT * (north_east + north_west)
     scale = 1.0 / (xx * yy - xy * xy)
     xx, yy, xy = scale * yy, scale * xx, -scale * xy  # the inverse
     shift, covariance = np.empty((len(x), 2)), np.empty((len(x), 2, 2))

@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 
 from modt.geometry.boxes import upright_boxes
-from modt.geometry.kdop import certain_pairs, kdop_ends, overlapping_pairs, pair_costs
+from modt.geometry.kdop import certain_pairs, coverage, kdop_ends, measured, overlapping_pairs, pair_costs
 from modt.types import Float32, Float64, Int, copy_runs, regrouped
 
 
@@ -54,13 +54,15 @@ class GeometryKernels:
     """
 
     library: ctypes.CDLL | None = None
-    """Where compiled passes are."""
+    """Library of the compiled passes, for the kernels of other stages."""
     upright_boxes = staticmethod(upright_boxes)
     kdop_ends = staticmethod(kdop_ends)
     copy_runs = staticmethod(copy_runs)
     regrouped = staticmethod(regrouped)
     overlapping_pairs = staticmethod(overlapping_pairs)
+    coverage = staticmethod(coverage)
     pair_costs = staticmethod(pair_costs)
+    measured = staticmethod(measured)
     assign = staticmethod(assign)
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:

@@ -7,7 +7,7 @@ from array import array
 
 import numpy as np
 
-from modt.geometry.kdop import HALF_ROOT, PAD_M, PairWeights, Shapes
+from modt.geometry.kdop import AGREE_M, DECAY, DISAGREEMENT, HALF_ROOT, JITTER_M, PAD_M, PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
 from modt.native.library import FLOAT32, FLOAT64, INT64, Own, Signatures, declare, pointers, structure
 from modt.types import Float32, Float64, Int
@@ -19,10 +19,12 @@ _SIGNATURES: Signatures = {
     "modt_group_sums": (None, (FLOAT32, _L, _L, INT64, _L, Own)),
     "modt_copy_runs": (None, (Own, INT64, INT64, _L, Own)),
     "modt_overlapping_pairs": (_L, (FLOAT64, _L, FLOAT64, _L, Own, _L, Own, Own)),
+    "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _D, Own)),
+    "modt_measured": (None, (FLOAT64, FLOAT64, _L, _D, FLOAT64, Own, _D, Own, Own, Own)),
     "modt_pair_costs": (None, (Own, Own, FLOAT64, _D, INT64, INT64, _L, Own, _D, _D, Own, Own, Own)),
-    "modt_certain_pairs": (None, (Own, FLOAT64, _L, _D, Own, Own, Own, Own)),
-    "modt_settle_pairs": (ctypes.c_int, (Own, FLOAT64, _L, _D, Own, Own, Own, Own, Own)),
-    "modt_regrouped": (None, (Own, INT64, _L, _L, Own, Own, Own)),
+    "modt_certain_pairs": (None, (INT64, INT64, FLOAT64, _L, _D, Own, Own, Own, _L, Own)),
+    "modt_settle_pairs": (ctypes.c_int, (INT64, INT64, FLOAT64, _L, _D, Own, _L, Own, Own, Own, Own)),
+    "modt_regrouped": (None, (Own, INT64, _L, INT64, INT64, INT64, _L, _L, Own, Own, Own)),
 }
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
@@ -77,6 +79,19 @@ class NativeGeometryKernels(GeometryKernels):
                 return one[:count], other[:count]
             limit = count
 
+    def coverage(self, a: Float64, b: Float64, rows: Int, columns: Int) -> Float64:
+        """(K,) part of the k-DOP of a (8, n) that that of b (8, k) covers, of each pair."""
+        part = np.empty(len(rows))
+        self.library.modt_coverage(a, a.shape[1], b, b.shape[1], rows, columns, len(rows), JITTER_M, part)
+        return part
+
+    def measured(self, a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
+        """Displacement between k-DOPs a and b (8, K) with its covariance, and the variance by ends that disagree."""
+        n, limits = a.shape[1], array("d", (AGREE_M, DISAGREEMENT**2, DECAY))
+        out = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((4, n))
+        self.library.modt_measured(a, b, n, variance, before, limits, HALF_ROOT, *out)
+        return out
+
     def pair_costs(
         self,
         a: Shapes,
@@ -97,21 +112,22 @@ class NativeGeometryKernels(GeometryKernels):
     def assign(self, rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
         """Indices, ascending, of the candidate pairs that a least-cost assignment keeps."""
         n, sizes = len(rows), array("q", (int(rows.max(initial=-1)) + 1, int(columns.max(initial=-1)) + 1))
-        number, following = np.empty((2, max(sizes)), np.int64), np.empty((2, max(sizes)))
-        given, numbers, state = (structure(rows, columns), cost, n, limit), pointers(number), np.empty(n, np.uint8)
-        self.library.modt_certain_pairs(*given, sizes, numbers, pointers(following), state)
+        most, given, state = max(sizes), (rows, columns, cost, n, limit), np.empty(n, np.uint8)
+        number = np.empty((2, most), np.int64)
+        self.library.modt_certain_pairs(*given, sizes, number, np.empty((2, most)), most, state)
         if sizes[0]:
             few, many = sorted(sizes)
-            potentials, distance, matrix = np.empty(few), np.empty((2, many)), np.empty(few * many)
-            column_of, others = np.empty(few, np.int64), np.empty((3, many), np.int64)
-            scratch = pointers(potentials, distance, column_of, others)
-            if not self.library.modt_settle_pairs(*given, numbers, sizes, matrix, scratch, state):
+            costs, partners = np.empty(few * many + few + 2 * many), np.empty(few + 3 * many, np.int64)
+            if not self.library.modt_settle_pairs(*given, number, most, sizes, costs, partners, state):
                 raise ValueError("no assignment has a finite cost")
         return state.nonzero()[0]
 
-    def regrouped(self, members: Int, coordinates: Float32, label: Int, n: int) -> tuple[Int, Float32, Int]:
-        """Members and (3, K) coordinates by label (K,), below n, and (n,) count of each."""
+    def regrouped(
+        self, members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int
+    ) -> tuple[Int, Float32, Int]:
+        """Members and (3, K) coordinates by the label of their group or, if moved, their own; (n,) count of each."""
         rows, xyz, (following, count) = np.empty_like(members), np.empty_like(coordinates), np.empty((2, n), np.int64)
         given, out = pointers(members, coordinates), pointers(rows, xyz)
-        self.library.modt_regrouped(given, label, len(members), n, following, count, out)
+        groups = offsets, len(label), label, *moved, len(moved[0]), n
+        self.library.modt_regrouped(given, *groups, following, count, out)
         return rows, xyz, count

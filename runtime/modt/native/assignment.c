@@ -56,22 +56,28 @@ static int least_cost_assignment(const double *cost, i64 rows, i64 columns, cons
     return 1;
 }
 
-/* assign: whether each contested of n pairs is kept (1) or not (0), given their rows and columns, numbered, and how many
- * there are. Scratch: `matrix` of all pairs of these, and `a`; 0 where no assignment has a finite cost. */
-EXPORT int modt_settle_pairs(const i64 *index[2], const double *cost, i64 n, double limit, i64 *const number[2],
-                             const i64 sizes[2], double *matrix, const Assignment *a, uint8_t *state)
+/* assign: whether each contested of n pairs is kept (1) or not (0), given their rows and columns, numbered in two rows of
+ * `most`, and how many there are; 0 where no assignment has a finite cost. Scratch: for the lesser m and the greater k of
+ * the sizes `costs` of mk + m + 2k numbers, `partners` of m + 3k. */
+EXPORT int modt_settle_pairs(const i64 *rows, const i64 *columns, const double *cost, i64 n, double limit,
+                             const i64 *number, i64 most, const i64 sizes[2], double *costs, i64 *partners,
+                             uint8_t *state)
 {
     int across = sizes[0] > sizes[1]; /* at least as many columns as rows */
-    i64 rows = sizes[across], columns = sizes[!across];
-    for (i64 k = 0; k < rows * columns; k++)
-        matrix[k] = limit;
+    i64 m = sizes[across], k = sizes[!across];
+    const i64 *index[2] = {rows, columns}, *few = index[across], *many = index[!across];
+    const i64 *of_few = number + across * most, *of_many = number + !across * most;
+    double *matrix = costs + m + 2 * k;
+    Assignment a = {costs, costs + m, costs + m + k, partners, partners + m, partners + m + k, partners + m + 2 * k};
+    for (i64 i = 0; i < m * k; i++)
+        matrix[i] = limit;
     for (i64 pair = 0; pair < n; pair++)
         if (state[pair] == 2)
-            matrix[number[across][index[across][pair]] * columns + number[!across][index[!across][pair]]] = cost[pair];
-    if (!least_cost_assignment(matrix, rows, columns, a))
+            matrix[of_few[few[pair]] * k + of_many[many[pair]]] = cost[pair];
+    if (!least_cost_assignment(matrix, m, k, &a))
         return 0;
     for (i64 pair = 0; pair < n; pair++)
         if (state[pair] == 2)
-            state[pair] = a->column_of[number[across][index[across][pair]]] == number[!across][index[!across][pair]];
+            state[pair] = a.column_of[of_few[few[pair]]] == of_many[many[pair]];
     return 1;
 }

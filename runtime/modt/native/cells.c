@@ -117,14 +117,17 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
     i32 above = 0;
     for (i32 k = 0; k < n; k++) {
         i32 place = span[k].place;
-        parent[k] = k;
+        i32 own = parent[k] = k;
         if (k && span[k - 1].place == place - 1 && near(&span[k - 1], &span[k]))
-            join(parent, k - 1, k);
+            own = parent[k - 1];
         while (span[above].place < place - side - 1)
             above++;
         for (i32 a = above; span[a].place <= place - side + 1; a++) /* ends at k */
-            if (parent[a] != parent[k] && near(&span[a], &span[k]))
-                join(parent, a, k);
+            if (parent[a] != own && near(&span[a], &span[k])) {
+                join(parent, parent[a], own);
+                own = parent[own];
+            }
+        parent[k] = own;
     }
     for (i32 k = 0; k < n; k++)
         parent[k] = parent[parent[k]];
@@ -132,9 +135,9 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
 
 /* connect and connect_coarse: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
  * used lies, NONE for the others; in the order of the first of their wide cells, those in the order of their last
- * cells. Scratch: `next`, of side + 9 n_cells. */
-EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift,
-                         i32 side, i32 *next, i64 *component)
+ * cells. Returns how many components there are. Scratch: `next`, of side + 9 n_cells. */
+static i64 connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift, i32 side,
+                   i32 *next, i64 *component)
 {
     Span *span = (Span *)(next + side);
     i32 *order = next + side + 4 * n_cells, *parent = order + n_cells, *wide = parent + n_cells, *last = wide + n_cells;
@@ -172,37 +175,103 @@ EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8
             number[parent[ends[k]]] = count++;
     for (i64 i = 0; i < n_cells; i++)
         component[i] = use[i] ? number[parent[wide[i]]] : NONE;
+    return count;
 }
 
 typedef struct {
-    float *min_x, *max_x, *min_y, *max_y, *bottom, *top;
     i64 *points, *cell;
-} Bounds;
+    float *extent_m, *bottom_m, *top_m, *sqrt_range, *beam_m;
+    uint8_t *is_part;
+} Sizes;
 
-/* cluster_bounds: bounds of n clusters of cells, sums of their points, and the last cell of each; a cell may have no
- * cluster. */
-EXPORT void modt_cluster_bounds(const Cells *cells, const float *x, const float *y, const i64 *cluster, i64 n_cells,
-                                i64 n, Bounds *bounds)
+/* ClusterSizes.of_cells of n clusters. Scratch: `edge`, of 4 n. */
+static void measure(const Cells *cells, const Samples *points, const float *beam_m, const i64 *cluster, i64 n_cells,
+                    i64 n, float *edge, const Sizes *sizes)
 {
+    float *min_x = edge, *max_x = min_x + n, *min_y = max_x + n, *max_y = min_y + n;
     for (i64 g = 0; g < n; g++) {
-        bounds->min_x[g] = bounds->min_y[g] = bounds->bottom[g] = INFINITY;
-        bounds->max_x[g] = bounds->max_y[g] = bounds->top[g] = -INFINITY;
-        bounds->points[g] = bounds->cell[g] = 0;
+        min_x[g] = min_y[g] = sizes->bottom_m[g] = INFINITY;
+        max_x[g] = max_y[g] = sizes->top_m[g] = -INFINITY;
+        sizes->points[g] = sizes->cell[g] = 0;
     }
     for (i64 i = 0; i < n_cells; i++) {
         i64 g = cluster[i];
         PROVEN(g >= NONE && g < n);
         if (g == NONE)
             continue;
-        bounds->min_x[g] = least(x[i], bounds->min_x[g]);
-        bounds->max_x[g] = most(x[i], bounds->max_x[g]);
-        bounds->min_y[g] = least(y[i], bounds->min_y[g]);
-        bounds->max_y[g] = most(y[i], bounds->max_y[g]);
-        bounds->bottom[g] = least(cells->low[i], bounds->bottom[g]);
-        bounds->top[g] = most(cells->high[i], bounds->top[g]);
-        bounds->points[g] += cells->entries[i];
-        bounds->cell[g] = i;
+        min_x[g] = least(points->x[i], min_x[g]);
+        max_x[g] = most(points->x[i], max_x[g]);
+        min_y[g] = least(points->y[i], min_y[g]);
+        max_y[g] = most(points->y[i], max_y[g]);
+        sizes->bottom_m[g] = least(cells->low[i], sizes->bottom_m[g]);
+        sizes->top_m[g] = most(cells->high[i], sizes->top_m[g]);
+        sizes->points[g] += cells->entries[i];
+        sizes->cell[g] = i;
     }
+    for (i64 g = 0; g < n; g++) {
+        float width = max_x[g] - min_x[g], depth = max_y[g] - min_y[g];
+        sizes->extent_m[g] = __builtin_sqrtf(width * width + depth * depth);
+        sizes->sqrt_range[g] = points->sqrt_range[sizes->cell[g]];
+        sizes->beam_m[g] = beam_m[sizes->cell[g]];
+        sizes->is_part[g] = 0;
+    }
+}
+
+typedef struct {
+    float max_gap_m, max_gap_beams, max_extent_m, min_split_m, max_split_sqrt_range, min_person_points;
+    float min_extent_m, max_person_m, min_top_m, max_top_m, min_height_m; /* of a person */
+} Rules;
+
+/* CellClusterer._may_hold_person, or an oversized cluster */
+static int may_split(const Rules *r, const Sizes *s, i64 g)
+{
+    return s->extent_m[g] >= r->max_extent_m ||
+           (s->extent_m[g] > r->min_split_m && s->top_m[g] > r->min_top_m &&
+            s->points[g] >= 2 * (i64)r->min_person_points && s->sqrt_range[g] < r->max_split_sqrt_range);
+}
+
+/* CellClusterer._may_be_person */
+static int may_be_person(const Rules *r, const Sizes *s, i64 g)
+{
+    return s->points[g] >= (i64)r->min_person_points && s->extent_m[g] > r->min_extent_m &&
+           s->extent_m[g] < r->max_person_m && s->top_m[g] > r->min_top_m && s->top_m[g] < r->max_top_m &&
+           s->top_m[g] - s->bottom_m[g] > r->min_height_m;
+}
+
+/* CellClusterer.cluster: cluster of each cell; returns how many there are. There is room for the sizes of 2 n_cells.
+ * Scratch: `work`, of fine_side + 18 n_cells. */
+EXPORT i64 modt_cluster(const Rules *rules, const Cells *cells, const Samples *points, const float *beam_m,
+                        i64 n_cells, i32 coarse_side, i32 fine_side, i32 *work, i64 *cluster, const Sizes *sizes)
+{
+    i64 *part = (i64 *)work; /* 2 n_cells; then 9 n_cells and a side for connect, of which measure takes 4 */
+    i32 *next = work + 2 * n_cells, *number = next + fine_side + 9 * n_cells;
+    float *gap_m = (float *)(number + n_cells), *edge = (float *)next;
+    uint8_t *use = (uint8_t *)(gap_m + n_cells);
+    for (i64 i = 0; i < n_cells; i++) {
+        gap_m[i] = rules->max_gap_m + rules->max_gap_beams * beam_m[i];
+        use[i] = 1;
+    }
+    i64 n = connect(cells, gap_m, use, n_cells, 1, coarse_side, next, cluster);
+    measure(cells, points, beam_m, cluster, n_cells, n, edge, sizes);
+    for (i64 g = 0; g < n; g++)
+        number[g] = may_split(rules, sizes, g);
+    for (i64 i = 0; i < n_cells; i++)
+        use[i] = (uint8_t)number[cluster[i]];
+    i64 parts = connect(cells, gap_m, use, n_cells, 0, fine_side, next, part);
+    Sizes own = {sizes->points + n,     sizes->cell + n,   sizes->extent_m + n, sizes->bottom_m + n, sizes->top_m + n,
+                 sizes->sqrt_range + n, sizes->beam_m + n, sizes->is_part + n};
+    measure(cells, points, beam_m, part, n_cells, parts, edge, &own);
+    for (i64 p = 0; p < parts; p++) {
+        i64 owner = cluster[own.cell[p]];
+        own.is_part[p] = sizes->extent_m[owner] >= rules->max_extent_m;
+        number[p] = own.is_part[p] || may_be_person(rules, &own, p) ? (i32)(n + p) : NONE;
+        own.points[p] = number[p] == NONE ? 0 : own.points[p];
+        sizes->points[owner] -= own.points[p];
+    }
+    for (i64 i = 0; i < n_cells; i++)
+        if (part[i] != NONE && number[part[i]] != NONE)
+            cluster[i] = number[part[i]];
+    return n + parts;
 }
 
 /* view_bounds: bounds of n clusters of cells in direction, range, height and elevation, and their scale; `number` of a

@@ -1,4 +1,4 @@
-/* The extended Kalman filter of tracks, in their table: Filter of kalman.py. */
+/* The extended Kalman filter of tracks and what is observed of them, in their table: kalman.py and track_table.py. */
 #include "kernels.h"
 
 enum { X, Y, HEADING, SPEED, N };
@@ -100,5 +100,66 @@ EXPORT void modt_observe_speed(double (*x)[N], double (*P)[N][N], const i64 *row
         }
         own[HEADING] = wrap(own[HEADING]);
         reduce(A, K, SPEED, 1);
+    }
+}
+
+typedef struct {
+    double (*kdop)[8], (*lagged)[8], (*envelope)[8], (*mean)[8], (*box)[7], (*size)[3], (*anchor)[2];
+    double *moved, *observed, *bottom, *top;
+    i64 *proposal, *points;
+    const i64 *hits, *object_class;
+    const uint8_t *final;
+} Table;
+
+typedef struct {
+    const double *kdop, (*box)[7], *bottom, *top; /* eight rows of n, rows of seven */
+    const i64 *count;
+    i64 n;
+} Observations;
+
+typedef struct {
+    double envelope_decay, mean_decay, agree, shrinkage, growth, lag, dt_s, longest[4], confirmed_growth[4];
+} Memory;
+
+/* observe: what n proposals show of rows of the table at positions, which are given along the directions of k-DOPs too. */
+EXPORT void modt_observe(const Table *t, const Observations *seen, const i64 *rows, const i64 *proposals, i64 n,
+                         const double (*position)[2], const double (*along)[8], const Memory *memory)
+{
+    for (i64 m = 0; m < n; m++) {
+        i64 row = rows[m], p = proposals[m], class = t->object_class[row];
+        PROVEN(p >= 0 && p < seen->n && class >= 0 && class < 4);
+        double end[8], about[8], shift[8], longest = 0.0, moved = 0.0, weight = 1.0 - 1.0 / (double)t->hits[row];
+        for (int k = 0; k < 8; k++) {
+            end[k] = seen->kdop[k * seen->n + p];
+            about[k] = end[k] - along[m][k];
+            shift[k] = end[k] - t->lagged[row][k];
+        }
+        for (int k = 0; k < 4; k++) {
+            double ahead = shift[k], behind = -shift[k + 4];
+            double together = high(low(ahead, behind), -high(ahead, behind)); /* 0 or less where the ends part */
+            longest = high(about[k] + about[k + 4], longest);
+            moved = high(together, moved);
+        }
+        weight = low(weight, memory->mean_decay);
+        for (int k = 0; k < 8; k++) {
+            double *envelope = &t->envelope[row][k], off = t->mean[row][k] - about[k];
+            if (!(longest > memory->longest[class])) /* else merged with others */
+                *envelope = high(about[k], memory->envelope_decay * *envelope + (1 - memory->envelope_decay) * about[k]);
+            t->mean[row][k] = __builtin_fabs(off) < memory->agree ? about[k] + weight * off : about[k];
+            t->kdop[row][k] = end[k];
+            t->lagged[row][k] += memory->lag * shift[k];
+        }
+        double growth = t->final[row] ? memory->confirmed_growth[class] : memory->growth;
+        for (int k = 0; k < 3; k++) {
+            double change = seen->box[p][3 + k] - t->size[row][k];
+            t->size[row][k] += (change > 0 ? growth : memory->shrinkage) * change;
+        }
+        for (int k = 0; k < 7; k++)
+            t->box[row][k] = seen->box[p][k];
+        for (int k = 0; k < 2; k++)
+            t->anchor[row][k] = position[m][k];
+        t->moved[row] = moved, t->observed[row] += memory->dt_s;
+        t->bottom[row] = seen->bottom[p], t->top[row] = seen->top[p];
+        t->proposal[row] = p, t->points[row] = seen->count[p];
     }
 }

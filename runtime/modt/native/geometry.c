@@ -113,8 +113,6 @@ typedef struct {
     double size, overlap, height, count;
 } PairWeights;
 
-static inline double low(double a, double b) { return a < b ? a : b; }
-static inline double high(double a, double b) { return a > b ? a : b; }
 static inline double apart(double a, double b) { return __builtin_fabs(a - b); }
 
 /* pair_costs: coverage of n pairs (i, j) of shapes a and b, cost without the term of the determinant, and that
@@ -156,21 +154,70 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
     }
 }
 
-/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. The rows and columns of contested
- * pairs are numbered in `best`, and counted in `sizes`, which held the greatest index + 1, the length of `best` and of
- * the scratch `next`. */
-EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, double limit, i64 sizes[2],
-                               i64 *best[2], double *next[2], uint8_t *state)
+/* coverage: part of each k-DOP a (8, n_a) that b (8, n_b) covers, of n pairs (i, j). */
+EXPORT void modt_coverage(const double *a, i64 n_a, const double *b, i64 n_b, const i64 *rows, const i64 *columns, i64 n,
+                          double pad_m, double *coverage)
 {
+    for (i64 pair = 0; pair < n; pair++) {
+        double part[4];
+        i64 i = rows[pair], j = columns[pair];
+        PROVEN(i >= 0 && i < n_a && j >= 0 && j < n_b);
+        for (int k = 0; k < 4; k++) {
+            double one = a[k * n_a + i], back = a[(k + 4) * n_a + i];
+            double common = low(one, b[k * n_b + j] + pad_m) + low(back, b[(k + 4) * n_b + j] + pad_m);
+            part[k] = high(common, 0.0) / high(one + back, pad_m);
+        }
+        coverage[pair] = low(part[0] * part[2], part[1] * part[3]);
+    }
+}
+
+/* measured: displacements between n k-DOPs a and b (8, n) with their covariances, and the variances by ends that
+ * disagree, of which `before` were a frame ago; given the limit of agreement, the squared share and the decay. */
+EXPORT void modt_measured(const double *a, const double *b, i64 n, double variance, const double *before,
+                          const double limits[3], double half_root, double (*shift)[2], double (*covariance)[2][2],
+                          double *end_variance)
+{
+    for (i64 m = 0; m < n; m++) {
+        double both[4], apart[4], weight[4], widest = -INFINITY, longest = 1.0;
+        for (int k = 0; k < 4; k++) {
+            double ahead = b[k * n + m] - a[k * n + m], behind = b[(k + 4) * n + m] - a[(k + 4) * n + m];
+            double width = b[k * n + m] + b[(k + 4) * n + m];
+            both[k] = ahead - behind, apart[k] = ahead + behind;
+            widest = high(widest, width), longest = high(longest, high(width, width - apart[k]));
+        }
+        for (int k = 0; k < 4; k++) {
+            double off = apart[k] * (longest / limits[0]), alike = high(1 - off * off, 0.0), unlike = 1 - alike * alike;
+            double by_ends = high(limits[1] * unlike * (apart[k] * apart[k]), limits[2] * before[k * n + m]);
+            end_variance[k * n + m] = by_ends = low(by_ends, limits[1] * (widest * widest));
+            weight[k] = 0.5 / (variance + by_ends);
+            both[k] = weight[k] * ((both[k] - unlike * __builtin_copysign(apart[k], both[k])) / 2);
+        }
+        double xx = weight[0] + (weight[1] + weight[3]) / 2, yy = weight[2] + (weight[1] + weight[3]) / 2;
+        double xy = (weight[1] - weight[3]) / 2, scale = 1.0 / (xx * yy - xy * xy);
+        double x = both[0] + half_root * (both[1] - both[3]), y = both[2] + half_root * (both[1] + both[3]);
+        covariance[m][0][0] = scale * yy, covariance[m][1][1] = scale * xx;
+        covariance[m][0][1] = covariance[m][1][0] = -scale * xy;
+        shift[m][0] = covariance[m][0][0] * x + covariance[m][0][1] * y;
+        shift[m][1] = covariance[m][0][1] * x + covariance[m][1][1] * y;
+    }
+}
+
+/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. The rows and the columns of
+ * contested pairs are numbered in two rows of `best`, of `most` each like the scratch `next`, and counted in `sizes`, which
+ * held the greatest index + 1. */
+EXPORT void modt_certain_pairs(const i64 *rows, const i64 *columns, const double *cost, i64 n, double limit,
+                               i64 sizes[2], i64 *best, double *next, i64 most, uint8_t *state)
+{
+    const i64 *index[2] = {rows, columns};
     for (int side = 0; side < 2; side++) {
         for (i64 k = 0; k < sizes[side]; k++) {
-            best[side][k] = NONE;
-            next[side][k] = limit;
+            best[side * most + k] = NONE;
+            next[side * most + k] = limit;
         }
         for (i64 pair = 0; pair < n; pair++) {
             PROVEN(index[side][pair] >= 0 && index[side][pair] < sizes[side]);
-            i64 *own = &best[side][index[side][pair]];
-            double *second = &next[side][index[side][pair]];
+            i64 *own = &best[side * most + index[side][pair]];
+            double *second = &next[side * most + index[side][pair]];
             if (*own == NONE || cost[pair] <= cost[*own]) {
                 *second = *own == NONE ? limit : cost[*own];
                 *own = pair;
@@ -179,20 +226,20 @@ EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, d
         }
     }
     for (i64 pair = 0; pair < n; pair++)
-        state[pair] = cost[pair] + limit < next[0][index[0][pair]] + next[1][index[1][pair]];
+        state[pair] = cost[pair] + limit < next[rows[pair]] + next[most + columns[pair]];
     for (i64 pair = 0; pair < n; pair++)
-        if (state[best[0][index[0][pair]]] != 1 && state[best[1][index[1][pair]]] != 1)
+        if (state[best[rows[pair]]] != 1 && state[best[most + columns[pair]]] != 1)
             state[pair] = 2;
     for (int side = 0; side < 2; side++) {
-        i64 number = 0;
+        i64 number = 0, *numbers = best + side * most;
         for (i64 k = 0; k < sizes[side]; k++)
-            best[side][k] = NONE;
+            numbers[k] = NONE;
         for (i64 pair = 0; pair < n; pair++)
             if (state[pair] == 2)
-                best[side][index[side][pair]] = 0;
+                numbers[index[side][pair]] = 0;
         for (i64 k = 0; k < sizes[side]; k++)
-            if (best[side][k] != NONE)
-                best[side][k] = number++;
+            if (numbers[k] != NONE)
+                numbers[k] = number++;
         sizes[side] = number;
     }
 }

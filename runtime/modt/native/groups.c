@@ -8,23 +8,20 @@ EXPORT const char *modt_sources(void) { return MODT_SOURCES; }
 /* Groups.from_labels: n groups of the rows labelled 0 to n - 1; returns how many rows that is. */
 EXPORT i64 modt_group(const i64 *labels, i64 n_rows, i64 n, i64 *rows, i64 *offsets)
 {
+    i64 *next = offsets + 1; /* of each group, the place of its next row; its end, when all are placed */
     for (i64 g = 0; g <= n; g++)
         offsets[g] = 0;
     for (i64 i = 0; i < n_rows; i++) {
         PROVEN(labels[i] >= NONE && labels[i] < n);
-        if (labels[i] != NONE)
-            offsets[labels[i] + 1]++;
+        if (labels[i] != NONE && labels[i] + 1 < n)
+            next[labels[i] + 1]++;
     }
-    for (i64 g = 0; g < n; g++)
-        offsets[g + 1] += offsets[g];
-    i64 total = offsets[n];
+    for (i64 g = 1; g < n; g++)
+        next[g] += next[g - 1];
     for (i64 i = 0; i < n_rows; i++)
         if (labels[i] != NONE)
-            rows[offsets[labels[i]]++] = i;
-    for (i64 g = n; g > 0; g--)
-        offsets[g] = offsets[g - 1];
-    offsets[0] = 0;
-    return total;
+            rows[next[labels[i]]++] = i;
+    return offsets[n];
 }
 
 typedef struct {
@@ -44,27 +41,39 @@ EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i
         }
 }
 
-/* regrouped: rows by label, below n, in their order within it, and the count of each. Scratch: `next` of n. */
-EXPORT void modt_regrouped(const Rows *rows, const i64 *label, i64 n_rows, i64 n, i64 *next, i64 *count, Rows *sorted)
+/* regrouped: rows of n_groups groups by label, below n, in their order within it, and the count of each. A group has a
+ * label, but for the rows `moved`, ascending, which have their own. Scratch: `next` of n. */
+EXPORT void modt_regrouped(const Rows *rows, const i64 *offsets, i64 n_groups, const i64 *label, const i64 *moved,
+                           const i64 *own, i64 n_moved, i64 n, i64 *next, i64 *count, Rows *sorted)
 {
-    i64 end, total = 0;
+    i64 total = 0;
     for (i64 g = 0; g < n; g++)
         count[g] = 0;
-    for (i64 i = 0; i < n_rows; i++) {
-        PROVEN(label[i] >= 0 && label[i] < n);
-        count[label[i]]++;
+    for (i64 g = 0; g < n_groups; g++) {
+        PROVEN(label[g] >= 0 && label[g] < n);
+        count[label[g]] += offsets[g + 1] - offsets[g];
+    }
+    for (i64 m = 0, g = 0; m < n_moved; m++) {
+        PROVEN(own[m] >= 0 && own[m] < n);
+        while (offsets[g + 1] <= moved[m])
+            g++;
+        count[label[g]]--, count[own[m]]++;
     }
     for (i64 g = 0; g < n; total += count[g], g++)
         next[g] = total;
-    for (i64 i = 0; i < n_rows; i = end) { /* a run of rows of one label at a time */
-        i64 first = next[label[i]] - i;
-        for (end = i; end < n_rows && label[end] == label[i]; end++)
-            sorted->index[first + end] = rows->index[end];
-        for (int v = 0; v < 3; v++)
+    for (i64 g = 0, m = 0; g < n_groups; g++)
+        for (i64 i = offsets[g], end; i < offsets[g + 1]; i = end) { /* rows of one label at a time */
+            int moves = m < n_moved && moved[m] == i;
+            i64 *first = &next[moves ? own[m] : label[g]], to = *first;
+            m += moves;
+            end = moves ? i + 1 : m < n_moved && moved[m] < offsets[g + 1] ? moved[m] : offsets[g + 1];
+            *first += end - i;
             for (i64 k = i; k < end; k++)
-                sorted->xyz[v][first + k] = rows->xyz[v][k];
-        next[label[i]] += end - i;
-    }
+                sorted->index[to + k - i] = rows->index[k];
+            for (int v = 0; v < 3; v++)
+                for (i64 k = i; k < end; k++)
+                    sorted->xyz[v][to + k - i] = rows->xyz[v][k];
+        }
 }
 
 typedef struct {
@@ -168,14 +177,13 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
     }
 }
 
-/* reflectance_sums: number, sum, sum of squares, bright and dark ones of the measured reflectances of each group,
- * five rows of n, and the greatest; points are rows of `width`. */
-EXPORT void modt_reflectance_sums(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
-                                  float bright, float dark, double *sums, float *greatest)
+/* reflectance_statistics: of the measured reflectances of each group; points are rows of `width`. */
+EXPORT void modt_reflectance_statistics(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
+                                        float bright, float dark, double (*statistics)[5])
 {
     i64 last = offsets[n];
     for (i64 g = 0; g < n; g++) {
-        double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0;
+        double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0, *own = statistics[g];
         float high = -INFINITY;
         for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
             __builtin_prefetch(&points[index[i + AHEAD < last ? i + AHEAD : i] * width + 3]);
@@ -189,8 +197,8 @@ EXPORT void modt_reflectance_sums(const float *points, i64 width, const i64 *ind
             darks += r < dark;
             high = most(r, high);
         }
-        sums[g] = number, sums[n + g] = total, sums[2 * n + g] = squares, sums[3 * n + g] = brights;
-        sums[4 * n + g] = darks;
-        greatest[g] = high;
+        double mean = total / number, variance = squares / number - mean * mean; /* not a number without any */
+        own[0] = mean, own[1] = __builtin_sqrt(variance < 0.0 ? 0.0 : variance);
+        own[2] = number > 0.0 ? (double)high : mean, own[3] = brights / number, own[4] = darks / number;
     }
 }

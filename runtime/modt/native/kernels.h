@@ -27,6 +27,8 @@ typedef int64_t i64;
 
 static inline float least(float a, float b) { return a < b ? a : b; }
 static inline float most(float a, float b) { return a > b ? a : b; }
+static inline double low(double a, double b) { return a < b ? a : b; }
+static inline double high(double a, double b) { return a > b ? a : b; }
 static inline float magnitude(float a) { return __builtin_fabsf(a); }
 
 #endif

@@ -14,12 +14,6 @@ from modt.placement import Placement, PlanarMotion
 from modt.types import Float64, Frame, Proposals
 
 
-def skews_alike(a: PlanarMotion, b: PlanarMotion, turn_s: float, range_m: float, tolerance_m: float) -> bool:
-    """Whether no position within a range is displaced by two motions to places further apart than a tolerance."""
-    faster = abs(a.velocity_mps - b.velocity_mps) + range_m * abs(a.yaw_rate_radps - b.yaw_rate_radps)
-    return bool(faster * abs(turn_s) / 2 <= tolerance_m)
-
-
 def delays(proposals: Proposals, turn_s: float) -> Float64:
     """(P,) time after the stamp at which each proposal was seen [s]; turn_s as in Frame.
 
@@ -112,8 +106,9 @@ class Odometry:
 
             predicted = placed(before @ (inverse(self._before.T_world_sensor) @ before))  # the last motion continues
             placement = registered(predicted)
-            moved = not skews_alike(placement.motion, predicted.motion, frame.turn_s, _RANGE_M, _TOLERANCE_M)
-            if delay_s is not None and moved:
+            a, b = placement.motion, predicted.motion
+            faster_mps = abs(a.velocity_mps - b.velocity_mps) + _RANGE_M * abs(a.yaw_rate_radps - b.yaw_rate_radps)
+            if delay_s is not None and faster_mps * abs(frame.turn_s) / 2 > _TOLERANCE_M:
                 placement = registered(placement)
             if given is not None:  # an odometry that begins late or restarts is aligned with the world of the tracks
                 self._T_world_odometry = placement.T_world_sensor @ inverse(given)

@@ -78,10 +78,6 @@ GATE_M = 0.8
 """Greatest error of a prediction once the motion is known [m]. Farther landmarks are no candidates."""
 MAX_TURN_RAD = 0.2
 """Greatest turn of a correction [rad]. A larger one is refused."""
-VOTE_CELL_M = 0.25
-"""Side of a cell of the vote on the first displacement [m]."""
-MAX_SIZE_DIFFERENCE = 0.5
-"""Sum of differences of log sizes beyond which a pair has no vote on the first displacement."""
 END_SIGMA_M, END_SIGMA_PER_M = 0.02, 0.0007
 """Scale of the error of an end of a k-DOP at range 0 [m], and its growth per metre of range."""
 YOUNG_SIGMA_M = 0.07
@@ -197,11 +193,6 @@ class Registration:
         i, j = self._pairs(landmarks.kdop, near, reach_m)
         if len(i) < _MIN_LANDMARKS:
             return None
-        if not self._initialised:
-            a, b = landmarks.kdop[:, i], near[:, j]
-            shift, (size, _) = shift_between(a, b), shape_similarity(a, b)
-            vote = _vote(shift[size < MAX_SIZE_DIFFERENCE])
-            motion = motion + np.append(-vote, 0.0)
         a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
         outward_shift, young = b - a, np.where(landmarks.established, 0.0, YOUNG_SIGMA_M)
         sigma = END_SIGMA_M + END_SIGMA_PER_M * observations.range_m[j]
@@ -232,18 +223,6 @@ def _jacobian(observations: Observations) -> Float64:
     jacobian[:2] = DIRECTIONS[:, :, None]
     jacobian[2] = DIRECTIONS.T @ np.stack([-y, x])
     return jacobian
-
-
-def _vote(shift: Float64) -> Float64:
-    """(2,) displacement that most pairs agree on, in whole cells; zero where there are no pairs."""
-    if not len(shift):
-        return np.zeros(2)
-    side = int(2 * REACH_M / VOTE_CELL_M) + 3
-    cell = np.clip(np.rint(shift / VOTE_CELL_M).astype(np.int64) + side // 2, 1, side - 2)
-    counts = np.bincount(cell[:, 0] * side + cell[:, 1], minlength=side * side).reshape(side, side)
-    around = np.sum([np.roll(counts, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1)], axis=0)
-    row, column = divmod(int(np.argmax(around)), side)
-    return np.array([row - side // 2, column - side // 2]) * VOTE_CELL_M
 
 
 def _mutual(i: Int, j: Int, cost: Float64) -> Int:

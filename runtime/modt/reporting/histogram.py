@@ -35,7 +35,8 @@ class Histogram:
         self.count += 1
         self.total += value
         self.maximum = max(self.maximum, value)
-        self._occurrences[bucket_middle(value, self._bits)] += 1
+        dropped = max(value.bit_length() - self._bits, 0)
+        self._occurrences[(value >> dropped << dropped) + (1 << dropped >> 1)] += 1
 
     def occurrences(self) -> dict[str, list[int]]:
         """Distinct values that are held, in order, and how often each occurred."""
@@ -66,9 +67,3 @@ class Histogram:
         """(V,) distinct values in order, and (V,) how often each occurred."""
         held = np.array(sorted(self._occurrences.items()), np.int64).reshape(-1, 2)
         return held[:, 0], held[:, 1]
-
-
-def bucket_middle(value: int, bits: int = BITS) -> int:
-    """Middle of all integers of this length that share its leading bits."""
-    dropped = max(value.bit_length() - bits, 0)
-    return (value >> dropped << dropped) + (1 << dropped >> 1)

@@ -16,7 +16,7 @@ from modt.types import NONE, FrameResult, Proposals, Tracks
 _SCHEMA = "modt.summary/1"
 
 
-class TrackLives:
+class TrackLengths:
     """Count of the tracks, and of the frames in which they had a proposal; only live tracks are held."""
 
     def __init__(self) -> None:
@@ -43,11 +43,11 @@ class TrackLives:
 
 
 class Summary:
-    """Totals of a run of any length; memory is bounded (`Histogram`, `TrackLives`)."""
+    """Totals of a run of any length; memory is bounded (`Histogram`, `TrackLengths`)."""
 
     def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
-        self.lives = TrackLives()
+        self._lengths = TrackLengths()
         self._last: tuple[Tracks, Proposals] | None = None
         self._calls: Counter[str] = Counter()
         self._items: Counter[str] = Counter()
@@ -62,7 +62,7 @@ class Summary:
         self.classified += len(result.classified)
         self.deferred += result.n_deferred
         seen, foreground = tracks.proposal != NONE, tracks.object_class != ObjectClass.BACKGROUND
-        self.lives.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))
+        self._lengths.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))
 
     def add_ledger(self, line: dict[str, Any]) -> None:
         """Add the ledger line of a frame."""
@@ -88,14 +88,14 @@ class Summary:
             "deferred": self.deferred,
             "beta": _ratio(self.classified, self.proposals),
             "around": around(*self._last) if self._last else {},
-            "tracks": self._life(foreground_only=False),
-            "foreground_tracks": self._life(foreground_only=True),
+            "tracks": self._tracks(foreground_only=False),
+            "foreground_tracks": self._tracks(foreground_only=True),
             "energy_counts": {"E_seg": self._calls[SEGMENTATION], "E_class": self._items[CLASSIFICATION]},
             "stages": {stage: self._stage(stage) for stage in self._times},
         }
 
-    def _life(self, *, foreground_only: bool) -> dict[str, Any]:
-        tracks, frames = self.lives.totals(foreground_only=foreground_only)
+    def _tracks(self, *, foreground_only: bool) -> dict[str, Any]:
+        tracks, frames = self._lengths.totals(foreground_only=foreground_only)
         return {"count": tracks, "N_go": _ratio(frames, tracks)}
 
     def _stage(self, stage: str) -> dict[str, Any]:
@@ -164,10 +164,9 @@ def summary_text(summary: dict[str, Any]) -> str:
     faults = summary.get("faults", {})
     if faults.get("count"):
         lines.append(f"  faulty scans: {faults['count']}, {faults['skipped']} of them skipped: {faults['first']}")
-    lacking = faults.get("frames_without_reflectance")
-    if lacking:
+    if faults.get("frames_without_reflectance"):
         remedy = "have the driver write it, or set sensor.reflectance to none"
-        lines.append(f"  without reflectance: {lacking} frames; {remedy}")
+        lines.append(f"  without reflectance: {faults['frames_without_reflectance']} frames; {remedy}")
     return "\n".join(lines)
 
 

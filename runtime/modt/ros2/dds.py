@@ -110,11 +110,6 @@ class Subscription:
             if hasattr(sample, "message")  # a notice that a sender has left has none
         ]
 
-    @property
-    def senders(self) -> int:
-        """Matched publishers."""
-        return _count(self._reader, "get_matched_publications")
-
 
 class Publication:
     """Sends to a topic; never waits for a slow receiver."""
@@ -133,13 +128,9 @@ class Publication:
 
     @property
     def receivers(self) -> int:
-        """Matched subscribers."""
-        return _count(self._writer, "get_matched_subscriptions")
-
-
-def _count(entity: Any, matched: str) -> int:
-    """Number of matched entities; 1 with version 0.10 of the binding (Humble, Jazzy), which does not count them."""
-    return len(getattr(entity, matched)()) if hasattr(entity, matched) else 1
+        """Matched subscribers; 1 with version 0.10 of the binding (Humble, Jazzy), which does not count them."""
+        matched = getattr(self._writer, "get_matched_subscriptions", None)
+        return 1 if matched is None else len(matched())
 
 
 def _qos(depth: int, reliable: bool) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,38 +68,18 @@ class PointCloud:
 
 
 @dataclass(frozen=True, slots=True)
-class _Field:
-    offset: int
-    datatype: int
-
-    @property
-    def end(self) -> int:
-        return self.offset + np.dtype(NUMBERS[self.datatype]).itemsize
-
-
-@dataclass(frozen=True, slots=True)
 class _Table:
-    """The points in the message; `fields` by lower-case name."""
+    """The points in the message; `fields` are types and offsets by lower-case name."""
 
     data: memoryview
-    order: str
     shape: tuple[int, int]
     strides: tuple[int, int]
-    fields: dict[str, _Field]
+    fields: dict[str, tuple[np.dtype[Any], int]]
 
-    def first(self, names: tuple[str, ...]) -> _Field | None:
-        """The first of these fields that exists."""
-        return next((self.fields[name] for name in names if name in self.fields), None)
-
-    def columns(self, field: _Field, n: int = 1) -> NDArray[np.generic]:
-        """(height, width, n) view of a field and those of its type that follow it."""
-        kind = np.dtype(self.order + NUMBERS[field.datatype])
-        strides = (*self.strides, kind.itemsize)
-        return np.ndarray((*self.shape, n), kind, self.data, field.offset, strides)
-
-    def column(self, field: _Field) -> NDArray[np.generic]:
-        """(height, width) view of a field."""
-        return self.columns(field)[..., 0]
+    def columns(self, name: str, n: int = 1) -> NDArray[np.generic]:
+        """(height, width, n) view of a field and of the numbers of its type that follow it."""
+        kind, offset = self.fields[name]
+        return np.ndarray((*self.shape, n), kind, self.data, offset, (*self.strides, kind.itemsize))
 
 
 def read_cloud(message: bytes) -> PointCloud:
@@ -110,7 +91,7 @@ def read_cloud(message: bytes) -> PointCloud:
     cdr = CdrReader(message)
     stamp_s, frame_id = cdr.stamp_s(), cdr.text()
     height, width = cdr.count(), cdr.count()
-    fields = _fields(cdr)
+    kinds = _fields(cdr)
     order = ">" if cdr.number("B") else "<"
     point_step, row_step = cdr.count(), cdr.count()
     data = cdr.octets()
@@ -119,12 +100,13 @@ def read_cloud(message: bytes) -> PointCloud:
     strides = (row_step if height > 1 else point_step * width, point_step)  # a single row may state 0
     if strides[0] < width * point_step or (height - 1) * strides[0] + width * point_step > len(data):
         raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
-    fields = {name: field for name, field in fields.items() if field.end <= point_step}
-    table = _Table(data, order, (height, width), strides, fields)
+    fields = {name: (np.dtype(order + kind), offset) for name, (kind, offset) in kinds.items()}
+    fields = {name: (kind, at) for name, (kind, at) in fields.items() if at + kind.itemsize <= point_step}
+    table = _Table(data, (height, width), strides, fields)
     points = _points(table)
-    time = table.first(TIMES)
+    time = next((name for name in TIMES if name in fields), None)
     with np.errstate(all="ignore"):  # times may be any numbers
-        turn = None if time is None else turn_of(points, table.column(time).reshape(-1))
+        turn = None if time is None else turn_of(points, table.columns(time).reshape(-1))
     return PointCloud(stamp_s, frame_id, points, turn)
 
 
@@ -142,7 +124,8 @@ def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
     return cdr.message()
 
 
-def _fields(cdr: CdrReader) -> dict[str, _Field]:
+def _fields(cdr: CdrReader) -> dict[str, tuple[str, int]]:
+    """Types and offsets by lower-case name."""
     n = cdr.count()
     if n > MAX_FIELDS:
         raise MessageError("malformed", f"{n} fields")
@@ -150,33 +133,34 @@ def _fields(cdr: CdrReader) -> dict[str, _Field]:
     for _ in range(n):
         name, offset, datatype, _count = cdr.text(), cdr.count(), int(cdr.number("B")), cdr.count()
         if datatype in NUMBERS:
-            fields[name.lower()] = _Field(offset, datatype)
+            fields[name.lower()] = NUMBERS[datatype], offset
     return fields
 
 
 def _points(table: _Table) -> Float32:
     xyz = [table.fields[name] for name in "xyz" if name in table.fields]
-    if len(xyz) < 3 or any(NUMBERS[field.datatype][0] != "f" for field in xyz):
-        kinds = ": they are " + ", ".join(str(np.dtype(NUMBERS[f.datatype])) for f in xyz) if len(xyz) == 3 else ""
+    if len(xyz) < 3 or any(kind.kind != "f" for kind, _ in xyz):
+        kinds = ": they are " + ", ".join(kind.name for kind, _ in xyz) if len(xyz) == 3 else ""
         there = ", ".join(table.fields) or "none"
         raise MessageError("fields", f"no x, y, z of floating point among {there}{kinds}")
-    named = reflectance_name(table.fields)
-    reflectance = None if named is None else table.fields[named]
+    reflectance = reflectance_name(table.fields)
     points = np.empty((table.shape[0] * table.shape[1], 4), np.float32)
     rows = points.reshape(*table.shape, 4)
-    in_row = [_Field(xyz[0].offset + 4 * k, FLOAT32) for k in range(4)]
+    kind, offset = xyz[0]
+    row = [(kind, offset + k * kind.itemsize) for k in range(4)]
+    whole = reflectance is not None and [*xyz, table.fields[reflectance]] == row
     with np.errstate(all="ignore"):  # float64 beyond float32, and NaN
-        if [*xyz, reflectance] == in_row:
-            rows[...] = table.columns(xyz[0], 4)
-        elif xyz == in_row[:3]:
-            rows[..., :3] = table.columns(xyz[0], 3)
+        if whole:
+            rows[...] = table.columns("x", 4)
+        elif xyz == row[:3]:
+            rows[..., :3] = table.columns("x", 3)
         else:
-            for k, field in enumerate(xyz):
-                rows[..., k] = table.column(field)
+            for k, name in enumerate("xyz"):
+                rows[..., k] = table.columns(name)[..., 0]
         if reflectance is None:
             rows[..., 3] = UNRECORDED
-        elif [*xyz, reflectance] != in_row:
-            rows[..., 3] = table.column(reflectance)
+        elif not whole:
+            rows[..., 3] = table.columns(reflectance)[..., 0]
         _scale(points[:, 3])
         if not np.isfinite(np.dot(points.ravel(), points.ravel())):
             _finite(points)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from modt.class_sizes import SPLIT_PERSON
+from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
 from modt.types import NONE, Bool, Float32, Int, Self
@@ -74,20 +76,6 @@ def connect_coarse(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int
 
 
 @dataclass(frozen=True, slots=True)
-class ClusterBounds:
-    """Bounds of n clusters of cells: of one point of each cell from above, of all points in height above ground."""
-
-    min_x: Float32  # (n,) [m, sensor frame]
-    max_x: Float32
-    min_y: Float32
-    max_y: Float32
-    bottom: Float32  # (n,) [m]
-    top: Float32
-    points: Int  # (n,) number of points
-    cell: Int  # (n,) last cell
-
-
-@dataclass(frozen=True, slots=True)
 class ClusterSizes:
     """Sizes of G clusters, some of them empty."""
 
@@ -104,17 +92,22 @@ class ClusterSizes:
         return len(self.points)
 
     @classmethod
-    def of_bounds(cls, bounds: ClusterBounds, points: PointColumns, beam_m: Float32) -> Self:
-        """Sizes of clusters, given (C,) a point of each cell and the vertical distance of beams there [m]."""
+    def of_cells(cls, cells: Cells, points: PointColumns, beam_m: Float32, cluster: Int) -> Self:
+        """Sizes of clusters by (C,) a point of each cell, the distance of beams there [m], its cluster or NONE."""
+        n, has = int(cluster.max(initial=NONE)) + 1, np.flatnonzero(cluster != NONE)
+        label, cell = cluster.take(has), np.zeros(n, np.int64)
+        cell[label] = has
+        x, y, low, high = (v.take(has) for v in (points.x, points.y, cells.low, cells.high))
+        width, depth = (label_max(v, label, n) - label_min(v, label, n) for v in (x, y))
         return cls(
-            points=bounds.points,
-            extent_m=np.sqrt(np.square(bounds.max_x - bounds.min_x) + np.square(bounds.max_y - bounds.min_y)),
-            bottom_m=bounds.bottom,
-            top_m=bounds.top,
-            sqrt_range=points.sqrt_range.take(bounds.cell),
-            cell=bounds.cell,
-            beam_m=beam_m.take(bounds.cell),
-            is_part=np.zeros(len(bounds.cell), np.bool_),
+            points=np.bincount(label, cells.entries.take(has), n).astype(np.int64),
+            extent_m=np.sqrt(np.square(width) + np.square(depth)),
+            bottom_m=label_min(low, label, n),
+            top_m=label_max(high, label, n),
+            sqrt_range=points.sqrt_range.take(cell),
+            cell=cell,
+            beam_m=beam_m.take(cell),
+            is_part=np.zeros(n, np.bool_),
         )
 
     def followed_by(self, other: Self) -> Self:
@@ -154,23 +147,61 @@ class Clusters:
         return replace(self, of_cell=number[self.of_cell], n=int(keep.sum()))
 
 
-def cluster_bounds(cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
-    """Bounds of n clusters, given (C,) the cluster of each cell, NONE where it has none, and a point of each cell."""
-    has = cluster != NONE
-    rows = slice(None) if has.all() else np.flatnonzero(has)
-    label, cell = cluster[rows], np.zeros(n, np.int64)
-    cell[label] = np.arange(len(cluster))[rows]
-    x, y = points.x[rows], points.y[rows]
-    return ClusterBounds(
-        min_x=label_min(x, label, n),
-        max_x=label_max(x, label, n),
-        min_y=label_min(y, label, n),
-        max_y=label_max(y, label, n),
-        bottom=label_min(cells.low[rows], label, n),
-        top=label_max(cells.high[rows], label, n),
-        points=np.bincount(label, cells.entries[rows], n).astype(np.int64),
-        cell=cell,
-    )
+MAX_CELL_GAP_M, MAX_CELL_GAP_BEAMS = 0.3, 2.0
+"""Neighbouring cells with a vertical gap below the sum, the beams taken at their range, are one cluster."""
+MIN_SPLIT_M, MIN_CELL_RETURNS = 0.8, 0.9
+"""A cluster of this extent may hold a person and more, where a fine cell is as wide as so many spacings of points."""
+MIN_PERSON_POINTS = 8
+"""Least number of points of a person that is split off."""
+
+
+class CellClusterer:
+    """Clusters of cells: those of a coarse grid, and parts of them on a grid of half the spacing.
+
+    Args:
+        sensor: range and spacing of points.
+        config: clustering distance and sizes of objects.
+    """
+
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
+        step = config.cell_m / np.sqrt(10.0)
+        self.max_extent_m = config.max_extent_m
+        self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
+        self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
+        spacing = MIN_CELL_RETURNS * np.deg2rad(sensor.azimuth_step_deg)
+        self.max_split_sqrt_range = np.float32(self.fine.step / spacing)  # a cell is as wide as step * sqrt(range)
+
+    def cluster(self, cells: Cells, points: PointColumns, beam_m: Float32) -> tuple[Int, ClusterSizes]:
+        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
+        max_gap_m = np.float32(MAX_CELL_GAP_M) + np.float32(MAX_CELL_GAP_BEAMS) * beam_m
+        cluster = connect_coarse(self.coarse, cells, max_gap_m)
+        coarse = ClusterSizes.of_cells(cells, points, beam_m, cluster)
+        oversized = coarse.extent_m >= self.max_extent_m
+        again = (oversized | self._may_hold_person(coarse)).take(cluster)
+        part = connect(self.fine, cells, max_gap_m, again)
+        parts = ClusterSizes.of_cells(cells, points, beam_m, part)
+        owner = cluster.take(parts.cell)
+        of_oversized = oversized.take(owner)
+        split = of_oversized | self._may_be_person(parts)
+        number = np.full(len(parts) + 1, NONE)  # the last is that of NONE
+        number[:-1][split] = len(coarse) + split.nonzero()[0]
+        cluster = np.maximum(number.take(part), cluster)  # parts follow the clusters
+        whole = np.bincount(owner, parts.points * split, len(coarse))
+        coarse, parts = (
+            replace(coarse, points=coarse.points - whole.astype(np.int64)),
+            replace(parts, points=parts.points * split, is_part=of_oversized),
+        )
+        return cluster, coarse.followed_by(parts)
+
+    def _may_hold_person(self, sizes: ClusterSizes) -> Bool:
+        """(G,) clusters that may hold a person and more, near enough for the fine grid to hold an object together."""
+        may: Bool = (sizes.extent_m > MIN_SPLIT_M) & (sizes.top_m > SPLIT_PERSON.min_top_m)
+        may &= (sizes.points >= 2 * MIN_PERSON_POINTS) & (sizes.sqrt_range < self.max_split_sqrt_range)
+        return may
+
+    def _may_be_person(self, sizes: ClusterSizes) -> Bool:
+        """(G,) parts of a person's size."""
+        return (sizes.points >= MIN_PERSON_POINTS) & SPLIT_PERSON.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
 
 
 @dataclass(frozen=True, slots=True)

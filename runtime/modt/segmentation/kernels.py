@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from modt.geometry.kernels import GeometryKernels
-from modt.segmentation.clusters import (
-    cluster_bounds,
-    connect,
-    connect_coarse,
-    members_of,
-    occupied_cells,
-)
+from modt.segmentation.ceiling import histogram
+from modt.segmentation.clusters import CellClusterer, members_of, occupied_cells
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
-from modt.segmentation.groups import Groups, best_headings, reflectance_sums
+from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
 from modt.segmentation.strips import merge_strips, view_bounds
 from modt.types import Float32, Int
 
@@ -24,21 +19,20 @@ class Kernels(GeometryKernels):
 
     name = "numpy"
     occupied_cells = staticmethod(occupied_cells)
-    connect = staticmethod(connect)
-    connect_coarse = staticmethod(connect_coarse)
-    cluster_bounds = staticmethod(cluster_bounds)
+    cluster = staticmethod(CellClusterer.cluster)
     view_bounds = staticmethod(view_bounds)
     merge_strips = staticmethod(merge_strips)
     group = staticmethod(Groups.from_labels)
     members_of = staticmethod(members_of)
     best_headings = staticmethod(best_headings)
-    reflectance_sums = staticmethod(reflectance_sums)
+    reflectance_statistics = staticmethod(reflectance_statistics)
 
     def above_ground(
         self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
-    ) -> tuple[Int, PointColumns, Float32]:
-        """(K,) rows of (N, 3) or wider points within bounds, those points, and their (K,) heights above ground [m].
+    ) -> tuple[Int, PointColumns, Float32, Int]:
+        """(K,) rows of (N, 3) or wider points within bounds, those points, their (K,) heights above ground [m].
 
+        With them comes the histogram of the heights in which a ceiling shows.
         Bounds are the least and greatest height [m], and the least and greatest square root of range, exclusively.
         """
         sweep = PointColumns.from_array(points)
@@ -47,7 +41,8 @@ class Kernels(GeometryKernels):
         mask = (height > low) & (height < high)
         mask &= (sweep.sqrt_range > near) & (sweep.sqrt_range < far)
         rows = np.flatnonzero(mask)
-        return rows, sweep.take(rows), height[rows]
+        height = height.take(rows)
+        return rows, sweep.take(rows), height, histogram(height, float(high))
 
 
 NUMPY = Kernels()

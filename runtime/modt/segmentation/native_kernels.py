@@ -9,29 +9,39 @@ from typing import Any
 
 import numpy as np
 
-from modt.class_sizes import STRIP_PERSON
+from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON
 from modt.geometry.native_kernels import NativeGeometryKernels
-from modt.native.library import BOOL, FLOAT32, INT32, INT64, Own, Signatures, declare, pointers, structure
-from modt.segmentation.clusters import Cells, ClusterBounds, Clusters, Members
+from modt.native.library import FLOAT32, INT32, INT64, Own, Signatures, declare, pointers, structure
+from modt.segmentation.ceiling import ABOVE_M, BIN_M, bins_up_to
+from modt.segmentation.clusters import (
+    MAX_CELL_GAP_BEAMS,
+    MAX_CELL_GAP_M,
+    MIN_PERSON_POINTS,
+    MIN_SPLIT_M,
+    CellClusterer,
+    Cells,
+    Clusters,
+    ClusterSizes,
+    Members,
+)
 from modt.segmentation.grids import FAR_M, RING_STEP, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, NOISE_M, SLOPE_GAIN, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
-from modt.types import NONE, Bool, Float32, Float64, Int
+from modt.types import N_REFLECTANCE, NONE, Float32, Float64, Int
 
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, _L, Own, Own, FLOAT32, Own, Own)),
+    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, _L, Own, Own, FLOAT32, *[Own] * 3)),
     "modt_occupied_cells": (_L, (Own, FLOAT32, _L, _F, _I, _I, INT32, Own, Own, Own, Own)),
-    "modt_connect": (None, (Own, FLOAT32, BOOL, _L, _I, _I, Own, Own)),
-    "modt_cluster_bounds": (None, (Own, FLOAT32, FLOAT32, INT64, _L, _L, Own)),
+    "modt_cluster": (_L, (Own, Own, Own, FLOAT32, _L, _I, _I, Own, Own, Own)),
     "modt_view_bounds": (None, (Own, Own, FLOAT32, INT64, INT64, _L, INT64, _L, Own, Own)),
     "modt_merge_strips": (None, (Own, Own, FLOAT32, FLOAT32, _L, INT64, Own, Own, Own)),
     "modt_group": (_L, (INT64, _L, _L, Own, Own)),
     "modt_members": (None, (Own, INT64, _L, INT64, INT64, _L, _L, Own)),
     "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, Own)),
-    "modt_reflectance_sums": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, Own, Own)),
+    "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, Own)),
 }
 
 
@@ -41,7 +51,10 @@ class _Ground(ctypes.Structure):
     _fields_ = (
         *((name, _I) for name in ("rings", "sectors", "sector_bits", "flank_sectors")),
         *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope")),
-        *((name, _F) for name in ("ramp_slope", "near_m", "slope_gain", "noise_m", "max_gap_m", "flank_m")),
+        *(
+            (name, _F)
+            for name in ("ramp_slope", "near_m", "slope_gain", "noise_m", "max_gap_m", "flank_m", "upper_m", "bin_m")
+        ),
     )
 
 
@@ -51,6 +64,8 @@ _STRIP_KEYS = (
 )
 _PERSON_KEYS = "max_extent_m", "min_top_m", "min_height_m"
 """Fields of CarLimits and of STRIP_PERSON, in the order of Strips of cells.c."""
+_PART_KEYS = "min_extent_m", "max_extent_m", "min_top_m", "max_top_m", "min_height_m"
+"""Fields of SPLIT_PERSON, in the order of Rules of cells.c."""
 
 
 class _GroundBuffers:
@@ -60,19 +75,9 @@ class _GroundBuffers:
         grid = ground.grid
         scales = FAR_M, 1 / RING_STEP, SECTORS / 4
         slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
-        self.constants = _Ground(
-            grid.rings,
-            SECTORS,
-            SECTORS.bit_length() - 1,
-            FLANK_SECTORS,
-            *scales,
-            *slopes,
-            NEAR_M,
-            SLOPE_GAIN,
-            NOISE_M,
-            MAX_GAP_M,
-            FLANK_M,
-        )
+        limits = NEAR_M, SLOPE_GAIN, NOISE_M, MAX_GAP_M, FLANK_M, ABOVE_M, BIN_M
+        sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS
+        self.constants = _Ground(grid.rings, *sectors, *scales, *slopes, *limits)
         self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
         self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
         self.points = np.empty((3, 0), np.float32)
@@ -106,19 +111,19 @@ class NativeKernels(NativeGeometryKernels, Kernels):
 
     def above_ground(
         self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
-    ) -> tuple[Int, PointColumns, Float32]:
-        """(K,) rows of the points within bounds, those points, and their (K,) heights above ground [m]."""
+    ) -> tuple[Int, PointColumns, Float32, Int]:
+        """(K,) rows of the points within bounds, those points, their (K,) heights above ground [m] and histogram."""
         buffers = self._ground.get(ground) or self._ground.setdefault(ground, _GroundBuffers(ground))
         points = np.ascontiguousarray(points, np.float32)
         n, width = points.shape
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
-        scratch, out = buffers.scratch(n), pointers(kept)
+        scratch, out, count = buffers.scratch(n), pointers(kept), np.zeros(bins_up_to(float(bounds[1])), np.int64)
         k = self.library.modt_above_ground(
             buffers.constants, ground.grid.range_m, buffers.flat_m, sensor_height_m, points, n, width, scratch,
-            buffers.rays, bounds, rows, out,
+            buffers.rays, bounds, rows, out, count,
         )  # fmt: skip
         x, y, z, sqrt_range, height = kept[:, :k]
-        return rows[:k], PointColumns(x, y, z, sqrt_range), height
+        return rows[:k], PointColumns(x, y, z, sqrt_range), height, count
 
     def occupied_cells(
         self, grid: SqrtRangeGrid, points: PointColumns, height: Float32
@@ -136,27 +141,23 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         cells = Cells(row, column, low, high, entries[k - n :])
         return cells, sample[k - n :], PointColumns(*sampled[:, k - n :]), cell
 
-    def connect_coarse(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
-        """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
-        return self.connect(grid, cells, max_gap_m, np.ones(len(cells), np.bool_), 1)
-
-    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool, shift: int = 0) -> Int:
-        """(C,) connected component of the cell of the grid, 2^shift times as wide, in which each cell used lies.
-
-        They are in the order of their first cells; NONE for the other cells.
-        """
-        n, component = len(cells), np.empty(len(cells), np.int64)
-        if len(self._work) < grid.side + 9 * n:
-            self._work = np.empty(grid.side + 9 * n, np.int32)
-        self.library.modt_connect(self._cells(cells), max_gap_m, use, n, shift, grid.side, self._work, component)
-        return component
-
-    def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
-        """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
-        bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
-        out = pointers(bounds, counts)
-        self.library.modt_cluster_bounds(self._cells(cells), points.x, points.y, cluster, len(cells), n, out)
-        return ClusterBounds(*bounds, *counts)
+    def cluster(
+        self, clusterer: CellClusterer, cells: Cells, points: PointColumns, beam_m: Float32
+    ) -> tuple[Int, ClusterSizes]:
+        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
+        n, coarse, fine = len(cells), clusterer.coarse.side, clusterer.fine.side
+        if len(self._work) < fine + 18 * n:
+            self._work = np.empty(fine + 18 * n, np.int32)
+        limits = clusterer.max_extent_m, MIN_SPLIT_M, clusterer.max_split_sqrt_range, MIN_PERSON_POINTS
+        rules = array("f", (MAX_CELL_GAP_M, MAX_CELL_GAP_BEAMS, *limits, *attrgetter(*_PART_KEYS)(SPLIT_PERSON)))
+        cluster, counts = np.empty(n, np.int64), np.empty((2, 2 * n), np.int64)
+        sizes, is_part = np.empty((5, 2 * n), np.float32), np.empty(2 * n, np.bool_)
+        given, out = self._columns(points), pointers(counts, sizes, is_part)
+        g = self.library.modt_cluster(
+            rules, self._cells(cells), given, beam_m, n, coarse, fine, self._work, cluster, out
+        )
+        (count, cell), (extent_m, bottom_m, top_m, sqrt_range, beam_m) = counts[:, :g], sizes[:, :g]
+        return cluster, ClusterSizes(count, extent_m, bottom_m, top_m, sqrt_range, cell, beam_m, is_part[:g])
 
     def view_bounds(self, clusters: Clusters, number: Int, n: int) -> ViewBounds:
         """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
@@ -202,13 +203,13 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         self.library.modt_best_headings(*given, *AXES, len(HEADINGS), noise_m, best)
         return best
 
-    def reflectance_sums(self, points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
-        """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
+    def reflectance_statistics(self, points: Float32, index: Int, offsets: Int) -> Float64:
+        """(G, 5) mean, standard deviation, maximum, share of bright and share of dark returns of each group."""
         points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
-        sums, greatest = np.empty((5, n), np.float64), np.empty(n, np.float32)
+        statistics = np.empty((n, N_REFLECTANCE))
         given = points, points.shape[1], index, offsets, n
-        self.library.modt_reflectance_sums(*given, BRIGHT, DARK, sums, greatest)
-        return sums, greatest
+        self.library.modt_reflectance_statistics(*given, BRIGHT, DARK, statistics)
+        return statistics
 
     @staticmethod
     def _columns(points: PointColumns) -> array[int]:

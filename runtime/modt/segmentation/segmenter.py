@@ -12,7 +12,7 @@ from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
-from modt.segmentation.groups import HEADINGS, has_reflectance, reflectance_statistics
+from modt.segmentation.groups import HEADINGS, has_reflectance
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.view_ends import ViewEnds
 from modt.types import NONE, Bool, Cut, Float32, Int, Proposals
@@ -70,8 +70,8 @@ class Segmenter:
         With them come those points and their (K,) heights above ground [m].
         """
         sensor_height_m = self.sensor_height_m(points)
-        rows, above, height = self.kernels.above_ground(self.ground, points, sensor_height_m, self.bounds)
-        limit_m = below_ceiling_m(height)
+        rows, above, height, count = self.kernels.above_ground(self.ground, points, sensor_height_m, self.bounds)
+        limit_m = below_ceiling_m(count)
         if limit_m is None:
             limit_m = below_grazed_m(points[::SAMPLED, 2], sensor_height_m, self.config.max_height_m)
         if limit_m is None:
@@ -97,7 +97,7 @@ class Segmenter:
         if depth is not None:
             cut |= Cut.SIDE * (by_cell.min(depth[by_cell.rows]) < TRUNCATION_M - VIEW_MARGIN_M)
         if self.sensor.reflectance != "none" and has_reflectance(sweep[:, 3]):
-            statistics = reflectance_statistics(*kernels.reflectance_sums(sweep, members.index, offsets))
+            statistics = kernels.reflectance_statistics(sweep, members.index, offsets)
         return Proposals(
             members=members.index,
             offsets=offsets,

@@ -116,12 +116,16 @@ class Background(Generic[T]):
             self._writer.close()
 
     def _attempt(self, job: Callable[[], None]) -> None:
+        """Run a job in this thread, and count it by its outcome."""
         try:
             job()
         except Exception as error:
             self._fail(error)
-        else:
-            self._succeed()
+            return
+        self._written += 1
+        if self._state != "ok":
+            log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
+            self._state = "ok"
 
     def _next(self) -> Callable[[], None] | None:
         """Wait for the oldest job; None at the end."""
@@ -145,9 +149,3 @@ class Background(Generic[T]):
         self._state = what
         with self._changed:
             self._changed.wait_for(lambda: self._end_s is not None, self._retry_s)
-
-    def _succeed(self) -> None:
-        self._written += 1
-        if self._state != "ok":
-            log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
-            self._state = "ok"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
 from modt.placement import Mount
-from modt.sinks.output import Health, LineFile, writing
+from modt.sinks.output import LineFile, writing
 from modt.types import NONE, Cut, Float64, FrameResult
 
 KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
@@ -89,7 +89,7 @@ class PointLabels:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._written = folder, 0
+        self._folder = folder
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
 
@@ -110,11 +110,6 @@ class PointLabels:
         path = self._folder / f"{index:06d}.label"
         with writing(path):
             path.write_bytes(labels.tobytes())
-        self._written += 1
-
-    def health(self) -> Health:
-        """Number of files written."""
-        return {"written": self._written}
 
     def close(self) -> None:
         """No effect: no file stays open."""

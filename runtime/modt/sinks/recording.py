@@ -130,7 +130,7 @@ class Recording:
 
     def state(self, status: str) -> None:
         """Write the status beside the records or in memory, and make the lines so far survive a power cut."""
-        self._look()
+        self._check_files()
         self.sync()
         if self._ready() or self._begun:
             with suppress(ModtError):
@@ -144,14 +144,14 @@ class Recording:
         if self.cause is None and self._unsynced:
             if not self._attempt(self._sync):
                 self.lost += self._unsynced
-                self._leave()
+                self._close_files()
             self._unsynced = 0
 
     def finish(self) -> None:
         """Close the files."""
-        self._look()
+        self._check_files()
         self.sync()
-        self._leave()
+        self._close_files()
 
     def _allows(self) -> bool:
         """Whether another frame keeps to `gb_per_day`."""
@@ -183,15 +183,15 @@ class Recording:
         self._begun = self._attempt(lambda: self.directory.begin(self._describe(), limit_bytes))
         self._bytes, self.parts = RESERVED_BYTES, self.parts + self._begun
 
-    def _look(self) -> None:
+    def _check_files(self) -> None:
         """Close a part whose files were moved or removed. The lines of removed files count as lost."""
         if self._begun and not (self.directory.present() and all(file.present() for file in self._files.values())):
             removed = sum(int(file.health()["written"]) for file in self._files.values() if file.removed())
             self.lost, self._unsynced = self.lost + removed, 0
             log.warning("%s: records were removed or moved; %d lines are lost", self.directory.path, removed)
-            self._leave()
+            self._close_files()
 
-    def _leave(self) -> None:
+    def _close_files(self) -> None:
         files, self._files, self._named, self._begun = self._files, {}, 0, False
         for file in files.values():
             with suppress(ModtError):
@@ -250,7 +250,8 @@ class WholeRecording(Recording):
         *,
         labels: bool,
     ) -> None:
-        super().__init__(directory, RecordingConfig(disk_mb=1e7), AtOnce(), describe)  # more than a disk has
+        more_than_a_disk_has = RecordingConfig(disk_mb=1e7, gb_per_day=1e5)
+        super().__init__(directory, more_than_a_disk_has, AtOnce(), describe)
         self._sequence, self._camera, self._labels = sequence, camera, labels
         self._more: list[Writer[FrameResult]] = []
 
@@ -277,9 +278,6 @@ class WholeRecording(Recording):
         super().finish()
         for writer in self._more:
             writer.close()
-
-    def _allows(self) -> bool:
-        return True
 
     def _attempt(self, action: Callable[[], None]) -> bool:
         action()

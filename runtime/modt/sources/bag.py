@@ -115,18 +115,16 @@ class BagStream:
         try:
             yield from messages_of(self._files, topics)
         except ModtError as error:
-            place = f"{self._topic} {self._last}"
-            self.faults.report(self._last, self._topic, error.cause, skipped=True, place=place)
+            self.faults.report(self._last, self._topic, error.cause, skipped=True)
 
     def _frame(self, index: int, message: BagMessage, stamps: StampCheck) -> Frame | None:
-        place = (index, self._topic, f"{self._topic} {index}")
         try:
             cloud = read_cloud(message.data)
         except MessageError as error:
-            self.faults.report(index, self._topic, str(error), skipped=True, place=place[2])
+            self.faults.report(index, self._topic, str(error), skipped=True)
             return None
         sweep = Sweep(_stamp_s(cloud, message), cloud.points, cloud.turn_s)
-        return stamps.frame(sweep, message.recorded_s, self.faults, place, began_s=self._began[0])
+        return stamps.frame(sweep, message.recorded_s, index, self._topic, self.faults, began_s=self._began[0])
 
     def _keep(self, message: BagMessage, buffer: PoseBuffer, stamps: StampCheck) -> None:
         with suppress(MessageError):

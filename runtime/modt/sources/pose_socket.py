@@ -25,7 +25,6 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.ros2.cdr import MessageError
-from modt.sources.pose_source import pose_defect
 from modt.sources.received_poses import CAPACITY, ReceivedPoses
 from modt.types import Float64
 
@@ -62,9 +61,7 @@ def read_datagram(raw: bytes) -> tuple[float, Float64]:
         T = _matrix(message["pose"])
     else:
         x, y, yaw = (_number(message[key], key) for key in PLANAR)
-        T = se3(rotation_zyx(0.0, 0.0, math.remainder(yaw, 2 * math.pi)), np.array([x, y, 0.0]))
-    if defect := pose_defect(T):
-        raise MessageError("malformed", f"pose is {defect}")
+        T = se3(rotation_zyx(0.0, 0.0, yaw), np.array([x, y, 0.0]))
     return stamp, T
 
 

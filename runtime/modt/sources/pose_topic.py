@@ -9,10 +9,8 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.ros2.address import domain_of, topic_of
-from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
-from modt.sources.pose_source import pose_defect
 from modt.sources.received_poses import CAPACITY, ReceivedPoses
 from modt.types import Float64
 
@@ -33,10 +31,7 @@ class PoseTopic(ReceivedPoses):
 
     def _read(self, message: Message, /) -> tuple[float, Float64]:
         odometry = read_odometry(message.data)
-        T = odometry.T_odom_child @ self._T_base_sensor
-        if defect := pose_defect(T):
-            raise MessageError("malformed", f"pose is {defect}")
-        return odometry.stamp_s, T
+        return odometry.stamp_s, odometry.T_odom_child @ self._T_base_sensor
 
 
 def open_topic(address: Address, config: OdometryConfig) -> PoseTopic:

@@ -18,7 +18,7 @@ import numpy as np
 from modt.config import OdometryConfig
 from modt.geometry import se3, turn_between
 from modt.ros2.cdr import MessageError
-from modt.sources.pose_source import PoseSource
+from modt.sources.pose_source import PoseSource, pose_defect
 from modt.sources.stream import MAX_STAMP_S, unit_of
 from modt.types import Float64, Frame
 
@@ -263,11 +263,11 @@ class ReceivedPoses(PoseSource):
         raise NotImplementedError
 
     def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
+        if defect := pose_defect(T):
+            raise MessageError("malformed", f"pose is {defect}")
         cause = f"stamp {stamp_s:.15g} s when the frame's is {now_s:.15g} s"
-        if stamp_s and now_s and abs(stamp_s - now_s) > MAX_AHEAD_S:
-            for whose, ratio in (("this one seems", stamp_s / now_s), ("the sensor's seem", now_s / stamp_s)):
-                if unit := unit_of(ratio):
-                    raise MessageError("unit", f"{cause}: {whose} to be in {unit}; give seconds")
+        if now_s and abs(stamp_s - now_s) > MAX_AHEAD_S and (unit := unit_of(stamp_s / now_s)):
+            raise MessageError("unit", f"{cause}: it seems to be in {unit}; give seconds")
         if abs(stamp_s) > MAX_STAMP_S:
             raise MessageError("malformed", f"{cause}: no time in seconds")
         if stamp_s > now_s + MAX_AHEAD_S:

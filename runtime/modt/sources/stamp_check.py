@@ -70,17 +70,16 @@ class StampCheck:
         self,
         sweep: Sweep,
         arrived_s: float,
+        index: int,
+        subject: str,
         faults: Faults,
-        place: tuple[int, str, str],
         flaws: Sequence[str] = (),
         began_s: float = 0.0,
     ) -> Frame | None:
         """Frame of a recorded sweep, stamped from `began_s` on; None if it cannot be used.
 
-        Flaws and refusals are reported to `faults`; `place` is the index of the frame, the subject of its faults, and
-        its name in the log.
+        Flaws and refusals of the `subject` are reported to `faults`.
         """
-        index, subject, name = place
         steps, cause = self.steps, self.doubt(sweep.stamp_s, arrived_s)
         if not cause:
             try:
@@ -88,10 +87,10 @@ class StampCheck:
             except ScanError as error:
                 cause = error.cause
         if cause:
-            faults.report(index, subject, cause, skipped=True, place=name)
+            faults.report(index, subject, cause, skipped=True)
             return None
         flaws = [*broken, *flaws, *["a clock was set: stamps go on evenly"] * (self.steps > steps)]
         if flaws:
-            faults.report(index, subject, "; ".join(flaws), skipped=False, place=name)
+            faults.report(index, subject, "; ".join(flaws), skipped=False)
         stamp_s = sweep.stamp_s + self.shift_s - began_s
         return Frame(index, stamp_s, points, turn_s=sweep.turn_s)

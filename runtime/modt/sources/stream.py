@@ -72,14 +72,14 @@ class Faults:
     skipped: int = 0  # number of skipped scans
     first: list[Fault] = field(default_factory=list)  # the first MAX_KEPT_FAULTS faults
 
-    def report(self, frame: int, subject: object, cause: str, *, skipped: bool, place: str = "") -> None:
-        """Count a fault, and log it unless there are too many; `place` names it in the log instead of `subject`."""
+    def report(self, frame: int, subject: object, cause: str, *, skipped: bool) -> None:
+        """Count a fault, and log it unless there are too many."""
         self.count += 1
         self.skipped += skipped
         if self.count <= MAX_KEPT_FAULTS:
             self.first.append(Fault(frame, str(subject), cause, skipped))
             more = "; later faults are only counted" if self.count == MAX_KEPT_FAULTS else ""
-            log.warning("%s: %s%s%s", place or subject, cause, "; frame skipped" if skipped else "", more)
+            log.warning("%s: frame %d: %s%s%s", subject, frame, cause, "; frame skipped" if skipped else "", more)
 
 
 class Stream(Protocol):

@@ -33,16 +33,6 @@ class Matches:
     covariance: Float64
     end_variance: Float64
 
-    def take(self, kept: Int, proposals: Int) -> Matches:
-        """The matches given, with other numbers (K,) of their proposals."""
-        return Matches(
-            self.rows[kept],
-            proposals,
-            self.position.take(kept, axis=0),
-            self.covariance.take(kept, axis=0),
-            self.end_variance.take(kept, axis=0),
-        )
-
     def reassigned(self, tracks: TrackTable, rows: Int, proposals: Int) -> Matches:
         """The matches with other proposals, NONE for none, of the tracks given (R,).
 
@@ -50,16 +40,16 @@ class Matches:
         """
         changed = np.zeros(len(tracks), np.bool_)
         changed[rows] = True
-        kept = (~changed[self.rows]).nonzero()[0]
-        rows, proposals = rows[proposals != NONE], proposals[proposals != NONE]
-        same = self.take(kept, self.proposals[kept])
-        return Matches(
-            np.concatenate([same.rows, rows]),
-            np.concatenate([same.proposals, proposals]),
-            np.concatenate([same.position, tracks.x.take(rows, axis=0)[:, :2]]),
-            np.concatenate([same.covariance, (UNMEASURED_M2 * np.eye(2))[None].repeat(len(rows), axis=0)]),
-            np.concatenate([same.end_variance, tracks.end_variance.take(rows, axis=0)]),
+        same, taken = (~changed[self.rows]).nonzero()[0], (proposals != NONE).nonzero()[0]
+        rows, n = rows[taken], len(taken)
+        columns = (
+            (self.rows, rows),
+            (self.proposals, proposals[taken]),
+            (self.position, tracks.x.take(rows, axis=0)[:, :2]),
+            (self.covariance, (UNMEASURED_M2 * np.eye(2))[None].repeat(n, axis=0)),
+            (self.end_variance, tracks.end_variance.take(rows, axis=0)),
         )
+        return Matches(*(np.concatenate([known.take(same, axis=0), new]) for known, new in columns))
 
 
 class Association(Protocol):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.geometry.kdop import coverage
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
@@ -43,6 +42,6 @@ class BackgroundMap:
             top = np.concatenate([self._top, tracks.top[rows]])
             kdop = observations.kdop.take(which, axis=1)
             i, j = self._kernels.overlapping_pairs(kdop, place)
-            within = coverage(kdop.take(i, axis=1), place.take(j, axis=1)) >= MIN_COVERAGE
+            within = self._kernels.coverage(kdop, place, i, j) >= MIN_COVERAGE
             known[i[within & (observations.top[which[i]] < top[j] + RISE_M)]] = True
         return known

@@ -47,16 +47,8 @@ def symmetric(P: Float64) -> Float64:
     return (P + transposed(P)) / 2
 
 
-def motion(x: Float64, dt_s: float) -> Float64:
-    """(4, M) F(x): constant heading and speed for dt_s (Equation 1)."""
-    moved = x.copy()
-    moved[X] += dt_s * np.cos(x[HEADING]) * x[SPEED]
-    moved[Y] += dt_s * np.sin(x[HEADING]) * x[SPEED]
-    return moved
-
-
 def motion_jacobian(x: Float64, dt_s: float) -> Float64:
-    """(2, 2, M) derivative of F's x and y by heading and speed, at x; the rest of F changes nothing."""
+    """(2, 2, M) derivative of the motion's x and y by heading and speed, at x; heading and speed stay as they are."""
     c, s = dt_s * np.cos(x[HEADING]), dt_s * np.sin(x[HEADING])
     return np.array(((-s * x[SPEED], c), (c * x[SPEED], s)))
 
@@ -67,11 +59,11 @@ def predict(
     """States and covariances dt_s later, F P F' + Q.
 
     Q is what an acceleration [m/s2] and a rate of turn [rad/s], white within dt_s, add. Across its heading a track
-    can be pushed as hard as along it while it stands: then the heading says nothing.
+    can be pushed as hard as along it while it stands, since its heading is then unknown.
     """
     F = motion_jacobian(x, dt_s)
     moved = x.copy()
-    moved[:2] += F[:, 1] * x[SPEED]  # motion(), which is linear in the speed
+    moved[:2] += F[:, 1] * x[SPEED]  # the motion is linear in the speed
     along, across = np.square(dt_s * acceleration), np.square(dt_s**2 / 2 * acceleration)
     after, cross = P.copy(), P[:2, 2:] + product(F, P[2:, 2:])
     after[:2, :2] += product(F, P[2:, :2]) + product(cross, transposed(F))
@@ -102,8 +94,8 @@ def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) ->
 def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64]:
     """Turn the heading of tracks that stand to where they seem to go.
 
-    At speed zero every heading says the same, and the filter's linearisation would see motion along one of them
-    only: the heading may be chosen, and what is known along it and across it turns with it.
+    At speed zero all headings are the same state, but the linearisation sees motion along the chosen one alone. So
+    the heading is chosen anew, and the covariance along it and across it turns with it.
     """
     turn = heading_rad - x[HEADING]
     c, s = np.cos(turn), np.sin(turn)
@@ -189,8 +181,9 @@ class NativeFilter(Filter):
 
     def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
         """All states dt_s later."""
-        heading, along = x[:, HEADING].copy(), np.square(dt_s * self.acceleration)
-        noise = array("d", (along, np.square(dt_s**2 / 2 * self.acceleration), np.square(dt_s * self.turn)))
+        heading = x[:, HEADING].copy()
+        along, across, turn = dt_s * self.acceleration, dt_s**2 / 2 * self.acceleration, dt_s * self.turn
+        noise = array("d", (along * along, across * across, turn * turn))
         self._library.modt_predict(x, P, len(x), np.cos(heading), np.sin(heading), dt_s, noise)
 
     def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:

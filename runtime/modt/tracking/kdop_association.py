@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes, measured
+from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches
@@ -39,12 +39,12 @@ class KdopAssociation:
         """Pairs of least cost; then, among the rest, those that overlap although they changed their shape."""
         expected = tracks.predicted_kdops()
         variance = POSITION_SIGMA_M**2
-        reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
-        rows, columns = self._kernels.overlapping_pairs(expected + reach, observations.kdop)
+        xx, xy, yy = covariance = np.stack([tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]])
+        rows, columns = self._kernels.overlapping_pairs(expected + _reach(xx, xy, yy), observations.kdop)
         cost, coverage = self._kernels.pair_costs(
             Shapes.of(expected, tracks.bottom, tracks.top, tracks.points),
             Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count),
-            np.stack([tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]]),
+            covariance,
             variance + JUMP_SIGMA_M**2,
             (rows, columns),
             WEIGHTS,
@@ -59,12 +59,26 @@ class KdopAssociation:
         x = tracks.x.take(rows, axis=0)[:, :2]
         mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
         before = tracks.end_variance.T.take(rows, axis=1)
-        shift, covariance, end_variance = measured(mean, observations.kdop.take(columns, axis=1), variance, before)
+        kdop = observations.kdop.take(columns, axis=1)
+        shift, covariance, end_variance = self._kernels.measured(mean, kdop, variance, before)
         return Matches(rows, columns, x + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:
         """Centre of the k-DOP."""
         return observations.position
+
+
+def _reach(xx: Float64, xy: Float64, yy: Float64) -> Float64:
+    """(M,) distance beyond which no pair of a track is listed, by the covariance of its position [m].
+
+    It is three deviations, or fewer where a pair would cost more than MAX_COST: shapes that do not overlap cost the
+    weight of the overlap at least, and an uncertain position costs its uncertainty.
+    """
+    least = POSITION_SIGMA_M**2 + JUMP_SIGMA_M**2
+    uncertainty = np.log(((xx + least) * (yy + least) - xy * xy) / least**2)
+    left = np.minimum(2 * (MAX_COST - WEIGHTS.overlap) - uncertainty, 9.0)
+    reach: Float64 = 0.5 + np.sqrt(np.maximum(left, 0.0) * np.maximum(xx, yy))
+    return reach
 
 
 def _free(index: Int, taken: Int, n: int) -> Bool:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.config import PaperAssociationConfig
 from modt.geometry.kernels import assign
 from modt.observations import Observations
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
 from modt.types import Float64, Int
 
+ALPHA, BETA, GAMMA = 2.0, 0.01, 0.1
+"""Weights of 1 - I, of N and of S in the cost of a match."""
+T_DA = 0.95
+"""Greatest cost of a match."""
 POSITION_SIGMA_M = 0.3
 """Standard deviation of a centroid [m], which the paper does not state. With a greater one tracks turn later."""
 _NO_PARTNER = 1e6
@@ -34,15 +37,12 @@ class PaperAssociation:
     the assignment; those of a higher cost are rejected afterwards.
     """
 
-    def __init__(self, config: PaperAssociationConfig) -> None:
-        self.config = config
-
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs of least cost in all, without those above T_DA."""
         rows, columns = np.indices((len(tracks), len(observations))).reshape(2, -1)
         cost = self.cost(tracks, observations, rows, columns)
         kept = assign(rows, columns, cost, _NO_PARTNER)
-        kept = kept[cost[kept] <= self.config.t_da]
+        kept = kept[cost[kept] <= T_DA]
         rows, columns = rows[kept], columns[kept]
         covariance = np.square(POSITION_SIGMA_M) * np.eye(2)[None].repeat(len(kept), axis=0)
         return Matches(rows, columns, observations.centroid[columns], covariance, np.zeros((len(kept), 4)))
@@ -55,8 +55,7 @@ class PaperAssociation:
         )
         points = _likeness(tracks.points[rows], observations.count[columns])
         size = _likeness(a[:, 3:6], b[:, 3:6]).sum(axis=1)
-        config = self.config
-        cost: Float64 = config.alpha * (1 - overlap) - config.beta * points - config.gamma * size
+        cost: Float64 = ALPHA * (1 - overlap) - BETA * points - GAMMA * size
         return cost
 
     def initial_position(self, observations: Observations) -> Float64:

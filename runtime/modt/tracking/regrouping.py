@@ -16,14 +16,15 @@ The risk: a person who steps close to a parked car, and is not classified yet, b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_SIZE_M, PART_PERSON
 from modt.classes import ObjectClass
 from modt.geometry import yaw_of
-from modt.geometry.kdop import DIRECTIONS, coverage, measured, widths
+from modt.geometry.kdop import DIRECTIONS, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations, observe
 from modt.placement import Placement
@@ -48,39 +49,38 @@ MIN_POINTS, MIN_SHARE = 8, 0.4
 """Least number of points that are split off and that remain; least share of the points last seen."""
 MAX_DROP_M = 0.4
 """Greatest distance of the top of a part below the expected top [m]."""
+OPPOSITE = np.arange(-4, 4)
+"""Direction of a k-DOP that is opposite to each."""
 
 
-@dataclass(frozen=True, slots=True)
-class Associated:
-    """A frame after association.
-
-    Attributes:
-        proposals: proposals of the frame.
-        observations: the proposals in the world.
-        matches: pairs of tracks and proposals.
-    """
+class Associated(NamedTuple):
+    """A frame after association."""
 
     proposals: Proposals
-    observations: Observations
+    observations: Observations  # the proposals in the world
     matches: Matches
 
 
-@dataclass(frozen=True, slots=True)
-class Pairs:
-    """Tracks and the proposals that overlap their known extents, by falling seniority of the tracks.
+class Pairs(NamedTuple):
+    """Tracks and the proposals that overlap their known extents, by falling seniority of the tracks."""
 
-    Attributes:
-        rows, proposals: (K,) row and proposal of each pair.
-        known: (8, K) known extent of the track, as a k-DOP [m].
-        within: (K,) part of the proposal that lies within the known extent.
-        free: (K,) the track may take the proposal, and most of one lies within the other.
-    """
+    rows: Int  # (K,) track of each pair
+    proposals: Int  # (K,) proposal of each pair
+    within: Float64  # (K,) part of the proposal that lies within the known extent
+    around: Float64  # (K,) part of the track, as it is expected, that lies within the proposal
+    free: Bool  # (K,) the track may take the proposal, and most of one lies within the other
 
-    rows: Int
-    proposals: Int
-    known: Float64
-    within: Float64
-    free: Bool
+
+class Pieces(NamedTuple):
+    """Objects that are split off longer proposals."""
+
+    rows: Int  # (S,) track of each piece
+    hosts: Int  # (S,) proposal that it is split off
+    members: Int  # (K,) members of the frame that are split off, ascending
+    label: Int  # (K,) piece of each
+
+
+NO_PIECES = Pieces(*np.zeros((4, 0), np.int64))
 
 
 class Regrouping:
@@ -110,7 +110,8 @@ class Regrouping:
         _take_larger(tracks, observations, pairs, own, owner)
         into = _join(tracks, observations, pairs, own, owner)
         joined = (into != np.arange(n)).nonzero()[0]
-        rows, hosts, piece = _split(tracks, frame, placement, pairs, own)
+        pieces = _split(tracks, frame, placement, pairs, own)
+        rows, hosts = pieces.rows, pieces.hosts
         intact = np.ones(len(tracks) + 1, np.bool_)  # the last is that of NONE
         intact[owner[hosts]] = False
         lost = owner[joined]
@@ -122,58 +123,66 @@ class Regrouping:
         matches = matches.reassigned(tracks, changed, own[changed])
         if not len(joined) + len(rows):
             return Associated(frame.proposals, observations, matches)
-        yaw = np.append(frame.proposals.box[:, 6], tracks.box[rows, 6] - yaw_of(placement.T_world_sensor))
-        whole = into[joined]
-        yaw[whole] = tracks.box[owner[whole], 6] - yaw_of(placement.T_world_sensor)  # a part may lie across the car
-        source, into = np.append(np.arange(n), hosts), np.append(into, np.arange(n, n + len(rows)))
-        kept = into == np.arange(len(into))
+        turn = yaw_of(placement.T_world_sensor)
+        yaw, whole = np.concatenate([frame.proposals.box[:, 6], tracks.box[rows, 6] - turn]), into[joined]
+        yaw[whole] = tracks.box[owner[whole], 6] - turn  # a part may lie across the car
+        index = np.arange(n + len(rows))  # of the proposals, then of the pieces
+        source, into = np.concatenate([index[:n], hosts]), np.concatenate([into, index[n:]])
+        kept = into == index
         number = (kept.cumsum() - 1)[into]
-        renewed = np.zeros(len(into), np.bool_)
-        renewed[whole] = renewed[hosts] = renewed[n:] = True
-        label = number.take(piece)
-        proposals, observations = self._regrouped(frame, placement, label, source[kept], renewed[kept], yaw[kept])
-        new = number[n:]
+        renewed = index >= n
+        renewed[whole] = renewed[hosts] = True
+        new, moved = number[n:], (pieces.members, number[n + pieces.label])
+        proposals, observations = self._regrouped(
+            frame, placement, number[:n], moved, source[kept], renewed[kept], yaw[kept]
+        )
         if proposals.reflectance is not None:
             proposals.reflectance[new] = np.nan
         if len(rows):
-            observations.kdop[:, new] = _locate(tracks, rows, observations.kdop[:, new], matches)
+            observations.kdop[:, new] = self._locate(tracks, rows, observations.kdop[:, new], matches)
         observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
-        return Associated(
-            proposals, observations, matches.take(np.arange(len(matches.rows)), number[matches.proposals])
-        )
+        return Associated(proposals, observations, replace(matches, proposals=number[matches.proposals]))
 
     def _pairs(self, tracks: TrackTable, frame: Associated, owner: Int) -> Pairs:
         """Pairs of tracks observed twice and proposals that overlap their known extents."""
-        order = (-tracks.hits * tracks.points).argsort(kind="stable")
-        rank = np.empty_like(order)
-        rank[order] = np.arange(len(order))
-        rows = order[tracks.hits[order] > 1]
-        known = tracks.known_kdops(rows)
-        k, part = self._kernels.overlapping_pairs(known, frame.observations.kdop)
-        rows, known, kdop = rows[k], known.take(k, axis=1), frame.observations.kdop.take(part, axis=1)
-        other = owner[part]
-        a, b = tracks.last_class[rows], tracks.last_class[other]
+        junior = np.arange(len(tracks)) - len(tracks) * tracks.hits * tracks.points  # of two alike the later one
+        order = junior.argsort(kind="stable")  # faster than by default
+        senior = order[tracks.hits[order] > 1]
+        known, kdop = tracks.known_kdops(senior), frame.observations.kdop
+        k, part = self._kernels.overlapping_pairs(known, kdop)
+        rows, other = senior[k], owner[part]
+        a, b = tracks.object_class[rows], tracks.object_class[other]
         one_class = (a == b) | _whole(tracks)[rows] & ~IS_PERSON[b]  # background and cars are easily confused
-        free = (other == NONE) | (other == rows) | (rank[other] > rank[rows]) & one_class
-        within, around = coverage(kdop, known), coverage(tracks.predicted_kdops(rows), kdop)
+        free = (other == NONE) | (other == rows) | (junior[other] > junior[rows]) & one_class
+        within = self._kernels.coverage(kdop, known, part, k)
+        around = self._kernels.coverage(tracks.predicted_kdops(), kdop, rows, part)
         free &= np.maximum(within, around) > MIN_COVERAGE
-        return Pairs(rows, part, known, within, free)
+        return Pairs(rows, part, within, around, free)
 
     def _regrouped(
-        self, frame: Associated, placement: Placement, label: Int, source: Int, renewed: Bool, yaw: Float64
+        self,
+        frame: Associated,
+        placement: Placement,
+        label: Int,
+        moved: tuple[Int, Int],
+        source: Int,
+        renewed: Bool,
+        yaw: Float64,
     ) -> tuple[Proposals, Observations]:
         """Proposals and observations in another grouping.
 
         Args:
             frame: the grouping before.
             placement: placement of the frame in the world.
-            label: (K,) proposal of each member.
+            label: (P,) proposal that each becomes, or a part of.
+            moved: (S,) members, ascending, that are split off, and the proposal that each goes to.
             source: (Q,) former proposal whose columns each takes over.
             renewed: (Q,) those whose members changed: box and k-DOP come from their points.
             yaw: (Q,) heading of their boxes [rad, sensor frame].
         """
         old, changed, kernels = frame.proposals, renewed.nonzero()[0], self._kernels
-        members, coordinates, count = kernels.regrouped(old.members, old.coordinates, label, len(source))
+        given = old.members, old.coordinates, old.offsets
+        members, coordinates, count = kernels.regrouped(*given, label, moved, len(source))
         proposals = old.regrouped(members, coordinates, count, source)
         runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
         copied = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
@@ -186,21 +195,39 @@ class Regrouping:
         observations.put(changed, observed.moved(placement.deskew(observed.centroid)))
         return proposals, observations
 
+    def _locate(self, tracks: TrackTable, rows: Int, kdop: Float64, matches: Matches) -> Float64:
+        """(8, S) k-DOPs of tracks (S,) whose pieces have (8, S) k-DOPs; writes the measured positions into matches.
+
+        A piece shows where its track is, by the ends at which nothing touches it, and nothing new of its shape.
+        """
+        x, expected = tracks.x.take(rows, axis=0)[:, :2].T, tracks.predicted_kdops(rows)
+        mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x
+        touched, gain = kdop > expected + (PAD_M - TOUCH_M), kdop - mean
+        both = touched & touched[OPPOSITE]
+        gain = np.where(both, 0.0, np.where(touched, -gain[OPPOSITE], gain))
+        before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
+        shift, covariance, end_variance = self._kernels.measured(mean, mean + gain, POSITION_SIGMA_M**2, before)
+        at = (matches.rows == rows[:, None]).argmax(axis=1)
+        matches.position[at] += shift
+        matches.covariance[at], matches.end_variance[at] = covariance, end_variance.T
+        at_measured: Float64 = expected + DIRECTIONS.T @ shift.T
+        return at_measured
+
 
 def _whole(tracks: TrackTable) -> Bool:
     """(M,) tracks whose parts are joined: of a hidden person the legs are left, one object."""
-    whole: Bool = ~IS_PERSON[tracks.last_class] | tracks.hidden
+    whole: Bool = ~IS_PERSON[tracks.object_class] | tracks.hidden
     return whole
 
 
 def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> None:
     """Let senior tracks take larger parts of their objects: writes own (M,) and owner (P,), each track once."""
-    size = np.where(own == NONE, 0, observations.count[own])
+    size = np.append(observations.count, 0)[own]  # the last is that of NONE
     larger = (pairs.free & (observations.count[pairs.proposals] > size[pairs.rows])).nonzero()[0]
     rows, parts = pairs.rows[larger], pairs.proposals[larger]
     box = tracks.box.take(rows, axis=0)
     box[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
-    fits = _fit_together(box, observations.box.take(parts, axis=0), MAX_SIZE_M[tracks.last_class[rows]])
+    fits = _fit_together(box, observations.box.take(parts, axis=0), MAX_SIZE_M[tracks.object_class[rows]])
     changed: set[int] = set()
     for row, part in zip(rows[fits].tolist(), parts[fits].tolist(), strict=True):
         former, left = int(owner[part]), int(own[row])
@@ -217,12 +244,13 @@ def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, o
 
 def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> Int:
     """(P,) proposal into which each is joined, itself where it is not; the most senior track is served first."""
-    into, car = np.arange(len(owner)), tracks.last_class == ObjectClass.CAR.value
+    into, car = np.arange(len(owner)), tracks.object_class == ObjectClass.CAR.value
     host = own[pairs.rows]
     joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
     joins &= (tracks.hits[pairs.rows] >= ESTABLISHED_HITS) & _whole(tracks)[pairs.rows]
     k = joins.nonzero()[0]
-    rows, parts, known, host = pairs.rows[k], pairs.proposals[k], pairs.known.take(k, axis=1), host[k]
+    rows, parts, host = pairs.rows[k], pairs.proposals[k], host[k]
+    known = tracks.known_kdops(rows)
     part = observations.kdop.take(parts, axis=1)
     person = PART_PERSON.fits(
         widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts]
@@ -237,40 +265,33 @@ def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int
     return into
 
 
-def _split(
-    tracks: TrackTable, frame: Associated, placement: Placement, pairs: Pairs, own: Int
-) -> tuple[Int, Int, Int]:
-    """Objects that are split off longer proposals.
+def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: Pairs, own: Int) -> Pieces:
+    """Objects that are split off longer proposals: of tracks seen a frame ago that have no proposal, or an odd one.
 
-    Returns:
-        rows: (S,) tracks of objects seen a frame ago that have no proposal, or one that is too long or of few points.
-        hosts: (S,) proposal off which each is split.
-        label: (K,) proposal of each member of the frame; those split off follow the others.
+    A proposal is odd that is too long for the class of the track, or of few points.
     """
     proposals, observations, n = frame.proposals, frame.observations, len(frame.proposals)
-    label = np.arange(n).repeat(proposals.count)
     may = (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
-    may &= tracks.last_class != ObjectClass.BACKGROUND.value
+    may &= tracks.object_class != ObjectClass.BACKGROUND.value
     lost = may & (own == NONE)
     held = (may & ~lost).nonzero()[0]
-    class_, kept = tracks.last_class[held], own[held]
+    class_, kept = tracks.object_class[held], own[held]
     longest_m = widths(observations.kdop.take(kept, axis=1)).max(axis=0, initial=0.0)
     odd = (longest_m > MAX_SIZE_M[class_, 0]) | (observations.count[kept] < MIN_SHARE * tracks.points[held])
     lost[held] = odd & (tracks.posterior[held, class_] >= LIKELY)
-    k = lost[pairs.rows].nonzero()[0]
+    k = (lost[pairs.rows] & (pairs.around > MIN_COVERAGE)).nonzero()[0]
     if not len(k):
-        return k, k, label
+        return NO_PIECES
+    k = k[pairs.around[k].argsort(kind="stable")]
     rows, hosts = pairs.rows[k], pairs.proposals[k]
-    expected, kdop = tracks.predicted_kdops(rows), observations.kdop.take(hosts, axis=1)
-    covered = coverage(expected, kdop)
-    longer = widths(kdop).max(axis=0, initial=0.0) > widths(expected).max(axis=0, initial=0.0) + LONGER_M
-    order = covered.argsort(kind="stable")
-    order = order[(longer & (covered > MIN_COVERAGE))[order]]
-    best = np.full(len(tracks), NONE)
-    best[rows[order]] = hosts[order]  # the last written covers most
+    length_m, expected_m = (
+        widths(kdop).max(axis=0) for kdop in (observations.kdop.take(hosts, axis=1), tracks.predicted_kdops(rows))
+    )
+    longer, best = length_m > expected_m + LONGER_M, np.full(len(tracks), NONE)
+    best[rows[longer]] = hosts[longer]  # the last written covers most
     rows = (best != NONE).nonzero()[0]
     if not len(rows):
-        return rows, rows, label
+        return NO_PIECES
     hosts, top = best[rows], tracks.top[rows]
     count = proposals.count[hosts]
     pair = np.arange(len(rows)).repeat(count)
@@ -280,52 +301,28 @@ def _split(
     below = (xyz[2] < top[pair] + PAD_M).nonzero()[0]
     member, pair, xyz = member[below], pair[below], xyz.take(below, axis=1)
     xy = xyz[:2] + placement.deskew(tracks.x.take(rows, axis=0)[:, :2]).T.take(pair, axis=1)
-    within = (DIRECTIONS.T @ xy <= (tracks.predicted_kdops(rows) + PAD_M).take(pair, axis=1)).all(axis=0)
-    member, pair, z = member[within], pair[within], xyz[2, within]
-    label[member[::-1]] = n + pair[::-1]  # the first of two that expect a point takes it
-    mine = label[member] == n + pair
-    member, pair = member[mine], pair[mine]
+    within = (DIRECTIONS.T @ xy <= (tracks.predicted_kdops(rows) + PAD_M).take(pair, axis=1)).all(axis=0).nonzero()[0]
+    member, first = np.unique(member[within], return_index=True)  # the first of two that expect a point takes it
+    pair, z = pair[within[first]], xyz[2, within[first]]
     size, highest = np.bincount(pair, minlength=len(rows)), np.full(len(rows), -np.inf)
-    np.maximum.at(highest, pair, z[mine])
+    np.maximum.at(highest, pair, z)
     splits = (size >= np.maximum(MIN_POINTS, MIN_SHARE * tracks.points[rows])) & (highest >= top - MAX_DROP_M)
     for these in (own[rows] == hosts, splits):  # a track keeps its proposal if the other pieces leave nothing else
         splits &= ~these | (count - np.bincount(hosts, size * splits, n)[hosts] >= MIN_POINTS)
-    label[member] = np.where(splits, n + splits.cumsum() - 1, hosts)[pair]
-    return rows[splits], hosts[splits], label
-
-
-def _locate(tracks: TrackTable, rows: Int, kdop: Float64, matches: Matches) -> Float64:
-    """(8, S) k-DOPs of the tracks (S,) whose pieces have (8, S) k-DOPs; writes the measured positions into matches.
-
-    A piece shows where its track is, by the ends at which nothing touches it, and nothing new of its shape.
-    """
-    x, expected = tracks.x.take(rows, axis=0)[:, :2].T, tracks.predicted_kdops(rows)
-    mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x
-    touched, gain = kdop > expected + (PAD_M - TOUCH_M), kdop - mean
-    both = touched & np.roll(touched, 4, axis=0)
-    gain = np.where(both, 0.0, np.where(touched, -np.roll(gain, 4, axis=0), gain))
-    before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
-    shift, covariance, end_variance = measured(mean, mean + gain, POSITION_SIGMA_M**2, before)
-    at = (matches.rows == rows[:, None]).argmax(axis=1)
-    matches.position[at] += shift
-    matches.covariance[at], matches.end_variance[at] = covariance, end_variance.T
-    return expected + DIRECTIONS.T @ shift.T
+    split = splits[pair]
+    return Pieces(rows[splits], hosts[splits], member[split], (splits.cumsum() - 1)[pair[split]])
 
 
 def _fit_together(a: Float64, b: Float64, size: Float64) -> Bool:
     """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer."""
-    yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
+    of_a = (a[:, 3] > b[:, 3])[:, None]
+    longer, other = np.where(of_a, a, b), np.where(of_a, b, a)
+    yaw, (x, y), half = longer[:, 6], (other[:, :2] - longer[:, :2]).T, longer[:, 3:5].T / 2
     c, s = np.cos(yaw), np.sin(yaw)
-    x, y = (b[:, :2] - a[:, :2]).T
     offset = np.array((x * c + y * s, y * c - x * s))
-    half_a, half_b = (_half_widths(box, yaw) for box in (a, b))
-    span = np.maximum(half_a, offset + half_b) - np.minimum(-half_a, offset - half_b)
+    (length, width), turn = other[:, 3:5].T / 2, yaw - other[:, 6]
+    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    reach = np.array((length * c + width * s, length * s + width * c))  # of the other, along the heading and across
+    span = np.maximum(half, offset + reach) - np.minimum(-half, offset - reach)
     fit: Bool = (np.maximum(*span) < size[:, 0]) & (np.minimum(*span) < size[:, 1])
     return fit
-
-
-def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
-    """(2, k) half extent of each box (k, 7) along a heading yaw and across it [m]."""
-    (length, width), turn = boxes[:, 3:5].T / 2, yaw - boxes[:, 6]
-    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
-    return np.array((length * c + width * s, length * s + width * c))

@@ -1,8 +1,9 @@
 """The finite-state machines of a proposal, as tables (Tables I and II, Figs. 3 and 6).
 
-A row says which event leads from which state to which. In each state an event has one row at most, so arrays of
-states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are extensions: the paper has
-no budget, so it has no object that waits for its first class, no second look at a final class, no background map.
+A row names an event, the state that it leaves and the state that it leads to. In each state an event has one row at
+most, so arrays of states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are
+extensions: the paper has no budget, so it has no object that waits for its first class, no second look at a final
+class, no background map.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ class UndefinedTransitionError(ValueError):
 
 
 class Event(IntEnum):
-    """Events in the life of a proposal and of its track."""
+    """Events that change the state of a proposal or track."""
 
     ASSOCIATED = 0
-    """Proposal and track found each other."""
+    """Proposal and track were associated."""
     UNASSOCIATED = 1
-    """They did not."""
+    """They were not."""
     EXPIRED = 2
     """The track went without a proposal for more than N frames."""
     JOINS_FINAL = 3
@@ -45,7 +46,7 @@ class Event(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where a proposal or track stands.
+    """A state of a proposal or track.
 
     Attributes:
         name: as in the paper's figure.

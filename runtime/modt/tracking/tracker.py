@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_SIZE_M
+from modt.class_sizes import IS_PERSON
 from modt.classes import PERSON_M, ObjectClass
 from modt.config import TrackingConfig
-from modt.geometry.kdop import AGREE_M, DIRECTIONS, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Association, Matches
@@ -16,7 +15,7 @@ from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.states import Event, StateMachine
-from modt.tracking.track_table import TrackTable
+from modt.tracking.track_table import NativeObserve, TrackTable, observe
 from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks
 
 ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS = 2.0, 0.3
@@ -27,8 +26,6 @@ STATIONARY_RADIUS_M, STATIONARY_SIGMA_MPS = 0.5, 1.0
 """A track this near to its rest position is stationary: the speed 0 is observed of it, with this deviation."""
 STOPPED_MPS, REST_GAIN = 0.5, 0.1
 """A moving track slower than this has a new rest position; weight of a new position in the rest position."""
-ENVELOPE_DECAY, MEAN_KDOP_DECAY = 0.98, 0.8
-"""Share kept a frame of an extent that is not seen again; greatest weight of the past in a mean k-DOP."""
 MIN_STEP_SHARE = 0.1
 """A time step shorter than this share of the period means a stalled clock."""
 
@@ -38,7 +35,7 @@ def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOM
     if config.association == "paper":
         from modt.tracking.paper_association import PaperAssociation
 
-        return PaperAssociation(config.paper)
+        return PaperAssociation()
     return KdopAssociation(kernels)
 
 
@@ -67,6 +64,7 @@ class Tracker:
         self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0)
         self._period_s = period_s
         self._regrouping = Regrouping(kernels)
+        self._observe = observe if kernels.library is None else NativeObserve(kernels.library)
         self._filter = filter_of(kernels, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS)
         position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
         self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
@@ -84,7 +82,7 @@ class Tracker:
         self._tracks, self.next_id = tracks.copy(), next_id
 
     def adopt(self, other: Tracker) -> None:
-        """Go on where another tracker stands."""
+        """Continue with the tracks and the time of another tracker."""
         self.restore(other.tracks, other.next_id)
         self._stamp_s = other._stamp_s
 
@@ -124,11 +122,10 @@ class Tracker:
         if self._extended:  # the paper takes proposals as they are
             frame = self._regrouping.regroup(self._tracks, frame, located.placement)
         known = self._tracks.box.take(frame.matches.rows, axis=0)
-        self._update(frame.matches, frame.observations)
-        self._tracks.observe_motion(frame.matches.rows, dt_s)
+        self._associate(frame.matches.rows)
+        self._update(frame.matches, frame.observations, dt_s)
         self._keep_top(frame, known)
         self._observe_rest(frame.matches.rows)
-        self._coast(frame.matches.rows)
         near = self._near_rest()
         self._withdraw(near)
         at_rest = self._background(near)
@@ -144,13 +141,14 @@ class Tracker:
             certain: (R,) whether the class of each is certain now.
         """
         t = self._tracks
-        if len(rows):
-            self._advance(rows, np.where(certain, Event.CLASSIFIED, Event.UNDECIDED))
+        self._advance(rows, np.where(certain, Event.CLASSIFIED.value, Event.UNDECIDED.value))
         return t.copy()
 
     def _advance(self, rows: Int, events: Event | Int) -> None:
-        """Move rows to the states that events lead to; the state says whether the class is final."""
+        """Move rows to the states that events lead to, and write whether the class is final there."""
         t = self._tracks
+        if not len(rows):
+            return
         t.state[rows] = self.machine.transition(t.state[rows], events)
         t.final[rows] = self.machine.final[t.state[rows]]
 
@@ -179,55 +177,45 @@ class Tracker:
         t = self._tracks
         creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
         t.unseen_s += self._period_s if creeps else dt_s
-        t.last_class = t.object_class
         self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
-    def _update(self, matches: Matches, observations: Observations) -> None:
-        """Equation 1's filter on the matched positions; the proposals take over the standing of their tracks."""
+    def _associate(self, rows: Int) -> None:
+        """Count hits and misses; proposals take over the standing of their tracks, the other tracks coast."""
+        t = self._tracks
+        events = np.full(len(t), Event.UNASSOCIATED.value)
+        events[rows] = Event.ASSOCIATED.value
+        self._advance(np.arange(len(t)), events)
+        t.state[rows] = self.machine.joined(t.state[rows])
+        t.age += 1
+        t.hits[rows] += 1
+        t.missed += 1
+        t.missed[rows], t.unseen_s[rows] = 0, 0.0
+        t.proposal[:] = NONE
+
+    def _update(self, matches: Matches, observations: Observations, dt_s: float) -> None:
+        """Equation 1's filter on the matched positions, and what the proposals show of their tracks."""
         t, rows = self._tracks, matches.rows
         self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
-        self._advance(rows, Event.ASSOCIATED)
-        t.state[rows] = self.machine.joined(t.state[rows])
-        t.missed[rows], t.unseen_s[rows] = 0, 0.0
-        t.hits[rows] += 1
         t.end_variance[rows] = matches.end_variance
-        about = self._record(rows, matches.proposals, observations, matches.position)
-        known = t.envelope.take(rows, axis=0)
-        envelope = np.maximum(about, ENVELOPE_DECAY * known + (1 - ENVELOPE_DECAY) * about)
-        merged = _oversized(t.last_class[rows], about)
-        envelope[merged] = known[merged]
-        t.envelope[rows] = envelope
-        off = t.mean_kdop.take(rows, axis=0) - about
-        weight = np.minimum(1.0 - 1.0 / t.hits[rows], MEAN_KDOP_DECAY)[:, None]
-        t.mean_kdop[rows] = about + (np.abs(off) < AGREE_M) * weight * off
+        self._observe(t, rows, matches.proposals, observations, matches.position, dt_s)
 
     def _keep_top(self, frame: Associated, known: Float64) -> None:
         """A person cut above is as high as in (R, 7) the boxes known before the frame: writes track and proposal."""
         t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
-        hidden_m = (known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2)
-        kept = IS_PERSON[t.last_class[rows]] & (hidden_m > 0)
-        if kept.any():
-            kept &= frame.proposals.cut[own] & Cut.TOP > 0
-        t.hidden[rows] = kept & (t.box[rows, 5] < PERSON_M / 2)
-        if not kept.any():
+        t.hidden[rows] = False
+        people = IS_PERSON[t.object_class[rows]].nonzero()[0]
+        people = people[frame.proposals.cut[own[people]] & Cut.TOP > 0]
+        if not len(people):
             return
-        for boxes, index in ((t.box, rows[kept]), (frame.proposals.box, own[kept])):
-            boxes[index, 2:6:3] += np.outer(hidden_m[kept], (0.5, 1.0))  # z of the middle, and height
-
-    def _record(self, rows: Int, proposals: Int, observations: Observations, position: Float64) -> Float64:
-        """Record what is observed of tracks (R,) at positions (R, 2); returns (R, 8) their k-DOPs about these [m]."""
-        t = self._tracks
-        kdop = observations.kdop.T.take(proposals, axis=0)
-        t.anchor[rows], t.kdop[rows], t.proposal[rows] = position, kdop, proposals
-        t.box[rows] = observations.box.take(proposals, axis=0)
-        t.points[rows] = observations.count[proposals]
-        t.bottom[rows], t.top[rows] = observations.bottom[proposals], observations.top[proposals]
-        about: Float64 = kdop - position @ DIRECTIONS
-        return about
+        rows, own, known = rows[people], own[people], known[people]
+        hidden_m = np.maximum((known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2), 0.0)
+        t.hidden[rows] = (hidden_m > 0) & (t.box[rows, 5] < PERSON_M / 2)
+        for boxes, index in ((t.box, rows), (frame.proposals.box, own)):
+            boxes[index, 2:6:3] += np.outer(hidden_m, (0.5, 1.0))  # z of the middle, and height
 
     def _observe_rest(self, rows: Int) -> None:
-        """Which tracks are near their rest position; a track that stopped rests where it is."""
+        """Write rest position and stationary of the rows; a track that stopped rests where it is."""
         t = self._tracks
         x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
         stopped = ((x[:, SPEED] < STOPPED_MPS) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
@@ -235,20 +223,9 @@ class Tracker:
         step = x[:, :2] - position
         near = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
         t.stationary[rows] = near & (hits > 2)
-        t.rest_position[rows] = position + REST_GAIN * near[:, None] * step
+        t.rest_position[rows] = position + (REST_GAIN * near)[:, None] * step
         if self._extended:
             self._filter.observe_speed(t.x, t.P, rows[near], 0.0, STATIONARY_SIGMA_MPS)
-
-    def _coast(self, matched: Int) -> None:
-        """Tracks without a proposal go on as predicted."""
-        t = self._tracks
-        t.age += 1
-        lost = np.ones(len(t), np.bool_)
-        lost[matched] = False
-        rows = lost.nonzero()[0]
-        t.proposal[rows] = NONE
-        t.missed[rows] += 1
-        self._advance(rows, Event.UNASSOCIATED)
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
@@ -258,15 +235,14 @@ class Tracker:
 
     def _background(self, near: Bool) -> Bool:
         """(M,) tracks that are finally background, and near their rest position."""
-        background: Bool = self._tracks.last_class == ObjectClass.BACKGROUND.value
+        background: Bool = self._tracks.object_class == ObjectClass.BACKGROUND.value
         return self._tracks.final & background & near
 
     def _withdraw(self, near: Bool) -> None:
         """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
         t = self._tracks
         rows = (t.inherited & (t.proposal != NONE) & ~near).nonzero()[0]
-        if len(rows):
-            self._advance(rows, Event.WITHDRAWN)
+        self._advance(rows, Event.WITHDRAWN)
 
     def _expire(self, at_rest: Bool) -> Int:
         """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
@@ -287,21 +263,12 @@ class Tracker:
         t.id[new] = self.next_id + np.arange(len(new))
         self.next_id += len(new)
         t.state[new] = self.machine.proposal
-        self._advance(new, np.where(known, Event.ASSOCIATED, Event.UNASSOCIATED))
+        self._advance(new, np.where(known, Event.ASSOCIATED.value, Event.UNASSOCIATED.value))
         self._advance(new[known], Event.JOINS_FINAL)
-        position = self.association.initial_position(observations)[proposals]
+        position = self.association.initial_position(observations).take(proposals, axis=0)
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
-        t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
-        t.lagged_kdop[new], t.size_m[new] = t.kdop[new], t.box[new, 3:6]
-        t.observe_motion(new, 0.0)
-
-
-def _oversized(object_class: Int, kdop: Float64) -> Int:
-    """Indices of objects, by classes (n,) and k-DOPs (n, 8), that are longer than their class: merged with others."""
-    objects: Int = (object_class != ObjectClass.BACKGROUND.value).nonzero()[0]
-    longer: Bool = (
-        widths(kdop.take(objects, axis=0).T).max(axis=0, initial=0.0) > MAX_SIZE_M[object_class[objects], 0]
-    )
-    return objects[longer]
+        t.lagged_kdop[new] = observations.kdop.T.take(proposals, axis=0)
+        t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]
+        self._observe(t, new, proposals, observations, position, 0.0)

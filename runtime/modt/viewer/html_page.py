@@ -20,7 +20,6 @@ LIVE = _PAGE / "live.js"
 def content(states: list[theme.Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
     """Content of a page: columns, legends, budget of a frame, width of a cell (None without points)."""
     return {
-        "schema": "modt.player/2",
         "columns": [(name, SCALE.get(name, 1)) for name in COLUMNS],
         "classes": theme.classes(),
         "states": states,

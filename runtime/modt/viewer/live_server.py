@@ -7,12 +7,11 @@ import threading
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler
 from ipaddress import ip_address
-from queue import Empty, Queue
 from socketserver import ThreadingTCPServer
 
 _Request = socket.socket | tuple[bytes, socket.socket]
 
-MOST_CLIENTS, MOST_CONNECTIONS = 8, 32
+MOST_PAGES, MOST_CONNECTIONS = 8, 32
 """Most pages that receive events, and most connections, each with its thread."""
 SEND_S = 5.0
 """A client that takes nothing for so long is disconnected [s]."""
@@ -20,25 +19,6 @@ POLL_S = 0.1
 """Interval between two checks for the end of the server [s]."""
 ALIVE_S = 10.0
 """Longest time without an event before a comment keeps a connection open [s]."""
-
-
-class Client:
-    """Mailbox of a client, which holds the newest event alone; None ends the events."""
-
-    def __init__(self) -> None:
-        self._box: Queue[bytes | None] = Queue(1)
-
-    def put(self, event: bytes | None) -> None:
-        """Replace the event that has not been sent; one thread at a time may do this."""
-        with suppress(Empty):
-            self._box.get_nowait()
-        self._box.put_nowait(event)
-
-    def take(self) -> bytes | None:
-        """The next event, or a comment after ALIVE_S without one."""
-        with suppress(Empty):
-            return self._box.get(timeout=ALIVE_S)
-        return b": alive\n\n"
 
 
 class LiveServer(ThreadingTCPServer):
@@ -62,43 +42,51 @@ class LiveServer(ThreadingTCPServer):
         super().__init__((str(address[0]), int(address[1])), _Handler)
         local = ip_address(str(address[0])).is_loopback
         self.names = {"localhost", "127.0.0.1", "[::1]", host} if local else None
-        self._clients: set[Client] = set()
-        self._lock, self._free = threading.Lock(), threading.Semaphore(MOST_CONNECTIONS)
+        self._free, self._changed = threading.Semaphore(MOST_CONNECTIONS), threading.Condition()
+        self._event, self._number, self._pages, self._closed = b"", 0, 0, False
         threading.Thread(target=self.serve_forever, args=(POLL_S,), name="view", daemon=True).start()
 
     @property
     def watched(self) -> bool:
         """Whether a page is open."""
-        return bool(self._clients)
+        return self._pages > 0
 
     def publish(self, data: str) -> None:
-        """Hand an event to every client."""
-        event = f"data: {data.rstrip()}\n\n".encode()
-        with self._lock:
-            for client in self._clients:
-                client.put(event)
+        """Replace the event, which every page receives as soon as it has sent the one before."""
+        with self._changed:
+            self._event, self._number = f"data: {data.rstrip()}\n\n".encode(), self._number + 1
+            self._changed.notify_all()
 
-    def enter(self) -> Client | None:
-        """A new client, None where there are too many."""
-        with self._lock:
-            if len(self._clients) >= MOST_CLIENTS:
+    def enter(self) -> int | None:
+        """Count a page, and return the number of the last event before it; None where there are too many."""
+        with self._changed:
+            if self._pages >= MOST_PAGES:
                 return None
-            client = Client()
-            self._clients.add(client)
-            return client
+            self._pages += 1
+            return self._number
 
-    def leave(self, client: Client) -> None:
-        """Forget a client."""
-        with self._lock:
-            self._clients.discard(client)
+    def leave(self) -> None:
+        """Count a page no longer."""
+        with self._changed:
+            self._pages -= 1
+
+    def event_after(self, number: int) -> tuple[int, bytes] | None:
+        """Wait for an event after the one of a number, and return the newest with its number; None at the end.
+
+        After ALIVE_S without an event it is a comment.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self._number > number, ALIVE_S)
+            if self._closed:
+                return None
+            return self._number, self._event if self._number > number else b": alive\n\n"
 
     def close(self) -> None:
-        """Stop the server and disconnect its clients."""
+        """Stop the server and disconnect the pages."""
         self.shutdown()
-        with self._lock:
-            for client in self._clients:
-                client.put(None)
-            self._clients.clear()
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
         self.server_close()
 
     def verify_request(self, request: object, client_address: object) -> bool:
@@ -150,19 +138,20 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_error(404)
 
     def _events(self) -> None:
-        client = self.server.enter()
-        if client is None:
+        number = self.server.enter()
+        if number is None:
             self.send_error(503, "too many pages are open")
             return
         try:
             self._head("text/event-stream")
-            while (event := client.take()) is not None:
-                self.wfile.write(event)
+            while (event := self.server.event_after(number)) is not None:
+                number, text = event
+                self.wfile.write(text)
         except OSError:
             with suppress(OSError):
                 self.connection.close()
         finally:
-            self.server.leave(client)
+            self.server.leave()
 
     def _head(self, kind: str) -> None:
         self.send_response(200)

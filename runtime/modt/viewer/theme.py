@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from modt.classes import CLASS_NAMES, CLASSES
 from modt.energy.ledger import STAGES
@@ -50,6 +50,6 @@ def states(names: Iterable[str]) -> list[Entry]:
     return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
 
 
-def stages(names: Sequence[str] = STAGES) -> list[Entry]:
+def stages() -> list[Entry]:
     """Legend of the stages of a frame."""
-    return [{"name": name, "colour": COLOURS[k % len(COLOURS)]} for k, name in enumerate(names)]
+    return [{"name": name, "colour": colour} for name, colour in zip(STAGES, COLOURS, strict=True)]

@@ -36,7 +36,7 @@ def result_rows(result: FrameResult) -> Float64:
     """(M, COLUMNS) rows of the tracks of a result, at frame 0."""
     tracks, pose = result.tracks, planar(result.T_world_sensor)
     seen = tracks.proposal != NONE
-    box = tracks.box.copy()
+    box = tracks.box - [0, 0, result.T_world_sensor[2, 3], 0, 0, 0, 0]
     c, s = np.cos(pose[2]), np.sin(pose[2])
     dx, dy = (tracks.x[:, :2] - pose[:2]).T
     box[:, 0], box[:, 1], box[:, 6] = c * dx + s * dy, c * dy - s * dx, wrap(box[:, 6] - pose[2])

@@ -1,5 +1,3 @@
-import os
-
 import numpy as np
 import pytest
 
@@ -48,8 +46,7 @@ def test_an_invalid_line_is_refused_by_number(tmp_path, text):
         one(write(tmp_path, AB3DMOT + text))
 
 
-def test_files_of_a_folder_are_regular_ones_and_missing_ones_refused(tmp_path):
-    os.mkfifo(tmp_path / "0002.txt")
+def test_a_folder_without_files_and_a_missing_file_are_refused(tmp_path):
     with pytest.raises(MisuseError, match=r"no \.txt"):
         files(tmp_path)
     write(tmp_path, "")

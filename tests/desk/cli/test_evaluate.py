@@ -62,25 +62,6 @@ def test_a_wider_sector_and_cut_objects_count_on_request(drives, capsys):
     assert called[0] < called[1]
 
 
-def test_the_sector_is_that_of_the_truth(drives, tmp_path, capsys):
-    """A drive that is annotated on all sides is judged all round, and the report says so."""
-    around = drive_and_run(tmp_path, seconds=0.3, options=("--all-around",))
-    chosen = (*around, "--sector", "60")
-    first = [evaluated(capsys, *arguments).split("\n")[0] for arguments in (drives["vlp-16"], around, chosen)]
-    assert ["all round" in line for line in first] == [False, True, False]
-    assert ["within 40 degrees" in first[0], "within 60 degrees" in first[2]] == [True, True]
-
-
-def test_further_objects_are_added(drives, tmp_path, capsys):
-    rows = "".join(f"{frame},1,Pedestrian,9,0,-1.7,1,1,2,0\n" for frame in (0, 1))
-    (tmp_path / "more.csv").write_text(f"{COLUMNS}\n{rows}")
-    more = ("--further", tmp_path / "more.csv")
-    assert "--further adds 1 of them, in 2 labels" in evaluated(capsys, *drives["vlp-16"], *more)
-    assert "leave out road users" in evaluated(capsys, *drives["vlp-16"])
-    found = json.loads(evaluated(capsys, *drives["vlp-16"], *more, "--json"))["sensors"]["vlp-16"]
-    assert (found["further_objects"], found["further_labels"], found["complete"]) == (1, 2, False)
-
-
 def test_misuse_is_one_line_with_the_remedy(drives, tmp_path, capsys):
     run, truth = drives["vlp-16"]
     lines = (run / "tracks.jsonl").read_text().splitlines(keepends=True)
@@ -106,7 +87,6 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path, capsys):
         ((run, drives["hdl-32e"][1]), "labels for a scan of"),
         ((run,), "are no pairs"),
         ((tmp_path, truth), "describes no run"),
-        ((run, tmp_path), "holds no labels that are recognised"),
         ((run, truth, "--further", broken), "broken.csv:2: 'Tree' is no type of an object"),
         ((run, truth, run, truth, "--further", broken), "--further: is for one drive"),
         ((run, truth, "--json", "--unlabelled", "found"), "makes a list, and no evaluation"),

@@ -39,28 +39,9 @@ def test_misuse_is_one_line_and_status_2(capsys, arguments, named):
     assert named in refusal(capsys, "profile", "fit", *arguments)
 
 
-@pytest.mark.parametrize(
-    ("asked", "used", "warning"),
-    [
-        ((), "as found", "--profile vlp-16"),
-        (("raspberry-pi-5",), "as found", "--profile vlp-16"),
-        (("hdl-64e",), "hdl-64e", "used all the same"),
-        (("vlp-16",), "vlp-16", ""),
-    ],
-    ids=["default", "a board", "another sensor", "the sensor"],
-)
-def test_another_sensor_than_the_profiles_is_recognised_and_used_unless_one_is_asked_for(
-    scans, asked, used, warning, tmp_path, caplog
-):
-    options = (word for name in asked for word in ("--profile", name))
-    assert here("replay", scans, "--quiet", *options, "--out", tmp_path / "run") == 0
-    assert len(caplog.records) == bool(warning)
-    assert warning in caplog.text
+def test_a_sensor_that_is_asked_for_is_used_with_a_warning_where_it_does_not_fit(scans, tmp_path, caplog):
+    assert here("replay", scans, "--quiet", "--profile", "hdl-64e", "--out", tmp_path / "run") == 0
+    assert "used all the same" in caplog.text
     facts = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())
-    assert facts["recognition"]["used"] == used
-    if used == "as found":
-        assert facts["profile"]["sensor"]["elevation_step_deg"] == pytest.approx(2.0, rel=0.02)
-        board = profile.load(list(asked)).energy.board if asked else profile.load().energy.board
-        assert facts["profile"]["energy"]["board"] == board
-    else:
-        assert facts["profile"] == profile.dump(profile.load(used))
+    assert facts["recognition"]["used"] == "hdl-64e"
+    assert facts["profile"] == profile.dump(profile.load("hdl-64e"))

@@ -11,13 +11,10 @@ import numpy as np
 import pytest
 
 from modt.classes import CLASS_NAMES
-from modt.ros2.point_cloud2 import write_cloud
-from modt.sources.recognise import open_scans
 from modt_desk.reporting.run_report import run_tree
 from modt_desk.viewer.recorded_run import RecordedRun
 from tests.cli.commands import environment, here, modt, refusal
 from tests.desk.recorded import drive_and_run
-from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.viewer.chromium import LOADED, WIDE
 from tests.viewer.pages import Page
 
@@ -116,14 +113,6 @@ def test_stamps_from_1970_are_times_and_fit_a_narrow_page(run, records, tmp_path
         round_ = "Math.abs(canvas.width / canvas.clientWidth - canvas.height / canvas.clientHeight)"
         assert tab.value(round_) < 0.01
     assert "frame 9, 2014-05-13 16:53:20.90, mode" in (dated / "view-9.svg").read_text()
-
-
-def test_playing_ends_at_the_last_frame(run, chromium):
-    with chromium.tab((run / "view.html").as_uri()) as tab:
-        tab.value("speed.value = 4")
-        tab.press(" ")
-        tab.until("!state.playing && state.at === last")
-        assert tab.value("element('play').textContent") == "Play"
 
 
 def test_pointing_at_a_track_tells_its_story(run, records, chromium):
@@ -272,19 +261,6 @@ def test_truth_beside_the_source_is_marked_and_drawn(labelled, tmp_path, chromiu
     assert "foundmissednot judgedfalse" in shown["legends"]
 
 
-def test_truth_of_a_recording_is_given_by_its_frame_numbers(labelled, tmp_path):
-    _, drive = labelled
-    recorded = [
-        ("/points", CLOUD, BEGAN_S + frame.stamp_s, write_cloud(BEGAN_S + frame.stamp_s, "lidar", frame.points))
-        for frame in open_scans(drive)
-    ]
-    path, run = write_mcap(tmp_path / "drive", recorded), tmp_path / "run"
-    assert here("replay", path, "--profile", "vlp-16", "--quiet", "--labels", "--out", run) == 0
-    frames = viewed(run, "--truth", drive)
-    assert [len(frame["truth"]) > 0 for frame in frames] == [True] * 15
-    assert np.mean([o == "found" for o in outcomes(frames)]) > 0.2
-
-
 def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled, tmp_path, caplog, capsys):
     exact, drive = labelled
     live = shutil.copytree(exact, tmp_path / "live")
@@ -293,12 +269,15 @@ def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled,
     (live / "run.yaml").write_text(f"{text}service: true\n")
     lines = [json.loads(line) for line in (live / "tracks.jsonl").read_text().splitlines()]
     moved = [line | {"frame": line["frame"] + 100, "stamp_s": line["stamp_s"] + 1e9} for line in lines]
+    moved[-1]["stamp_s"] += 0.06  # farther than half a period from any scan
     (live / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in moved))
     viewed(live)
     assert "a live source cannot be read again" in capsys.readouterr().err + caplog.text
-    pairs = zip(outcomes(viewed(live, "--truth", drive)), outcomes(viewed(exact)), strict=True)
-    assert np.mean([a == b for a, b in pairs]) > 0.95
-    assert min(len(cell) for cell, _ in Page(live / "view.html").points) > 1000
+    by_stamp, by_number = viewed(live, "--truth", drive), viewed(exact)
+    assert "truth" not in by_stamp.pop()
+    by_number.pop()
+    assert np.mean([a == b for a, b in zip(outcomes(by_stamp), outcomes(by_number), strict=True)]) > 0.95
+    assert sum(len(cell) > 1000 for cell, _ in Page(live / "view.html").points) == len(by_stamp)
 
 
 def test_misuse_is_one_line_with_the_remedy(run, tmp_path, capsys):

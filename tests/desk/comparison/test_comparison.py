@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from modt.config import EnergyConfig
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions, model_meter
 from modt.energy.windows import Clocks, Windows
@@ -55,9 +56,9 @@ def test_counts_of_first_further_and_reacquired_views_and_lives_of_tracks():
         "foreground": [2, 1, 2, 0, 0, 1],
     }
     assert {name: one.counts()[:, COUNTS.index(name)].tolist() for name in expected} == expected
-    assert one.lives.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}, "frames with a proposal"
+    assert one.lengths.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}, "frames with a proposal"
     counts = total(one.counts())
-    assert (counts.tracks, counts.n_go) == (one.lives.count, pytest.approx(one.lives.mean))
+    assert (counts.tracks, counts.n_go) == (one.lengths.count, pytest.approx(one.lengths.mean))
 
 
 @pytest.mark.parametrize(
@@ -79,7 +80,7 @@ def test_meters_are_read_at_the_ends_of_turns():
         return now[0]
 
     clocks = Clocks(tick, tick, tick)
-    metered = [Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), min_s=1e9) for _ in "ab"]
+    metered = [Windows([model_meter(EnergyConfig(), tick, tick)], clocks, Conditions(), min_s=1e9) for _ in "ab"]
     made = [mode_run(name, [], windows=windows) for name, windows in zip("ab", metered, strict=True)]
     interleave(FRAMES, made, turn=3)
     for each in made:

@@ -13,20 +13,7 @@ GAMMA = slice(3, None)
 FRAMES = 240
 
 
-def run_costs(
-    counts: dict[str, np.ndarray], costs: dict[str, np.ndarray], random: np.random.Generator, noise: float
-) -> RunCosts:
-    """A run of these counts by name and costs by stage [s]."""
-    n = len(counts["proposals"])
-    table, cost = np.zeros((n, len(COUNTS)), np.int64), np.zeros((n, len(STAGES)))
-    for name, value in counts.items():
-        table[:, COUNTS.index(name)] = value
-    for stage, value in costs.items():
-        cost[:, STAGES.index(stage)] = value
-    return RunCosts(table, cost * (1 + noise * random.standard_normal(cost.shape)))
-
-
-def run(mode: str, seen: np.ndarray, n_go: float, random: np.random.Generator) -> RunCosts:
+def run(mode: str, seen: np.ndarray, n_go: float, random: np.random.Generator, noise: float) -> RunCosts:
     """A run of known costs on (F, 3) proposals, new tracks, points of the sweep."""
     proposals, started, sweep_points = seen.T
     classified = {
@@ -51,18 +38,23 @@ def run(mode: str, seen: np.ndarray, n_go: float, random: np.random.Generator) -
         "scheduling": SCHEDULE_S[0] + SCHEDULE_S[1] * (proposals + 2),
         "classification": np.stack([classified > 0, classified, network], 1) @ CLASS_S,
     }
-    return run_costs(counts, costs, random, 0.05)
+    table, cost = np.zeros((FRAMES, len(COUNTS)), np.int64), np.zeros((FRAMES, len(STAGES)))
+    for name, value in counts.items():
+        table[:, COUNTS.index(name)] = value
+    for stage, spent_s in costs.items():
+        cost[:, STAGES.index(stage)] = spent_s
+    return RunCosts(table, cost * (1 + noise * random.standard_normal(cost.shape)))
 
 
-def stream(seed: int, n: int = 40, n_go: float = 20.0, points: int = 100_000) -> Stream:
-    """Four in five new tracks ask for a class."""
+def stream(seed: int, n: int = 40, n_go: float = 20.0, points: int = 100_000, noise: float = 0.05) -> Stream:
+    """A stream on which four in five new tracks ask for a class."""
     random = np.random.default_rng(seed)
     proposals = np.maximum(random.poisson(n, FRAMES), 1)
     started = random.poisson(n / n_go, FRAMES)
     started[0] = n
     seen = np.column_stack([proposals, started, random.normal(points, points / 50, FRAMES).astype(int)])
     modes = ("conventional", "efficient", "accurate", "varied")
-    runs = {mode: run(mode, seen, n_go, random) for mode in modes}
+    runs = {mode: run(mode, seen, n_go, random, noise) for mode in modes}
     seen = runs["conventional"].counts[:, [COUNTS.index(name) for name in OBSERVED]]
     asked = random.binomial(seen[:, OBSERVED.index("tracks")], 0.8)
     return Stream(runs, np.column_stack([seen, asked, asked]))

@@ -14,7 +14,7 @@ NAMED = {"Car": 1, "Van": 1, "Pedestrian": 2, "Person_sitting": 2, "Cyclist": 3}
 
 
 def shares(frame):
-    """Of each object: type, identity, its points, and how many of them each proposal holds."""
+    """Type, identity and number of points of each object, and how many of them each proposal holds."""
     for name, id_, box in zip(frame.truth.type_, frame.truth.id.tolist(), frame.truth.box, strict=True):
         own = inside(frame.points, box)
         yield name, id_, int(own.sum()), Counter(frame.proposal[own & (frame.proposal >= 0)].tolist())

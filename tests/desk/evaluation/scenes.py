@@ -3,7 +3,9 @@
 import numpy as np
 
 from modt.classes import CLASS_NAMES
+from modt_desk.evaluation.evaluation import Evaluation, collect, evaluation
 from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.rules import KITTI_RULES
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
 
 CERTAIN = {name: np.eye(4)[k] * 0.96 + 0.01 for k, name in enumerate(CLASS_NAMES)}
@@ -44,3 +46,8 @@ def cars(*places: float, first_id: int = 0, **more) -> FrameTruth:
     """Cars ahead."""
     ids = list(range(first_id, first_id + len(places)))
     return FrameTruth.of(KITTI_TYPES, ids, ["Car"] * len(places), [car(x) for x in places], **more)
+
+
+def score(frames, rules=KITTI_RULES) -> Evaluation:
+    """The evaluation of one drive."""
+    return evaluation([collect(frames, rules)])

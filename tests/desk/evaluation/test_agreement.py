@@ -9,13 +9,13 @@ from modt import profile
 from modt.app import assembly
 from modt.geometry import FieldOfView
 from modt.sources.recognise import open_stream
-from modt_desk.evaluation.evaluation import score
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.rules import KITTI_RULES
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
 from modt_desk.evaluation.truth_files import open_truth
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.desk.evaluation.reference import life, precision_of_ranking, recall
+from tests.desk.evaluation.scenes import score
 
 ALL_COUNTS = dataclasses.replace(KITTI_RULES, ignored=frozenset({"parked"}))
 

@@ -1,16 +1,9 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from modt_desk.evaluation.class_score import (
-    average_precision,
-    expected_calibration_error,
-    top_calibration_error,
-)
-from modt_desk.evaluation.evaluation import score
+from modt_desk.evaluation.class_score import expected_calibration_error, top_calibration_error
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
-from tests.desk.evaluation.scenes import blob, car, cars, frame
+from tests.desk.evaluation.scenes import blob, car, cars, frame, score
 
 
 def posterior(car):
@@ -53,22 +46,3 @@ def test_calibration():
     sure = np.array([posterior(1.0), posterior(1.0), posterior(0.0)])
     assert top_calibration_error(sure, np.array([1, 1, 0])) == 0
     assert top_calibration_error(sure, np.array([1, 0, 0])) == pytest.approx(1 / 3)
-
-
-@given(st.lists(st.tuples(st.integers(0, 3), st.floats(0, 1)), min_size=1, max_size=40), st.integers(0, 5))
-def test_average_precision_agrees_with_the_definition(rows, missed):
-    label = np.array([r[0] for r in rows])
-    value = np.array([r[1] for r in rows])
-    probability = np.c_[1 - value, value, np.zeros((len(rows), 2))]
-    truth = np.bincount(label, minlength=4)
-    truth[1] += missed
-    order = np.argsort(-value, kind="stable")
-    points, true = [], 0
-    for k, i in enumerate(order, start=1):
-        true += label[i] == 1
-        points.append((true / max(truth[1], 1), true / k))
-    area, before = 0.0, 0.0
-    for k, (recall, _) in enumerate(points):
-        area += (recall - before) * max(p for _, p in points[k:])
-        before = recall
-    assert average_precision(probability, label, truth)["car"] == pytest.approx(area, abs=1e-3)

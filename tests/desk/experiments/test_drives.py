@@ -1,6 +1,7 @@
 import pytest
 
 from modt.errors import MisuseError
+from modt_desk.evaluation.rules import KITTI_RULES
 from modt_desk.evaluation.truth import Role
 from modt_desk.experiments.catalogue import chosen
 from modt_desk.experiments.drives import completed, kitti_drives
@@ -19,6 +20,8 @@ def test_further_objects_make_another_drive_of_the_one_that_has_its_sweeps(tmp_p
     before, after = drives[0].labels()[0], whole.labels()[0]
     added = after.role == Role.FURTHER
     assert added.sum() == 1
+    assert [frame.index for frame, _ in whole.sweeps()] == [0, 1]
+    assert (whole.fov().full, whole.rules()) == (False, KITTI_RULES)
     assert not set(after.id[added]) & set(before.id), "its number may be that of a label"
     streams = {name for name, _ in Study([], [*drives, whole], [()])._streams(chosen(["table4"])[0])}
     assert streams == {drives[0].name, whole.name}

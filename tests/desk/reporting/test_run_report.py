@@ -22,6 +22,7 @@ from modt_desk.reporting.energy_plots import stage_energy_mJ
 from modt_desk.reporting.quantity import to_json
 from modt_desk.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
 from modt_desk.reporting.run_sums import FrameSeries, FrameSums
+from tests.results import CAR, frame_record, result
 
 
 def run_text(tree):
@@ -59,20 +60,14 @@ def row(calls, items, ms, points=0):
     return {"calls": calls, "items": items, "points": points, "wall_ns": ms * MS, "cpu_ns": ms * MS}
 
 
+CAR_AND_BACKGROUND = result(0, [40, 40], {0: 0, 1: 1}, {0: CAR})
+CAR_AND_BACKGROUND.tracks.key_points[0], CAR_AND_BACKGROUND.tracks.final[0] = 40, True
+CAR_AND_BACKGROUND.tracks.points[:], CAR_AND_BACKGROUND.tracks.age[:] = 40, 1
+NAMED, NAMELESS = frame_record(CAR_AND_BACKGROUND)["tracks"]
+
+
 def track(id_, proposal, named):
-    return {
-        "id": id_,
-        "state": "tracked",
-        "class": "car" if named else "background",
-        "posterior": [0.1, 0.7, 0.1, 0.1] if named else [0.25] * 4,
-        "witness": [0.0] * 4,
-        "viewed": named,
-        "final": named,
-        "proposal": proposal,
-        "points": 40,
-        "age": 1,
-        "missed": 0,
-    }
+    return {**(NAMED if named else NAMELESS), "id": id_, "proposal": proposal}
 
 
 def window(index, lines, energy_J, kind="measured", marks=()):
@@ -86,13 +81,11 @@ def window(index, lines, energy_J, kind="measured", marks=()):
         "frames": [lines[0]["frame"], lines[-1]["frame"], len(lines)],
         "wall_ns": sum(line["wall_ns"] for line in lines),
         "process_ns": sum(line["cpu_ns"] for line in lines),
-        "overhead_ns": 0,
-        "idle_ns": 0,
         "stages": stages,
         "energy_J": energy_J,
         "kind": kind,
         "resolution_J": 1e-4,
-        "meters": [{"name": "RAPL packages", "kind": kind, "scope": "CPU packages", "J": energy_J}],
+        "meters": [{"name": "RAPL packages"}],
         "conditions": {"governor": "performance", "frequency_MHz": 2600.0, "temperature_C": 50.0},
         "marks": list(marks),
     }

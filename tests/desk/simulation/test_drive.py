@@ -1,13 +1,12 @@
 """A synthetic drive on disk, read back like a recorded one."""
 
-import xml.etree.ElementTree as ET
-
 import numpy as np
 import pytest
 
 from modt.cli.main import main
 from modt.geometry import inverse
 from modt.sources.recognise import open_stream
+from modt_desk.evaluation.truth_files import open_truth
 from modt_desk.simulation.kitti_raw import DATE
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.desk.recorded import written
@@ -51,19 +50,13 @@ def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, tur
 
 
 def test_tracklets_hold_the_boxes_in_view_of_the_camera(drive):
-    writer, _, sweeps = drive
-    items = ET.parse(writer.drive / "tracklet_labels.xml").getroot().find("tracklets").findall("item")
-    assert len(items) > 3
-    assert {i.findtext("objectType") for i in items} <= {"Car", "Van", "Truck", "Pedestrian", "Cyclist"}
-    _, truth = sweeps[0]
-    places = truth.boxes[:, :2]
-    for item in items:
-        poses = item.find("poses").findall("item")
-        assert len(poses) == int(item.find("poses").findtext("count"))
-        if item.findtext("first_frame") == "0":
-            at = [float(poses[0].findtext(k)) for k in ("tx", "ty")]
-            assert np.linalg.norm(places - at, axis=1).min() < 1e-6
-            assert at[0] > 0
+    writer, _, ((_, truth), *_) = drive
+    labelled = open_truth(writer.drive).frames[0]
+    assert len(labelled.id) > 3
+    off = np.linalg.norm(labelled.box[:, None, :6] - truth.boxes[:, :6], axis=2)
+    assert off.min(axis=1).max() < 1e-5
+    assert labelled.box[:, 0].min() > 0
+    assert set(labelled.type_) <= {"Car", "Van", "Truck", "Pedestrian", "Cyclist"}
 
 
 def test_labels_hold_class_and_instance(drive):

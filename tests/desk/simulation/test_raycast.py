@@ -51,7 +51,7 @@ def test_windows_contain_every_ray_that_hits(seed):
             near = super().windows(solids)
             n = len(solids)
             whole = np.tile([0, 16], (n, 1)), np.tile([0, 1808], (n, 1))
-            return type(near)(np.arange(n), *whole, np.zeros(n, np.float32), 1808)
+            return type(near)(np.arange(n), *whole, np.zeros(n, np.float32))
 
     solids, depth = scene(seed, n=6), np.ones_like(NO_GROUND)
     found, whole = (

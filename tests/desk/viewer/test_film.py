@@ -11,7 +11,7 @@ pytest.importorskip("matplotlib", reason="needs the extra [view]")
 from matplotlib.transforms import Bbox  # noqa: E402
 
 from modt.errors import ModtError  # noqa: E402
-from modt_desk.viewer import film, picture  # noqa: E402
+from modt_desk.viewer import picture  # noqa: E402
 
 N, WIDTH, SIZE = 5, 128, (128, 91)
 BLUE = (0, 0, 255)
@@ -36,7 +36,7 @@ def left_edge(image):
 def film_of(path):
     figure = picture.new_figure(WIDTH)
     rest = drawings(figure)
-    film.save_film(path, next(rest), rest, 0.1)
+    picture.save_film(path, next(rest), rest, 0.1)
 
 
 def test_a_gif_shows_every_drawing_as_long_as_it_stays(tmp_path):

@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from modt.classes import CLASS_NAMES
+from modt.geometry import rotation_zyx, se3
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.evaluation.recorded_result import recorded_result
-from modt_desk.viewer.recorded_tracks import frame_rows, reach_m, track_table
+from modt_desk.viewer.recorded_run import frame_rows, reach_m, track_table
 
 
 def track(id_, box, world, state="tracked", class_="car"):
@@ -26,17 +27,17 @@ def posts(x):
 
 
 def recorded(at, *tracks, **more):
-    """The result of a line of tracks.jsonl."""
-    counts = {"proposals": 1, "classifications": 0, "deferred": 0, "T_world_sensor": np.eye(4)[:3].ravel().tolist()}
+    """The result of a line of tracks.jsonl, `at` metres along the world's x, where the sensor looks along its y."""
+    T = se3(rotation_zyx(0.0, 0.0, np.pi / 2), np.array([at, 0.0, 0.0]))
+    counts = {"proposals": 1, "classifications": 0, "deferred": 0, "T_world_sensor": T[:3].ravel().tolist()}
     return recorded_result({"frame": at, "stamp_s": 0.0, "tracks": [*tracks], **counts, **more})
 
 
 def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     seen, lost = track(3, (4, 0, -1, 4.5, 1.8, 1.5, 0.5), (0, 4, 0, 1.0)), track(3, None, (0, 6, 0, 1.0), "lost")
     records = [recorded(0, *posts(0.0), seen, classified=[3]), recorded(1, lost, *posts(1.0))]
-    states: list[str] = []
-    poses = np.array([[0, 0, np.pi / 2], [1, 0, np.pi / 2]])
-    table = track_table((frame_rows(at, record, states) for at, record in enumerate(records)), poses)
+    states, boxes = list[str](), dict[int, np.ndarray]()
+    table = track_table(frame_rows(at, record, states, boxes) for at, record in enumerate(records))
     assert states == ["tracked", "lost"]
     rows = [dict(zip(COLUMNS, row, strict=True)) for row in table.tolist()]
     assert [(row["id"], row["at"]) for row in rows] == [(3, 0), (3, 1), (7, 0), (7, 1), (8, 0), (8, 1)]
@@ -44,6 +45,7 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     assert [rows[1][key] for key in BOX_KEYS] == [600, 100, -100, 450, 180, 150, 500]
     assert [rows[0][f"p_{name}"] for name in CLASS_NAMES] == [100, 700, 150, 50]
     assert [rows[0][f"motion_{name}"] for name in CLASS_NAMES] == [0, 150, -60, 20]
+    assert [rows[1][f"world_{key}"] for key in WORLD_KEYS] == [0, 600, 0, 100]
 
 
 def rows(x, y=0.0, seen=1):
@@ -64,7 +66,7 @@ FAR, LOST = rows([60]), rows([60] * 50, seen=0)
         (rows([3, 1], [0, 12]), 20.0),
         (rows([-25], [2]), 30.0),
         (rows([80], [2]), REACH_M),
-        (track_table([], np.zeros((0, 3))), REACH_M),
+        (track_table([]), REACH_M),
         (np.concatenate([rows(np.linspace(-8, 8, 40)), FAR, LOST]), 10.0),
     ],
     ids=["room", "hall", "street", "beyond", "no track", "one far and lost ones"],

@@ -35,7 +35,6 @@ def shown(history):
         numbers=[100 + k for k in range(len(history))],
         states=STATES,
         frames=[{}] * len(history),
-        call_mJ=lambda frame: {},
     )
     text = track_page(run, [row(at, *entry) for at, entry in enumerate(history)], {})
     plain = unescape(re.sub(r"<[^>]+>", " ", text))

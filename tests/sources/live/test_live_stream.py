@@ -1,8 +1,8 @@
 """The newest sweep is handed over; everything else is counted."""
 
 import logging
-import threading
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,27 +13,17 @@ from modt.sources.stream import Reception, StreamEndedError, StreamInfo, Sweep
 INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
 
 
-class ScriptedReader:
-    """Hands over batches of sweeps, one a call, and raises those that are errors."""
+def scripted(*batches: Sequence[Sweep] | Exception) -> SimpleNamespace:
+    """A reader that hands over batches of sweeps, one a call, and raises those that are errors."""
+    waiting = list(batches)
 
-    profile = None
-
-    def __init__(self, *batches: Sequence[Sweep] | Exception) -> None:
-        self.reception = Reception()
-        self._batches = list(batches)
-        self._closed = threading.Event()
-
-    def read(self, timeout_s: float) -> Sequence[Sweep]:
-        if not self._batches:
-            self._closed.wait(timeout_s)
-            return []
-        batch = self._batches.pop(0)
+    def read(timeout_s: float) -> Sequence[Sweep]:
+        batch = waiting.pop(0) if waiting else []
         if isinstance(batch, Exception):
             raise batch
         return batch
 
-    def close(self) -> None:
-        self._closed.set()
+    return SimpleNamespace(profile=None, reception=Reception(), read=read, close=lambda: None)
 
 
 def sweep(stamp_s: float, *, complete: bool = True, x: float = 5.0) -> Sweep:
@@ -45,7 +35,7 @@ class Driven:
 
     def __init__(self):
         self.now_s = 0.0
-        self.stream = LiveStream(INFO, ScriptedReader(), clock=lambda: self.now_s)
+        self.stream = LiveStream(INFO, scripted(), clock=lambda: self.now_s)
 
     def sweep(self, after_s, stamp_s, x=5.0):
         """The frame of a sweep that arrives after some time; None where it is refused."""
@@ -97,7 +87,7 @@ def test_unusable_sweeps_are_faults_and_the_next_good_one_is_taken(driven, caplo
 
 def test_a_failure_of_the_receiving_thread_costs_a_message_and_the_end_comes_after_the_last_sweep(caplog):
     failures = RuntimeError("broken"), [None], RuntimeError("broken"), OSError("down")
-    stream = LiveStream(INFO, ScriptedReader(*failures, [sweep(1.0)], StreamEndedError()), clock=lambda: 0.0)
+    stream = LiveStream(INFO, scripted(*failures, [sweep(1.0)], StreamEndedError()), clock=lambda: 0.0)
     stream.start()
     stream._thread.join(60.0)
     assert stream.take(60.0).frame.stamp_s == 1.0

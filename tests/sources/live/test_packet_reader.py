@@ -4,23 +4,17 @@ import socket
 import time
 from contextlib import ExitStack
 from itertools import islice
+from types import SimpleNamespace
 
 import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
-from modt.sources.packets.capture import open_capture
 from modt.sources.packets.hesai import HesaiDecoder
 from modt.sources.packets.livox import LivoxDecoder
-from modt.sources.stream import Reception
 from tests.sources.packets.simulated import decoded, packets
 from tools.send.loops import endless
-from tools.send.packets import send
-from tools.send.pcap_writer import write_capture
-
-MAKERS = {"vlp-16": "velodyne", "xt-32": "hesai", "mid-360": "livox"}
-"""Schemes of simulated models."""
 
 
 @pytest.fixture
@@ -43,16 +37,8 @@ def now():
     return pytest.approx(time.time(), abs=60.0)
 
 
-class EchoDecoder:
-    """Each packet is a sweep."""
-
-    name, profile, elevations_deg = "sensor", None, None
-
-    def decode(self, received_s: float, payload: bytes, reception: Reception) -> list[object]:
-        return [(received_s, payload)]
-
-    def pause(self, reception: Reception) -> list[object]:
-        return []
+ECHO = SimpleNamespace(name="sensor", decode=lambda *packet: [packet[:2]], pause=lambda reception: [])
+"""A decoder whose sweeps are the packets, with the times of their reception."""
 
 
 @pytest.fixture(name="listen")
@@ -61,7 +47,7 @@ def listening(port):
     with ExitStack() as stack:
 
         def listen(*group, **options):
-            reader = PacketReader(bound_socket("sensor", port, *group), EchoDecoder(), **options)
+            reader = PacketReader(bound_socket("sensor", port, *group), ECHO, **options)
             stack.callback(reader.close)
             return reader
 
@@ -129,50 +115,6 @@ def test_a_port_or_host_that_cannot_be_used_is_refused(port):
         address_of("sensor", "nowhere.invalid")
     with pytest.raises(MisuseError, match=r"metadata; write ouster://HOST.*\?metadata=FILE"):
         open_sensor("ouster://:7502")
-
-
-def received(address, timed, to, n):
-    """The first n sweeps of a live stream, and the closed stream.
-
-    Each packet is sent when the one before has been received, and nothing counts as late on a busy machine.
-    """
-    live, frames = open_sensor(address), []
-    live._clock = live.reader._clock = lambda: 0.0
-
-    def take(timeout_s):
-        if (taken := live.take(timeout_s)) is not None:
-            frames.append(taken.frame)
-
-    def one_by_one():
-        until_s = time.monotonic() + 120
-        for k, packet in enumerate(timed, 1):
-            yield packet
-            while live.health()["messages"] < k and time.monotonic() < until_s:
-                time.sleep(0.0002)
-            take(0.0)
-
-    live.start()
-    send(one_by_one(), to)
-    for _ in range(n - len(frames)):
-        take(60.0)
-    live.close()
-    return frames, live
-
-
-@pytest.mark.parametrize("model", MAKERS)
-def test_sweeps_over_loopback_are_those_of_the_file(model, port, to, tmp_path):
-    timed = packets(model)[:-5]  # a file's last sweep does not wait for the packet after it
-    write_capture(tmp_path / "drive.pcap", timed, port)
-    began_s = timed[0][0]
-    file = list(open_capture(tmp_path / "drive.pcap", {}))
-    timed = [(at_s - began_s, payload) for at_s, payload in timed]
-    frames, live = received(f"{MAKERS[model]}://127.0.0.1:{port}", timed, to, len(file))
-    assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in file]
-    assert frames[-1].stamp_s == now()
-    assert live.reader.profile == model
-    health = live.health()
-    assert (health["messages"], health["lost_messages"], health["refused_messages"]) == (len(timed), 0, {})
-    assert (health["sweeps"], health["incomplete_sweeps"], health["dropped_sweeps"]) == (len(file), 0, 0)
 
 
 @pytest.mark.parametrize(("model", "made", "n"), [("xt-32", HesaiDecoder, 3000), ("mid-360", LivoxDecoder, 1000)])

@@ -8,7 +8,7 @@ import pytest
 from modt.schemes import open_sensor
 from modt.types import Frame
 from tests.ros2 import messages
-from tests.ros2.network import FAR, NEAR, Scripted, until
+from tests.ros2.network import FAR, NEAR, Scripted, has_sender, until
 
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds
@@ -92,7 +92,7 @@ def live(loopback):
 def test_sweeps_that_are_sent_over_loopback_are_frames(live):
     sender = Sender(dds.participant(FAR))
     assert sender.wait_for_receiver(60.0)
-    until(lambda: live.reader._subscription.senders)
+    until(lambda: has_sender(live.reader._subscription))
     points = np.random.default_rng(0).uniform(0, 1, (100_000, 4)).astype(np.float32)
     sender.send(Frame(0, 0.0, points), 1000.5)
     received = live.take(60.0).frame

@@ -25,6 +25,13 @@ def test_a_drifting_clock_is_followed():
     assert worst_s < 1e-3
 
 
+def test_a_clock_of_the_host_that_is_set_forward_is_followed():
+    clock = DeviceClock()
+    for k in range(300):
+        time_s = host_s(clock, 0.1 * k, 0.1 * k + 0.5 * (k >= 50))
+    assert time_s == pytest.approx(29.9 + 0.5, abs=1e-3)
+
+
 def test_stamps_that_begin_again_continue():
     clock = DeviceClock(wrap_s=3600.0)
     before = host_s(clock, 3599.95, 50.0)

@@ -56,15 +56,20 @@ def test_sweeps_are_the_frames_of_the_sdk(timed, metadata):
     assert np.all(np.diff(np.unwrap(np.deg2rad(bearing_deg(beam)))) < 0.01)
 
 
-def numbered(timed, metadata, first):
-    """The packets with other numbers of their frames, from the first on."""
+def edited(timed, metadata, edit):
+    """The packets after a call of `edit` with their format, the packet and its number."""
     layout, out = sdk.PacketFormat(sdk.SensorInfo(metadata.read_text())), []
     for k, (at_s, payload) in enumerate(timed):
         packet = sdk.LidarPacket(layout)
         packet.buf[:] = np.frombuffer(payload, np.uint8)
-        layout.set_frame_id(packet, first + k // 64)
+        edit(layout, packet, k)
         out.append((at_s, packet.buf.tobytes()))
     return out
+
+
+def numbered(timed, metadata, first):
+    """The packets with other numbers of their frames, from the first on."""
+    return edited(timed, metadata, lambda layout, packet, k: layout.set_frame_id(packet, first + k // 64))
 
 
 @pytest.mark.parametrize("lies", [1, 64 * 3])
@@ -77,14 +82,11 @@ def test_frame_numbers_that_leap_ahead_or_begin_anew_cost_one_frame(timed, metad
 
 
 def test_a_frame_without_stamps_is_refused(timed, metadata):
-    layout, unstamped = sdk.PacketFormat(sdk.SensorInfo(metadata.read_text())), []
-    for at_s, payload in timed:
-        packet = sdk.LidarPacket(layout)
-        packet.buf[:] = np.frombuffer(payload, np.uint8)
+    def unstamp(layout, packet, _):
         for column in range(16):
             layout.set_col_timestamp(packet, column, 0)
-        unstamped.append((at_s, packet.buf.tobytes()))
-    sweeps, reception = decoded(OusterDecoder("sensor", metadata), unstamped)
+
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), edited(timed, metadata, unstamp))
     assert (sweeps, sum(reception.refused.values())) == ([], 3)
 
 

@@ -34,7 +34,7 @@ def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
     stream = open_stream(path)
     assert [f.points.tobytes() for f in stream] == [f.points.tobytes() for f in whole]
     assert [(f.frame, f.skipped) for f in stream.faults.first] == [(3, False)]
-    assert "sweep 3: truncated within a record" in caplog.text
+    assert "frame 3: truncated within a record" in caplog.text
 
 
 def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(path):
@@ -55,6 +55,7 @@ def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(
     assert stamps_s == sorted(stamps_s)
     assert len(stamps_s) >= 8
     assert stream.faults.skipped == 0
+    assert stream.faults.first[-1].cause == "1 packets refused: its stamp leaps: the clock was set, or lies"
 
 
 def test_invalid_options_are_refused(path):

@@ -18,6 +18,8 @@ from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.point_cloud_file import read_pcd
+from modt.sources.stream import Reception
+from tests.sequences import makers
 from tests.sources.packets.simulated import BEGAN_S, decoded, equal, packets, scene
 from tools.send.faults import Timed
 from tools.send.packet_bag import packets_of_bag
@@ -166,6 +168,20 @@ def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker: Maker
     assert reception.lost == 0
     assert reception.refused == {reason: n * count for reason, count in maker.refused.items()}
     assert sum("only counted" in r.message for r in caplog.records) == len(maker.refused)  # one line a reason
+
+
+@pytest.mark.parametrize("name", ["velodyne", "hesai", "livox"])
+def test_a_sweep_holds_no_more_packets_than_a_sensor_sends(name: str) -> None:
+    maker, stamped, reception = MAKERS[name], makers.MAKERS[name].stamped, Reception()
+    decoder, timed, at = maker.decoder(), maker.timed(), maker.lost[0]
+    for at_s, payload in timed[:at]:
+        decoder.decode(at_s, stamped(payload, at_s), reception)
+    for k in range(3000):
+        decoder.decode(at_s, stamped(payload, at_s - 0.01 * k / 3000), reception)
+    assert makers.is_bounded(decoder)
+    assert reception.refused["more than a turn has; do several sensors send to this port?"] > 1000
+    sweeps = [s for at_s, payload in timed[at:] for s in decoder.decode(at_s, stamped(payload, at_s), reception)]
+    assert sweeps[-1].complete  # the sensor's own packets go on
 
 
 CLOUDS = {  # recorded packets: name, calibration, number of sweeps, greatest median distance [m]

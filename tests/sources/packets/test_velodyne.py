@@ -144,30 +144,3 @@ def test_real_captures(kitti_root, name, profile, n_sweeps, turn_s):
     assert all(s.complete for s in sweeps)
     assert (reception.lost, reception.refused) == (0, {})
     assert [s.turn_s for s in sweeps] == pytest.approx([turn_s] * n_sweeps, abs=2e-4)
-
-
-@pytest.mark.slow
-def test_another_model_is_adopted_once_the_one_before_is_silent(caplog):
-    other = packets("hdl-64e", 2)[:20]
-    later = [(at_s + 5.0, payload) for at_s, payload in packets("vlp-16", 20)]
-    decoder = VelodyneDecoder("sensor")
-    sweeps, reception = decoded(decoder, [*other, *later])
-    assert decoder.profile == "vlp-16"
-    assert len(sweeps) >= 17
-    assert reception.refused["of another model than the packets before"] == 20
-    assert "packets are of another model, and those of the one before have ended" in caplog.text
-
-
-def test_a_turn_holds_no_more_packets_than_a_sensor_sends():
-    timed = packets("vlp-16", 5)
-    decoder, reception = VelodyneDecoder("sensor"), Reception()
-    for at_s, payload in timed[:130]:
-        decoder.decode(at_s, payload, reception)
-    began_us, last_us = (stamp_us(timed[k][1]) for k in (80, 129))
-    for k in range(3000):
-        within_us = began_us + (last_us - began_us) * (0.1 + 0.8 * (k * 0.618 % 1))
-        decoder.decode(timed[129][0], at_time(timed[100][1], within_us), reception)
-    assert len(decoder._turn.entries) <= decoder._most < 500
-    assert reception.refused["more than a turn has; do several sensors send to this port?"] > 2000
-    sweeps = [s for at_s, p in timed[130:] for s in decoder.decode(at_s, p, reception)]
-    assert len(sweeps) >= 2  # the sensor's own packets go on

@@ -36,7 +36,7 @@ def test_the_drift_of_a_written_drive_is_small_against_positions_and_velocities(
     positions = np.array([s.T_world_sensor for s in scans])
     integrated = ego_drift.integrated(drive, [s.index for s in scans])
     assert abs(ego_drift.drift(integrated, positions)["end_percent"]) < 0.5
-    monkeypatch.setattr(sys, "argv", ["ego_drift", str(drive), str(drive), "--no-kiss"])
+    monkeypatch.setattr(sys, "argv", ["ego_drift", str(drive), str(drive)])
     ego_drift.main()
     said = capsys.readouterr().out
     assert "means over 2 drives" in said

@@ -1,9 +1,7 @@
 """Scenes from KITTI label files: objects stand where the file states."""
 
 import numpy as np
-import pytest
 
-from modt.errors import MisuseError
 from tools.train.synthetic_scans import label_scene
 
 
@@ -20,18 +18,3 @@ def test_objects_of_a_label_file_stand_where_it_states(tmp_path):
     np.testing.assert_allclose(truth.boxes[0, [0, 1, 3, 4, 5]], [15.27, -2.0, 4.0, 1.6, 1.5], atol=0.1)
     np.testing.assert_allclose(truth.boxes[1, :2], [9.27, 3.0], atol=0.1)
     assert (truth.points > 50).all()
-
-
-@pytest.mark.parametrize("text", ["Car 0 0\n", "Car a b\n"])
-def test_an_invalid_label_file_is_refused(tmp_path, text):
-    (tmp_path / "x.txt").write_text(text)
-    with pytest.raises(MisuseError, match="label"):
-        label_scene(tmp_path / "x.txt", seed=0)
-
-
-@pytest.mark.kitti
-def test_real_label_files_make_scenes(kitti_root):
-    path = kitti_root / "object" / "training" / "label_2" / "000008.txt"
-    _, truth = label_scene(path, seed=0).sweep(0)
-    assert [k.name for k in truth.kinds].count("Car") >= 4
-    assert truth.points.sum() > 1000

@@ -23,15 +23,6 @@ def test_an_object_that_is_hardly_ever_so_short_is_none_there():
     np.testing.assert_allclose(ratio[FRAGMENTS, 0], 0.0, atol=1e-3)
 
 
-def test_a_length_without_counts_has_those_of_all_lengths_and_no_certainty():
-    counts = np.zeros((4, CELLS, 4), np.int64)
-    counts[1, 1, 0] = counts[1, 2, 1] = 1000
-    ratio = log_likelihood_ratio(counts)
-    assert np.abs(ratio).max() <= MOST
-    np.testing.assert_allclose(ratio[2], ratio[3])
-    assert ratio[2, 0, 2] == MOST
-
-
 def test_every_judged_track_of_a_drive_is_counted_once():
     counts = counted(simulated("crossing", "vlp-16", 0.5, 900), 0)
     assert counts[:, 3:].sum() < counts.sum()  # hardly anything has gone far within half a second

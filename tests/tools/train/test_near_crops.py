@@ -10,7 +10,7 @@ from modt.classification.crops import Crops
 from modt.types import Cut
 from tests.tools.train.datasets import data_of
 from tools.train.dataset import Sensors
-from tools.train.near_batches import MIN_CUT_POINTS, NearSource, cut_near, varied
+from tools.train.near_batches import MIN_CUT_POINTS, NearSource, cut_near
 from tools.train.near_scans import HEIGHT_M, near_scans, ramp_scans
 
 
@@ -70,14 +70,3 @@ def test_a_batch_holds_simulated_crops_and_crops_of_the_streets_cut_near():
     assert 20 < from_streets.sum() < len(batch.crops)
     assert ((batch.cut[from_streets] & ~Cut.SIDE) > 0).all()
     assert not (batch.cut[~from_streets] & ~Cut.SIDE).any()  # of an HDL-64E it is not known where the beams end
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_varied_crops_lie_where_they_did_and_those_flagged_are_narrower(seed):
-    crops, _ = boards(10)
-    out, cut = varied(crops, np.random.default_rng(seed))
-    assert len(out) == len(cut) == 10
-    widths = [np.ptp(out.xyz[a:b, 1]) for a, b in zip(out.offsets, out.offsets[1:], strict=False)]
-    assert np.abs(out.xyz - [10.0, 0.0, 0.0]).max(axis=0)[:2].max() < 0.4
-    assert all(width < 0.56 for width in widths)
-    assert set(np.unique(cut)) <= {0, int(Cut.SIDE)}

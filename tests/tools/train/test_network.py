@@ -23,7 +23,8 @@ def test_max_pooled_linear_has_the_gradients_of_its_definition():
         assert torch.allclose(one, other, atol=1e-6)
 
 
-def test_the_exported_network_equals_the_trained_one(tmp_path_factory):
+@pytest.mark.parametrize("pool_first", [True, False])
+def test_the_exported_network_equals_the_trained_one(pool_first, tmp_path):
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.pointnet import PointNet
     from modt.config import ClassificationConfig, SensorConfig
@@ -38,8 +39,8 @@ def test_the_exported_network_equals_the_trained_one(tmp_path_factory):
     for norm in net.norms:
         torch.nn.init.normal_(norm.log_scale, 0, 0.3)
     net.eval()
-    path = tmp_path_factory.mktemp("model") / "net.onnx"
-    path.write_bytes(graph(net.layers()).SerializeToString())
+    path = tmp_path / "net.onnx"
+    path.write_bytes(graph(net.layers(), pool_first=pool_first).SerializeToString())
     exported = PointNet(ClassificationConfig(model=str(path)), SensorConfig())
     for n in (1, 2, 17, 400, 1200):
         xyz = torch.randn(2 * n, 3) * 2

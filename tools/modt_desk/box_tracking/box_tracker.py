@@ -67,7 +67,7 @@ class BoxClass:
 
     report_above: float = 1.0  # least confidence of a track in a frame in which it is reported
     keep_above: float  # least mean confidence of a track that is written
-    range_bonus_per_m: float = 0.0  # added to a score per metre: few points on what is far lower its score
+    range_bonus_per_m: float = 0.0  # added to a score per metre, since few points lower the score of a far object
     yaw_gain: float = 0.7  # weight of a new yaw
     max_gap: int = 3  # frames without a report that are filled afterwards
 
@@ -84,9 +84,9 @@ BOX_CLASSES = {
 class BoxTracks:
     """Reported tracks of a frame."""
 
-    id: Int  # (K,) of the tracks
+    id: Int  # (K,) identities of the tracks
     box: Float64  # (K, 7) smoothed, world frame
-    confidence: Float64  # (K,) in the track
+    confidence: Float64  # (K,) confidence in the track
     source: Int  # (K,) index of the associated detection
 
 
@@ -133,7 +133,7 @@ class BoxTracker:
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
         self._x, self._P = predict(self._x, self._P, ACCELERATION_SIGMA_MPS2, dt_s)
-        # A gate that widened while a track is missed would end by taking the detection of something else.
+        # A gate that widens while a track is missed would in the end accept the detection of another object.
         np.copyto(self._reach, self._P[:, 0], where=self._missed == 0)
 
     def _match(self, boxes: Float64, variance: Float64, strong: Bool) -> tuple[Int, Int]:

@@ -28,7 +28,7 @@ DETECTED = (ObjectClass.PEDESTRIAN, ObjectClass.CAR, ObjectClass.CYCLIST)
 """Classes in the order of AB3DMOT's types, which count from 1."""
 N_COLUMNS = 15
 DEFAULT_SCORE = 10.0
-"""Score of a label without one: certain."""
+"""Score of a label without one, which counts as certain."""
 LOGIT_OFFSET = 5.0
 """PointRCNN's score of cars at 20 m at which half of them are true."""
 MIN_PROBABILITY = 1e-3
@@ -101,7 +101,7 @@ def read(paths: Sequence[Path]) -> list[Detections]:
 
 
 def merge(detectors: Iterable[Iterable[Detections]]) -> list[Detections]:
-    """The sequences of all detectors, those of one name as one, ordered by name."""
+    """The sequences of all detectors, ordered by name. Those of one name are merged."""
     named: dict[str, list[Detections]] = {}
     for sequence in chain.from_iterable(detectors):
         named.setdefault(sequence.name, []).append(sequence)

@@ -57,7 +57,7 @@ def iou_3d(a: Float64, b: Float64) -> Float64:
 MIN_IOU = 0.25
 """Overlap of boxes of two classes from which both are of one object."""
 REACH_M = 3.0
-"""Distance of centres up to which that is tested."""
+"""Distance of centres up to which the overlap is tested."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +65,10 @@ class TrackedBoxes:
     """The n boxes of tracks, in the world frame."""
 
     frame: Int  # (n,) index of the frame
-    id: Int  # (n,) of the track
+    id: Int  # (n,) identity of the track
     image_box: Float64  # (n, 4) left, top, right, bottom [pixel]
     box: Float64  # (n, 7)
-    confidence: Float64  # (n,) in the track, at that frame
+    confidence: Float64  # (n,) confidence in the track, at that frame
 
     def take(self, rows: Bool | Int) -> TrackedBoxes:
         """The boxes at some rows."""

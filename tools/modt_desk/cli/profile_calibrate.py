@@ -52,11 +52,14 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt import profile
-    from modt.app import assembly, inputs, metering
+    from modt.app import assembly, inputs
     from modt.app.chosen_profile import choose
     from modt.classification.pointnet import PointNet
     from modt.classification.scheduler import padded_size
     from modt.energy.ledger import Ledger
+    from modt.energy.meters.discovery import discover
+    from modt.energy.meters.meter import Conditions
+    from modt.energy.windows import Clocks, Windows
     from modt.geometry import FieldOfView
     from modt.sinks.output import writing
     from modt_desk.comparison.window_fit_calibration import Workload
@@ -68,11 +71,11 @@ def run(arguments: argparse.Namespace) -> int:
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
     loaded = choose(request.profile, scans[0], stream.info).config
-    meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
+    meters = discover(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = PointNet(limits, loaded.sensor)
     segmenter = assembly.segmenter(loaded, FieldOfView(), assembly.chosen_kernels(loaded.segmentation.kernels))
-    windows = metering.windows(meters, pinned, min_s=math.inf)
+    windows = Windows(meters, Clocks(), Conditions(pinned or 0), math.inf)
     workload = Workload(scans, segmenter.segment, network.classify, padded_size(limits), ledger, windows)
     try:
         found = workload.calibrate(arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))

@@ -36,8 +36,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare."""
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.app import inputs, metering
+    from modt.app import inputs
     from modt.app.chosen_profile import choose
+    from modt.energy.meters.discovery import discover
     from modt.energy.meters.meter import Conditions, Kind
     from modt_desk.comparison.compare_report import Basis, compare_tree
     from modt_desk.comparison.compare_view import compare_document, compare_plots
@@ -52,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info).config
     board, info = loaded.energy, stream.info
-    meters = metering.discovery(board).choose(arguments.meter).meters
+    meters = discover(board).choose(arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
     comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
     repetitions = []

@@ -10,7 +10,7 @@ from typing import Any
 
 from modt.cli import options
 from modt.config import ProfileConfig, StageConfig
-from modt.profile.yaml_text import EXTENDS
+from modt.profile import EXTENDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,7 @@ def compare_tree(
         "savings": savings,
         "calibration": {name: _table(run) for name, run in (*runs.items(), (varied, load_varied_run))},
         "series_kind": Kind.MEASURED.value,
-        "series": {mode: _series(runs[mode], attributed[mode], repetitions[0][mode].lives) for mode in modes},
+        "series": {mode: _series(runs[mode], attributed[mode], repetitions[0][mode].lengths) for mode in modes},
     }
 
 
@@ -184,11 +184,11 @@ def _table(run: gamma.RunCosts) -> dict[str, Any]:
     }
 
 
-def _series(run: gamma.RunCosts, energy: EnergySums, lives: Histogram) -> dict[str, Any]:
+def _series(run: gamma.RunCosts, energy: EnergySums, lengths: Histogram) -> dict[str, Any]:
     return {
         "stage_W": energy.stage_watts(STAGES),
         "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
         "proposals": run.counts[:, COUNTS.index("proposals")].tolist(),
         "classified": run.counts[:, COUNTS.index("classified")].tolist(),
-        "lives": lives.occurrences(),
+        "lives": lengths.occurrences(),
     }

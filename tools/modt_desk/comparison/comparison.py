@@ -53,9 +53,9 @@ class ModeRun:
     windows: Windows | None = None  # None where no meter is read
     lines: list[Line] = field(default_factory=list)  # lines of the ledger
     energy_lines: list[Line] = field(default_factory=list)
-    lives: Histogram = field(default_factory=Histogram)  # frames with a proposal, of every track that ended
+    lengths: Histogram = field(default_factory=Histogram)  # frames with a proposal of every track that has ended
     _counts: list[tuple[int, ...]] = field(default_factory=list)
-    _life: dict[int, int] = field(default_factory=dict)
+    _alive: dict[int, int] = field(default_factory=dict)  # the same of the tracks alive
     _classified: set[int] = field(default_factory=set)
     _seen: set[int] = field(default_factory=set)
 
@@ -83,7 +83,7 @@ class ModeRun:
 
     def finish(self) -> None:
         """Count the length of the tracks that are alive at the end of the stream."""
-        self._end(self._life.keys())
+        self._end(self._alive.keys())
 
     def counts(self) -> Int:
         """(frames, columns) counts of each frame, columns as COUNTS."""
@@ -91,11 +91,12 @@ class ModeRun:
 
     def cpu_s(self) -> Float64:
         """(frames, stages) CPU time of each stage of the pipeline [s]."""
-        return cpu_seconds(self.lines)
+        rows = [[line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES] for line in self.lines]
+        return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
     def _end(self, ids: Iterable[int]) -> None:
         for id_ in ids:
-            self.lives.add(self._life[id_])
+            self.lengths.add(self._alive[id_])
 
     def _count(self, result: FrameResult, line: Line) -> None:
         tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
@@ -105,7 +106,7 @@ class ModeRun:
             (
                 len(result.proposals),
                 int((visible & (tracks.object_class != ObjectClass.BACKGROUND)).sum()),
-                len(alive - self._life.keys()),
+                len(alive - self._alive.keys()),
                 len(classified - self._classified),
                 len(result.classified),
                 len((classified & self._classified) - self._seen),
@@ -115,8 +116,8 @@ class ModeRun:
                 len(tracks.id),
             )
         )
-        self._end(self._life.keys() - alive)
-        self._life = {id_: self._life.get(id_, 0) + (id_ in seen) for id_ in alive}
+        self._end(self._alive.keys() - alive)
+        self._alive = {id_: self._alive.get(id_, 0) + (id_ in seen) for id_ in alive}
         self._classified, self._seen = (self._classified | classified) & alive, seen
 
 
@@ -139,12 +140,6 @@ def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> N
         first = (first + 1) % len(runs)
     for run in runs:
         run.finish()
-
-
-def cpu_seconds(lines: Sequence[Line]) -> Float64:
-    """(frames, stages) CPU time of each stage of the pipeline by ledger lines [s]."""
-    rows = [[line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES] for line in lines]
-    return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
 
 def total(counts: Int) -> Counts:

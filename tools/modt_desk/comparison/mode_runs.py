@@ -7,11 +7,12 @@ from itertools import islice
 
 import numpy as np
 
-from modt.app import assembly, inputs, metering
+from modt.app import assembly, inputs
 from modt.classification.scheduler import padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Meter
+from modt.energy.meters.meter import Conditions, Meter
+from modt.energy.windows import Clocks, Windows
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Budget, Frame, Int
 from modt_desk.comparison.comparison import ModeRun, RecordingFusion, Repetition, interleave
@@ -64,7 +65,7 @@ class Comparison:
             pipeline=pipeline,
             ledger=ledger,
             budget=varied_load if name == VARIED else lambda _frame: budget,
-            windows=metering.windows(self.meters, self.core) if self.meters else None,
+            windows=Windows(self.meters, Clocks(), Conditions(self.core or 0)) if self.meters else None,
         )
 
 

@@ -88,7 +88,7 @@ class Rates:
 
     @classmethod
     def fit(cls, streams: Sequence[Stream]) -> Self:
-        """Over all frames of the calibration's streams."""
+        """Fit the rates to all frames of the calibration's streams."""
         runs = {name: _joined([stream.runs[name] for stream in streams]) for name in streams[0].runs}
         observed = np.concatenate([stream.observed for stream in streams]).astype(float)
         *modes, _ = runs
@@ -126,7 +126,7 @@ class Expected:
 def expect(rates: Rates, observed: Int, frames: int) -> Expected:
     """Costs of a stream of so many frames, of which (F, 7) OBSERVED were seen, the first among them."""
     sweep_points, n, alive, _, all_points, *_ = observed.mean(axis=0).tolist()
-    tracks, *asked = _whole(observed[:, [OBSERVED.index("tracks"), *range(len(OBSERVED), observed.shape[1])]], frames)
+    tracks, *asked = _means(observed[:, [OBSERVED.index("tracks"), *range(len(OBSERVED), observed.shape[1])]], frames)
     e_seg = float(rates.segmentation @ [1.0, sweep_points])
     asking = dict(zip(rates.views, [n, *asked], strict=True))
     most = n * next(iter(rates.views.values())).each
@@ -156,8 +156,11 @@ class Forecast:
     copied: Float64  # the calibration's own, geometric mean over its streams
 
 
-def _whole(started: Int, frames: int) -> list[float]:
-    """Mean a frame of a stream of so many frames, of columns (F, k) of its first ones: all is new at the start."""
+def _means(started: Int, frames: int) -> list[float]:
+    """(k,) means over a stream of so many frames, from counts (F, k) of its first ones.
+
+    The first _START frames count once, because there everything is new.
+    """
     start = min(_START, len(started) // 2)
     later = started[start:].mean(axis=0) if len(started) else np.zeros(started.shape[1])
     found: list[float] = ((started[:start].sum(axis=0) + (frames - start) * later) / frames).tolist()
@@ -180,13 +183,13 @@ def forecast(streams: Sequence[Stream], observed: Int, frames: int, random: np.r
 
 
 def measured(stream: Stream) -> Float64:
-    """The same values as of Expected, by the runs themselves."""
+    """Values as in Expected, measured on the runs of a stream."""
     *modes, _ = stream.runs.values()
     return _with_gamma([float(run.cost.sum(axis=1).mean()) for run in modes])
 
 
 def _errors(streams: Sequence[Stream]) -> Iterator[Float64]:
-    """Logarithmic errors of the values for streams left out."""
+    """Logarithmic errors of the values of each stream, predicted from the others."""
     if len(streams) == 1:
         quarters = np.array_split(np.arange(len(streams[0].observed)), _PARTS)
         streams = [streams[0].take(part) for part in quarters]

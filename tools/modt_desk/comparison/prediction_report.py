@@ -25,7 +25,7 @@ SCHEMA = "modt.prediction/1"
 _SEEN = (*OBSERVED, *(f"asked_{k}" for k in range(len(MODES) - 1)))
 _MIN_FRAMES = 8
 """Least number of frames of a comparison that is used as a calibration."""
-_OVER = (
+_INTERVAL = (
     "The interval at 95 % is over resampled frames of the calibration and of those seen, and over the calibration's "
     "own error on streams, or quarters of its only one, that it was not fitted to."
 )
@@ -45,7 +45,7 @@ def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tup
         if tree["fov"] != fov:
             raise MisuseError(path, f"its field of view is {tree['fov']}, not {fov}", f"{remedy} with --fov {fov}")
         if tree["frames"] < _MIN_FRAMES:
-            few = f"{tree['frames']} frames tell no unit costs"
+            few = f"its {tree['frames']} frames are too few for unit costs"
             raise MisuseError(path, few, f"{remedy} of {_MIN_FRAMES} or more")
         runs = {
             name: RunCosts(
@@ -121,7 +121,7 @@ def prediction_document(tree: dict[str, Any]) -> Document:
         Table(["a frame, above idling", "energy", "cpu time"], energy),
         Table(["gamma", *tree["gamma"]], rivals),
     ]
-    return Document(f"Prediction for {tree['stream']}", about, results, tables, _OVER)
+    return Document(f"Prediction for {tree['stream']}", about, results, tables, _INTERVAL)
 
 
 def read_prediction(path: Path, about: dict[str, Any]) -> dict[str, Any]:

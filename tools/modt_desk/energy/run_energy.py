@@ -18,10 +18,10 @@ def modelled(line: Line, board: EnergyConfig) -> Line:
     return line | {
         "frames": [line["frame"], line["frame"], 1],
         "process_ns": line["cpu_ns"],
-        "energy_J": model_J(board.idle_W, board.busy_W, line["wall_ns"], line["cpu_ns"]),
+        "energy_J": model_J(board, line["wall_ns"], line["cpu_ns"]),
         "kind": Kind.ESTIMATED.value,
         "resolution_J": 0.0,
-        "meters": [{"name": model_name(board.idle_W, board.busy_W)}],
+        "meters": [{"name": model_name(board)}],
     }
 
 

@@ -12,7 +12,7 @@ from modt_desk.evaluation.rows import Outcome, Rows, ratio
 from modt_desk.evaluation.truth import CLASSIFIED
 
 BINS = 15
-"""Number of bins of confidence, equally wide."""
+"""Number of bins of confidence, all of one width."""
 CURVE_RECALLS = np.arange(1, 21) / 20
 
 
@@ -22,7 +22,7 @@ class ClassScore:
 
     objects: int  # number of objects of the class, one count an object and frame
     average_precision: float | None  # area under the envelope of precision over recall
-    curve: tuple[tuple[float, float, float], ...]  # threshold, precision, recall at each new twentieth
+    curve: tuple[tuple[float, float, float], ...]  # threshold, precision, recall at each twentieth of recall
     called: int  # proposals reported as the class
     precision: float | None  # share of them that lie on an object of the class
     objects_called: float | None  # share of the objects whose proposal is reported as the class
@@ -60,7 +60,7 @@ def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
 
 
 def precision_recall(score: Float64, hit: Bool, n: int) -> tuple[Float64, Float64, Float64]:
-    """(R,) scores from the greatest on, precision and recall of all that score as much; n objects are there."""
+    """(R,) descending scores, and precision and recall with each as the threshold, for n objects."""
     order = np.argsort(-score, kind="stable")
     true = np.cumsum(hit[order])
     return score[order], true / np.arange(1, len(true) + 1), true / max(n, 1)

@@ -14,14 +14,14 @@ from modt_desk.evaluation.class_score import ClassScore, class_scores, top_calib
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rows import Association, Outcome, Rows, kinds, ratio
-from modt_desk.evaluation.rules import KITTI_RULES, Rules
+from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.track_score import TrackScore, track_metrics, track_scores
 from modt_desk.evaluation.truth import LABELLED, Role
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentationScore:
-    """Objects of one kind, one count an object and frame; merged to missed are those not detected (`Outcome`)."""
+    """Counts of one kind of object, one for each object and frame. `Outcome` explains merged to missed."""
 
     objects: int  # judged
     recall: float | None  # share of them that is detected
@@ -29,7 +29,7 @@ class SegmentationScore:
     split: int
     partial: int
     missed: int
-    cut: int  # most is out of view, judged or not
+    cut: int  # objects mostly out of view, judged or not
 
 
 def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
@@ -77,10 +77,10 @@ class Evaluation:
     """Scores of some drives; tracks and metrics are empty and None where labels have no identities."""
 
     drives: int
-    sectors_deg: tuple[float, ...]  # half the sectors in which the drives are judged, each once, in order
+    sectors_deg: tuple[float, ...]  # half angles of the judged sectors, without repeats, ascending
     complete: bool  # whether the labels of all drives are taken for complete
     further_objects: int  # objects added beside the labels
-    further_labels: int  # their frames, summed over the objects
+    further_labels: int  # labels of these objects, one a frame
     frames: int
     proposals: int
     beta: float | None  # proposals classified over all
@@ -89,15 +89,6 @@ class Evaluation:
     metrics: dict[str, dict[str, float]] | None  # metrics of all classes and of each; None without trackeval
     calibration_error: float | None  # expected, of the most probable class, over all judged proposals
     calibration_error_of_objects: float | None  # the same over the proposals that stand for an object
-
-
-def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES) -> Evaluation:
-    """The evaluation of the frames of one drive, in order.
-
-    Raises:
-        ValueError: there are no frames.
-    """
-    return evaluation([collect(frames, rules)])
 
 
 def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> DriveRows:

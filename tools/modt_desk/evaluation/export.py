@@ -74,7 +74,7 @@ HEADER = _text([COLUMNS])
 
 @contextmanager
 def whole(target: Path) -> Iterator[Path]:
-    """A path that takes the target's place once all is written; a failure leaves nothing.
+    """A path to write to, which is renamed to the target at the end. A failure leaves nothing behind.
 
     Raises:
         ModtError: it cannot be written.
@@ -93,7 +93,7 @@ class Export:
     """The run, the frames and the points that are exported.
 
     Attributes:
-        n_frames: exported so far.
+        n_frames: number of frames exported so far.
     """
 
     def __init__(
@@ -178,7 +178,7 @@ def _csv(export: Export, target: Path) -> None:
 
 
 def _parquet(export: Export, target: Path) -> None:
-    """The table of --csv, by the reader of Arrow."""
+    """Write the table of --csv, read again by Arrow."""
     try:
         from pyarrow import csv as arrow
         from pyarrow import parquet

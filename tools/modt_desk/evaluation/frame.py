@@ -29,7 +29,7 @@ class JudgedFrame:
 
     @classmethod
     def of_result(cls, result: FrameResult, truth: FrameTruth, fov: FieldOfView | None = None) -> Self:
-        """A result of the pipeline that is still in memory."""
+        """From a result of the pipeline in memory."""
         tracks, proposals = result.tracks, result.proposals
         seen = np.flatnonzero(tracks.proposal != NONE)
         return cls(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +17,11 @@ from modt_desk.evaluation.kitti_labels import MAX_FRAME, MAX_ID, MAX_NUMBER, Lab
 from modt_desk.evaluation.truth import FrameTruth, Role, Truth, Types
 
 PARKED = "IgnoredCar"
-"""Type of a parked car that counts neither for nor against."""
+"""Type of a parked car that is ignored."""
 NUMBERS = ("x", "y", "z_bottom", "length", "width", "height", "yaw")
 COLUMNS = ("frame", "object", "type", *NUMBERS)
 WRITE = "write frame and object as whole numbers, the others in metres and radians, sizes above 0"
 HEAD = f"begin with the line {','.join(COLUMNS)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A label and the place where it stands."""
-
-    place: str  # file and line
-    label: Label  # box in the sensor frame
 
 
 def with_further(truth: Truth, path: Path, types: Types) -> Truth:
@@ -44,14 +36,13 @@ def with_further(truth: Truth, path: Path, types: Types) -> Truth:
         MisuseError: the table is broken or of another drive; it names the line.
     """
     added: dict[int, list[Label]] = defaultdict(list)
-    for row in _rows(path):
-        label = row.label
+    for place, label in _rows(path):
         if label.type_ != PARKED and label.type_ not in types:
             known = ", ".join((*types, PARKED))
-            raise MisuseError(row.place, f"{label.type_!r} is no type of an object", f"write one of {known}")
+            raise MisuseError(place, f"{label.type_!r} is no type of an object", f"write one of {known}")
         if label.frame not in truth.frames:
             cause = f"frame {label.frame} is not in the truth, which has {len(truth.frames)} frames"
-            raise MisuseError(row.place, cause, "give the table of the drive that is judged")
+            raise MisuseError(place, cause, "give the table of the drive that is judged")
         added[label.frame].append(label)
     frames = {f: _joined(frame, added[f], types) if f in added else frame for f, frame in truth.frames.items()}
     return replace(truth, frames=frames)
@@ -73,12 +64,12 @@ def _joined(frame: FrameTruth, labels: list[Label], types: Types) -> FrameTruth:
 
 
 def _boxes(frame: FrameTruth, labels: list[Label]) -> Float64:
-    """(n, 7) boxes of labels in the frame of those of the truth."""
+    """(n, 7) boxes of labels in the frame of the truth's boxes."""
     return transform_boxes(frame.T_box_sensor, np.array([label.box for label in labels]).reshape(-1, 7))
 
 
-def _rows(path: Path) -> Iterator[Row]:
-    """The lines of a table.
+def _rows(path: Path) -> Iterator[tuple[str, Label]]:
+    """File and line of each row of a table, and its label, whose box is in the sensor frame.
 
     Raises:
         MisuseError: it cannot be read, is empty, or a line is broken.
@@ -100,7 +91,7 @@ def _rows(path: Path) -> Iterator[Row]:
                     cause = f"object {label.id} is in frame {label.frame} twice"
                     raise MisuseError(place, cause, "leave one of the lines out, or give it a number of its own")
                 seen.add((label.frame, label.id))
-                yield Row(place, label)
+                yield place, label
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise MisuseError(path, f"cannot be read ({error})", "restore the table") from None
     if not seen:
@@ -111,7 +102,7 @@ def _label(fields: dict[str, str]) -> Label:
     """The label of a line.
 
     Raises:
-        ValueError, TypeError or OverflowError: it is none.
+        ValueError, TypeError or OverflowError: it is no label.
     """
     frame, number = int(fields["frame"]), int(fields["object"])
     x, y, foot, length, width, height, yaw = values = [float(fields[name]) for name in NUMBERS]

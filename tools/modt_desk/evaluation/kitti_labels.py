@@ -81,10 +81,10 @@ def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
 
 
 def _possible(frame: int, id_: int, values: Float64) -> int:
-    """The frame of a label that can be.
+    """The frame of a label, if its numbers are within their bounds.
 
     Raises:
-        ValueError: it cannot.
+        ValueError: a number is out of bounds.
     """
     if frame > MAX_FRAME or abs(id_) > MAX_ID or not (np.abs(values) <= MAX_NUMBER).all():
         raise ValueError(frame)

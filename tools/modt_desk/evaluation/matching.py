@@ -16,13 +16,13 @@ from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.truth import CLASSIFIED, LABELLED, Role
 
 PARKED_PAD_M = 0.4
-"""A proposal is of a parked car if it lies in its box or up to this beyond."""
+"""Margin of the box of a parked car [m]. A proposal mostly within it is part of that car."""
 
 
 def judge(
     frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None
 ) -> tuple[Rows, Rows, tuple[Association, ...]]:
-    """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class.
+    """The rows of a frame's objects and of its tracked proposals, and the associations of each class.
 
     `points` are the points of the labelled objects, where they are known.
     """
@@ -97,13 +97,13 @@ def _outcome(overlap: Overlap) -> Int:
 
 
 def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool, rules: Rules) -> Rows:
-    """The rows of all proposals; pairs: (n,) whether the best proposal of each object stands for it."""
+    """The rows of all proposals, by (n,) whether the best proposal of each object stands for it."""
     truth, size, best = frame.truth, overlap.size, overlap.best
     members = np.flatnonzero(frame.proposal >= 0)
     of, points = frame.proposal[members], frame.points[members]
 
     def most(which: Bool) -> Bool:
-        """(P,) whether more than half of each proposal's points are so."""
+        """(P,) whether more than half of each proposal's points satisfy it."""
         return np.asarray(np.bincount(of[which], minlength=len(size)) > 0.5 * size)
 
     # The object that a proposal stands for, and the one in whose box it lies.
@@ -118,7 +118,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
     for i, k in zip(*np.nonzero(held & (truth.object_class > 0)[:, None]), strict=True):
         owner[k], role[k] = truth.object_class[i], truth.role[i]
 
-    # On an object that is not judged for its class; where nothing is known.
+    # Neutral proposals lie on objects that are not judged for their class, unknown ones where nothing is labelled.
     excused = (truth.object_class > 0) & ~objects["to_classify"] & (objects["range_m"] <= rules.max_range_m)
     if "few" not in rules.ignored:
         excused &= _has_points(frame, overlap, rules) | ~np.isin(truth.role, CLASSIFIED)

@@ -26,7 +26,7 @@ class ObjectPoints:
 
     @classmethod
     def of(cls, points: Float32, truth: FrameTruth) -> Self:
-        """Among (N, 4) points of the sensor frame."""
+        """Select them among (N, 4) points of the sensor frame."""
         centre = transform(inverse(truth.T_box_sensor), truth.box[:, :3])
         reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
         reach += 0.05 * truth.box[:, 5]  # sensors are tilted by a few degrees at most
@@ -44,7 +44,7 @@ class ObjectPoints:
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
-    """Points that n objects and P proposals of a frame share; the last proposal is none, without points."""
+    """Points that n objects and P proposals of a frame share. The last proposal is empty and stands for none."""
 
     own: list[Int]  # points of each object, clear of the ground
     count: Int  # (n,) points of each object
@@ -59,7 +59,7 @@ class Overlap:
 
     @classmethod
     def of(cls, frame: JudgedFrame, objects: ObjectPoints | None = None) -> Overlap:
-        """Overlap in a frame; objects: points of its labelled objects, where they are known."""
+        """The overlap in a frame, whose points of labelled objects may be given."""
         p = max(frame.n_proposals, int(frame.proposal.max(initial=NONE)) + 1) + 1
         size = np.bincount(frame.proposal + 1, minlength=p + 1)[1:]
         objects = objects or ObjectPoints.of(frame.points, frame.truth)

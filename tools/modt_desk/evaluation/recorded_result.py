@@ -79,7 +79,7 @@ def semantic_labels(tracks: Tracks, proposals: Int) -> NDArray[np.uint32]:
     seen = np.flatnonzero(tracks.proposal != NONE)
     label, instance = SEMANTIC[tracks.object_class[seen]], tracks.id[seen] % MAX_INSTANCE + 1
     code[tracks.proposal[seen]] = np.where(label > 0, instance << 16 | label, 0)
-    return code[proposals]  # the last one is that of NONE
+    return code[proposals]  # index -1, NONE, is the last one
 
 
 def recorded_pose(record: dict[str, Any]) -> Float64:

@@ -15,7 +15,7 @@ CLASS_TABLES = (
     ("objects reported with their class [%]", "objects_called", "objects"),
     ("recall with the right class [%]", "recall", "segmentable"),
 )
-"""Title, figure and the count that it is a share of."""
+"""Title of a table, its figure, and the count that the figure is a share of."""
 FAILURES = ("merged", "split", "partial", "missed", "cut")
 TRACKS = ["objects", "length", "ideal", "ratio", "as seen", "its ideal", "labelled", "breaks", "taken", "mixed"]
 METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")

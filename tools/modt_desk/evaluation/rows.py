@@ -36,7 +36,7 @@ OBJECT = np.dtype(
         ("class", int),
         ("role", int),
         ("range_m", float),  # range of the centre of the box
-        ("in_view", bool),  # most of its points are
+        ("in_view", bool),  # whether most of its points are
         ("to_segment", bool),  # judged for segmentation
         ("to_classify", bool),  # judged for average precision
         ("to_follow", bool),  # judged for the length of its track
@@ -64,7 +64,7 @@ PROPOSAL = np.dtype(
 
 
 def table(dtype: np.dtype[np.void], n: int, **columns: Any) -> Rows:
-    """N rows of these columns, each an array or one value for all; those not given are zero."""
+    """N rows with these columns, each an array or one value for all. Other columns are zero."""
     rows = np.zeros(n, dtype)
     for name, column in columns.items():
         rows[name] = column

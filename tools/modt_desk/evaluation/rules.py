@@ -12,8 +12,8 @@ IGNORABLE = ("cut", "few", "parked", "dontcare")
 class Rules:
     """Thresholds of a judgement.
 
-    By IoU, an object has a proposal for average precision if that of their points exceeds one half; otherwise if each
-    holds more than half of the other.
+    For average precision, an object and a proposal are a pair if the IoU of their points exceeds one half (`by_iou`),
+    otherwise if each holds more than half of the other.
     """
 
     min_points: int = 20  # least points of an object that must be segmented
@@ -22,7 +22,7 @@ class Rules:
     by_iou: bool = False
     sector_deg: float = 40.0  # half the sector about x in which proposals are judged: where everything is labelled
     max_range_m: float = float("inf")  # farthest judged object or proposal
-    ignored: frozenset[str] = frozenset(IGNORABLE)  # kinds that count neither for nor against
+    ignored: frozenset[str] = frozenset(IGNORABLE)  # kinds that are ignored
     complete: bool = False  # whether every road user in the sector is believed to be labelled
 
 

@@ -76,7 +76,7 @@ class RunRecord:
 
     path: Path
     facts: dict[str, Any]  # content of run.yaml
-    stream: Path | None  # where its scans lay, None for the embedded stream
+    stream: Path | None  # path of its scans, None for the embedded stream
     sensor: str  # name of its profile
     mount: Mount  # mount of its sensor
 
@@ -99,13 +99,13 @@ class RunRecord:
 
     @property
     def live(self) -> bool:
-        """Whether its source was live and cannot be read again."""
+        """Whether its source was live, so that it cannot be read again."""
         return self.stream is None and bool(self.facts.get("service", False))
 
     def source(
         self, capture: Sequence[tuple[str, str]], frames: tuple[int, int | None] = (0, None)
     ) -> LevelStream | None:
-        """The stream that the run read, opened again and level; None where it was live.
+        """The stream that the run read, opened again and turned level. None for a live one.
 
         Raises:
             MisuseError: it is gone.

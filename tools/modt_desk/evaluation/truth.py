@@ -84,12 +84,12 @@ class FrameTruth:
     role: Int  # (n,) `Role`
     box: Float64  # (n, 7) x, y, z of the centre, l, w, h [m], yaw [rad]
     parked: Float64 = field(default_factory=lambda: np.zeros((0, 7)))  # (k, 7) parked cars that are not labelled here
-    regions: Regions | None = None  # where nothing is labelled, None for nowhere
+    regions: Regions | None = None  # image regions without labels, None for none
     T_box_sensor: Float64 = field(default_factory=lambda: np.eye(4))
 
     @classmethod
     def of(cls, types: Types, id_: Sequence[int], type_: Sequence[str], box: ArrayLike, **more: Any) -> FrameTruth:
-        """Objects of labelled types; more: the fields that have a default."""
+        """Objects of labelled types; `more` sets fields that have a default."""
         table = np.array([types.get(name, (0, Role.COUNTED)) for name in type_], np.int64).reshape(-1, 2)
         boxes = np.asarray(box, np.float64).reshape(-1, 7)
         return cls(np.asarray(id_, np.int64), tuple(type_), table[:, 0], table[:, 1], boxes, **more)
@@ -150,7 +150,7 @@ def by_stamp(truth: Truth, stamps_s: Mapping[int, float]) -> Truth:
 
 
 def _nearest(stamps_s: Float64, wanted_s: Float64, within_s: float) -> Int:
-    """(n,) place of the stamp, of ascending ones, that is nearest to each, NONE where none is so near."""
+    """(n,) index of the nearest of ascending stamps to each wanted one, NONE where none is near enough."""
     middles_s = (stamps_s[1:] + stamps_s[:-1]) / 2
     place = np.searchsorted(middles_s, wanted_s)
     return np.where(np.abs(stamps_s[place] - wanted_s) < within_s, place, NONE)

@@ -38,7 +38,7 @@ GIVE = "give a raw drive with tracklets, label_02/NNNN.txt, object/training, or 
 
 
 def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False) -> Truth:
-    """The labels that lie at a path.
+    """The labels at a path.
 
     Args:
         path: KITTI raw drive, tracking label file or folder, object folder, folder with tables of cuboids.
@@ -77,7 +77,7 @@ def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False)
 
 
 def labels_beside(stream: Path) -> Path | None:
-    """Path of the labels of a recording, if they lie where its layout puts them."""
+    """Path of the labels of a recording, if they are where its layout puts them."""
     if (stream / TRACKLETS).is_file():
         return stream
     sequence = stream.parent.parent / "label_02" / f"{stream.name}.txt"
@@ -149,7 +149,7 @@ def _frame(types: Types, labels: Iterable[Label], camera: Camera | None = None, 
 
 
 def _rows(path: Path) -> Iterator[Label]:
-    """The cuboids of a table; without columns for frame and track they are of one frame and have no identities."""
+    """The cuboids of a table. Without columns for frame and track, all are in frame 0 and have no identities."""
     try:
         with path.open(encoding="utf-8", newline="") as lines:
             for number, row in enumerate(csv.DictReader(lines), 2):

@@ -26,19 +26,20 @@ from modt_desk.evaluation.truth import Truth
 WINDOW_S = 2.0
 """Time within which a motion is judged; a shorter track is judged as a whole."""
 MIN_SIGHTINGS = 5
-"""Fewer frames in a window show no motion."""
+"""Least number of frames in a window for a judgement of its motion."""
 MIN_GONE_M = 1.2
-"""Distance gone within a window from which a track moves: a slow walker's, above the drift of poses."""
+"""Least distance that a moving track covers in a window [m]: a slow walker does, the drift of poses does not."""
 MAX_SPEED_MPS = 30.0
-"""A faster track jumps between objects."""
+"""Greatest speed of a road user. A faster track jumps between objects."""
 ENDS_SHARE = 0.9
-"""Both ends of a road user move with its centre. Of a wall whose visible part changes, one end stays behind."""
+"""Least speed of either end of a road user, relative to its centre. Where the visible part of a wall changes, one end
+stays behind."""
 STEADINESS = 15.0
-"""Distance gone over the scatter about an even motion: a road user's centre moves evenly, that of a wall jumps."""
+"""Least ratio of the distance to the scatter about an even motion. A wall's centre jumps, a road user's does not."""
 MIN_SCATTER_M = 0.05
-"""Scatter that every outline has."""
+"""Least scatter of an outline."""
 STEP_S = 0.5
-"""Steps of the path by which straightness is computed."""
+"""Time step of the path whose straightness is computed."""
 CAR_LENGTH_M, CAR_WIDTH_M, RIDING_MPS = 2.6, 1.3, 2.5
 """A longer or wider mover is taken for a car; of the others, a faster one for a cyclist."""
 
@@ -53,7 +54,7 @@ class Mover:
 
     track: int
     type_: str  # KITTI's type that its size and speed suggest
-    reported: str  # class that the run gave it most often
+    reported: str  # class that the run reported most often
     frame: Int  # (n,)
     box: Float64  # (n, 7) sensor frame, along the motion, all of one size
     gone_m: float  # from its first place to its last
@@ -89,7 +90,7 @@ def write_table(path: Path, movers: Sequence[Mover]) -> None:
 
 
 def listing(movers: Sequence[Mover]) -> Iterator[str]:
-    """A line for each mover, below a head."""
+    """A heading and a line for each mover."""
     yield "track   frames      gone m  straight  m/s  l x w x h m       looks like  reported"
     for m in movers:
         span, size = f"{m.frame[0]} to {m.frame[-1]}", " x ".join(f"{side:.1f}" for side in m.box[0, 3:6].tolist())

@@ -24,9 +24,9 @@ from modt_desk.experiments.figures import (
 from modt_desk.experiments.judged import Judged, LabelReplay, NetworkReplay, Replay
 
 Label = tuple[str, float | None]
-"""Variant, and the value that is swept."""
+"""Variant, and the swept value."""
 DETECTION, TRACKING = "det_only", "with_trk"
-"""Each view by itself; views fused along a track. The names are the paper's."""
+"""Each view by itself, and views fused along a track, by the paper's names."""
 IDEAL = "ideal detector, ideal tracker"
 ALPHAS = tuple(k / 50 for k in range(26))
 START_FRAMES = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60)

@@ -1,4 +1,4 @@
-"""The drives that experiments are made on: KITTI's below a folder, and simulated ones."""
+"""Drives for experiments: KITTI's below a folder, and simulated ones."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ KITTI, SIMULATED = "KITTI", "simulated"
 DRIVE_OF_SEQUENCE = dict(
     enumerate(("0005", "0009", "0011", "0013", "0014", "0015", "0018", "0022", "0032", "0036", "0056", "0059"))
 )
-"""Raw drive of 2011_09_26 that each of KITTI's first tracking sequences is of."""
+"""Number of the raw drive of 2011_09_26 from which each of KITTI's first tracking sequences comes."""
 DEVELOPMENT_DRIVES = frozenset({"0005"})
-"""Drives that choices of this project were confirmed on."""
+"""Drives on which choices of this project were confirmed."""
 FIRST_SEED = 7000
 """First seed of the simulated drives; nothing is trained or chosen on these."""
 SCENES = ("street", "crossing")
@@ -48,7 +48,7 @@ class KittiDrive:
         name: number of the raw drive, and the sequence if its labels are those.
         number: number of the raw drive, or the sequence if it is not known.
         path: folder of the drive, or the label file.
-        scans: whether sweeps of half of the labelled frames or more are there.
+        scans: whether sweeps of half of the labelled frames or more are present.
         further: table of objects that its labels leave out, None for the labels alone.
     """
 
@@ -70,11 +70,11 @@ class KittiDrive:
         return dict(_truth(self.path, self.further).frames)
 
     def rules(self) -> Rules:
-        """Labels cover the camera's view."""
+        """Rules for labels that cover the camera's view."""
         return _truth(self.path).rules
 
     def fov(self) -> FieldOfView:
-        """The camera's."""
+        """The camera's field of view."""
         scans = _truth(self.path).scans
         camera = scans.info.camera if scans else None
         return FieldOfView() if camera is None else FieldOfView.of_camera(camera)
@@ -109,7 +109,7 @@ class SimulatedDrive:
         return {frame.index: truth for frame, truth in self.sweeps()}
 
     def rules(self) -> Rules:
-        """Labels all round."""
+        """Rules for labels all round."""
         return CUBOID_RULES
 
     def fov(self) -> FieldOfView:
@@ -128,7 +128,7 @@ Drive = KittiDrive | SimulatedDrive
 
 
 def kitti_drives(root: Path) -> list[KittiDrive]:
-    """The labelled drives below a folder, by name; scans that lie there twice are used once.
+    """The labelled drives below a folder, by name. Scans that are there twice are used once.
 
     Raises:
         MisuseError: there are none, or labels that are broken.
@@ -145,7 +145,7 @@ def kitti_drives(root: Path) -> list[KittiDrive]:
 
 
 def completed(drives: Sequence[KittiDrive], further: Path) -> KittiDrive:
-    """The drive whose sweeps are there, with the objects of a table that its labels leave out.
+    """The drive whose sweeps are present, with the objects of a table that its labels leave out.
 
     Raises:
         MisuseError: there is not one such drive, or the table is broken or of another drive.

@@ -20,7 +20,7 @@ from modt_desk.experiments.judged import Judged
 
 RESAMPLES, SEED, LEVEL = 200, 0, (2.5, 97.5)
 _TOGETHER = 8
-"""Resamples that are ranked at a time, to stay in the cache."""
+"""Number of resamples ranked at a time, so that they stay in the cache."""
 RECALLS = np.arange(1, 20) / 20
 
 
@@ -51,12 +51,12 @@ def ratio(part: ArrayLike, whole: ArrayLike) -> Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Ranking:
-    """Proposals by decreasing score, down to the last right one.
+    """Proposals by decreasing score, down to the last correct one.
 
     Attributes:
-        hit: (R,) whether each is right.
+        hit: (R,) whether each is correct.
         unit: (R,) object that each stands for, or the track of a false one, numbered behind the objects.
-        wanted: (n,) times that each object is to be found.
+        wanted: (n,) number of frames in which each object is to be detected.
         tracks: number of tracks of false ones.
     """
 
@@ -67,7 +67,7 @@ class Ranking:
 
     @classmethod
     def of(cls, objects: Rows, proposals: Rows, object_class: int, counted: Bool) -> Ranking:
-        """For one class, of the judged proposals; counted: which objects' rows are of it."""
+        """The ranking for one class; `counted` are the rows of its objects."""
         seen = objects[counted]
         names, of_row = np.unique(seen[["drive", "id"]], return_inverse=True)
         proposals = proposals[proposals["to_classify"]]
@@ -178,7 +178,7 @@ def curves(judged: Judged, variant: str, at: float | None = None) -> Iterator[Fi
 
 @dataclass(frozen=True, slots=True)
 class ObjectLengths:
-    """(n,) of each labelled object: frames to follow it in, frames followed, and discontinuities."""
+    """(n,) frames in which each labelled object is to be followed and is followed, and its discontinuities."""
 
     wanted: Int
     followed: Int
@@ -186,7 +186,7 @@ class ObjectLengths:
 
     @classmethod
     def of(cls, judged: Judged) -> ObjectLengths:
-        """As in the judgement of runs."""
+        """Lengths by the rules of the judgement of runs."""
         rows = judged.objects
         rows = rows[rows["to_follow"] & (rows["class"] > 0) & (rows["role"] != Role.IGNORED) & (rows["id"] != NONE)]
         rows = np.sort(rows, order=["drive", "id", "frame"])
@@ -198,7 +198,7 @@ class ObjectLengths:
 
 
 def track_lengths(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
-    """Lengths of the tracks of objects, and what ends it early."""
+    """Lengths of the tracks of objects, and the events that end them early."""
     found = ObjectLengths.of(judged)
     if not len(found.wanted):
         return
@@ -214,7 +214,7 @@ def track_lengths(judged: Judged, variant: str, at: float | None = None) -> Iter
 
 @dataclass(frozen=True, slots=True)
 class TrackWork:
-    """(n,) of each track: frames with a proposal, most of them on objects or not, and calls."""
+    """(n,) frames with a proposal of each track, whether most are on objects, and its calls of the network."""
 
     frames: Int
     on_object: Bool
@@ -233,7 +233,7 @@ class TrackWork:
 
 
 def efficiencies(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
-    """beta, of all proposals and of those of objects."""
+    """Beta of all proposals, and of those on objects."""
     tracks = TrackWork.of(judged)
     of = tracks.on_object
     yield Figure(variant, at, "beta", ratio(tracks.calls, tracks.frames))

@@ -1,4 +1,4 @@
-"""Replays of a drive, detector and tracker each ideal or real, and the tables of their judged frames."""
+"""Replays of a drive with an ideal or a real detector and tracker, and the tables of their judged frames."""
 
 from __future__ import annotations
 
@@ -66,12 +66,12 @@ class LabelReplay:
 
 @dataclass(frozen=True, slots=True)
 class NetworkReplay:
-    """The real detector: segmentation and network, without a budget of CPU time, which no two machines fill alike.
+    """Segmentation and network as the detector, without a budget of CPU time, whose effect depends on the machine.
 
     Attributes:
         config: profile of the stages.
         mode: mode of the method.
-        ideal: whether the tracker is.
+        ideal: whether the tracker is ideal.
         range_m: range of interest; proposals beyond it are left out.
     """
 

@@ -8,13 +8,11 @@ from pathlib import Path
 
 from modt import host, profile
 from modt.classification.pointnet import PointNet
-from modt_desk.experiments import paper
 from modt_desk.experiments.catalogue import Experiment
-from modt_desk.experiments.drives import KITTI
 from modt_desk.experiments.study import Row
 
 _MOST = 6
-"""Values of a sweep in a table; the CSV file has all."""
+"""Greatest number of values of a sweep in a table. The CSV file has all."""
 _CURVES = "precision "
 """Beginning of quantities that only the CSV file has."""
 _NOT_THERE = "-"
@@ -44,21 +42,17 @@ def _head(command: str, sources: str, rows: Sequence[Row]) -> Iterator[str]:
 
 def _body(experiments: Sequence[Experiment], rows: Sequence[Row]) -> Iterator[str]:
     for experiment in experiments:
-        own = [row for row in rows if row.experiment == experiment.name]
+        own = (row for row in rows if row.experiment == experiment.name)
         listed = [row for row in own if not row.quantity.startswith(_CURVES)]
         if not listed:
             continue
         yield from ("", f"## {experiment.title}", "", *([experiment.note, ""] if experiment.note else []))
         for cells in _table(experiment, listed):
             yield f"| {' | '.join(cells)} |"
-        if experiment.name == "table3":
-            there = {row.streams[:4] for row in own if row.kind == KITTI}
-            yield ""
-            yield from (f"- {drive}: {why}" for drive, why in paper.DEVIATIONS.items() if drive in there)
 
 
 def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str]]:
-    """Head, rule and lines; columns are quantities, or the values of a sweep."""
+    """Heading, rule and lines. The columns are quantities, or the values of a sweep."""
     several = len({row.profile for row in rows}) > 1
     swept = sorted({row.at for row in rows if row.at is not None})
     lines: dict[tuple[str, ...], dict[str | float | None, str]] = {}
@@ -81,14 +75,14 @@ def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str
 
 
 def _spread(values: Sequence[float]) -> list[float]:
-    """At most _MOST of them, the ends included."""
+    """At most _MOST of the values, the ends included."""
     if len(values) <= _MOST:
         return list(values)
     return [values[round(k * (len(values) - 1) / (_MOST - 1))] for k in range(_MOST)]
 
 
 def number(value: float) -> str:
-    """Three digits."""
+    """A number with three digits."""
     return f"{value:.0f}" if abs(value) >= 100 or value == int(value) else f"{value:.3g}"
 
 

@@ -1,4 +1,4 @@
-"""The figures of the paper, and why ours deviate where the labels alone decide."""
+"""The figures of the paper."""
 
 from __future__ import annotations
 
@@ -30,18 +30,10 @@ _OF_ALL: dict[tuple[str, str, str], float] = {
     for name, percent in zip(("car", "cyclist", "pedestrian"), percents, strict=True)
 }
 _OF_RANGE = {("fig8", 10.0, "beta"): 0.1, ("fig8", 70.0, "beta"): 0.02}
-DEVIATIONS = {
-    "0001": "33.1, not 32.4: the same 14 objects, in 464 labelled frames, where the paper's mean makes 454.",
-    "0005": "34.9 by the labels of KITTI tracking, as in the paper; the tracklets hold five more frames (35.3).",
-    "0014": "26.9, not 27.1: 35 objects as in the paper, over 314 labelled frames, where the paper counts 341.",
-    "0059": "63.3, not 61.9: 57 objects and 373 frames as in the paper; the labels of KITTI tracking hold 2 % more "
-    "frames an object than the paper counts.",
-}
-"""Reasons why N_go by the labels differs from Table III, by drive."""
 
 
 def figure(experiment: str, streams: str, variant: str, at: float | None, quantity: str) -> tuple[float, str] | None:
-    """The paper's value of a figure, and what it is over; None where the paper does not state it."""
+    """The paper's value of a figure, and the drives that it is taken over. None where the paper does not state it."""
     drive, pooled = streams[:4], streams.endswith("drives")
     if at is not None and pooled:
         found = _OF_RANGE.get((experiment, at, quantity))

@@ -33,7 +33,7 @@ from modt_desk.experiments.drives import Drive
 
 @dataclass(frozen=True, slots=True)
 class SegmentedFrame:
-    """A sweep: the points that matter, proposals and their likelihoods, labels, and the points of its objects."""
+    """A sweep with the points that matter, proposals, their likelihoods, labels, and the points of objects."""
 
     frame: Frame
     proposals: Proposals
@@ -44,7 +44,7 @@ class SegmentedFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SegmentedDrive:
-    """All sweeps of a drive, with the field of view that was segmented and the rules of their judgement."""
+    """All sweeps of a drive, with the segmented field of view and the rules of the judgement."""
 
     frames: tuple[SegmentedFrame, ...]
     network: PointNet
@@ -101,7 +101,7 @@ def within(proposals: Proposals, range_m: float) -> Bool:
 @lru_cache(maxsize=2)
 def _ideal_tracks(drive: SegmentedDrive, tracking: TrackingConfig, period_s: float) -> tuple[Int, ...]:
     """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
-    tracker = Tracker(replace(tracking, extensions="none"), ACCURATE, period_s=period_s)  # proposals as they are
+    tracker = Tracker(replace(tracking, extensions="none"), ACCURATE, period_s=period_s)  # joins no proposals
     return tuple(_tracks(drive, tracker, Odometry()))
 
 
@@ -119,7 +119,7 @@ def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: Odometry) -> Iter
 
 
 def _owner(made: SegmentedFrame) -> list[int]:
-    """(P,) identity of the object whose proposal each is, NONE for none."""
+    """(P,) identity of the object that each proposal stands for, NONE for none."""
     truth, n = made.truth, len(made.proposals)
     none = np.zeros(0, np.int64)
     of_points = made.proposals.label(len(made.frame.points))
@@ -162,7 +162,7 @@ class PlayedBack:
 
 
 class IdealTracking(PlayedBack):
-    """Segmenter, odometry, tracker and classifier of a pipeline that return what is known of a drive.
+    """Segmenter, odometry, tracker and classifier of a pipeline that return the truth of a drive.
 
     The tracker of the profile follows background and further fragments; proposals beyond a range are left out.
     """
@@ -177,7 +177,7 @@ class IdealTracking(PlayedBack):
         self._tracks.id[:] = np.arange(len(self._tracks))
 
     def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
-        """At the origin: nothing is associated by position."""
+        """The origin, since nothing is associated by position."""
         origin = Placement(np.eye(4))
         return Located(origin, observe(proposals, origin.T_world_sensor))
 
@@ -201,7 +201,7 @@ class IdealTracking(PlayedBack):
         return TrackedFrame(t, proposals, (t.proposal != NONE) & ~t.final)
 
     def conclude(self, rows: Int, certain: Bool) -> Tracks:
-        """A certain class is final."""
+        """Make the confirmed classes final."""
         self._tracks.final[rows] = certain
         return self._tracks.copy()
 

@@ -1,4 +1,4 @@
-"""Experiments on drives: the replays that they need, and the figures that follow."""
+"""Experiments on drives, the replays that they need, and the figures that follow."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Task = tuple[Drive, Replay]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A figure of some streams, beside the paper's.
+    """A figure of some streams, and the paper's figure.
 
     Attributes:
         experiment: its name.
@@ -99,13 +99,13 @@ class Study:
         return self.profiles if experiment.scans else self.profiles[:1]
 
     def _suited(self, experiment: Experiment) -> list[Drive]:
-        """Drives with sweeps where they are needed; for labels alone, KITTI's."""
+        """Drives with sweeps, where these are needed. An experiment on labels alone suits KITTI's."""
         if experiment.scans:
             return [drive for drive in self.drives if drive.scans]
         return [drive for drive in self.drives if isinstance(drive, KittiDrive) and drive.further is None]
 
     def _streams(self, experiment: Experiment) -> Iterator[tuple[str, Sequence[Drive]]]:
-        """Names of drives that are pooled, with these."""
+        """Names of pooled drives, and the drives."""
         suited = self._suited(experiment)
         simulated = [drive for drive in suited if not isinstance(drive, KittiDrive)]
         if simulated:

@@ -99,7 +99,7 @@ Plot = tuple[str, str, str]
 def document_page(document: Document, drawn: Iterable[Plot]) -> str:
     """HTML of a report with its plots."""
     blocks = [
-        _tiles((name, _cell(value), note) for name, value, note in document.results),
+        tiles(document.results),
         plots(drawn),
         *map(_table, document.tables),
     ]
@@ -120,9 +120,13 @@ def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
     )
 
 
-def tiles(facts: Iterable[tuple[str, str, str]]) -> str:
+def tiles(facts: Iterable[tuple[str, Cell, str]]) -> str:
     """Facts side by side: name, value and note of each."""
-    return _tiles((name, escape(value), note) for name, value, note in facts)
+    cells = (
+        f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
+        for name, value, note in facts
+    )
+    return f'<div class="tiles">{"".join(cells)}</div>'
 
 
 def plots(items: Iterable[Plot]) -> str:
@@ -147,15 +151,6 @@ def save(path: Path, text: str) -> None:
     """
     with writing(path):
         path.write_text(text, encoding="utf-8")
-
-
-def _tiles(facts: Iterable[tuple[str, str, str]]) -> str:
-    """Facts whose values are HTML."""
-    cells = (
-        f'<div class="tile"><small>{escape(name)}</small><b>{value}</b><small>{escape(note)}</small></div>'
-        for name, value, note in facts
-    )
-    return f'<div class="tiles">{"".join(cells)}</div>'
 
 
 def _table(table: Table) -> str:

@@ -67,7 +67,7 @@ EGO_M = (4.6, 1.8)
 OVERHEAD_M = 2.2
 """Parts of scenery above this height are not part of its footprint."""
 NONE_M = 1e-3
-"""Size of a coat or a backpack that a person does not have."""
+"""Size of the coat or backpack of a person without one."""
 POSTURES = {kinds.SITTER: Posture.SIT, kinds.CYCLIST: Posture.RIDE}
 """Postures of others than pedestrians."""
 STRIP_M, STRIP_SHARE, STRIP_SHARE_CYCLISTS = 0.07, 0.04, 0.1
@@ -77,7 +77,7 @@ PITCH_RAD = (0.007, 0.005)
 
 
 class SceneBuilder:
-    """Bodies of a scene of a duration [s]."""
+    """Collects the bodies of a scene that lasts some seconds."""
 
     def __init__(self, rng: np.random.Generator, seconds: float) -> None:
         self.rng, self.seconds = rng, seconds
@@ -86,7 +86,7 @@ class SceneBuilder:
         self._strip_rng = rng.spawn(1)[0]
 
     def scenery(self, solids: Solids, x: float, y: float, heading_rad: float) -> None:
-        """Add something at rest that is not annotated."""
+        """Add a body at rest without annotation."""
         self.bodies.append(Body(kinds.SCENERY, _extent(solids), Path.standing(x, y, heading_rad), solids))
 
     def vehicle(self, kind: Kind, path: Path, size: Triple | None = None) -> None:

@@ -46,7 +46,7 @@ class Material(IntEnum):
 _TABLE = np.array([material.properties for material in Material], np.float32).T.copy()
 
 REFLECTIVITY, DROPOUT = _TABLE[:2]
-"""Share of the light returned, which decides on detection; share of pulses reflected away or transmitted."""
+"""Share of the light that is returned, which decides on detection; share of pulses reflected away or transmitted."""
 
 INTENSITY, BODY_SIGMA, POINT_SIGMA, GRAZING_LOSS = _TABLE[2:6]
 """Reported intensity at normal incidence in the focus, its standard deviation from body to body and from point to

@@ -21,12 +21,12 @@ class Path:
 
     @classmethod
     def standing(cls, x: float, y: float, heading_rad: float) -> Path:
-        """A body at rest."""
+        """The path of a body at rest."""
         return cls(np.array([[x, y]]), np.zeros(1), np.zeros(1), heading_rad)
 
     @classmethod
     def steady(cls, xy: Float64, start_m: float, speed_mps: float, seconds: float) -> Path:
-        """A body at constant speed from start_m along the line."""
+        """The path of a body at constant speed from start_m along the line."""
         time = np.array([0.0, seconds])
         return cls(xy, time, start_m + speed_mps * time)
 

@@ -33,13 +33,12 @@ class RangeImage:
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Bounds of each solid in the range image; a solid across the seam has two windows."""
+    """Bounds of each solid in the range image. A solid across the seam has two windows."""
 
     solid: Int  # (W,) index of the solid, nearest first
-    rows: Int  # (W, 2) first, and one past the last
-    columns: Int  # (W, 2) first, and one past the last
+    rows: Int  # (W, 2) first row, and one past the last
+    columns: Int  # (W, 2) first column, and one past the last
     near: Float32  # (W,) least horizontal distance of the solid [m]
-    n_columns: int  # columns of the image
 
     @property
     def area(self) -> Int:
@@ -199,8 +198,7 @@ class RayCaster:
         first = np.flatnonzero(enter == nearest[at])
         solid[at[first]] = k[hit[first]]
 
-    @staticmethod
-    def _pairs(windows: Windows, chunk: Int, nearest: Float32) -> tuple[Int, Int, Int, Int]:
+    def _pairs(self, windows: Windows, chunk: Int, nearest: Float32) -> tuple[Int, Int, Int, Int]:
         """Ray, row, column and solid of every pair in some windows that is not occluded by an earlier hit."""
         area, n_columns = windows.area[chunk], np.diff(windows.columns[chunk], axis=1)[:, 0]
         which = np.repeat(np.arange(len(chunk)), area)
@@ -208,7 +206,7 @@ class RayCaster:
         down = step // n_columns[which]
         row = windows.rows[chunk, 0][which] + down
         column = windows.columns[chunk, 0][which] + step - down * n_columns[which]
-        ray = row * windows.n_columns + column
+        ray = row * self.sensor.shape[1] + column
         open_ = np.flatnonzero(windows.near[chunk][which] < nearest[ray])
         return ray[open_], row[open_], column[open_], windows.solid[chunk][which[open_]]
 
@@ -238,7 +236,7 @@ class RayCaster:
             parts.append(np.stack([which, r0[which], r1[which], c0[which], c1[which]], axis=1))
         part = np.concatenate(parts)
         part = part[np.argsort(near[part[:, 0]], kind="stable")]
-        return Windows(part[:, 0], part[:, 1:3], part[:, 3:5], near[part[:, 0]], self.sensor.shape[1])
+        return Windows(part[:, 0], part[:, 1:3], part[:, 3:5], near[part[:, 0]])
 
     def _row_range(self, bottom: Float32, top: Float32, near: Float32, far: Float32) -> tuple[Int, Int]:
         """First row, and one past the last, whose beams pass between two heights at some distances."""

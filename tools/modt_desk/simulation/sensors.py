@@ -12,7 +12,7 @@ from modt.errors import MisuseError
 from modt.types import Bool, Float32, Float64, Int
 
 COLUMN_STEP, SWEEP_STEP = (np.sqrt(5) - 1) / 2, np.sqrt(2) - 1
-"""Irrational steps of the ray that a non-repetitive sensor fires, so that no two columns or sweeps are alike."""
+"""Irrational steps of the fired ray of a non-repetitive sensor, by which columns and sweeps differ."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ _HDL_64E: dict[str, Any] = {
 _OUSTER: dict[str, Any] = {"range_sigma_m": 0.02, "beam_sigma_m": 0.01, "detect_m": 60.0}
 _HESAI: dict[str, Any] = {"range_sigma_m": 0.01, "beam_sigma_m": 0.005}
 _NO_SCALE = Response(most=0.0)
-"""Materials are not known on the scale of the sensor."""
+"""Response of a sensor on whose scale the intensities of materials are unknown."""
 _MODELS = (
     _rotating(
         "hdl-64e", np.append(_beams(1.94, -8.71, 32), _beams(-9.03, -25.0, 32)), 2083, 1.73, (2.0, 80.0), **_HDL_64E

@@ -24,7 +24,7 @@ from modt_desk.simulation.terrain import UInt8
 from modt_desk.simulation.world import MOVING_MPS, World
 
 GLOSSY = np.float32(0.25)
-"""Grazing loss above which the slope between beams counts as well: roofs and bonnets."""
+"""Grazing loss above which the slope between beams counts as well, as on roofs and bonnets."""
 
 
 class Receiver:
@@ -82,7 +82,7 @@ class Receiver:
         return np.where(solid < 0, ground, np.where(same, level, np.float32(0.7))).astype(np.float32)
 
     def _cos_glossy(self, near: Float32, solid: Int32, cosine: Float32, glossy: Bool) -> Float32:
-        """(B, A) the same cosine, with the slope between beams where the surface is glossy."""
+        """(B, A) cosine of incidence with the slope between beams, where the surface is glossy."""
         here = np.flatnonzero(glossy[:-1])
         below = here + near.shape[1]
         s, part, out = near.ravel(), solid.ravel(), cosine.flatten()
@@ -92,7 +92,7 @@ class Receiver:
         return out.reshape(near.shape)
 
     def _mix_edges(self, measured: Float32, near: Float32, detected: Bool, chance: Float32) -> None:
-        """Mixed pixels: at edges some returns lie between the surfaces, some of the nearer surface are late."""
+        """Mix pixels at edges: some returns lie between the surfaces, some of the nearer surface are late."""
         gap = near[:, 1:] - near[:, :-1]
         share = np.float32(self.sensor.mixed_share)
         split = np.flatnonzero((np.abs(gap) > 0.2) & detected[:, 1:] & detected[:, :-1])
@@ -108,7 +108,7 @@ class Receiver:
 
 
 N_SLICES = 64
-"""Sectors of a sweep within which nothing moves."""
+"""Number of sectors of a sweep. Nothing moves while one is measured."""
 
 
 def slice_delay_s(part: int, period_s: float) -> float:
@@ -123,12 +123,10 @@ class Truth:
 
     instance: Int  # (N,) body of each point, NONE for the ground
     semantic: Int  # (N,) SemanticKITTI label of each point
-    object_class: Int  # (N,) class of each point's body
     bodies: Int  # (b,) indices of all bodies of annotated kinds, visible or not: their identities
     kinds: tuple[Kind, ...]  # kind of each
     boxes: Float64  # (b, 7) box of each, sensor frame
     points: Int  # (b,) number of points of each in this sweep
-    speed_mps: Float64  # (b,) speed of each
 
 
 class Simulator:
@@ -145,7 +143,6 @@ class Simulator:
         self.receiver = Receiver(sensor, np.random.default_rng([seed, 1]))
         normal = np.random.default_rng([seed, 3]).standard_normal((len(world.bodies), len(BODY_SIGMA)), np.float32)
         self._intensity_offset = normal * BODY_SIGMA
-        self._object_class = np.array([b.kind.object_class for b in world.bodies] + [0], np.int64)
         self._annotated = np.array([i for i, b in enumerate(world.bodies) if b.kind.name], np.int64)
         self._kinds = tuple(world.bodies[i].kind for i in self._annotated.tolist())
         self._labels = np.array([(b.kind.semantic, b.kind.moving) for b in world.bodies], np.int64).reshape(-1, 2)
@@ -212,10 +209,8 @@ class Simulator:
         return Truth(
             instance=instance,
             semantic=np.where(label > 0, label, SEMANTIC[material]).astype(np.int64),
-            object_class=self._object_class[instance],
             bodies=shown,
             kinds=self._kinds,
             boxes=transform_boxes(inverse(T_world_sensor), world.boxes(time_s)[shown]),
             points=np.bincount(instance + 1, minlength=len(world.bodies) + 1)[1:][shown],
-            speed_mps=speed[shown],
         )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from modt.types import Bool, Float32, Float64, Int, Self
 
 N_CUTS = 4
-"""Cutting planes of a solid."""
+"""Number of cutting planes of a solid."""
 NARROW_M = 0.3
 """Half the least side below which the width of the beam matters."""
 EYE: Float32 = np.eye(3, dtype=np.float32)
@@ -52,7 +52,7 @@ class Solids:
         return self._with(rotation=R @ self.rotation, centre=(R @ self.centre[:, :, None])[:, :, 0] + t)
 
     def widened_by_beam(self, radius_m: float, divergence_rad: float) -> Self:
-        """Solids, sensor frame, narrow opaque ones wider by the radius of the beam, which returns from edges."""
+        """Solids, sensor frame, with narrow opaque ones widened by the beam, which returns from their edges."""
         narrow = (self.half.min(axis=1) < NARROW_M) & ~np.isfinite(self.density)
         beam_m = np.float32(radius_m) + np.float32(divergence_rad) * np.linalg.norm(self.centre, axis=1)
         more = np.where(narrow, beam_m, 0)[:, None]

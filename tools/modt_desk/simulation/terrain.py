@@ -13,9 +13,9 @@ from modt_desk.simulation.raycast import RayCaster
 UInt8 = NDArray[np.uint8]
 
 NEAREST_M, N_DISTANCES = 0.5, 90
-"""Series of distances along a ray, each 6 % longer than the one before."""
+"""Nearest distance along a ray, and number of distances, each 6 % longer than the one before."""
 N_HALVINGS = 6
-"""Bisections of the interval in which a ray meets the ground."""
+"""Number of bisections of the interval in which a ray meets the ground."""
 STEEPEST = 0.1
 """Tangent of the rays that may meet the rising ground of streets."""
 

@@ -14,7 +14,7 @@ LEAN = 0.1
 PLATE_M = (0.52, 0.11)
 """Width and height of a number plate."""
 INSET_M = 0.03
-"""Depth of the centres of plates and lamps below the surface: the width of the beam makes up for it."""
+"""Depth of the centres of plates and lamps below the surface, for which the width of the beam makes up."""
 
 
 def car(rng: np.random.Generator, size: Triple) -> Solids:
@@ -148,7 +148,7 @@ def _tail_lamps(hull: Solids, z: float) -> Solids:
 
 
 def car_size(rng: np.random.Generator) -> Triple:
-    """Distribution of the KITTI object labels: 3.9 by 1.63 by 1.53 m, correlated."""
+    """A random size of a car, as KITTI's object labels are distributed: 3.9 by 1.63 by 1.53 m, correlated."""
     scale = rng.normal(0.0, 1.0)
     return (
         float(np.clip(3.9 + 0.38 * scale + 0.15 * rng.normal(), 3.0, 5.0)),
@@ -158,7 +158,7 @@ def car_size(rng: np.random.Generator) -> Triple:
 
 
 def van_size(rng: np.random.Generator) -> Triple:
-    """Vans of 5.1 by 1.9 by 2.2 m."""
+    """A random size of a van, about 5.1 by 1.9 by 2.2 m."""
     scale = rng.normal(0.0, 1.0)
     return (
         float(np.clip(5.0 + 0.6 * scale, 4.0, 7.0)),
@@ -168,7 +168,7 @@ def van_size(rng: np.random.Generator) -> Triple:
 
 
 def truck_size(rng: np.random.Generator) -> Triple:
-    """Lorries of 9 by 2.6 by 3.3 m."""
+    """A random size of a lorry, about 9 by 2.6 by 3.3 m."""
     return float(rng.uniform(6.5, 12.0)), float(rng.uniform(2.3, 2.7)), float(rng.uniform(2.8, 3.8))
 
 

@@ -108,12 +108,9 @@ def crowd(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     return builder.world(floor(rng, SQUARE_HALF_M, Material.PAVING, 0.005), ego, height_m, ego_m=ROBOT_M)
 
 
-def ramp(rng: np.random.Generator, seconds: float, height_m: float, slope_deg: float | None = None) -> World:
-    """Flat ground with a kerb to the left, and a ramp 10 m long across the way, 4 m ahead; people before and on it.
-
-    The slope is 6 to 15 degrees where none is given.
-    """
-    slope_deg = rng.uniform(6.0, 15.0) if slope_deg is None else slope_deg
+def ramp(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+    """Flat ground with a kerb to the left, and a ramp 10 m long across the way, 4 m ahead, with people."""
+    slope_deg = rng.uniform(6.0, 15.0)
     x, y = _grid()
     height = np.clip(x - 4.0, 0, 10.0) * np.float32(np.tan(np.deg2rad(slope_deg))) + np.float32(KERB_M) * (y > 6.0)
     builder = SceneBuilder(rng, seconds)

@@ -1,12 +1,17 @@
-"""A frame of a run seen from above, x forward to the right, drawn by Matplotlib."""
+"""A frame of a run from above, x forward to the right, as a picture (SVG, PNG); frames as a film (GIF, MP4)."""
 
 from __future__ import annotations
 
 import math
+import subprocess
 from collections.abc import Iterable
 from datetime import datetime, timezone
+from itertools import chain
+from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.animation import FFMpegWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
@@ -16,16 +21,18 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Circle, Patch, Polygon
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
+from PIL import Image
 
+from modt.errors import MisuseError, ModtError
 from modt.geometry import corners
+from modt.sinks.output import writing
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64
 from modt.viewer import theme
 from modt.viewer.packed import SIDE, Cells
 from modt.viewer.theme import LIGHT, REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.recorded_tracks import RINGS_M, reach_m
+from modt_desk.viewer.recorded_run import RINGS_M, RecordedRun, reach_m
 from modt_desk.viewer.truth_marks import LEGEND
 
 SIZE_IN = (12.8, 9.1)
@@ -159,7 +166,7 @@ def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
 
 
 def _legend(axes: Axes, run: RecordedRun, at: int) -> Legend:
-    """Colours of the classes, the states and, where the frame has truth, of what became of it."""
+    """Colours of the classes and the states, and of the outcomes where the frame has truth."""
     outlines = theme.states(run.states) + (list(LEGEND.values()) if "truth" in run.frames[at] else [])
     entries = [(entry, True) for entry in theme.classes()] + [(entry, False) for entry in outlines]
     patches = [Patch(fill=f, color=e["colour"], linewidth=2, label=e["name"].replace("_", " ")) for e, f in entries]
@@ -193,3 +200,57 @@ def _time(stamp_s: float) -> str:
     if stamp_s < _DATES_S:
         return f"{stamp_s:.2f} s"
     return f"{datetime.fromtimestamp(stamp_s, timezone.utc):%Y-%m-%d %H:%M:%S.%f}"[:-4]
+
+
+SHARP_DPI = 200
+"""Resolution of the points in an SVG [pixel/inch]."""
+_REPEATABLE = {"svg.fonttype": "none", "svg.hashsalt": "modt"}
+"""Text stays text, and the same picture is the same bytes."""
+
+
+def save_picture(path: Path, figure: Figure, title: str) -> None:
+    """Write a figure as SVG or PNG.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    dpi = SHARP_DPI if path.suffix == ".svg" else figure.dpi
+    with writing(path), mpl.rc_context(_REPEATABLE):
+        figure.savefig(path, dpi=dpi, metadata={"Title": title, "Date": None})
+
+
+def save_film(path: Path, figure: Figure, drawings: Iterable[Figure], period_s: float) -> None:
+    """Write a figure as it is now and as each drawing leaves it, one after the other, as GIF or MP4.
+
+    Raises:
+        MisuseError: ffmpeg, for MP4, is not installed.
+        ModtError: it cannot be written.
+    """
+    save = _save_mp4 if path.suffix == ".mp4" else _save_gif
+    with writing(path):
+        save(path, figure, drawings, period_s)
+
+
+def _save_gif(path: Path, figure: Figure, drawings: Iterable[Figure], period_s: float) -> None:
+    palette = _image(figure).quantize(method=Image.Quantize.MAXCOVERAGE)
+    images = (_image(f).quantize(palette=palette, dither=Image.Dither.NONE) for f in chain([figure], drawings))
+    next(images).save(path, save_all=True, append_images=images, duration=round(1e3 * period_s), loop=0)
+
+
+def _save_mp4(path: Path, figure: Figure, drawings: Iterable[Figure], period_s: float) -> None:
+    if not FFMpegWriter.isAvailable():
+        raise MisuseError(path, "needs ffmpeg", "install it, or give a name that ends with .gif")
+    writer = FFMpegWriter(fps=1 / period_s)
+    try:
+        with writer.saving(figure, path, figure.dpi):
+            for _ in chain([figure], drawings):
+                writer.grab_frame()
+    except subprocess.CalledProcessError as error:
+        raise ModtError(
+            path, f"cannot be written by ffmpeg ({error.stderr[-200:].strip()})", "free or unlock the disk"
+        ) from None
+
+
+def _image(figure: Figure) -> Image.Image:
+    figure.canvas.draw()
+    return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")

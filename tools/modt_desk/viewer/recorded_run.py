@@ -1,8 +1,9 @@
-"""The recorded frames of a run."""
+"""The recorded frames of a run, its tracks as one table of `modt.viewer.track_rows`, and their extent."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,16 +17,16 @@ from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
-from modt.profile.yaml_text import to_yaml
+from modt.profile import to_yaml
 from modt.sinks.records import BROKEN, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
-from modt.types import Float64, Int
-from modt.viewer.track_rows import COLUMNS, planar
+from modt.types import NONE, Float64, FrameResult, Int
+from modt.viewer.theme import REACH_M
+from modt.viewer.track_rows import COLUMNS, SCALE, planar, result_rows, scaled
 from modt_desk.energy.run_energy import run_energy
 from modt_desk.evaluation.recorded_result import recorded_result
 from modt_desk.evaluation.run_record import RunRecord, broken
 from modt_desk.reporting.records import read_records
-from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +62,11 @@ class RecordedRun:
         with records_of(run / LEDGER):
             costs = _costs(run / LEDGER, config.energy)
         frames, rows, states, poses = list[dict[str, Any]](), list[Float64](), list[str](), list[Float64]()
+        boxes: dict[int, Float64] = {}
         for number, (place, record) in enumerate(opened.records()):
             try:
                 result, classifications = recorded_result(record), int(record["classifications"])
-                rows.append(frame_rows(number, result, states))
+                rows.append(frame_rows(number, result, states, boxes))
                 poses.append(planar(result.T_world_sensor))
                 counts = {
                     "frame": result.frame.index,
@@ -77,8 +79,7 @@ class RecordedRun:
             except BROKEN as error:
                 raise broken(place, error) from None
         with records_of(run / TRACKS), np.errstate(over="raise", invalid="raise"):
-            placed = np.stack(poses)
-            return cls(opened, config, frames, states, track_table(rows, placed), placed)
+            return cls(opened, config, frames, states, track_table(rows), np.stack(poses))
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -145,3 +146,46 @@ def _costs(ledger: Path, board: EnergyConfig) -> dict[int, dict[str, Any]]:
                 if frame in costs:
                     costs[frame] |= energy
     return costs
+
+
+def frame_rows(at: int, result: FrameResult, states: list[str], boxes: dict[int, Float64]) -> Float64:
+    """(M, COLUMNS) rows of a recorded result.
+
+    Args:
+        at: index of the frame.
+        result: recorded result, whose lost tracks get their last boxes.
+        states: names of the states so far; those of the result are added.
+        boxes: last box of each track in the world so far, by its id; those of the result are added.
+    """
+    states += [name for name in result.state_names if name not in states]
+    number, tracks = np.array([states.index(name) for name in result.state_names], np.int64), result.tracks
+    for id_, lost, box in zip(tracks.id.tolist(), (tracks.proposal == NONE).tolist(), tracks.box, strict=True):
+        box[:] = boxes.get(id_, box) if lost else box
+        boxes[id_] = box
+    rows = result_rows(result)
+    rows[:, COLUMNS.index("at")], rows[:, COLUMNS.index("state")] = at, number[tracks.state]
+    return rows
+
+
+def track_table(frames: Iterable[Float64]) -> Int:
+    """(R, COLUMNS) table of the rows of the frames."""
+    rows = np.concatenate([np.zeros((0, len(COLUMNS))), *frames])
+    return scaled(rows[np.lexsort((rows[:, 1], rows[:, 0]))])
+
+
+_SIDE_M = 32.0
+"""Half the height of a picture whose half width is REACH_M."""
+RINGS_M = {6.0: 2, 10.0: 5, 15.0: 5, 20.0: 10, 30.0: 10, REACH_M: 20}
+"""Ranges that a picture may reach, and the distance of the rings in it."""
+_NEARLY = 0.95
+"""Share of the tracked boxes that must be visible."""
+
+
+def reach_m(tracks: Int) -> float:
+    """Half the width of a picture that shows nearly all of (R, COLUMNS) rows of tracks; REACH_M at most."""
+    seen = tracks[tracks[:, COLUMNS.index("seen")] > 0]
+    if not len(seen):
+        return REACH_M
+    x, y = (np.abs(seen[:, COLUMNS.index(name)]) / SCALE[name] for name in ("x", "y"))
+    needed = np.quantile(np.maximum(x, y * REACH_M / _SIDE_M), _NEARLY)
+    return next((reach for reach in RINGS_M if reach >= needed), REACH_M)

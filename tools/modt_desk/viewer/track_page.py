@@ -76,16 +76,19 @@ def settled_from(rows: list[Row]) -> Row | None:
 
 def _plots(run: RecordedRun, rows: list[Row]) -> Iterator[Plot]:
     frame = np.array([run.numbers[int(row["at"])] for row in rows], float)
-    traces = [
-        svg.Trace(c, frame, np.array([row[f"p_{c}"] for row in rows]), colour=spec.colour)
-        for c, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)
-    ]
-    yield "Posterior", svg.lines(traces, "frame", "probability"), "after each frame, of views, box sizes and motion"
-    motion = [
-        svg.Trace(c, frame, np.array([row[f"motion_{c}"] for row in rows]), colour=spec.colour)
-        for c, spec in [*zip(CLASS_NAMES, CLASSES.values(), strict=True)][1:]
-    ]
-    yield "Motion", svg.lines(motion, "frame", "log-likelihood"), "of its motion, over that of background"
+    posterior, motion = (
+        [
+            svg.Trace(c, frame, np.array([row[f"{key}_{c}"] for row in rows]), colour=spec.colour)
+            for c, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)
+        ]
+        for key in ("p", "motion")
+    )
+    yield (
+        "Posterior",
+        svg.lines(posterior, "frame", "probability"),
+        "after each frame, of views, box sizes and motion",
+    )
+    yield "Motion", svg.lines(motion[1:], "frame", "log-likelihood"), "of its motion, over that of background"
     points = svg.Trace("", frame, np.array([row["points"] for row in rows]))
     yield "Points", svg.lines([points], "frame", "points"), "of its last proposal"
 
@@ -109,9 +112,7 @@ def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) ->
         if before is None or row["class"] != before["class"]:
             sentences.append(f"Reported as {_reported(row)}.")
         if row["final"] and not (before and before["final"]):
-            sentences.append(
-                f"The class is settled: {_reported(row)}. It is asked for again only if the view improves."
-            )
+            sentences.append(f"The class is settled: {_reported(row)}. A better view may still change it.")
         if before and before["final"] and not row["final"]:
             sentences.append("The class is open.")
         if sentences:

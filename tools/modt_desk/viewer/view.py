@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,8 +27,7 @@ from modt_desk.evaluation.run_record import FramesByNumber
 from modt_desk.evaluation.truth import by_stamp
 from modt_desk.evaluation.truth_files import labels_beside, open_truth
 from modt_desk.reporting.document import save
-from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.recorded_tracks import reach_m
+from modt_desk.viewer.recorded_run import RecordedRun, reach_m
 from modt_desk.viewer.track_page import rows_of, track_page, views
 from modt_desk.viewer.truth_marks import LEGEND, truth_marks
 
@@ -57,64 +56,11 @@ class Grid:
         return occupied(sweep.x[used], sweep.y[used], level, self.step_cm)
 
 
-def sweeps(numbers: Sequence[int], stream: Stream, grid: Grid, most: int) -> Iterator[Cells]:
-    """Cells of each frame, by ascending number, at most so many; none if the stream does not hold the frame."""
-    frames = FramesByNumber(stream.between(0, numbers[-1] + 1))
-    for number in numbers:
-        frame = frames.get(number)
-        yield NO_CELLS if frame is None else grid.cells(frame.points).thinned(most)
-
-
 SCRIPT = Path(__file__).parent / "recorded.js"
 POINT_BYTES = 20_000_000
-"""Approximate size of the points of a page."""
+"""Approximate size of the points of a page [bytes]; the sweeps of a long run have fewer cells each."""
 CELL_BYTES = 1.5
 """Size of a cell, compressed and in base64."""
-
-
-def most_cells(n_frames: int) -> int:
-    """Cells a sweep that a page of so many frames has room for."""
-    return int(POINT_BYTES / CELL_BYTES / n_frames)
-
-
-def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: Iterable[Cells] | None) -> None:
-    """Write the page of a run, which opens at a frame.
-
-    Args:
-        path: the file.
-        run: recorded run.
-        start: index of the frame.
-        step_cm: width of a cell.
-        sweeps: cells of each frame, None without points.
-
-    Raises:
-        ModtError: it cannot be written.
-    """
-    about = f"mode {run.facts['mode']}, field of view {run.facts.get('fov', 'full')}, profile {run.sensor}"
-    if sweeps is None:
-        about += "; the source of its points is not found"
-    head, tail = page(
-        run.facts["stream"]["name"], about, _content(run, start, None if sweeps is None else step_cm), SCRIPT
-    )
-    with writing(path), path.open("w", encoding="utf-8") as file:
-        file.write(head)
-        file.write(_data("tracks", packed_table(run.tracks)))
-        for at, cells in enumerate(sweeps or ()):
-            file.write(_data(f"points-{at}", packed_cells(cells)))
-        file.write(tail)
-
-
-def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any]:
-    """Content of the page beside the columns."""
-    poses = run.poses.round(4).tolist()
-    frames = [_rounded(f | {"pose": pose}) for f, pose in zip(run.frames, poses, strict=True)]
-    judged = any("truth" in frame for frame in run.frames)
-    return content(theme.states(run.states), run.budget, step_cm) | {
-        "frames": frames,
-        "truth": LEGEND if judged else None,
-        "reach_m": reach_m(run.tracks),
-        "start": start,
-    }
 
 
 def _rounded(value: Any) -> Any:
@@ -148,9 +94,15 @@ class View:
     grid: Grid
     out: Path
 
-    def cells(self, numbers: Sequence[int], most: int) -> Iterator[Cells] | None:
-        """Cells of the frames, None without points."""
-        return None if self.stream is None else sweeps(numbers, self.stream, self.grid, most)
+    def cells(self, numbers: Sequence[int], most: int = sys.maxsize) -> Iterator[Cells] | None:
+        """Cells of each frame, by ascending number, at most so many; none of a frame that the stream does not hold.
+
+        None without points.
+        """
+        if self.stream is None:
+            return None
+        frames = map(FramesByNumber(self.stream.between(0, numbers[-1] + 1)).get, numbers)
+        return (NO_CELLS if frame is None else self.grid.cells(frame.points).thinned(most) for frame in frames)
 
     def drawings(self, width: int, n: int | None = None) -> Iterator[Figure]:
         """One figure, drawn anew for each frame from the first one on.
@@ -163,7 +115,7 @@ class View:
         except ModuleNotFoundError as error:
             raise MisuseError(self.out, f"needs {error.name}", install("view")) from None
         figure, numbers = new_figure(width), self.run.numbers[self.at :][:n]
-        cells = self.cells(numbers, sys.maxsize)
+        cells = self.cells(numbers)
         for at in range(self.at, self.at + len(numbers)):
             draw(figure, self.run, at, self.grid.step_cm, None if cells is None else next(cells))
             yield figure
@@ -176,13 +128,30 @@ class View:
 
 
 def _player(view: View) -> None:
-    numbers = view.run.numbers
-    save_player(view.out, view.run, view.at, view.grid.step_cm, view.cells(numbers, most_cells(len(numbers))))
+    """Write the page of a run, which opens at a frame."""
+    run, poses = view.run, view.run.poses.round(4).tolist()
+    cells = view.cells(run.numbers, int(POINT_BYTES / CELL_BYTES / len(poses)))
+    about = f"mode {run.facts['mode']}, field of view {run.facts.get('fov', 'full')}, profile {run.sensor}"
+    if cells is None:
+        about += "; the source of its points is not found"
+    known = content(theme.states(run.states), run.budget, None if cells is None else view.grid.step_cm) | {
+        "frames": [_rounded(f | {"pose": pose}) for f, pose in zip(run.frames, poses, strict=True)],
+        "truth": LEGEND if any("truth" in frame for frame in run.frames) else None,
+        "reach_m": reach_m(run.tracks),
+        "start": view.at,
+    }
+    head, tail = page(run.facts["stream"]["name"], about, known, SCRIPT)
+    with writing(view.out), view.out.open("w", encoding="utf-8") as file:
+        file.write(head)
+        file.write(_data("tracks", packed_table(run.tracks)))
+        for at, sweep in enumerate(cells or ()):
+            file.write(_data(f"points-{at}", packed_cells(sweep)))
+        file.write(tail)
 
 
 def _picture(view: View) -> None:
-    figure = next(view.drawings(PICTURE_WIDTH, 1))  # names a missing library before the next module needs it
-    from modt_desk.viewer.film import save_picture
+    figure = next(view.drawings(PICTURE_WIDTH, 1))  # names a missing library
+    from modt_desk.viewer.picture import save_picture
 
     save_picture(view.out, figure, f"{view.run.facts['stream']['name']}, frame {view.run.numbers[view.at]}")
 
@@ -190,7 +159,7 @@ def _picture(view: View) -> None:
 def _film(view: View) -> None:
     drawings = view.drawings(FILM_WIDTH)
     first = next(drawings)
-    from modt_desk.viewer.film import save_film
+    from modt_desk.viewer.picture import save_film
 
     save_film(view.out, first, drawings, view.period_s)
 

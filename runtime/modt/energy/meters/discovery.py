@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from collections.abc import Collection
+import time
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
+from modt.config import EnergyConfig
 from modt.energy.meters.meter import (
     Candidate,
     Facts,
@@ -18,6 +19,7 @@ from modt.energy.meters.meter import (
     MeterLostError,
     Scope,
     file_meter,
+    model_meter,
     number_or_none,
     probe,
     read_text,
@@ -54,7 +56,8 @@ def find_powercap(sys: Path) -> list[Candidate]:
         elif zone.name.startswith("intel-rapl-mmio") and label in registers:
             found.append(Candidate(name, (), "the same package again", "none needed: its duplicate is used"))
         elif not (zone / "energy_uj").exists() and (zone / "power_uw").exists():
-            found.append(probe(name, (_scmi(zone, name),), "make its power_uw readable"))
+            facts = Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED)
+            found.append(probe(name, (file_meter(facts, zone / "power_uw"),), "make its power_uw readable"))
         elif label == "psys":
             found.append(probe(name, (_rapl(zone, name, Scope.BOARD),), _RAPL_REMEDY))
         elif label.startswith("package"):
@@ -65,7 +68,7 @@ def find_powercap(sys: Path) -> list[Candidate]:
 
 
 def _packages(meters: list[Meter]) -> list[Candidate]:
-    """The packages as one candidate. A package whose readings lie between those of another shows the same counter."""
+    """All packages as one candidate. A package whose readings lie between those of another shows the same counter."""
     try:
         pairs = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
     except MeterLostError:
@@ -87,10 +90,6 @@ def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
     range_J = 1e-6 * (number_or_none(zone / "max_energy_range_uj") or 0.0) or None
     facts = Facts(name, "uJ", 61e-6, 1000.0, scope, Kind.MEASURED, range_J, "root since Linux 5.10")
     return file_meter(facts, zone / "energy_uj")
-
-
-def _scmi(zone: Path, name: str) -> Meter:
-    return file_meter(Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED), zone / "power_uw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,37 +114,30 @@ BOARDS = (
 )
 
 
-def board_of(model: str, labels: Collection[str]) -> Board | None:
-    """The board of a model in the device tree with these rails; by the rails alone where the model is empty."""
-    for board in BOARDS:
-        if {board.cpu, *board.whole}.issubset(labels) and (not model or re.search(board.model, model)):
-            return board
-    return None
-
-
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
 _PART_SHARE = 1.1
 """A module is refused if the rails that it feeds draw more than this factor of its own power."""
 
 
 def find_hwmon(sys: Path) -> list[Candidate]:
-    """A candidate for each rail. Rails may feed one another, so only those of a known board are summed."""
+    """A candidate for the module of a known board (its supply rail or a sum of rails), then for each rail.
+
+    Rails may feed one another, so only those of a known board are summed. A board is known by its model in the device
+    tree and its rails; by the rails alone where there is no model.
+    """
     folders = sorted((sys / "class" / "hwmon").glob("hwmon*"), key=lambda p: (len(p.name), p.name))
     rails: dict[str, Meter] = {}
     for folder in folders:
         chip = text_or_none(folder / "name")
         if chip in _INA_CHIPS:
-            found_here = _rails(folder, chip)
-            rails |= {f"{label} of {folder.name}" if label in rails else label: m for label, m in found_here.items()}
+            for label, meter in _rails(folder, chip).items():
+                rails[f"{label} of {folder.name}" if label in rails else label] = meter
     if not rails:
         remedy = "wire an INA219, INA226 or INA3221 into the supply and load its driver"
         return [Candidate("hwmon", (), "no power monitor under /sys/class/hwmon", remedy)]
-    return _rails_of_board(text_or_none(sys / "firmware/devicetree/base/model") or "", rails)
-
-
-def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
-    """Candidates for the module of a known board (its supply rail or a sum of rails), then for each rail."""
-    remedy, board = "make the chip's inputs readable", board_of(model, rails)
+    model = text_or_none(sys / "firmware/devicetree/base/model") or ""
+    fitting = (b for b in BOARDS if rails.keys() >= {b.cpu, *b.whole} and (not model or re.search(b.model, model)))
+    board, remedy = next(fitting, None), "make the chip's inputs readable"
     found = [] if board is None else [_module(board, rails, remedy)]
     for label, meter in rails.items():
         if board is None or board.whole != (label,):
@@ -270,9 +262,6 @@ def rail_power_W(text: str, known: set[str]) -> float:
 
 FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Functions that search sysfs, mounted at a path, for candidates of one type of meter."""
-_KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
-_SCOPES = (Scope.CPU, Scope.CPU_RAIL, Scope.SOC, Scope.MODULE, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
-"""Order of preference: this program has a larger share of a narrower scope."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,8 +292,9 @@ class Discovery:
         raise MisuseError(f"meter {name}", "not on this machine", f"use one of: {names}")
 
 
-def discover(model: Meter, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
+def discover(board: EnergyConfig, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
     """Search for every type of meter. The model of the board is the last of the usable ones."""
+    model = model_meter(board, time.monotonic_ns, time.process_time_ns)
     found = [candidate for find in FINDERS for candidate in find(sys)]
     found += [*find_pmic(vcgencmd), Candidate(model.facts.name, (model,))]
     return Discovery(tuple(sorted(found, key=_rank)))
@@ -314,4 +304,4 @@ def _rank(candidate: Candidate) -> tuple[int, int, int]:
     facts = candidate.facts
     if facts is None or not candidate.usable:
         return (1, 0 if facts else 1, 0)
-    return (0, _KINDS.index(facts.kind), _SCOPES.index(facts.scope))
+    return (0, list(Kind).index(facts.kind), list(Scope).index(facts.scope))

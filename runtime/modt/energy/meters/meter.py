@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from modt.config import EnergyConfig
+
 
 class Words(str, Enum):
     """Base of enumerations whose members are written as their values."""
@@ -30,17 +32,9 @@ def worst(kinds: Iterable[Kind]) -> Kind:
     return max(kinds, key=list(Kind).index)
 
 
-class Measurand(Words):
-    """The physical quantity of a reading."""
-
-    ENERGY = "energy"  # a counter [J]
-    POWER = "power"  # a momentary value [W]
-
-
 class Scope(Words):
-    """The consumers a meter covers, from the narrowest."""
+    """The consumers a meter covers, in order of preference: this program has a larger share of a narrower scope."""
 
-    PROCESS = "this process, by a model"
     CPU = "CPU packages"
     CPU_RAIL = "the rail of the CPU, with what shares it"
     SOC = "system on chip"
@@ -48,6 +42,7 @@ class Scope(Words):
     BOARD = "whole board"
     ROBOT = "everything on the battery"
     RAIL = "one rail, of unknown extent"
+    PROCESS = "this process, by a model"
 
 
 class MeterLostError(Exception):
@@ -68,9 +63,9 @@ class Facts:
     privilege: str = "none"  # needed to read it
 
     @property
-    def measurand(self) -> Measurand:
-        """Power if the kind is integrated, else energy."""
-        return Measurand.POWER if self.kind is Kind.INTEGRATED else Measurand.ENERGY
+    def counts(self) -> bool:
+        """Whether a reading is an energy [J]; else it is a momentary power [W]."""
+        return self.kind is not Kind.INTEGRATED
 
     @property
     def must_draw(self) -> bool:
@@ -84,7 +79,7 @@ class Meter:
 
     facts: Facts
     read: Callable[[], float]
-    """Present value [J or W, by the measurand]; raises MeterLostError."""
+    """Present value [J or W, by facts.counts]; raises MeterLostError."""
 
 
 def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:
@@ -153,28 +148,21 @@ def probe(name: str, meters: tuple[Meter, ...], remedy: str) -> Candidate:
     return Candidate(name, meters)
 
 
-def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns: Callable[[], int]) -> Meter:
-    """A meter that computes the energy of this process by `model_J`.
-
-    Args:
-        idle_W: power while this process waits.
-        busy_W: power while it computes on one core.
-        wall_ns: monotonic clock.
-        cpu_ns: CPU time of this process.
-    """
-    most_W = max(idle_W, busy_W) * 1024
-    facts = Facts(model_name(idle_W, busy_W), "J", 1e-9, most_W, Scope.PROCESS, Kind.ESTIMATED)
-    return Meter(facts, lambda: model_J(idle_W, busy_W, wall_ns(), cpu_ns()))
+def model_meter(board: EnergyConfig, wall_ns: Callable[[], int], cpu_ns: Callable[[], int]) -> Meter:
+    """A meter that computes the energy of this process by `model_J`, from a monotonic clock and its CPU time."""
+    most_W = max(board.idle_W, board.busy_W) * 1024
+    facts = Facts(model_name(board), "J", 1e-9, most_W, Scope.PROCESS, Kind.ESTIMATED)
+    return Meter(facts, lambda: model_J(board, wall_ns(), cpu_ns()))
 
 
-def model_J(idle_W: float, busy_W: float, wall_ns: int, cpu_ns: int) -> float:
+def model_J(board: EnergyConfig, wall_ns: int, cpu_ns: int) -> float:
     """E = P_idle T + (P_busy - P_idle) t of wall time T and CPU time t [J]."""
-    return 1e-9 * (idle_W * wall_ns + (busy_W - idle_W) * cpu_ns)
+    return 1e-9 * (board.idle_W * wall_ns + board.active_W * cpu_ns)
 
 
-def model_name(idle_W: float, busy_W: float) -> str:
+def model_name(board: EnergyConfig) -> str:
     """Display name of the model of a board."""
-    return f"model {idle_W:g} W idle, {busy_W:g} W busy"
+    return f"model {board.idle_W:g} W idle, {board.busy_W:g} W busy"
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,19 +70,16 @@ class PointCloudReader:
         messages = subscription.take(timeout_s)
         self.reception.messages += len(messages)
         sweeps = [sweep for message in messages if (sweep := self._sweep(message)) is not None]
-        for sweep in sweeps:
-            self._lose(self._missing.before(sweep.stamp_s))
+        lost = sum(self._missing.before(sweep.stamp_s) for sweep in sweeps)
+        if lost and not self.reception.lost:
+            remedy = "raise net.core.rmem_max here, or check the network and the sender; later ones are only counted"
+            log.warning("%s: sweeps are missing by their stamps; %s", self._name, remedy)
+        self.reception.lost += lost
         return sweeps
 
     def close(self) -> None:
         """Leave the topic, once `read` has returned."""
         self._subscription = None
-
-    def _lose(self, count: int) -> None:
-        if count and not self.reception.lost:
-            remedy = "raise net.core.rmem_max here, or check the network and the sender; later ones are only counted"
-            log.warning("%s: sweeps are missing by their stamps; %s", self._name, remedy)
-        self.reception.lost += count
 
     def _sweep(self, message: Message) -> Sweep | None:
         try:

@@ -215,8 +215,7 @@ class PacketStream:
                 stamps.doubt(sweep.stamp_s, arrived_s)
                 continue
             flaws = [f"{missing} packets are missing"] if missing else []
-            place = (index, path, f"{path}: sweep {index}")
-            if frame := stamps.frame(sweep, arrived_s, self.faults, place, flaws):
+            if frame := stamps.frame(sweep, arrived_s, index, path, self.faults, flaws):
                 yield frame
 
     def between(self, first: int, last: int | None) -> Self:
@@ -237,8 +236,7 @@ class PacketStream:
         if self.capture.flaw is not None:
             flaws.append(self.capture.flaw)
         for flaw in flaws:
-            path = str(self.capture.path)
-            self.faults.report(index, path, flaw, skipped=False, place=f"{path}: sweep {index}")
+            self.faults.report(index, self.capture.path, flaw, skipped=False)
 
 
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:

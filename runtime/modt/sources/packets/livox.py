@@ -60,7 +60,7 @@ class LivoxDecoder(PacketDecoder):
         ahead = stamp_ns // SWEEP_NS - self._window
         late = ahead == -1 or stamp_ns in self._packets
         if late or (ahead == 0 and len(self._packets) >= MAX_PACKETS):
-            reason = "late or twice" if late else "more than a sweep has; do several sensors send to this port?"
+            reason = "late or twice" if late else "more than a turn has; do several sensors send to this port?"
             refuse(reception, self.name, reason)
             return []
         self._clock.unwrapped(stamp_ns * 1e-9, received_s)

@@ -237,9 +237,7 @@ class TurnDecoder(PacketDecoder):
         entry, quiet_s = self._entry(received_s, payload), received_s - self._heard_s
         leap_s = 0.0 if self._last is None else entry.time_s - self._last.time_s
         if abs(leap_s) > self._longest_s and not 0 < leap_s < SILENCE_S and quiet_s < SILENCE_S:
-            refuse(
-                reception, self.name, "its stamp leaps: the clock of the sensor was set, or lies; the turn is lost"
-            )
+            refuse(reception, self.name, "its stamp leaps: the clock was set, or lies")
         self._heard_s = received_s
         self._others.clear()
         return self._follow(entry, reception)

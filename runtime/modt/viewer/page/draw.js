@@ -7,10 +7,7 @@ let sweep = null, pixels = null, palette = null, colours = {}, dot = 1, taken = 
 function theme() {
   const style = getComputedStyle(document.documentElement);
   for (const name of ["ink", "soft", "line", "paper"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
-  const rgb = (hex) => {
-    const long = hex.length === 4 ? [...hex.slice(1)].map((c) => c + c).join("") : hex.slice(1);
-    return [0, 2, 4].map((k) => parseInt(long.slice(k, k + 2), 16));
-  };
+  const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
   const paper = rgb(colours.paper), ink = rgb(colours.ink);
   const mixed = (part) => {
     const [r, g, b] = paper.map((value, k) => Math.round(value + part * (ink[k] - value)));

@@ -1,0 +1,401 @@
+"""Configuration: one frozen dataclass a stage, every value bounded and checked as it is made.
+
+Defaults of the segmentation without another source were chosen on KITTI object frames and labelled odometry scans,
+and checked on drive 0005 and on simulated streets (docs/evaluation.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+from modt.classes import CLASS_NAMES, CLASSES, OBJECTS, PERSON_M, ObjectClass
+from modt.errors import MisuseError
+
+if TYPE_CHECKING:
+    from modt.geometry.beams import Beams
+
+BATCH = 4
+"""Proposals of one network call: few enough for their features to stay in the cache."""
+NATIVE, NUMPY = "native", "numpy"
+KERNELS = ("auto", NATIVE, NUMPY)
+GRID_CELLS, MAX_CELLS = 200, 5e7
+"""Cells of both grids of the segmentation per metre of range at a cell of 1 m, and greatest number (200 MB)."""
+REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
+"""Sensors whose reflectance a model may have learnt."""
+
+
+class ValueRangeError(MisuseError):
+    """A configuration value of the wrong type or out of its range; `key` names it."""
+
+    def __init__(self, key: str, cause: str, remedy: str) -> None:
+        super().__init__(key, cause, remedy)
+        self.key = key
+
+
+def number(default: float | None, low: float, high: float, unit: str, meaning: str) -> Any:
+    """Field of a number within bounds."""
+    return field(default=default, metadata={"low": low, "high": high, "unit": unit, "meaning": meaning})
+
+
+def numbers(low: float, high: float, most: int, unit: str, meaning: str, *, pairs: bool = False) -> Any:
+    """Field of two to `most` numbers within bounds; in pairs their number is even. The default is null."""
+    facts = {"low": low, "high": high, "least": 2, "most": most, "unit": unit, "meaning": meaning}
+    return field(default=None, metadata={**facts, "pairs": pairs})
+
+
+def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
+    """Field of one name among options."""
+    return field(default=default, metadata={"options": options, "meaning": meaning})
+
+
+def per_class(
+    column: str | None, low: float, high: float, meaning: str, classes: Sequence[ObjectClass] = OBJECTS
+) -> Any:
+    """Field of a number for each class; the defaults are a column of the class table, null without one."""
+    values = tuple(getattr(CLASSES[c], column) for c in classes) if column else None
+    meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in classes)}."
+    return field(default=values, metadata={"low": low, "high": high, "length": len(classes), "meaning": meaning})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageConfig:
+    """Base of every stage's configuration: checks each value against its declared bounds.
+
+    Raises:
+        ValueRangeError: a value is not of its kind or out of range.
+    """
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            check(f, getattr(self, f.name))
+
+
+def check(declared: Field[Any], value: object) -> None:
+    """Check a value against the bounds that its field declares.
+
+    Raises:
+        ValueRangeError: it is not of its kind or out of range.
+    """
+    key, kind, bounds = declared.name, str(declared.type), declared.metadata
+    if value is None and "None" in kind:
+        return
+    if "options" in bounds:
+        if value not in bounds["options"]:
+            raise ValueRangeError(key, f"{value!r} is unknown", f"use one of {', '.join(bounds['options'])}")
+    elif kind == "str":
+        if not isinstance(value, str):
+            raise ValueRangeError(key, f"{value!r} is no text", "write a name")
+    else:
+        _check_numbers(key, value, kind.startswith("int"), bounds)
+
+
+def _check_numbers(key: str, value: object, whole: bool, bounds: Mapping[str, Any]) -> None:
+    several = "length" in bounds or "most" in bounds
+    numbers = value if several and isinstance(value, tuple) else (value,)
+    noun = "a whole number" if whole else "a number"
+    span = f"{noun} from {bounds['low']:g} to {bounds['high']:g}"
+    if "length" in bounds:
+        span = f"{bounds['length']} values, each {span}"
+        if len(numbers) != bounds["length"]:
+            raise ValueRangeError(key, f"{value!r} does not fit", f"give {span}")
+    if "most" in bounds:
+        span = f"{bounds['least']} to {bounds['most']} values, each {span}"
+        if not bounds["least"] <= len(numbers) <= bounds["most"]:
+            raise ValueRangeError(key, f"{len(numbers)} values", f"give {span}")
+        if bounds["pairs"] and len(numbers) % 2:
+            raise ValueRangeError(key, f"{len(numbers)} values are no pairs", "give from and to of each, in one list")
+    remedy = f"give {span} {bounds.get('unit', '')}".rstrip()
+    for number in numbers:
+        if isinstance(number, bool) or not isinstance(number, int if whole else (int, float)):
+            raise ValueRangeError(key, f"{value!r} is not {noun}", remedy)
+        if not bounds["low"] <= number <= bounds["high"]:
+            raise ValueRangeError(key, f"{number!r} is out of range", remedy)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassificationConfig(StageConfig):
+    """The network and its input (section V-A)."""
+
+    model: str = field(
+        default="pointnet-kitti", metadata={"meaning": "Name of a model in models/, or path of an .onnx file."}
+    )
+    likelihood: str = choice(
+        "pooled",
+        ("pooled", "network"),
+        "How likely a view is for each class. pooled: by the network together with the classifiers of box and "
+        "reflectance, on the proposal's own points. network: as in the paper by the network alone, on exactly "
+        "max_points points, one proposal a call.",
+    )
+    max_points: int = number(128, 8, 4096, "", "Greatest number of points of a proposal that the network sees.")
+
+    @property
+    def batch(self) -> int:
+        """Proposals of one network call at most."""
+        return BATCH if self.likelihood == "pooled" else 1
+
+    @property
+    def min_points(self) -> int:
+        """Points of a proposal to which it is repeated, which costs more and changes no class."""
+        return 1 if self.likelihood == "pooled" else self.max_points
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SchedulerConfig(StageConfig):
+    """Budget of classification. Null means no limit, and the limit that is reached first applies."""
+
+    calls_per_frame: int | None = number(16, 0, 10000, "", "Greatest number of proposals classified in a frame.")
+    cpu_ms_per_frame: float | None = number(
+        None, 0.0, 10000.0, "ms", "CPU time of classification in a frame, on average over a second."
+    )
+    energy_mJ_per_frame: float | None = number(
+        None, 0.0, 100000.0, "mJ", "Energy of classification in a frame above idling, on average over a second."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecisionConfig(StageConfig):
+    """The reported class of a track."""
+
+    rule: str = choice(
+        "adapted",
+        ("adapted", "likeliest"),
+        "How the class is chosen. adapted: posteriors are adapted to the class frequency of the stream, and a "
+        "reported class is kept down to a fraction of its threshold. likeliest: the class of the greatest posterior.",
+    )
+    missed_cost: tuple[float, ...] = per_class(
+        "missed_cost",
+        0.01,
+        1000.0,
+        "Cost of a missed object, relative to a false one. Objects are reported from a posterior of 1 / (1 + cost).",
+    )
+    frequency: tuple[float, ...] | None = per_class(
+        None,
+        0.0001,
+        0.33,
+        "Share of each class among the proposals at the start of a run. Null: as the model assumes.",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FusionConfig(StageConfig):
+    """Fusion of views, boxes and motion to a class, and its confirmation (section V-C, Figs. 10 and 11)."""
+
+    rule: str = choice(
+        "mean",
+        ("mean", "product"),
+        "How the views of a track are combined. mean: averaged. product: multiplied, Equation 6 of the paper.",
+    )
+    object_threshold: float = number(0.9, 0.25, 1.0, "", "Posterior from which the class of an object is confirmed.")
+    min_object_probability: float = number(
+        0.1, 0.0, 1.0, "", "Tracks less likely an object by box and motion are not classified."
+    )
+    start_frame: int = number(
+        4, 1, 1000, "frames", "Age of a track from which its views are combined, with rule product."
+    )
+    point_change: tuple[float, ...] = per_class(
+        "point_change",
+        0.0,
+        10.0,
+        "Relative change of the number of points (Equation 4) from which a view is independent, with rule product.",
+        tuple(CLASSES),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryConfig(StageConfig):
+    """Poses from another program, in effect with `--odometry udp://`, `unix://` and `ros2://`."""
+
+    max_speed_mps: float = number(
+        60.0, 0.1, 1000.0, "m/s", "Greatest speed of the sensor. A faster jump means a restarted sender."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SegmentationConfig(StageConfig):
+    """Ground, clusters, and the sizes that an object can have (section III-A)."""
+
+    max_slope_deg: float = number(16.0, 0.5, 45.0, "deg", "Steepest slope of the ground, up or down.")
+    clearance_m: float = number(0.25, 0.02, 1.0, "m", "Height above the ground from which points belong to objects.")
+    max_height_m: float = number(2.6, 0.3, 20.0, "m", "Height above the ground up to which points belong to objects.")
+    cell_m: float = number(
+        0.105, 0.01, 2.0, "m", "Side of a cell at 10 m. It grows with the square root of the range."
+    )
+    min_points: int = number(5, 1, 1000, "", "Least number of points of a proposal.")
+    max_extent_m: float = number(9.0, 0.5, 50.0, "m", "Greatest length of a proposal.")
+    min_height_m: float = number(0.2, 0.0, 3.0, "m", "Least height of a proposal.")
+    kernels: str = choice(
+        "auto",
+        KERNELS,
+        "Code for points: compiled (native), NumPy (numpy), or compiled where it can be (auto). "
+        "The environment variable MODT_KERNELS overrules this key.",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackingConfig(StageConfig):
+    """Association of proposals with tracks, and the end of a track."""
+
+    association: str = choice("kdop", ("kdop", "paper"), "Cost of a match: by outlines (kdop), or as in the paper.")
+    extensions: str = choice(
+        "all",
+        ("all", "none"),
+        "Additions to the paper: tracks split, merge and reunite proposals, can be at rest, and leave remembered "
+        "background. none: switched off.",
+    )
+    max_missed: int = number(
+        8, 0, 100, "frames", "Time without a proposal, in periods, after which a track is deleted (N of a9 and a14)."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorConfig(StageConfig):
+    """Mount, range and resolution of the sensor."""
+
+    height_m: float | None = number(
+        1.73, 0.05, 5.0, "m", "Height of the sensor above the ground. Null: estimated from the first sweeps."
+    )
+    roll_deg: float | None = number(
+        None, -180.0, 180.0, "deg", "Roll of the mount, left side up. Null: measured in the first sweep."
+    )
+    pitch_deg: float | None = number(
+        None, -90.0, 90.0, "deg", "Pitch of the mount, nose down. Null: measured in the first sweep."
+    )
+    min_range_m: float = number(2.0, 0.0, 20.0, "m", "Nearer points are left out, as they are on the robot.")
+    max_range_m: float = number(80.0, 1.0, 400.0, "m", "Farther points are left out.")
+    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "Angle between neighbouring beams, evenly spaced.")
+    elevations_deg: tuple[float, ...] | None = numbers(
+        -90.0, 90.0, 512, "deg", "Elevation of every beam, in any order. Null: the beams are evenly spaced."
+    )
+    elevation_span_deg: tuple[float, ...] | None = numbers(
+        -90.0, 90.0, 2, "deg", "Elevations of the lowest and the highest beam. Null: not known."
+    )
+    azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "Angle between neighbouring returns of a beam.")
+    blind_sectors_deg: tuple[float, ...] | None = numbers(
+        -360.0, 360.0, 64, "deg", "Sectors hidden by the robot, each from and to, counter-clockwise.", pairs=True
+    )
+    blind_range_m: float = number(3.0, 0.1, 20.0, "m", "Points in blind_sectors_deg up to this range are left out.")
+    period_s: float = number(
+        0.1, 0.001, 10.0, "s", "Time between two sweeps, for scans without time stamps and tracking.max_missed."
+    )
+    reflectance: str = choice(
+        "none", ("none", *REFLECTANCE_SCALES), "Sensor whose scale the reflectance has. none: it is not used."
+    )
+
+    @property
+    def span_deg(self) -> tuple[float, float] | None:
+        """Elevations of the lowest and the highest beam; None if unknown."""
+        beams = self.elevations_deg or self.elevation_span_deg
+        return None if beams is None else (min(beams), max(beams))
+
+    @property
+    def person_seen_from_m(self) -> float | None:
+        """Distance from which a third of a person is in view [m]; None if the mount or the beams are unknown."""
+        if self.height_m is None or self.span_deg is None:
+            return None
+        h, (low, high) = self.height_m, (math.tan(math.radians(deg)) for deg in self.span_deg)
+        seen = ((d / 10, min(h + d / 10 * high, PERSON_M) - max(h + d / 10 * low, 0.0)) for d in range(1, 201))
+        return next((d for d, seen_m in seen if seen_m >= PERSON_M / 3), None)
+
+    @property
+    def beams(self) -> Beams:
+        """Spacing of the beams."""
+        from modt.geometry.beams import BeamTable, EvenBeams  # NumPy, which commands import after they are pinned
+
+        if self.elevations_deg is None:
+            return EvenBeams(self.elevation_step_deg)
+        return BeamTable(self.elevations_deg)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyConfig(StageConfig):
+    """Power of the board where no meter is read, and the coefficients that `modt-profile calibrate` finds.
+
+    Energy of a window = idle_W x time + seg_J x segmentations + class_J x classifications + point_J x points.
+    """
+
+    board: str = field(default="unknown", metadata={"meaning": "Name of the board in reports."})
+    idle_W: float = number(3.0, 0.0, 1000.0, "W", "Power of the board while modt waits.")
+    busy_W: float = number(7.0, 0.0, 1000.0, "W", "Power of the board while modt computes on one core.")
+    meter: str = field(default="none", metadata={"meaning": "Meter of the calibration."})
+    seg_J: float | None = number(None, -1000.0, 1000.0, "J", "Energy of one segmentation. Null: not calibrated.")
+    class_J: float | None = number(
+        None, -1000.0, 1000.0, "J", "Energy of one classification, without its points. Null: not calibrated."
+    )
+    point_J: float | None = number(
+        None, -1000.0, 1000.0, "J", "Energy of one point that is classified. Null: not calibrated."
+    )
+
+    @property
+    def active_W(self) -> float:
+        """Power of one busy core beyond idle [W], equal to mJ/ms."""
+        return self.busy_W - self.idle_W
+
+    @property
+    def coefficients(self) -> tuple[float, float, float] | None:
+        """seg_J, class_J and point_J of a calibration; None unless all three are set."""
+        if self.seg_J is None or self.class_J is None or self.point_J is None:
+            return None
+        return self.seg_J, self.class_J, self.point_J
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopConfig(StageConfig):
+    """Limit of the live loop, in effect with `modt run`."""
+
+    power_W: float | None = number(
+        None, 0.01, 1000.0, "W", "Power of the board above which the loop sheds load. Null: no limit."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingConfig(StageConfig):
+    """Records of the live loop, in effect with `modt run`."""
+
+    keep: str = choice(
+        "all", ("all", "tracks", "ledger", "none"), "Records that are written: tracks, ledger, both or none."
+    )
+    disk_mb: float = number(2000.0, 1.0, 1e7, "MB", "Size of all records together. The oldest are deleted.")
+    gb_per_day: float = number(
+        10.0, 0.01, 1e5, "GB", "Size of the tracks of a day, after the first 0.5 GB. Frames beyond it are left out."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProfileConfig:
+    """The whole configuration: a sensor, a board and all stages, as profiles describe them."""
+
+    sensor: SensorConfig = field(default_factory=SensorConfig)
+    segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    classification: ClassificationConfig = field(default_factory=ClassificationConfig)
+    scheduler: SchedulerConfig = field(default_factory=SchedulerConfig)
+    fusion: FusionConfig = field(default_factory=FusionConfig)
+    decision: DecisionConfig = field(default_factory=DecisionConfig)
+    odometry: OdometryConfig = field(default_factory=OdometryConfig)
+    energy: EnergyConfig = field(default_factory=EnergyConfig)
+    loop: LoopConfig = field(default_factory=LoopConfig)
+    recording: RecordingConfig = field(default_factory=RecordingConfig)
+
+    def __post_init__(self) -> None:
+        cells = GRID_CELLS * self.sensor.max_range_m / self.segmentation.cell_m**2
+        if cells > MAX_CELLS:
+            cause = f"{self.segmentation.cell_m:g} m takes {cells / 1e6:.0f} million cells at this sensor.max_range_m"
+            least_m = (GRID_CELLS * self.sensor.max_range_m / MAX_CELLS) ** 0.5
+            raise ValueRangeError("segmentation.cell_m", cause, f"give at least {least_m:.3f} m, or a shorter range")
+        if self.scheduler.energy_mJ_per_frame is not None and self.energy.active_W <= 0:
+            raise ValueRangeError(
+                "scheduler.energy_mJ_per_frame",
+                "buys any number of calls, since energy.busy_W is not above energy.idle_W",
+                "calibrate the board (modt-profile calibrate) or state both powers",
+            )
+
+    @property
+    def classification_ms(self) -> float | None:
+        """CPU time that a frame may spend on classification [ms], the smaller of both budgets; None without one."""
+        stage = self.scheduler
+        by_energy = stage.energy_mJ_per_frame
+        limits = [stage.cpu_ms_per_frame, None if by_energy is None else by_energy / self.energy.active_W]
+        return min((limit for limit in limits if limit is not None), default=None)

@@ -1,0 +1,279 @@
+"""Profiles: YAML to configuration with strict keys, and back; several of them combined to one configuration."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from modt import assets
+from modt.config import ProfileConfig, StageConfig, ValueRangeError, check
+from modt.errors import MisuseError
+
+DEFAULT = "hdl-64e"
+"""Profile of the sensor if none is asked for."""
+Names = str | Path | Sequence[str | Path] | None
+"""Names or files of profiles; later ones win key by key."""
+EXTENDS = "extends"
+"""Key that names the profiles on which a profile is based."""
+MAX_CHARACTERS = 100_000
+"""Greatest length of a text; the longest shipped profile has 2,000 characters."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Loader that refuses aliases: a few lines of them stand for any number of values."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Compose a node, unless it is an alias."""
+        if self.check_event(yaml.AliasEvent):
+            parser: Any = self  # its stubs are incomplete
+            raise yaml.MarkedYAMLError(problem="an alias", problem_mark=parser.peek_event().start_mark)
+        return super().compose_node(parent, index)
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """One profile as written.
+
+    Attributes:
+        name: its name or file.
+        settings: values by stage and key.
+        extends: names of the profiles on which it is based.
+        place: file and line of that key, or the file alone without it.
+    """
+
+    name: str
+    settings: Mapping[str, Mapping[str, Any]]
+    extends: tuple[str, ...]
+    place: str
+
+    @property
+    def of_sensor(self) -> bool:
+        """Whether it sets a key of the sensor."""
+        return bool(self.settings.get("sensor"))
+
+
+def read(text: str, origin: Path | str, name: str) -> Layer:
+    """The profile of a YAML text, in which every key is optional; messages name its `origin`.
+
+    Raises:
+        MisuseError: not YAML, an unknown key or a value out of range, with the line and the nearest valid key.
+    """
+    try:
+        root = yaml.compose(_bounded(text), Loader=_Loader)
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{origin}:{mark.line + 1}" if mark else str(origin)
+        cause = str(getattr(error, "problem", None) or "unreadable")
+        raise MisuseError(place, f"no YAML ({cause})", "correct this line") from None
+    stages = {f.name: f.default_factory for f in fields(ProfileConfig)}
+    extends, place, settings = tuple[str, ...](), str(origin), dict[str, dict[str, Any]]()
+    for key, node, line in _entries(root, origin, {EXTENDS: None, **stages}, "profile"):
+        stage = stages.get(key)
+        if isinstance(stage, type):
+            settings[key] = _stage(stage, node, origin, line)
+        else:
+            place = f"{origin}:{line}"
+            extends = _names(_plain(node, place), place)
+    return Layer(name, settings, extends, place)
+
+
+def to_yaml(data: Mapping[str, Any]) -> str:
+    """YAML text in the order of the keys."""
+    return str(yaml.safe_dump(dict(data), sort_keys=False, allow_unicode=True))
+
+
+def from_yaml(text: str, origin: Path | str) -> Any:
+    """Plain data of a YAML text written by this package."""
+    try:
+        return yaml.load(_bounded(text), Loader=_Loader)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        raise MisuseError(origin, "no YAML", "give the run directory of a whole run") from None
+
+
+def value_text(value: Any) -> str:
+    """A value on one line."""
+    plain = list(value) if isinstance(value, tuple) else value
+    text: str = yaml.safe_dump(plain, default_flow_style=True, allow_unicode=True, width=float("inf"))
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
+def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int) -> dict[str, Any]:
+    """Values of the keys of a stage."""
+    known = {f.name: f for f in fields(kind)}
+    settings: dict[str, Any] = {}
+    for key, value, at in _entries(node, origin, known, kind.__name__, line):
+        plain = _plain(value, f"{origin}:{at}")
+        settings[key] = tuple(plain) if isinstance(plain, list) else plain
+        try:
+            check(known[key], settings[key])
+        except ValueRangeError as error:
+            raise MisuseError(f"{origin}:{at}: {key}", error.cause, error.remedy) from None
+    return settings
+
+
+def _bounded(text: str) -> str:
+    if len(text) > MAX_CHARACTERS:
+        raise yaml.MarkedYAMLError(problem=f"more than {MAX_CHARACTERS} characters")
+    return text
+
+
+def _names(plain: Any, place: str) -> tuple[str, ...]:
+    names = plain if isinstance(plain, list) else [plain]
+    if not all(isinstance(name, str) for name in names):
+        raise MisuseError(place, f"{EXTENDS} is no name", "write the name or file of a profile, or a list of them")
+    return tuple(names)
+
+
+def _plain(node: yaml.Node, place: str) -> Any:
+    try:
+        return yaml.safe_load(yaml.serialize(node))
+    except (yaml.YAMLError, ValueError):
+        raise MisuseError(place, "no plain value", "write a number, a name or a list") from None
+
+
+def _entries(
+    node: yaml.Node | None, origin: Path | str, known: Mapping[str, object], what: str, line: int = 1
+) -> Iterator[tuple[str, yaml.Node, int]]:
+    if node is None or (isinstance(node, yaml.ScalarNode) and node.value == ""):
+        return
+    if not isinstance(node, yaml.MappingNode):
+        raise MisuseError(f"{origin}:{line}", f"{what} is no mapping", "write key: value lines")
+    seen: set[str] = set()
+    for key_node, value in node.value:
+        key, at = str(key_node.value), key_node.start_mark.line + 1
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.0)
+            raise MisuseError(f"{origin}:{at}", f"unknown key '{key}'", f"did you mean '{near[0]}'?")
+        if key in seen:
+            raise MisuseError(f"{origin}:{at}", f"key '{key}' appears twice", "keep one")
+        seen.add(key)
+        yield key, value, at
+
+
+@dataclass(frozen=True, slots=True)
+class Resolved:
+    """Profiles, combined.
+
+    Attributes:
+        layers: the profiles that are asked for, each after those that it extends; later ones win.
+        assumed: the DEFAULT profile, on which they are based if none of them sets a key of the sensor.
+        config: the resulting configuration.
+    """
+
+    layers: tuple[Layer, ...]
+    assumed: tuple[Layer, ...]
+    config: ProfileConfig
+
+    def used(self, default: str) -> tuple[str, ...]:
+        """Names of the profiles, after `default` if none of them sets a key of the sensor."""
+        names = tuple(layer.name for layer in self.layers)
+        return names if self.sensor else (default, *names)
+
+    @property
+    def sensor(self) -> str | None:
+        """Name of the last profile that sets a key of the sensor; None if none does."""
+        return next((layer.name for layer in reversed(self.layers) if layer.of_sensor), None)
+
+    def over(self, base: ProfileConfig) -> ProfileConfig:
+        """Another configuration with the values of the layers.
+
+        Raises:
+            MisuseError: the values contradict one another.
+        """
+        return _configured(self.layers, base)
+
+    def shown(self) -> str:
+        """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
+        text, layers = "", (*reversed(self.layers), *reversed(self.assumed))
+        for stage, values in dump(self.config).items():
+            text += f"{stage}:\n"
+            for key, value in values.items():
+                set_by = next((layer.name for layer in layers if key in layer.settings.get(stage, ())), "default")
+                text += f"  {key}: {value_text(value)} # {set_by}\n"
+        near_m = self.config.sensor.person_seen_from_m
+        return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
+
+
+def load(names: Names = None) -> ProfileConfig:
+    """Configuration of profiles by name or file, of the DEFAULT if there are none; raises as `resolve` does."""
+    return resolve(names).config
+
+
+def resolve(names: Names = None) -> Resolved:
+    """Read profiles by name or file, and the profiles that they extend.
+
+    Raises:
+        MisuseError: no such profile, unreadable, not YAML, an unknown key or a value out of range, with the
+            line and the nearest valid key; profiles that extend one another in a circle.
+    """
+    layers = _layers((names,) if isinstance(names, str | Path) else names or ())
+    assumed = () if any(layer.of_sensor for layer in layers) else _layers([DEFAULT])
+    return Resolved(layers, assumed, _configured((*assumed, *layers), ProfileConfig()))
+
+
+def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
+    """Configuration of a YAML text and of the profiles that it extends; raises as `resolve` does."""
+    layers = _chain(read(text, origin, str(origin)), Path(origin), ())
+    return _configured(tuple(layers.values()), ProfileConfig())
+
+
+def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
+    """A profile as plain data, with all defaults and tuples as lists."""
+    return {
+        stage: {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
+        for stage, values in asdict(config).items()
+    }
+
+
+def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:
+    """Profiles in their order, each after those that it extends, and each once."""
+    layers: dict[Path, Layer] = {}
+    for name in names:
+        path = assets.find("profiles", str(name), ".yaml")
+        layers.pop(path.resolve(), None)  # named twice: it wins over the profiles between
+        for file, layer in _chain(_read(path), path, ()).items():
+            layers.setdefault(file, layer)
+    return tuple(layers.values())
+
+
+def _chain(layer: Layer, path: Path, within: tuple[Path, ...]) -> dict[Path, Layer]:
+    """A profile by its resolved file, after the profiles that it extends; `within`: the files that lead to it."""
+    chain: dict[Path, Layer] = {}
+    within = (*within, path.resolve())
+    for name in layer.extends:
+        try:
+            base = assets.find("profiles", name, ".yaml", path.parent)
+        except MisuseError as error:
+            raise MisuseError(f"{layer.place}: extends {name}", error.cause, error.remedy) from None
+        if base.resolve() in within:
+            circle = ", ".join(file.stem for file in within[within.index(base.resolve()) :])
+            raise MisuseError(layer.place, f"extends itself, by way of {circle}", "remove one of these `extends`")
+        for file, extended in _chain(_read(base), base, within).items():
+            chain.setdefault(file, extended)
+    return {**chain, path.resolve(): layer}
+
+
+def _read(path: Path) -> Layer:
+    name = path.stem if path.parent == assets.folder("profiles") else str(path)
+    try:
+        with path.open(encoding="utf-8") as file:
+            return read(file.read(MAX_CHARACTERS + 1), path, name)
+    except (OSError, UnicodeDecodeError) as error:
+        raise MisuseError(path, f"cannot be read ({error})", "make it a readable UTF-8 file") from None
+
+
+def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:
+    merged: dict[str, dict[str, Any]] = {}
+    for layer in layers:
+        for stage, values in layer.settings.items():
+            merged[stage] = {**merged.get(stage, {}), **values}
+    try:
+        return replace(base, **{stage: replace(getattr(base, stage), **values) for stage, values in merged.items()})
+    except ValueRangeError as error:
+        names = ", ".join(layer.name for layer in layers)
+        raise MisuseError(f"{names}: {error.key}", error.cause, error.remedy) from None

@@ -1,0 +1,308 @@
+"""The frames of a live source or a recording, on a clock that only working and waiting move."""
+
+import logging
+import os
+import signal
+from types import SimpleNamespace
+from unittest.mock import Mock, call
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment, OncePerSecond
+from modt.app.deadlines import Deadlines, Timing
+from modt.app.ladder import Step
+from modt.app.playback import Playback
+from modt.app.session import WAIT_S, Session
+from modt.app.stop import NAP_S, Stop
+from modt.energy.ledger import Ledger
+from modt.errors import MisuseError, ModtError
+from modt.sources.stream import Received, StreamEndedError
+from modt.types import Budget, Frame
+from tests.results import Kept, result
+
+POINTS = np.zeros((1, 4), np.float32)
+
+
+class Time:
+    """A clock that only sleeping and working move."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.now += seconds
+
+
+class Sensor:
+    """A sweep every 0.1 s until an end; the newest one is taken, as from a LiveStream."""
+
+    def __init__(self, time, seconds, silent=(0.0, 0.0)):
+        self.time, self.end, self.profile = time, 100.0 + seconds, "vlp-16"
+        self.silent, self.taken, self.dropped = silent, 0, 0
+
+    def take(self, timeout_s):
+        due = 100.0 + 0.1 * (self.taken + 1)
+        if self.silent[0] <= due - 100.0 < self.silent[1]:
+            self.taken += 1
+            return self.take(timeout_s)
+        if due > self.end:
+            raise StreamEndedError
+        if due > self.time.now + timeout_s:
+            self.time.now += timeout_s
+            return None
+        while 100.0 + 0.1 * (self.taken + 2) <= self.time.now:
+            self.taken, self.dropped = self.taken + 1, self.dropped + 1
+            due = 100.0 + 0.1 * (self.taken + 1)
+        self.taken += 1
+        self.time.now = max(self.time.now, due)
+        return Received(Frame(self.taken, due, POINTS), due)
+
+
+class Stages:
+    """Stages that take some time, and fail at the frames in `fails`."""
+
+    budget, chosen = Budget(16, None), None
+
+    def __init__(self, time, work_s, fails):
+        self.time, self.work_s, self.fails, self.steps = time, work_s, fails, []
+        self.recognise, self.watch, self.recover = Mock(), Mock(), Mock()
+        stages = {"stages": {"segmentation": {"wall_ns": 20_000_000}}}
+        self.ledger = Mock(run=lambda stage, write, r: write(r), close_frame=lambda index: {"frame": index, **stages})
+
+    def step(self, frame, budget, *, reduced):
+        if frame.index in self.fails:
+            raise self.fails[frame.index]
+        self.steps.append((frame.index, budget, reduced))
+        self.time.now += self.work_s(self.time.now - 100.0)
+        return result(frame.index, [3], {0: 1})
+
+
+class Live:
+    """A session over the sensor, and the frames, reports and pings of the watchdog that it makes."""
+
+    def __init__(self, seconds, work=lambda t: 0.02, sinks=(), silent=(0.0, 0.0), fails=(), **calls):
+        self.time = time = Time()
+        self.sensor, self.stages = Sensor(time, seconds, silent), Stages(time, work, dict(fails))
+        self.seen, self.reports, self.pings = [], [], []
+        self.supervisor = Mock(alive=lambda: self.pings.append(time.now))
+        self.deadlines, self.failures, self.stop = Deadlines(0.1, time), Containment(), Stop()
+        named, kinds = {f"sink {k}": sink for k, sink in enumerate(sinks)}, (self.deadlines, self.failures, self.stop)
+        self.session = Session(self.sensor, self.stages, Mock(), named, *kinds, (), None, clock=time)
+        self.session._observe = calls.get("observe", lambda r, line: self.seen.append(r.frame.index))
+        self.session._report = calls.get("report", lambda supervisor: self.reports.append(time.now))
+
+    def run(self):
+        self.session.follow(self.supervisor)
+        return self
+
+
+def test_every_sweep_in_time_goes_through():
+    sink = Kept()
+    live = Live(10.0, sinks=[sink]).run()
+    assert len(live.seen) == 100
+    assert sink.indices == live.seen
+    assert live.deadlines.timing.missed == live.sensor.dropped == live.deadlines.shed == 0
+    assert live.deadlines.report()["lateness_ms"]["max"] == 0.0
+    ((first, named),) = (made.args for made in live.stages.recognise.call_args_list)
+    assert (first.index, named) == (1, "vlp-16")
+    assert [made.args[0].index for made in live.stages.watch.call_args_list] == live.seen
+    assert live.deadlines.report()["latency_ms"]["max"] == pytest.approx(20.0)
+    live.supervisor.ready.assert_called_once_with()
+    assert len(live.reports) in (10, 11)
+    assert live.stages.steps[-1][1] == Budget(16, pytest.approx(80.0)), "of the time that is left to the deadline"
+
+
+def test_the_watchdog_is_served_while_the_sensor_is_silent():
+    live = Live(12.0, silent=(1.0, 11.0)).run()
+    assert max(np.diff(live.pings)) <= WAIT_S + 0.11
+    assert 15 < len(live.seen) < 25
+
+
+def test_under_load_the_loop_sheds_and_is_back_within_a_second(caplog):
+    with caplog.at_level(logging.WARNING):
+        live = Live(10.0, lambda t: 0.15 if 2.0 <= t < 5.0 else 0.02).run()
+    reduced_s = [0.1 * index for index, _, reduced in live.stages.steps if reduced]
+    assert 2.0 < min(reduced_s) < max(reduced_s) < 5.0 + 0.15 + 1.01
+    assert live.deadlines.ladder.step is Step.ALL
+    assert live.deadlines.shed > 0
+    assert live.deadlines.changes["dropped"] == 1
+    assert len(caplog.records) >= 4, "each step is logged"
+
+
+def test_a_slow_loop_takes_the_newest_sweep_and_counts_what_it_misses():
+    live = Live(20.0, lambda t: 0.15).run()
+    assert len(live.seen) + live.sensor.dropped + live.deadlines.shed == 200
+    assert live.deadlines.timing.missed == len(live.seen) - 1  # all but the first one, which warms up
+
+
+def test_after_a_long_first_frame_the_loop_begins_afresh():
+    live = Live(3.0, lambda t: 0.25 if t < 0.2 else 0.02).run()
+    assert live.seen[:3] == [1, 4, 5]
+    assert live.sensor.dropped == live.deadlines.shed == 1
+    assert live.deadlines.report()["lateness_ms"]["max"] == 0.0
+
+
+def test_a_failure_costs_its_frame_and_is_logged_once(caplog):
+    live = Live(2.0, fails=dict.fromkeys((5, 6), IndexError("a bug"))).run()
+    assert sorted({*range(1, 21)} - {*live.seen}) == [5, 6]
+    assert live.failures.counts == {"frame: IndexError": 2}
+    assert live.stages.recover.call_args_list == [call(anew=False)] * 2
+    assert [r.exc_info is not None for r in caplog.records] == [True]
+
+
+def test_failures_that_repeat_renew_the_stages_and_then_end_the_run():
+    live = Live(10.0, fails=dict.fromkeys(range(5, 100), IndexError("a bug")))
+    with pytest.raises(ModtError, match="10 failures in a row") as caught:
+        live.run()
+    assert caught.value.exit_status == 1
+    assert live.seen == [1, 2, 3, 4]
+    assert live.stages.recover.call_args_list == [call(anew=k == RENEW_AFTER) for k in range(1, MAX_IN_A_ROW)]
+    with pytest.raises(MisuseError):
+        Live(1.0, fails={1: MisuseError("poses", "too few", "give more")}).run()
+
+
+def test_a_replay_contains_no_failure():
+    failures, gone = Containment(contains=False), ConnectionError("gone")
+    for failing in (lambda: failures.contain("sink", Mock(side_effect=gone)), lambda: failures.fail(gone, "frame")):
+        with pytest.raises(ConnectionError):
+            failing()
+
+
+def test_a_source_that_fails_is_asked_again_and_after_ten_failures_ends_the_run():
+    live = Live(1.0)
+    live.sensor.take = Mock(side_effect=RuntimeError("gone"))
+    with pytest.raises(ModtError, match="10 failures in a row, the last one RuntimeError: gone"):
+        live.run()
+    assert live.sensor.take.call_count == 10
+
+
+@pytest.mark.parametrize(("broken", "kind"), [("sink", "sink 0"), ("observe", "records"), ("report", "status")])
+def test_a_sink_records_and_status_that_fail_cost_no_frame(broken, kind):
+    failing, sink = Mock(side_effect=KeyError("wall_ns")), Kept()
+    sinks, calls = ([Mock(write=failing), sink], {}) if broken == "sink" else ([sink], {broken: failing})
+    live = Live(3.0, sinks=sinks, **calls).run()
+    assert sink.indices == [index for index, *_ in live.stages.steps] == list(range(1, 31))
+    assert live.failures.counts.keys() == {f"{kind}: KeyError"}
+    assert live.failures.counts.total() >= 3
+    assert live.failures.in_a_row == 0
+
+
+def test_a_log_has_one_line_a_second_of_each_kind():
+    now_s = [0.0]
+    limit = OncePerSecond(lambda: now_s[0])
+    lines = []
+    for k in range(1000):
+        now_s[0] = 0.01 * k
+        for name, text in (("a", "%s: stepped"), ("a", "%s: silent"), ("b", "%s: stepped")):
+            record = logging.LogRecord(name, logging.WARNING, "", 0, text, (k,), None)
+            if limit.filter(record):
+                lines.append(record.getMessage())
+    assert len(lines) == 30
+    assert lines[:4] == ["0: stepped", "0: silent", "0: stepped", "100: stepped (and 99 lines like it)"]
+
+
+def test_a_signal_ends_the_loop_though_the_sensor_is_silent():
+    live = Live(100.0)
+
+    def silent(timeout_s):
+        live.time.now += timeout_s
+        if live.time.now > 103.0:
+            live.stop.signal = "SIGTERM"
+
+    live.sensor.take = silent
+    assert live.run().time.now < 103.0 + 0.5
+
+
+def test_a_frame_is_missed_when_its_result_comes_after_the_next_sweep():
+    timing = Timing()
+    assert timing.add(10.0, 10.001, 10.05, 0.1) == pytest.approx(0.5)
+    assert timing.add(10.1, 10.15, 10.21, 0.1) == pytest.approx(1.1)
+    report = timing.report()
+    assert (report["frames"], report["missed_deadlines"]) == (2, 1)
+    assert report["lateness_ms"]["max"] == pytest.approx(50.0)
+    assert report["execution_ms"]["max"] == pytest.approx(60.0)
+    assert report["latency_ms"]["max"] == pytest.approx(110.0)
+
+
+def line(**ms):
+    return {"stages": {stage: {"wall_ns": int(1e6 * value)} for stage, value in ms.items()}}
+
+
+def test_the_cost_of_the_rest_rises_at_once_and_falls_slowly():
+    deadlines = Deadlines(0.1, lambda: 0.0)
+
+    def rest_ms(**ms):
+        deadlines.finish(0.0, line(**ms))
+        return deadlines.report()["other_stages_ms"]
+
+    assert rest_ms(segmentation=10, tracking=5, classification=50) == pytest.approx(15)
+    assert rest_ms(segmentation=30) == pytest.approx(30)
+    assert 28 < rest_ms(segmentation=10) < 30
+    for _ in range(200):
+        last_ms = rest_ms(segmentation=10)
+    assert last_ms == pytest.approx(10, rel=0.01)
+
+
+class Frames(list):
+    info, faults = SimpleNamespace(profile=None), None
+
+
+def starts(work, period=0.1):
+    """Times at which frames begin that take so long, and the playback after the last one."""
+    time, out = Time(), list[float]()
+    playback = Playback(Frames(work), Ledger(), 1 / period, time.sleep, time)
+    for _ in work:
+        seconds = playback.take(0.0).frame
+        out.append(time.now - 100.0)
+        time.now += seconds
+    with pytest.raises(StreamEndedError):
+        playback.take(0.0)
+    return out, playback
+
+
+@pytest.mark.parametrize(
+    ("work", "begins", "missed", "late_ms"),
+    [
+        ([0.03, 0.09, 0.0, 0.05], [0.0, 0.1, 0.2, 0.3], 0, 0),
+        ([0.35, 0.01, 0.01, 0.01], [0.0, 0.35, 0.45, 0.55], 2, 250),
+    ],
+    ids=["in time", "a stall, without a burst after it"],
+)
+def test_frames_start_at_absolute_deadlines_and_a_stall_is_counted(work, begins, missed, late_ms):
+    out, playback = starts(work)
+    assert out == pytest.approx(begins)
+    assert playback.report()["missed_deadlines"] == missed
+    assert playback.report()["max_lateness_ms"] == pytest.approx(late_ms)
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
+def test_frames_never_start_early_nor_in_a_burst(work):
+    out, playback = starts(work)
+    for i, first in enumerate(out):
+        for steps, later in enumerate(out[i:]):
+            assert later - first >= (steps - 1) * 0.1 - 1e-6  # one frame at most is made up for, never a row of them
+    assert playback.report()["missed_deadlines"] >= sum(w > 0.21 for w in work[:-1])
+
+
+def test_a_signal_ends_a_long_sleep_of_naps_that_add_up_to_it():
+    time, naps = Time(), []
+
+    def nap(seconds):
+        naps.append(seconds)
+        time.sleep(seconds + 0.003)
+        if len(naps) == 30:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with Stop(nap, time).on_signals() as stop:
+        stop.sleep(1.0)
+        assert time.now == pytest.approx(101.0, abs=0.004)
+        stop.sleep(100.0)
+    assert len(naps) == 30
+    assert max(naps) <= NAP_S
