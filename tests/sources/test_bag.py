@@ -126,6 +126,13 @@ def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):
         open_stream(path)
 
 
+@pytest.mark.parametrize("chunk_size", [1, 10**6])
+def test_messages_of_an_mcap_file_come_in_the_order_of_their_recording(tmp_path, chunk_size):
+    recorded = clouds(6)
+    path = write_mcap(tmp_path / "drive", [recorded[k] for k in (1, 0, 4, 2, 3, 5)], chunk_size=chunk_size)
+    assert [len(frame.points) for frame in open_stream(path)] == list(range(20, 26))
+
+
 def test_a_recording_in_several_files_is_read_in_their_order(tmp_path):
     recorded = clouds(12)
     for k, message in enumerate(recorded):

@@ -108,14 +108,15 @@ class LineFile(Generic[T]):
             ValueError: the item cannot be encoded.
         """
         data = self._encode(item).encode()
-        written = 0
         with writing(self.path):
+            whole = self._file.tell()
             try:
+                written = 0
                 while written < len(data):
                     written += self._file.write(data[written:])
             except OSError:
                 with suppress(OSError):
-                    self._file.truncate(self._file.seek(-written, os.SEEK_CUR))  # the next line begins there
+                    self._file.truncate(self._file.seek(whole))  # the next line begins where this one did
                 raise
         self._written += 1
 
