@@ -14,7 +14,7 @@ from modt.classification.pointnet import PointNet
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxScores, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
-from modt.config import ClassificationConfig, FusionConfig, SensorConfig
+from modt.config import ClassificationConfig, SensorConfig
 from modt.types import Proposals
 from tests.classification.scenes import blobs
 
@@ -76,10 +76,3 @@ def test_box_priors_of_the_shipped_models(name: str) -> None:
     assert car.argmax() == ObjectClass.CAR
     assert person[ObjectClass.PEDESTRIAN] > 0.1
     assert max(1 - wall[0], 1 - speck[0]) < 0.02
-
-
-def test_a_tall_person_who_seems_to_stand_above_the_ground_is_worth_a_classification() -> None:
-    """Where the ground rises it is found late."""
-    prior = make_prior(PointNet(ClassificationConfig(), SensorConfig()).box_scores, FREQUENCY)
-    probability = prior.probability(standing(300, 8.0, 0.5, 0.25, 1.65))
-    assert prior.may_be_object(probability, FusionConfig().min_object_probability).all()

@@ -37,7 +37,7 @@ from tools.train.labelled_scans import (
     semantic_scans,
     thinned,
 )
-from tools.train.near_scans import near_scans, ramp_scans
+from tools.train.near_scans import near_scans
 from tools.train.paste import cut_objects, paste_objects
 from tools.train.synthetic_scans import label_files, scans_from_labels, simulated_scans
 
@@ -241,12 +241,6 @@ def near_crops(path: Path, worlds: int, seed: int) -> None:
     """Write crops of simulated sweeps of low sensors among people at arm's length, one sweep of each world."""
     scans = near_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
     _save_simulated(path, scans, {"near": worlds, "seed": seed})
-
-
-def ramp_crops(path: Path, worlds: int, seed: int) -> None:
-    """Write crops of simulated sweeps of low sensors before and on a ramp."""
-    scans = ramp_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
-    _save_simulated(path, scans, {"ramps": worlds, "seed": seed})
 
 
 def _save_simulated(path: Path, scans: Iterable[Scan], provenance: dict[str, object]) -> None:

@@ -16,15 +16,13 @@ from pathlib import Path
 
 from modt import profile
 from tools.options import parser
-from tools.train.build_crops import kitti_crops, near_crops, own_crops, ramp_crops, synthetic_crops
+from tools.train.build_crops import kitti_crops, near_crops, own_crops, synthetic_crops
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
 """Simulated worlds of each kind."""
 NEAR_WORLDS, NEAR_STEPS = {1: 3000, 2: 550}, 4000
 """Seed and number of the worlds near the sensor, first for training, then for the card; training steps."""
-RAMP_SEED, RAMP_WORLDS = 3, 330
-"""Seed and number of the worlds with a ramp, which the box classifier of pointnet-kitti is trained on as well."""
 KITTI_DATA = (
     "106 + 2 and 53 more object frames and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; SemanticKITTI "
     "labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 sweeps of Argoverse 2 (B. "
@@ -90,9 +88,7 @@ def main() -> None:
     licence = "Apache-2.0: free for any use"
     build([free], near, MODELS / "pointnet-synthetic.onnx", args.steps, SYNTHETIC_DATA, licence)
     if args.kitti:
-        build([real, placed], near, out := MODELS / "pointnet-kitti.onnx", args.steps, KITTI_DATA, KITTI_LICENCE)
-        ramp_crops(ramps := args.work / "ramps.npz", RAMP_WORLDS, RAMP_SEED)
-        run("train_box_classifier", out, real, placed, ramps)
+        build([real, placed], near, MODELS / "pointnet-kitti.onnx", args.steps, KITTI_DATA, KITTI_LICENCE)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,6 @@ from modt_desk.simulation.scenery import chair, pallets, shelf, table
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.simulator import Simulator
 from modt_desk.simulation.solids import Solids, box, cylinder
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt_desk.simulation.world import World
 from modt_desk.simulation.yard import enclose, floor
 from tools.train.labelled_scans import Scan
@@ -36,8 +35,6 @@ ROBOT_M = (0.4, 0.4)
 MIN_RANGE_M, LOW_CLEARANCE_M = 0.2, 0.12
 """Nearest range used; lowest point of an object above ground, of a sensor below LOW_M."""
 LOW_M = 0.5
-RAMP_SECONDS, RAMP_TIMES_S = 4.0, (0.0, 2.5)
-"""Drive before and onto a ramp, and the times of the sweeps that are taken of it."""
 
 
 def near_scene(rng: Generator, height_m: float) -> World:
@@ -130,18 +127,3 @@ def near_scans(seeds: Sequence[int], sensors: Sequence[str] = tuple(SENSORS)) ->
         frame, truth = Simulator(near_scene(rng, height_m), model, seed).sweep(int(rng.integers(0, 10)))
         scan = labelled_scan(frame, truth, f"near-{seed}", f"near-{seed}", camera=False, sensor=name)
         yield replace(scan, profile=mounted(name, height_m))
-
-
-def ramp_scans(seeds: Sequence[int], sensors: Sequence[str] = tuple(SENSORS)) -> Iterator[Scan]:
-    """Sweeps of people before and on a ramp, by one low sensor after another.
-
-    The ground is found late where it rises, so these people seem to stand up to 0.7 m above it.
-    """
-    for seed, name in zip(seeds, cycle(sensors), strict=False):
-        height_m = float(np.random.default_rng([seed, 9]).uniform(*HEIGHT_M))
-        simulator = SyntheticStream("ramp", name, RAMP_SECONDS, seed, height_m=height_m).simulator
-        for time_s in RAMP_TIMES_S:
-            frame, truth = simulator.sweep(round(time_s / simulator.sensor.period_s))
-            drive = f"ramp-{seed}"
-            scan = labelled_scan(frame, truth, f"{drive}/{frame.index}", drive, camera=False, sensor=name)
-            yield replace(scan, profile=mounted(name, height_m))

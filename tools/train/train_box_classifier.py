@@ -1,29 +1,19 @@
-"""Training of the box classifier, modt.classification.box_classifier (extra [train]).
+"""Training of the box classifier, modt.classification.box_classifier.
 
-    python -m tools.train.train_box_classifier MODEL.onnx CROPS.npz...
-
-Crops are augmented as for the PointNet, and the boxes fitted to the augmented crops. The command replaces the box
-classifier of a model and keeps its network, its reflectance classifiers and the weights of the pool. The card gets a
-section on the new box classifier.
+Crops are augmented as for the PointNet, and the boxes fitted to the augmented crops.
 """
 
 from __future__ import annotations
 
-import hashlib
-import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 import torch
 from numpy.random import Generator
-from onnx import helper
 
 from modt.classes import CLASS_NAMES, N_CLASSES
-from modt.classification.box_classifier import METADATA_KEY, Layers, from_metadata, logits, to_metadata
+from modt.classification.box_classifier import Layers, logits
 from modt.types import Bool, Float64, Int
-from tools.options import make_torch_deterministic, parser
 from tools.train.augment import augment, subsample
 from tools.train.dataset import (
     BATCH_SIZE,
@@ -33,10 +23,9 @@ from tools.train.dataset import (
     crop_features,
     dataset_features,
     draw_batch,
-    load,
     sampling_pools,
 )
-from tools.train.held_out import HeldOut, Model, fit_pool, out_of_fold
+from tools.train.held_out import Calibration, Model, fit_pool, out_of_fold
 from tools.train.network import Batch, train_mlp
 from tools.train.scores import by_sensor
 
@@ -70,25 +59,31 @@ def _augmented_features(data: Dataset, rows: Int, rng: Generator) -> Float64:
     return crop_features(*augment(crops, data.sensors.take(rows), rng))
 
 
-def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> HeldOut:
-    """Out-of-fold predictions of k folds; each is trained for these steps, with a seed of its own from `seed` on."""
+def cross_validate(
+    data: Dataset, network: Float64, k: int, steps: int, seed: int
+) -> tuple[Calibration, dict[str, Any]]:
+    """Calibration, share in the pool with the network, and scores from out-of-fold predictions.
+
+    Args:
+        data: all crops.
+        network: (R, 4) out-of-fold probabilities of the PointNet.
+        k: number of folds.
+        steps: training steps of a fold.
+        seed: seed of the first fold.
+    """
 
     def model(among: Bool, i: int) -> Model:
         layers = train(data, np.flatnonzero(among & data.trainable), steps, seed + i)
         return lambda rows: logits(layers, dataset_features(data, rows))
 
-    return out_of_fold(data, k, model)
-
-
-def scores(held: HeldOut, network: Float64) -> dict[str, Any]:
-    """Share in the pool with the network, and scores, of out-of-fold predictions and those of the PointNet (R, 4)."""
+    held = out_of_fold(data, k, model)
     valid, box = held.validation, held.probability
     weights, pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
-    return {
+    return held.calibration, {
         "weights": weights.as_dict(),
         "cross_validation": by_sensor(np.log(box), valid, valid.clear),
         "pool": by_sensor(pool, valid, valid.clear),
-        "ruled_out": ruled_out(box[valid.clear], valid.label[valid.clear]),
+        "ruled_out": ruled_out(held.probability[valid.clear], valid.label[valid.clear]),
     }
 
 
@@ -114,48 +109,5 @@ def calibrated(data: Dataset, network: Float64) -> tuple[Layers, dict[str, Any]]
     The report holds the weights of the pool with the network, out-of-fold scores by sensor of the box alone and of
     the pool, and the share of each class below each of THRESHOLDS.
     """
-    held = cross_validate(data, FOLDS, STEPS, SEED)
-    return held.calibration.fold_into(train(data, np.flatnonzero(data.trainable), STEPS, SEED)), scores(held, network)
-
-
-def section(data: Dataset, held: HeldOut) -> str:
-    """Section of a card on a box classifier that was trained after the network."""
-    valid = held.validation
-    tally = np.bincount(data.label[data.trainable], minlength=N_CLASSES).tolist()
-    lines = [
-        "## Box classifier trained after the network\n",
-        "The tables above are those of the box classifier that the network was trained with. Of this one:\n",
-        f"- training: tools.train.train_box_classifier, seed {SEED}, {STEPS} steps, torch {torch.__version__}",
-        f"- crops by class ({', '.join(CLASS_NAMES)}): {tally}, sha256 {', '.join(data.sha256)}",
-        f"- calibration: {held.calibration.as_dict()}\n",
-        "Share of each class whose object probability is below the first column, out of fold:\n",
-        f"| | {' | '.join(CLASS_NAMES)} |\n|{'---|' * (1 + N_CLASSES)}",
-    ]
-    for row in ruled_out(held.probability[valid.clear], valid.label[valid.clear]):
-        shares = (f"{100 * share:.1f} %" for share in row["share"].values())
-        lines.append(f"| {row['likely']} | {' | '.join(shares)} |")
-    return "\n".join([*lines, ""])
-
-
-def main() -> None:
-    options = parser(__doc__)
-    options.add_argument("model", type=Path)
-    options.add_argument("crops", type=Path, nargs="+", help="data sets of crops (.npz)")
-    args = options.parse_args()
-    make_torch_deterministic()
-    data, model = load(*args.crops), onnx.load(str(args.model))
-    metadata = {entry.key: entry.value for entry in model.metadata_props}
-    held = cross_validate(data, FOLDS, STEPS, SEED)
-    layers = held.calibration.fold_into(train(data, np.flatnonzero(data.trainable), STEPS, SEED))
-    metadata[METADATA_KEY] = to_metadata(layers, from_metadata(metadata).weights)
-    helper.set_model_props(model, metadata)
-    raw = model.SerializeToString(deterministic=True)
-    args.model.write_bytes(raw)
-    card = args.model.with_suffix(".md")
-    text = re.sub(r"sha256: \w{64}", f"sha256: {hashlib.sha256(raw).hexdigest()}", card.read_text("utf-8"), count=1)
-    text = text.split("\n## Box classifier trained after")[0].rstrip("\n")
-    card.write_text(f"{text}\n\n{section(data, held)}", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    calibration, report = cross_validate(data, network, FOLDS, STEPS, SEED)
+    return calibration.fold_into(train(data, np.flatnonzero(data.trainable), STEPS, SEED)), report

@@ -36,13 +36,3 @@ def test_one_command_trains_on_scans_of_ones_own(tmp_path, monkeypatch):
     assert np.sum(frequency) == pytest.approx(1.0, abs=1e-3)
     assert frequency[0] > 0.7
     assert set(build_models.MODELS.glob("*.onnx")) == shipped
-    from tools.train import train_box_classifier  # needs torch
-
-    monkeypatch.setattr(train_box_classifier, "STEPS", 10)
-    monkeypatch.setattr(sys, "argv", ["train_box_classifier", str(path), str(tmp_path / "scans.npz")])
-    train_box_classifier.main()
-    PointNet(ClassificationConfig(model=str(path)), SensorConfig())
-    assert "## Box classifier trained after the network" in path.with_suffix(".md").read_text(encoding="utf-8")
-    retrained = ort.InferenceSession(path).get_modelmeta().custom_metadata_map
-    changed = {key for key in metadata if retrained[key] != metadata[key]}
-    assert changed == {"box_prior"}

@@ -5,13 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classes import ObjectClass
 from modt.classification.crops import Crops
 from modt.types import Cut
 from tests.tools.train.datasets import data_of
 from tools.train.dataset import Sensors
 from tools.train.near_batches import MIN_CUT_POINTS, NearSource, cut_near
-from tools.train.near_scans import HEIGHT_M, near_scans, ramp_scans
+from tools.train.near_scans import HEIGHT_M, near_scans
 
 
 def boards(n: int, height_m: float = 1.8) -> tuple[Crops, Sensors]:
@@ -48,17 +47,6 @@ def test_each_scan_is_seen_from_a_low_mount_of_its_own():
         below = scan.points[np.hypot(*scan.points[:, :2].T) < 3.0, 2].min()
         assert height_m is not None
         assert below == pytest.approx(-height_m, abs=0.15) or scan.sensor == "mid-360"
-
-
-def test_people_on_a_ramp_are_seen_from_low_mounts():
-    scans = list(ramp_scans(range(2), ["vlp-16", "mid-360"]))
-    assert [scan.drive for scan in scans] == ["ramp-0", "ramp-0", "ramp-1", "ramp-1"]
-    for scan in scans:
-        height_m = scan.profile.sensor.height_m
-        assert height_m is not None
-        assert HEIGHT_M[0] <= height_m <= HEIGHT_M[1]
-        people = scan.boxes[np.array(scan.kinds) == ObjectClass.PEDESTRIAN]
-        assert (people[:, 2] > 0.2 - height_m).any()  # the bottom of a person on the ramp
 
 
 def test_a_batch_holds_simulated_crops_and_crops_of_the_streets_cut_near():
