@@ -228,6 +228,12 @@ def test_passes_on_random_input(kernels, name, arguments, seed, n):
     assert same(*(getattr(each, name)(*given) for each in (NUMPY, kernels)))
 
 
+def test_covered_parts_of_k_dops_in_columns(kernels):
+    a, b, rows, columns = some_covered(np.random.default_rng(0), 9)
+    in_columns = kernels.coverage(np.asfortranarray(a), np.asfortranarray(b), rows, columns)
+    np.testing.assert_array_equal(in_columns, kernels.coverage(a, b, rows, columns))
+
+
 @given(
     seed=st.integers(0, 10_000),
     n=st.integers(0, 40),

@@ -81,7 +81,7 @@ class NativeGeometryKernels(GeometryKernels):
 
     def coverage(self, a: Float64, b: Float64, rows: Int, columns: Int) -> Float64:
         """(K,) part of the k-DOP of a (8, n) that that of b (8, k) covers, of each pair."""
-        part = np.empty(len(rows))
+        a, b, part = np.ascontiguousarray(a), np.ascontiguousarray(b), np.empty(len(rows))
         self.library.modt_coverage(a, a.shape[1], b, b.shape[1], rows, columns, len(rows), JITTER_M, part)
         return part
 
