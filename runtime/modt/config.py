@@ -1,7 +1,6 @@
 """Configuration: one frozen dataclass a stage, every value bounded and checked as it is made.
 
-Defaults of the segmentation without another source were chosen on KITTI object frames and labelled odometry scans,
-and checked on drive 0005 and on simulated streets (docs/evaluation.md).
+Defaults of the segmentation without another source were chosen on labelled KITTI scans (docs/evaluation.md).
 """
 
 from __future__ import annotations
