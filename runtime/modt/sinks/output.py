@@ -57,15 +57,6 @@ def writing(path: Path, remedy: str = WRITE_REMEDY) -> Iterator[None]:
         raise ModtError(path, f"cannot be written ({error.strerror or error})", remedy) from None
 
 
-def sync_folder(path: Path) -> None:
-    """Make the names in a folder survive a power cut; raises OSError."""
-    number = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)
-
-
 def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
     """Write a file atomically through .NAME.part, without following links. A lasting file survives a power cut whole.
 
