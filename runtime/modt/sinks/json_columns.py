@@ -32,7 +32,7 @@ def encode(text: str) -> Text:
 def encode_table(texts: Sequence[str]) -> Text:
     """(n, w) elements of n texts, padded to the longest."""
     rows = [encode(text) for text in texts]
-    out = np.zeros((len(rows), max(map(len, rows))), np.uint32)
+    out = np.zeros((len(rows), max(map(len, rows), default=0)), np.uint32)
     for row, padded in zip(rows, out, strict=True):
         padded[: len(row)] = row
     return out
