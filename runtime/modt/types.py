@@ -195,9 +195,7 @@ class Tracks:
     # Columns of the tracker
     id: Int = column(int, fill=NONE)  # never used twice in a run
     state: Int = column(int)  # value of the state machine's enumeration
-    final: Bool = column(
-        bool
-    )  # the class of that state is confirmed; it is asked for again only if the view improves
+    final: Bool = column(bool)  # the class of that state is confirmed, and asked for only if the view improves
     x: Float64 = column(float, 4)  # filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1)
     P: Float64 = column(float, 4, 4)  # its covariance
     box: Float64 = column(float, 7)  # last box seen, world frame

@@ -33,7 +33,7 @@ def worst(kinds: Iterable[Kind]) -> Kind:
 
 
 class Scope(Words):
-    """Consumers that a meter covers, the narrowest and preferred first: this program has a larger share of them."""
+    """Consumers that a meter covers, in order of preference. This program has a larger share of a narrower scope."""
 
     CPU = "CPU packages"
     CPU_RAIL = "the rail of the CPU, with what shares it"
