@@ -1,4 +1,4 @@
-"""sensor_msgs/PointCloud2, read into a sweep by one copy."""
+"""Messages of type sensor_msgs/PointCloud2."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
@@ -67,21 +68,6 @@ class PointCloud:
         return 0.0 if self.turn is None else self.turn.turn_s
 
 
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """The points in the message; `fields` are types and offsets by lower-case name."""
-
-    data: memoryview
-    shape: tuple[int, int]
-    strides: tuple[int, int]
-    fields: dict[str, tuple[np.dtype[Any], int]]
-
-    def columns(self, name: str, n: int = 1) -> NDArray[np.generic]:
-        """(height, width, n) view of a field and of the numbers of its type that follow it."""
-        kind, offset = self.fields[name]
-        return np.ndarray((*self.shape, n), kind, self.data, offset, (*self.strides, kind.itemsize))
-
-
 def read_cloud(message: bytes) -> PointCloud:
     """The sweep in a message, of either byte order.
 
@@ -102,11 +88,13 @@ def read_cloud(message: bytes) -> PointCloud:
         raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
     fields = {name: (np.dtype(order + kind), offset) for name, (kind, offset) in kinds.items()}
     fields = {name: (kind, at) for name, (kind, at) in fields.items() if at + kind.itemsize <= point_step}
-    table = _Table(data, (height, width), strides, fields)
-    points = _points(table)
+    formats, offsets = [kind for kind, _ in fields.values()], [at for _, at in fields.values()]
+    row = np.dtype({"names": [*fields], "formats": formats, "offsets": offsets, "itemsize": point_step})
+    table = np.ndarray((height, width), row, data, 0, strides)
+    points = _points(table, fields)
     time = next((name for name in TIMES if name in fields), None)
     with np.errstate(all="ignore"):  # times may be any numbers
-        turn = None if time is None else turn_of(points, table.columns(time).reshape(-1))
+        turn = None if time is None else turn_of(points, table[time].reshape(-1))
     return PointCloud(stamp_s, frame_id, points, turn)
 
 
@@ -137,30 +125,22 @@ def _fields(cdr: CdrReader) -> dict[str, tuple[str, int]]:
     return fields
 
 
-def _points(table: _Table) -> Float32:
-    xyz = [table.fields[name] for name in "xyz" if name in table.fields]
+def _points(table: NDArray[np.void], fields: dict[str, tuple[np.dtype[Any], int]]) -> Float32:
+    xyz = [fields[name] for name in "xyz" if name in fields]
     if len(xyz) < 3 or any(kind.kind != "f" for kind, _ in xyz):
         kinds = ": they are " + ", ".join(kind.name for kind, _ in xyz) if len(xyz) == 3 else ""
-        there = ", ".join(table.fields) or "none"
+        there = ", ".join(fields) or "none"
         raise MessageError("fields", f"no x, y, z of floating point among {there}{kinds}")
-    reflectance = reflectance_name(table.fields)
-    points = np.empty((table.shape[0] * table.shape[1], 4), np.float32)
+    reflectance = reflectance_name(fields)
+    points = np.empty((table.size, 4), np.float32)
     rows = points.reshape(*table.shape, 4)
     kind, offset = xyz[0]
-    row = [(kind, offset + k * kind.itemsize) for k in range(4)]
-    whole = reflectance is not None and [*xyz, table.fields[reflectance]] == row
     with np.errstate(all="ignore"):  # float64 beyond float32, and NaN
-        if whole:
-            rows[...] = table.columns("x", 4)
-        elif xyz == row[:3]:
-            rows[..., :3] = table.columns("x", 3)
+        if [*xyz, fields.get(reflectance or "")] == [(kind, offset + k * kind.itemsize) for k in range(4)]:
+            rows[...] = as_strided(table["x"], rows.shape, (*table.strides, kind.itemsize))
         else:
-            for k, name in enumerate("xyz"):
-                rows[..., k] = table.columns(name)[..., 0]
-        if reflectance is None:
-            rows[..., 3] = UNRECORDED
-        elif not whole:
-            rows[..., 3] = table.columns(reflectance)[..., 0]
+            for k, name in enumerate((*"xyz", reflectance)):
+                rows[..., k] = UNRECORDED if name is None else table[name]
         _scale(points[:, 3])
         if not np.isfinite(np.dot(points.ravel(), points.ravel())):
             _finite(points)

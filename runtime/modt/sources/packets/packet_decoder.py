@@ -44,9 +44,7 @@ class DeviceClock:
         if self._last_s is None:
             self._last_s, self._since_s, self.offset_s = device_s, device_s, received_s - device_s
             return device_s
-        elapsed_s = device_s - self._last_s
-        if self._wrap_s < math.inf:
-            elapsed_s = math.remainder(elapsed_s, self._wrap_s)
+        elapsed_s = math.remainder(device_s - self._last_s, self._wrap_s)
         self._last_s += elapsed_s
         offset_s = received_s - self._last_s
         if abs(offset_s - self.offset_s) > MAX_ERROR_S:
