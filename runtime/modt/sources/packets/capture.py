@@ -199,17 +199,15 @@ class PacketStream:
         reception: counts of the last pass.
     """
 
-    def __init__(
-        self, info: StreamInfo, capture: Capture, decoder: PacketDecoder, first: int = 0, last: int | None = None
-    ) -> None:
-        """Select the frames with first <= index < last; each pass decodes with a fresh copy of the decoder."""
+    def __init__(self, info: StreamInfo, capture: Capture, decoder: PacketDecoder, first: int = 0) -> None:
+        """Select the frames with first <= index < info.end; each pass decodes with a fresh copy of the decoder."""
         self.info, self.faults, self.reception = info, Faults(), Reception()
-        self.capture, self.decoder, self._first, self._last = capture, decoder, first, last
+        self.capture, self.decoder, self._first = capture, decoder, first
 
     def __iter__(self) -> Iterator[Frame]:
         self.reception = reception = Reception()
         stamps, path, lost = StampCheck(), str(self.capture.path), 0
-        for index, (arrived_s, sweep) in enumerate(islice(self._sweeps(reception), self._last)):
+        for index, (arrived_s, sweep) in enumerate(islice(self._sweeps(reception), self.info.end)):
             missing, lost = reception.lost - lost, reception.lost
             if index < self._first:
                 stamps.doubt(sweep.stamp_s, arrived_s)
@@ -220,11 +218,9 @@ class PacketStream:
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; the file is read up to the last one."""
-        ends = [end for end in (last, self._last) if end is not None]
-        first, end = max(first, self._first), min(ends, default=None)
-        nothing = end is not None and end <= first
-        info = replace(self.info, end=end, n_frames=0 if nothing else None)
-        return type(self)(info, self.capture, self.decoder, first, first if nothing else end)
+        first, end = max(first, self._first), min((k for k in (last, self.info.end) if k is not None), default=None)
+        info = replace(self.info, end=end, n_frames=0 if end is not None and end <= first else None)
+        return type(self)(info, self.capture, self.decoder, first)
 
     def _sweeps(self, reception: Reception) -> Iterator[tuple[float, Sweep]]:
         """Arrival [s] and sweep of each turn; refused packets and a broken end of the file are reported last."""
