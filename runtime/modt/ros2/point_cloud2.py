@@ -43,29 +43,16 @@ class PointCloud:
     """A sweep as received.
 
     Attributes:
-        stamp_s: stamp of the header [s]; 0 if the driver states none.
+        ahead_s: time of straight ahead, or the stamp of a sweep that is not skewed [s]; 0 if the driver states none.
         frame_id: frame of the coordinates.
         points: (N, 4) float32 x, y, z [m], reflectance or UNRECORDED. Points without a return lie at the origin.
-        turn: motion of the head by the times of the points; None if unknown.
+        turn_s: as in Frame.turn_s, by the times of the points; 0 if they tell none.
     """
 
-    stamp_s: float
+    ahead_s: float
     frame_id: str
     points: Float32
-    turn: Turn | None
-
-    @property
-    def ahead_s(self) -> float:
-        """Time of straight ahead, or the stamp of a sweep that is not skewed [s]; 0 if unknown."""
-        if self.turn is None or not self.stamp_s:
-            return self.stamp_s
-        absolute = abs(self.turn.ahead_s - self.stamp_s) < MAX_DELAY_S
-        return self.turn.ahead_s if absolute else self.stamp_s + self.turn.ahead_s
-
-    @property
-    def turn_s(self) -> float:
-        """Value of Frame.turn_s; 0 if the turn is unknown."""
-        return 0.0 if self.turn is None else self.turn.turn_s
+    turn_s: float
 
 
 def read_cloud(message: bytes) -> PointCloud:
@@ -95,7 +82,10 @@ def read_cloud(message: bytes) -> PointCloud:
     time = next((name for name in TIMES if name in fields), None)
     with np.errstate(all="ignore"):  # times may be any numbers
         turn = None if time is None else turn_of(points, table[time].reshape(-1))
-    return PointCloud(stamp_s, frame_id, points, turn)
+    turn_s, ahead_s = turn or (0.0, 0.0)
+    if turn and stamp_s:
+        stamp_s = ahead_s if abs(ahead_s - stamp_s) < MAX_DELAY_S else stamp_s + ahead_s
+    return PointCloud(stamp_s, frame_id, points, turn_s)
 
 
 def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
@@ -172,16 +162,10 @@ MAX_RESIDUAL = 0.03
 """Share of a turn by which most points may deviate from the line of time over bearing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """A turn of the head: duration as in Frame.turn_s, and time of straight ahead by the clock of the points [s]."""
+def turn_of(points: Float32, times: NDArray[np.generic]) -> tuple[float, float] | None:
+    """Duration of a turn, as in Frame.turn_s, and time of straight ahead by the clock of the points [s].
 
-    turn_s: float
-    ahead_s: float
-
-
-def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | None:
-    """The turn of a sweep whose seam lies behind the sensor; None for another seam, or times that fit no turn.
+    None for a sweep whose seam does not lie behind the sensor, or times that fit no turn.
 
     Args:
         points: (N, 4) points of the sweep; those at the origin are ignored.
@@ -204,4 +188,4 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | None:
     off = np.quantile(np.abs(t - slope * bearing - ahead_s), 0.9)
     if not off <= MAX_RESIDUAL * abs(turn_s):
         return None
-    return Turn(float(turn_s), float(begin * unit_s + ahead_s))
+    return float(turn_s), float(begin * unit_s + ahead_s)

@@ -189,24 +189,24 @@ class McapFile(BagFile):
         """Messages ordered by recorded time; without an index, chunks come in the order of the file."""
         from mcap.records import Message
 
-        summary, _ = self._summary
-        wanted = {channel.id: channel.topic for channel in summary.channels.values() if channel.topic in topics}
-        index = [
-            c for c in summary.chunk_indexes if not c.message_index_offsets or wanted.keys() & c.message_index_offsets
-        ]
+        channels, index = self._summary[0].channels, list[Any]()
+        for chunk in self._summary[0].chunk_indexes:
+            held = {channels[number].topic for number in chunk.message_index_offsets}
+            if not held or held & {*topics}:
+                index.append(chunk)
         index.sort(key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
         waiting, order = list[tuple[int, int, Any]](), count()
         with self._plain.open("rb") as file:
             chunks = (next(_records(file, chunk.chunk_start_offset)) for chunk in index)
-            contents = self._parts(chunks if summary.chunk_indexes else _records(file, 0))
+            contents = self._parts(chunks if self._summary[0].chunk_indexes else _records(file, 0))
             next_ns = chain((chunk.message_start_time for chunk in index[1:]), repeat(math.inf))
             for parts, until_ns in zip(contents, next_ns, strict=False):
                 for part in parts:
-                    if isinstance(part, Message) and part.channel_id in wanted:
+                    if isinstance(part, Message) and channels[part.channel_id].topic in topics:
                         heappush(waiting, (part.log_time, next(order), part))
                 while waiting and waiting[0][0] < until_ns:
                     _, _, message = heappop(waiting)
-                    yield wanted[message.channel_id], message.log_time, message.data
+                    yield channels[message.channel_id].topic, message.log_time, message.data
 
     @cached_property
     def _summary(self) -> tuple[Any, Mapping[int, int]]:

@@ -90,9 +90,8 @@ def camera_of_raw(path: Path) -> Camera:
 def camera_of_sequence(path: Path) -> Camera:
     """Left colour camera from a calibration file of the tracking, object or odometry layout."""
     table = read_table(path)
-    R_rect = np.eye(3)  # Tr of the odometry layout includes the rectification
-    if "R0_rect" in table or "R_rect" in table:
-        R_rect = matrix(table, path, (3, 3), "R0_rect", "R_rect")
+    unrectified = {"R_rect": np.eye(3)}  # Tr of the odometry layout includes the rectification
+    R_rect = matrix(unrectified | table, path, (3, 3), "R0_rect", "R_rect")
     T = homogeneous(matrix(table, path, (3, 4), "Tr_velo_to_cam", "Tr_velo_cam", "Tr"))
     return camera(matrix(table, path, (3, 4), "P2"), R_rect, T)
 
