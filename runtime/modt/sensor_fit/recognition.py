@@ -125,10 +125,7 @@ def _tilt_differences(mount: Mount, floor: Floor) -> list[str]:
 
 
 def _height_differences(expected_m: float | None, found_m: float | None) -> list[str]:
-    if (
-        expected_m is None
-        or found_m is None
-        or abs(found_m - expected_m) < max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * expected_m)
-    ):
+    if expected_m is None or found_m is None:
         return []
-    return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"]
+    differs = abs(found_m - expected_m) >= max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * expected_m)
+    return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"] if differs else []
