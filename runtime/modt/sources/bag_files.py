@@ -31,11 +31,11 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 MAX_RECORD_BYTES = 2**28
 """Largest record of an MCAP file and largest unpacked message; a chunk has a few megabytes."""
 ALLOWANCE_BYTES, MOST_TIMES = 16 * 2**20, 64
-"""A file may unpack to ALLOWANCE_BYTES and MOST_TIMES its size together."""
+"""A file may unpack to ALLOWANCE_BYTES plus MOST_TIMES its size."""
 FOOTER_BYTES = 37
 """Size of the last record of a closed MCAP file and of what follows it."""
 STEPS = 10_000
-"""Instructions of a database between two checks of their number, which is limited like the bytes unpacked."""
+"""Instructions of a database between two checks of their number. Their limit is that of the unpacked bytes."""
 
 
 class BagMessage(NamedTuple):
