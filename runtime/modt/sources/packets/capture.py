@@ -206,8 +206,9 @@ class PacketStream:
 
     def __iter__(self) -> Iterator[Frame]:
         self.reception = reception = Reception()
-        stamps, path, lost = StampCheck(), str(self.capture.path), 0
-        for index, (arrived_s, sweep) in enumerate(islice(self._sweeps(reception), self.info.end)):
+        stamps, path, lost, index = StampCheck(), str(self.capture.path), 0, -1
+        sweeps = islice(_decoded(self.capture, self.decoder.again(), reception), self.info.end)
+        for index, (arrived_s, sweep) in enumerate(sweeps):
             missing, lost = reception.lost - lost, reception.lost
             if index < self._first:
                 stamps.doubt(sweep.stamp_s, arrived_s)
@@ -215,24 +216,16 @@ class PacketStream:
             flaws = [f"{missing} packets are missing"] if missing else []
             if frame := stamps.frame(sweep, arrived_s, index, path, self.faults, flaws):
                 yield frame
+        if index + 1 != self.info.end:  # the file was read to its end
+            refused = [f"{count} packets refused: {reason}" for reason, count in reception.refused.items()]
+            for flaw in [*refused, *filter(None, [self.capture.flaw])]:
+                self.faults.report(index + 1, path, flaw, skipped=False)
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; the file is read up to the last one."""
         first, end = max(first, self._first), min((k for k in (last, self.info.end) if k is not None), default=None)
         info = replace(self.info, end=end, n_frames=0 if end is not None and end <= first else None)
         return type(self)(info, self.capture, self.decoder, first)
-
-    def _sweeps(self, reception: Reception) -> Iterator[tuple[float, Sweep]]:
-        """Arrival [s] and sweep of each turn; refused packets and a broken end of the file are reported last."""
-        index = 0
-        for arrived_s, sweep in _decoded(self.capture, self.decoder.again(), reception):
-            yield arrived_s, sweep
-            index += 1
-        flaws = [f"{count} packets refused: {reason}" for reason, count in reception.refused.items()]
-        if self.capture.flaw is not None:
-            flaws.append(self.capture.flaw)
-        for flaw in flaws:
-            self.faults.report(index, self.capture.path, flaw, skipped=False)
 
 
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
