@@ -162,9 +162,8 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
     T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_raw, drive.parent, notes.of_poses, NO_POSES)
     if T_imu_sensor is None:
         return {}
-    T_world_imu = kitti_calibration.oxts_poses(
-        np.concatenate([kitti_calibration.read_oxts(r)[:1, : len(kitti_calibration.OXTS_FIELDS)] for r in records])
-    )
+    first = [kitti_calibration.read_oxts(r)[0, : len(kitti_calibration.OXTS_FIELDS)] for r in records]
+    T_world_imu = kitti_calibration.oxts_poses(np.array(first))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 

@@ -13,7 +13,7 @@ from modt.address import Address
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LATE_S, LiveStream
 from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for, refuse
-from modt.sources.stream import Reception, StreamInfo, Sweep
+from modt.sources.stream import Reception, Sweep
 
 log = logging.getLogger(__name__)
 
@@ -89,10 +89,8 @@ def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with suppress(OSError):  # without it, packets have the time at which they are read
         made.setsockopt(socket.SOL_SOCKET, TIMESTAMP, 1)
-    cause, remedy = (
-        f"port {port} cannot be bound",
-        "end what else reads this sensor, or give the port that it sends to",
-    )
+    cause = f"port {port} cannot be bound"
+    remedy = "end what else reads this sensor, or give the port that it sends to"
     try:
         made.bind(("", port))
         if group:
@@ -136,11 +134,4 @@ def open_packets(address: Address, cores: frozenset[int] | None) -> LiveStream:
     decoder = decoder_for(address.scheme, name, address.options, address.host)
     source = address_of(name, address.host)
     reader = PacketReader(bound_socket(name, port, address.option("group")), decoder, source)
-    info = StreamInfo(
-        name,
-        f"{address.scheme} packets",
-        period_s=decoder.period_s,
-        profile=decoder.profile,
-        elevations_deg=decoder.elevations_deg,
-    )
-    return LiveStream(info, reader, cores=cores)
+    return LiveStream(decoder.info(name, address.scheme), reader, cores=cores)

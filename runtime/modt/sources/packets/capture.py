@@ -259,14 +259,8 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         why, _, remedy = max(reception.refused, key=reception.refused.__getitem__, default="").partition("; ")
         cause = f"no whole sweep ({layout})" + (f", packets are refused: {why}" if why else "")
         raise MisuseError(path, cause, remedy or "record at least two turns of the sensor")
-    info = StreamInfo(
-        path.stem,
-        f"{layout} packets",
-        period_s=round(first.turn_s, 3) or decoder.period_s,
-        profile=decoder.profile,
-        elevations_deg=decoder.elevations_deg,
-    )
-    return PacketStream(info, capture, decoder)
+    info = decoder.info(path.stem, layout)
+    return PacketStream(replace(info, period_s=round(first.turn_s, 3) or info.period_s), capture, decoder)
 
 
 def _beside(path: Path, **suffixes: str) -> dict[str, str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError, install
-from modt.sources.stream import Reception, Sweep
+from modt.sources.stream import Reception, StreamInfo, Sweep
 from modt.types import Self
 
 MAX_DRIFT = 1e-4
@@ -78,6 +78,11 @@ class PacketDecoder(ABC):
     profile: str | None = None
     elevations_deg: tuple[float, ...] | None = None
     period_s = 0.1
+
+    def info(self, name: str, maker: str) -> StreamInfo:
+        """Properties of a stream of the sensor's packets."""
+        layout, beams = f"{maker} packets", self.elevations_deg
+        return StreamInfo(name, layout, period_s=self.period_s, profile=self.profile, elevations_deg=beams)
 
     def again(self) -> Self:
         """Decoder of the same sensor that has seen no packet yet."""
