@@ -126,7 +126,7 @@ def _points(table: NDArray[np.void], fields: dict[str, tuple[np.dtype[Any], int]
     rows = points.reshape(*table.shape, 4)
     kind, offset = xyz[0]
     with np.errstate(all="ignore"):  # float64 beyond float32, and NaN
-        if [*xyz, fields.get(reflectance or "")] == [(kind, offset + k * kind.itemsize) for k in range(4)]:
+        if [*xyz, reflectance and fields[reflectance]] == [(kind, offset + k * kind.itemsize) for k in range(4)]:
             rows[...] = as_strided(table["x"], rows.shape, (*table.strides, kind.itemsize))
         else:
             for k, name in enumerate((*"xyz", reflectance)):
