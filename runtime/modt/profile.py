@@ -95,13 +95,6 @@ def from_yaml(text: str, origin: Path | str) -> Any:
         raise MisuseError(origin, "no YAML", "give the run directory of a whole run") from None
 
 
-def value_text(value: Any) -> str:
-    """A value on one line."""
-    plain = list(value) if isinstance(value, tuple) else value
-    text: str = yaml.safe_dump(plain, default_flow_style=True, allow_unicode=True, width=float("inf"))
-    return text.removesuffix("\n").removesuffix("\n...")
-
-
 def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int) -> dict[str, Any]:
     """Values of the keys of a stage."""
     known = {f.name: f for f in fields(kind)}
@@ -186,17 +179,6 @@ class Resolved:
             MisuseError: the values contradict one another.
         """
         return _configured(self.layers, base)
-
-    def shown(self) -> str:
-        """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
-        text, layers = "", (*reversed(self.layers), *reversed(self.assumed))
-        for stage, values in dump(self.config).items():
-            text += f"{stage}:\n"
-            for key, value in values.items():
-                set_by = next((layer.name for layer in layers if key in layer.settings.get(stage, ())), "default")
-                text += f"  {key}: {value_text(value)} # {set_by}\n"
-        near_m = self.config.sensor.person_seen_from_m
-        return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
 
 
 def load(names: Names = None) -> ProfileConfig:

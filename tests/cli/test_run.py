@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.cli.profile import main as modt_profile
 from modt.sinks.tracks import SCHEMA
+from modt_desk.cli.profile import main as modt_profile
 from modt_desk.reporting.records import read_records
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.desk import recorded

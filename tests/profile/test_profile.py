@@ -10,6 +10,7 @@ from modt import assets, profile
 from modt.config import EnergyConfig, ProfileConfig, SchedulerConfig
 from modt.errors import MisuseError
 from modt.segmentation.clusters import CellClusterer
+from modt_desk.cli import profile_group
 
 
 @pytest.fixture
@@ -143,11 +144,11 @@ def test_a_board_alone_goes_with_the_default_sensor():
 
 def test_a_shown_profile_can_be_read_and_says_who_set_each_key():
     found = profile.resolve(["os1-32", "raspberry-pi-5"])
-    shown = found.shown()
+    shown = profile_group.shown(found)
     assert profile.parse(shown) == found.config
     lines = {line.strip() for line in shown.splitlines()}
     assert "height_m: 1.0 # os1-64" in lines
     assert "elevation_step_deg: 1.45 # os1-32" in lines
     assert "period_s: 0.1 # default" in lines
     assert "from 0.7 m on" in shown, "people are in view"
-    assert "min_range_m: 2.0 # hdl-64e" in profile.resolve("raspberry-pi-5").shown()
+    assert "min_range_m: 2.0 # hdl-64e" in profile_group.shown(profile.resolve("raspberry-pi-5"))
