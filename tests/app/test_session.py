@@ -255,7 +255,7 @@ class Frames(list):
 
 
 def starts(work, period=0.1):
-    """Times at which frames begin that take so long, and the playback after the last one."""
+    """Times at which frames begin that take so long."""
     time, out = Time(), list[float]()
     playback = Playback(Frames(work), Ledger(), 1 / period, time.sleep, time)
     for _ in work:
@@ -264,31 +264,20 @@ def starts(work, period=0.1):
         time.now += seconds
     with pytest.raises(StreamEndedError):
         playback.take(0.0)
-    return out, playback
+    return out
 
 
-@pytest.mark.parametrize(
-    ("work", "begins", "missed", "late_ms"),
-    [
-        ([0.03, 0.09, 0.0, 0.05], [0.0, 0.1, 0.2, 0.3], 0, 0),
-        ([0.35, 0.01, 0.01, 0.01], [0.0, 0.35, 0.45, 0.55], 2, 250),
-    ],
-    ids=["in time", "a stall, without a burst after it"],
-)
-def test_frames_start_at_absolute_deadlines_and_a_stall_is_counted(work, begins, missed, late_ms):
-    out, playback = starts(work)
-    assert out == pytest.approx(begins)
-    assert playback.report()["missed_deadlines"] == missed
-    assert playback.report()["max_lateness_ms"] == pytest.approx(late_ms)
+def test_frames_start_at_absolute_times_and_a_stall_is_followed_by_no_burst():
+    assert starts([0.03, 0.09, 0.0, 0.05]) == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert starts([0.35, 0.01, 0.01, 0.01]) == pytest.approx([0.0, 0.35, 0.45, 0.55])
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
 def test_frames_never_start_early_nor_in_a_burst(work):
-    out, playback = starts(work)
+    out = starts(work)
     for i, first in enumerate(out):
         for steps, later in enumerate(out[i:]):
             assert later - first >= (steps - 1) * 0.1 - 1e-6  # one frame at most is made up for, never a row of them
-    assert playback.report()["missed_deadlines"] >= sum(w > 0.21 for w in work[:-1])
 
 
 def test_a_signal_ends_a_long_sleep_of_naps_that_add_up_to_it():
