@@ -41,7 +41,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def rate(text: str) -> float | None:
     """Frames a second, or None for no limit."""
-    return None if text == "max" else options.real(0.01, 1000, "frames a second, or max")(text)
+    return None if text == "max" else options.bounded(float, 0.01, 1000, "frames a second, or max")(text)
 
 
 def run(arguments: argparse.Namespace) -> int:
