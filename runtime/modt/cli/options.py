@@ -15,6 +15,8 @@ from modt.schemes import SINKS
 Parser = argparse.ArgumentParser
 MODES = ("conventional", "efficient", "accurate")
 CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
+OUT = Path("runs/live")
+"""Run directory of a service."""
 
 
 def capture(text: str) -> tuple[str, str]:
@@ -65,6 +67,7 @@ _CAPTURE = (
     "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai, metadata=FILE of "
     "an Ouster; of a ROS 2 recording with several topics of point clouds: topic=NAME; repeatable"
 )
+_ODOMETRY = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
 _SINKS = f"send tracks to {', '.join(scheme.form for scheme in SINKS.values())}; repeatable"
 SHARED: dict[str, dict[str, Any]] = {
     "capture": {"type": capture, **_REPEATABLE, "metavar": "KEY=VALUE", "help": _CAPTURE},
@@ -74,6 +77,8 @@ SHARED: dict[str, dict[str, Any]] = {
     "json": {"action": "store_true", "help": "print JSON"},
     "meter": {"metavar": "NAME", "help": "meter to read (default: the best)"},
     "mode": {"choices": MODES, "default": "accurate", "help": "default: %(default)s"},
+    "odometry": {"default": "recording", "metavar": "SOURCE", "help": _ODOMETRY},
+    "out": {"type": Path, "default": OUT, "metavar": "DIR", "help": "run directory (default: %(default)s)"},
     "profile": {**_REPEATABLE, "metavar": "NAME|FILE", "help": _PROFILES},
     "sink": {**_REPEATABLE, "metavar": "ADDRESS", "help": _SINKS},
 }
