@@ -105,25 +105,13 @@ def test_home_and_working_folder_stay_empty(observed):
 
 def test_only_what_was_asked_for_is_written(observed, calls):
     written = set().union(*(changed(call, observed.cwd) for call in calls))
+    assert any(path.startswith(f"{observed.out}/") for path in written) == any(observed.out.rglob("*"))
     assert {path for path in written if not path.startswith((f"{observed.out}/", "/dev/", "/proc/"))} == set()
 
 
 def test_no_socket_is_made_and_no_name_is_looked_up(calls):
     assert [call for call in calls if re.match("socket|connect|send", call)] == []
     assert [call for call in calls if re.search(r'"/etc/(resolv\.conf|hosts|host\.conf)"', call)] == []
-
-
-@pytest.mark.parametrize(
-    ("call", "paths"),
-    [
-        ('openat(AT_FDCWD</w>, "a", O_RDONLY|O_CLOEXEC) = 3</w/a>', set()),
-        ('openat(5</h>, "a", O_RDWR|O_CLOEXEC) = 3</h/a>', {"/h/a"}),
-        ('mkdir("/h", 0777) = -1 EEXIST (File exists)', set()),
-        ('renameat(4</h>, "a", AT_FDCWD</w>, "b") = 0', {"/h/a", "/w/b"}),
-    ],
-)
-def test_what_a_system_call_changes(call, paths):
-    assert changed(call, Path("/w")) == paths
 
 
 def importers() -> list[str]:
