@@ -9,10 +9,7 @@ import yaml
 
 from modt.app.supervisor import Supervisor
 from modt.geometry import inverse, rotation_zyx, se3
-from modt.ros2 import odometry
-from modt.types import Frame
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.ros2.network import FAR, NEAR, has_sender, until
 from tests.sources import layouts
 
 from .commands import refusal, session
@@ -66,19 +63,6 @@ def test_poses_from_a_socket_equal_recorded_poses_and_a_restart_of_the_sender_mo
     else:
         assert (received["frames_posed"], received["used"]) == (FRAMES, FRAMES)
         assert tracks == recorded[1]
-
-
-def test_the_poses_of_a_topic_place_the_sweeps(tmp_path, street, loopback):
-    from modt.ros2 import dds
-
-    made = session(tmp_path / "run", FRAMES, odometry=f"ros2:///odom?domain={NEAR}")
-    sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
-    until(lambda: sent.receivers and has_sender(made.stages.odometry._subscription))
-    for stamp_s, T in street:
-        sent.write(odometry.write_odometry(stamp_s, "odom", "lidar", T))
-    first = Frame(0, street[0][0], np.zeros((0, 4), np.float32))
-    until(lambda: made.stages.odometry.place(first).T_world_sensor is not None)
-    assert made.run(Supervisor())["odometry"]["used"] == FRAMES
 
 
 def test_without_poses_they_are_estimated(tmp_path, recorded):
