@@ -3,8 +3,6 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt import assets, profile
 from modt.config import EnergyConfig, ProfileConfig, SchedulerConfig
@@ -67,15 +65,6 @@ def test_an_error_is_one_line_that_names_the_place(write, texts, parts):
     message = str(caught.value)
     assert "\n" not in message
     assert all(part in message for part in parts), message
-
-
-@given(st.text(max_size=60))
-def test_any_text_is_a_profile_or_one_clear_error(text):
-    try:
-        parsed = profile.parse(text)
-    except MisuseError:
-        return
-    assert isinstance(parsed, ProfileConfig)
 
 
 def test_a_profile_that_cannot_be_read_is_one_clear_error(tmp_path):
