@@ -27,11 +27,7 @@ REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 
 
 class ValueRangeError(MisuseError):
-    """A configuration value of the wrong type or out of its range; `key` names it."""
-
-    def __init__(self, key: str, cause: str, remedy: str) -> None:
-        super().__init__(key, cause, remedy)
-        self.key = key
+    """A configuration value of the wrong type or out of its range. Its subject is the key."""
 
 
 def number(default: float | None, low: float, high: float, unit: str, meaning: str) -> Any:

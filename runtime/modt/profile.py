@@ -154,12 +154,10 @@ class Resolved:
 
     Attributes:
         layers: the profiles that are asked for, each after those that it extends; later ones win.
-        assumed: the DEFAULT profile, on which they are based if none of them sets a key of the sensor.
-        config: the resulting configuration.
+        config: the resulting configuration, based on the DEFAULT if none of them sets a key of the sensor.
     """
 
     layers: tuple[Layer, ...]
-    assumed: tuple[Layer, ...]
     config: ProfileConfig
 
     def used(self, default: str) -> tuple[str, ...]:
@@ -195,7 +193,7 @@ def resolve(names: Names = None) -> Resolved:
     """
     layers = _layers((names,) if isinstance(names, str | Path) else names or ())
     assumed = () if any(layer.of_sensor for layer in layers) else _layers([DEFAULT])
-    return Resolved(layers, assumed, _configured((*assumed, *layers), ProfileConfig()))
+    return Resolved(layers, _configured((*assumed, *layers), ProfileConfig()))
 
 
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
@@ -258,4 +256,4 @@ def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:
         return replace(base, **{stage: replace(getattr(base, stage), **values) for stage, values in merged.items()})
     except ValueRangeError as error:
         names = ", ".join(layer.name for layer in layers)
-        raise MisuseError(f"{names}: {error.key}", error.cause, error.remedy) from None
+        raise MisuseError(f"{names}: {error.subject}", error.cause, error.remedy) from None

@@ -51,7 +51,8 @@ def run_show(arguments: argparse.Namespace) -> int:
 
 def shown(found: profile.Resolved) -> str:
     """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
-    text, layers = "", (*reversed(found.layers), *reversed(found.assumed))
+    assumed = () if found.sensor else profile.resolve(profile.DEFAULT).layers
+    text, layers = "", (*reversed(found.layers), *reversed(assumed))
     for stage, values in profile.dump(found.config).items():
         text += f"{stage}:\n"
         for key, value in values.items():
