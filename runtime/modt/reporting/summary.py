@@ -132,11 +132,6 @@ def summary_text(summary: dict[str, Any]) -> str:
         lines.append(
             f"  {run['frames_per_s']:.1f} frames/s with all of it, {run['real_time_factor']:.1f} x real time"
         )
-    if run.get("missed_deadlines"):
-        lines.append(
-            f"  missed {run['missed_deadlines']} deadlines at {run['rate_hz']:g} frames/s, the latest frame began "
-            f"{run['max_lateness_ms']:.0f} ms late"
-        )
     if "host" in summary:
         lines.append(_host_line(summary["host"]))
     faults = summary.get("faults", {})

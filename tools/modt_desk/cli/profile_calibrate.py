@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    seconds = options.real(0.01, 600, "seconds")
+    seconds = options.bounded(float, 0.01, 600, "seconds")
     p = commands.add_parser("calibrate", help="fit the energy of this board's units of work, and write its profile")
     options.add_stream_options(p, (0, 40))
     options.add(p, "meter")
@@ -25,7 +25,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument(
         "--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="profile (default: %(default)s)"
     )
-    count = options.integer(12, 100_000, "a count")
+    count = options.bounded(int, 12, 100_000, "a count")
     varied = "number of windows of varied load (default: %(default)s)"
     p.add_argument("--windows", type=count, default=60, metavar="N", help=varied)
     p.add_argument(

@@ -15,7 +15,7 @@ from modt.errors import MisuseError
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    count = options.integer(1, 1000, "a count")
+    count = options.bounded(int, 1, 1000, "a count")
     p = commands.add_parser("compare", help="run all modes on the same stream, interleaved")
     options.add_stream_options(p)
     options.add(p, "fov", "meter", "json", "html")
