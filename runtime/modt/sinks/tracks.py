@@ -99,7 +99,7 @@ def _doubts(result: FrameResult) -> Int:
 
 
 def _rows(result: FrameResult) -> text.Text:
-    """(M, w) text of the JSON of each track, made column by column; each row begins with a comma.
+    """(M, w) text of the JSON of each track, made column by column. Each row begins with a comma.
 
     Raises:
         ValueError: a number is not finite.
