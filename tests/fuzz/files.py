@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from modt.geometry import Camera
-from modt.sources import kitti_calibration, oxts
+from modt.sources import kitti_calibration
 from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import read_scan
@@ -76,7 +76,7 @@ def calibration_of_drive(folder: Path) -> Feed:
 def oxts_records(folder: Path) -> Feed:
     path = folder / "0003.txt"
     seed = "\n".join(layouts.oxts_line(2.0 * f) for f in range(3))
-    return of_file(path, lambda: oxts.poses(oxts.read_records(path)), seed)
+    return of_file(path, lambda: kitti_calibration.oxts_poses(kitti_calibration.read_oxts(path)), seed)
 
 
 @target()

@@ -23,6 +23,9 @@ FRAMES = [
     result(2, [5, 5], {0: 1, 1: 3}, {1: CAR}, lost=(2,), classified=1),
     result(3, [5], {0: 1}, {1: CAR}),
 ]
+# Track 1 is seen 4 times, 2 twice (lost frames do not count), 3 once.
+for frame, hits in zip(FRAMES, ([1, 1], [2, 2], [3, 1, 2], [4]), strict=True):
+    frame.tracks.hits[:] = hits
 FRAMES[3].proposals.coordinates[:] = [[9.0, 9.0, 4.5, 9.0, 9.0], [0.0, 1.0, 6.0, 2.0, 3.0], [7.0] * 5]
 
 
@@ -38,7 +41,6 @@ def test_figures():
     figures = whole()
     assert (figures["frames"], figures["proposals"], figures["classifications"]) == (4, 7, 3)
     assert figures["beta"] == pytest.approx(3 / 7)
-    # Track 1 is seen 4 times, 2 twice (lost frames do not count), 3 once.
     assert figures["tracks"] == {"count": 3, "N_go": pytest.approx(7 / 3)}
     assert figures["foreground_tracks"] == {"count": 1, "N_go": 4.0}
     assert figures["energy_counts"] == {"E_seg": 4, "E_class": 4}

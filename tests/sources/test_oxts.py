@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.sources.oxts import poses
+from modt.sources.kitti_calibration import oxts_poses
 
 small = st.floats(-1e-3, 1e-3)
 records = arrays(np.float64, (4, 6), elements=small).map(lambda a: a + np.array([49.0, 8.4, 110.0, 0.01, 0.02, 1.0]))
@@ -32,4 +32,4 @@ def test_poses_equal_those_of_the_development_kit(rows):
     scale = math.cos(rows[0, 0] * math.pi / 180)
     origin = np.linalg.inv(mercator_pose(rows[0], scale))
     expected = np.stack([origin @ mercator_pose(r, scale) for r in rows])
-    np.testing.assert_allclose(poses(rows), expected, atol=1e-6)
+    np.testing.assert_allclose(oxts_poses(rows), expected, atol=1e-6)

@@ -7,11 +7,10 @@ from hypothesis import strategies as st
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
-from modt.sources.pose_source import PoseFile, read_poses
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, read_poses
 from modt.sources.recognise import open_stream
 
 from . import layouts
-from .posed_stream import PosedStream
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 CAMERA = Camera(np.zeros((3, 4)), T_CAMERA_SENSOR, 100.0, 100.0)
@@ -65,10 +64,19 @@ def test_camera_poses_are_converted_and_sensor_poses_unchanged(tmp_path):
 def test_a_line_belongs_to_the_frame_of_its_index(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     path = write(tmp_path / "p.txt", [se3(np.eye(3), np.array([0.0, 0.0, float(k)])) for k in range(5)])
-    posed = PosedStream(stream, PoseFile(path, stream.info.camera, stream.info.end))
+    poses = PoseFile(path, stream.info.camera, stream.info.end)
     # z of this camera is x of the sensor
-    assert [f.T_world_sensor[0, 3] for f in posed] == [0, 1, 4]
-    assert [f.T_world_sensor[0, 3] for f in posed.between(1, 5)] == [1, 4]
+    assert [poses.place(frame).T_world_sensor[0, 3] for frame in stream] == [0, 1, 4]
+    assert [poses.place(frame).T_world_sensor[0, 3] for frame in stream.between(1, 5)] == [1, 4]
+
+
+def test_a_source_of_poses_says_whether_a_stream_has_some(tmp_path):
+    path = write(tmp_path / "p.txt", [np.eye(4)] * 4)
+    for build, recorded in ((layouts.raw_drive, True), (layouts.bare, False)):
+        stream = open_stream(build(tmp_path))
+        for poses, known in ((PoseSource(), recorded), (NoPoses(), False), (PoseFile(path, None, None), True)):
+            assert poses.of_stream(stream.info).has_poses is known
+            assert all((poses.place(frame).T_world_sensor is not None) is known for frame in stream)
 
 
 def test_too_few_lines_are_refused_before_the_start_if_the_end_is_known(tmp_path):

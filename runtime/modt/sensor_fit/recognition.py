@@ -33,9 +33,9 @@ class Recognition:
     """Differences between a profile and a sweep.
 
     Attributes:
-        differences: in words, none if the profile fits.
+        differences: a phrase for each, none if the profile fits.
         nearest: name of the shipped profile of the same beams, None where there is none.
-        fitted: the profile, with the findings in the place of what differs.
+        fitted: the profile, in which measured values replace those that differ.
         tilt_deg: roll and pitch of the sensor where the profile leaves them open and they are not small.
         same_sensor: whether all differences are those of the mount.
     """
@@ -103,18 +103,18 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
 
 
 def _is_open(sensor: SensorConfig) -> bool:
-    """Whether a profile leaves roll and pitch to the first sweep."""
+    """Whether roll and pitch are measured in the first sweep, because a profile has none."""
     return sensor.roll_deg is None and sensor.pitch_deg is None
 
 
 def _pattern_differences(expected: SensorConfig, found: SensorConfig, tangent: Float32) -> list[str]:
-    said = []
+    differences = []
     if spacing_ratio(expected, found, tangent) > MAX_SPACING_RATIO:
         steps = (float(np.rad2deg(np.median(s.beams.step_rad(tangent)))) for s in (found, expected))
-        said.append("beams {:.2f} deg apart, not {:.2f}".format(*steps))
+        differences.append("beams {:.2f} deg apart, not {:.2f}".format(*steps))
     if azimuth_ratio(expected, found) > MAX_AZIMUTH_RATIO:
-        said.append(f"returns {found.azimuth_step_deg:.2f} deg apart, not {expected.azimuth_step_deg:.2f}")
-    return said
+        differences.append(f"returns {found.azimuth_step_deg:.2f} deg apart, not {expected.azimuth_step_deg:.2f}")
+    return differences
 
 
 def _tilt_differences(mount: Mount, floor: Floor) -> list[str]:
@@ -125,10 +125,7 @@ def _tilt_differences(mount: Mount, floor: Floor) -> list[str]:
 
 
 def _height_differences(expected_m: float | None, found_m: float | None) -> list[str]:
-    if (
-        expected_m is None
-        or found_m is None
-        or abs(found_m - expected_m) < max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * expected_m)
-    ):
+    if expected_m is None or found_m is None:
         return []
-    return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"]
+    differs = abs(found_m - expected_m) >= max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * expected_m)
+    return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"] if differs else []

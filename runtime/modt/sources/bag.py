@@ -30,7 +30,10 @@ Poses = tuple[str, Float64]
 def find_poses(
     files: list[BagFile], topics: dict[str, BagTopic], sensor: str
 ) -> tuple[Poses | None, tuple[str, ...]]:
-    """Poses that apply to the frame of a sensor (None without poses or without a transform to it), and notes."""
+    """Topic of the poses with the mount of the sensor, and notes.
+
+    The topic is None without poses, or without a transform from their frame to the sensor's.
+    """
     names = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE and topic.count)
     if not names:
         return None, ("no nav_msgs/Odometry: no poses",)
@@ -49,15 +52,15 @@ def find_poses(
                 transforms.add(message.data)
     T_base_sensor = transforms.between(base, sensor)
     if T_base_sensor is None:
-        where = f"{odometry.TF_STATIC} does not lead from {base}, of which they are, to {sensor}"
+        where = f"{odometry.TF_STATIC} does not lead from {base}, their frame, to {sensor}"
         return None, (f"poses of {topic} are not used: {where}",)
     return (topic, T_base_sensor), ()
 
 
 PEEKED = 50
-"""Greatest number of messages that are read before the first frame, to find usable sweeps."""
+"""Greatest number of messages that are searched for the first usable sweeps."""
 COMPARED = 4
-"""Number of first sweeps whose stamps are compared, to find one that is right."""
+"""Number of first sweeps whose stamps are compared. The first stamp that fits a later one begins the stream."""
 
 
 class BagStream:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.sources import kitti_calibration, oxts
+from modt.sources import kitti_calibration
 from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
 from modt.sources.pose_source import read_poses, sensor_poses
 from modt.sources.scan_file import PERIOD_S, ScanReference, ScanStream
@@ -51,12 +51,11 @@ def raw_drive(drive: Path) -> ScanStream:
     calib = drive.parent / "calib_cam_to_cam.txt"
     camera = _optional(kitti_calibration.camera_of_raw, calib, notes.of_stream, NO_CAMERA)
     poses = _poses_of_raw(drive, notes)
-    data = drive / "velodyne_points" / "data"
-    frames, _ = _scans(data)
-    stamps = _stamps(drive / "velodyne_points" / "timestamps.txt", frames, notes, time_ns)
-    turns = _raw_turns(drive / "velodyne_points", frames, notes)
+    folder = drive / "velodyne_points"
+    scans = _scans(folder / "data")
+    stamps = _stamps(folder / "timestamps.txt", scans, notes, time_ns)
     info = StreamInfo(drive.name, "KITTI raw drive", camera=camera)
-    return _stream(info, data, notes, poses, stamps, turns)
+    return _stream(info, scans, notes, poses, stamps, _raw_turns(folder, scans, notes))
 
 
 def tracking_sequence(scans: Path) -> ScanStream:
@@ -75,9 +74,9 @@ def tracking_sequence(scans: Path) -> ScanStream:
     else:
         T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, notes.of_poses, NO_POSES)
         if T_imu_sensor is not None:
-            poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
-    info = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera)
-    return _stream(info, scans, notes, poses, turns=dict.fromkeys(_scans(scans)[0], PERIOD_S))
+            poses = dict(enumerate(kitti_calibration.oxts_poses(kitti_calibration.read_oxts(records)) @ T_imu_sensor))
+    info, files = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera), _scans(scans)
+    return _stream(info, files, notes, poses, turns=dict.fromkeys(files, PERIOD_S))
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
@@ -97,44 +96,43 @@ def odometry_sequence(sequence: Path) -> ScanStream:
         notes.of_poses.append(f"{cause}: {NO_POSES}")
     else:
         poses = dict(enumerate(sensor_poses(read_poses(path), camera.T_camera_sensor)))
-    data = sequence / "velodyne"
-    stamps = _stamps(sequence / "times.txt", _scans(data)[0], notes, seconds_ns)
+    scans = _scans(sequence / "velodyne")
+    stamps = _stamps(sequence / "times.txt", scans, notes, seconds_ns)
     info = StreamInfo(f"odometry {sequence.name}", "KITTI odometry", camera=camera)
-    return _stream(info, data, notes, poses, stamps)
+    return _stream(info, scans, notes, poses, stamps)
 
 
 def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") -> ScanStream:
     """A folder of scans in the order of their names, stamped by their names or `period_s` apart."""
-    indices, files = _scans(folder, suffix)
-    times = times_ns([f.stem for f in files])
+    scans = _scans(folder, suffix)
+    times = times_ns([f.stem for f in scans.values()])
     apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
-    stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(indices)}
+    stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(scans)}
     notes = Notes([f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"])
     info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
-    return _stream(info, folder, notes, {}, stamps, suffix=suffix)
+    return _stream(info, scans, notes, {}, stamps)
 
 
-def _scans(data: Path, suffix: str = ".bin") -> tuple[list[int], list[Path]]:
-    """Indices and files of the scans of a folder in their order."""
+def _scans(data: Path, suffix: str = ".bin") -> dict[int, Path]:
+    """Files of the scans of a folder in their order, by index."""
     files = files_in(data, suffix)
     if not files:
         raise MisuseError(data, f"no {suffix} scans", "give a folder of scans")
     numbers = [int(f.stem) for f in files if re.fullmatch(f"[0-9]{{1,{MAX_NUMBER_DIGITS}}}", f.stem)]
     numbered = len(set(numbers)) == len(files) and times_ns([f.stem for f in files]) is None
-    return numbers if numbered else list(range(len(files))), files
+    return dict(zip(numbers if numbered else range(len(files)), files, strict=True))
 
 
 def _stream(
     info: StreamInfo,
-    data: Path,
+    files: Mapping[int, Path],
     notes: Notes,
     poses: Poses,
     stamps: Mapping[int, float] = MappingProxyType({}),
     turns: Mapping[int, float] = MappingProxyType({}),
-    suffix: str = ".bin",
 ) -> ScanStream:
-    """Stream of the scans in `data` with their poses, stamps and durations [s] by frame."""
-    indices, files = _scans(data, suffix)
+    """Stream of scan files with their poses, stamps and durations [s] by frame."""
+    indices = list(files)
     missing = indices[-1] - indices[0] + 1 - len(indices)
     if missing:
         first = next(a + 1 for a, b in pairwise(indices) if b > a + 1)
@@ -146,8 +144,7 @@ def _stream(
             notes.of_poses.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
         poses = {i: poses[known[max(bisect_right(known, i) - 1, 0)]] for i in indices}  # the first, before it
     scans = [
-        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0))
-        for i, f in zip(indices, files, strict=True)
+        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0)) for i, f in files.items()
     ]
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
         notes.of_stream.append(f"time stamps decrease: frames {PERIOD_S} s apart instead")
@@ -165,11 +162,12 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
     T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_raw, drive.parent, notes.of_poses, NO_POSES)
     if T_imu_sensor is None:
         return {}
-    T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1, : len(oxts.FIELDS)] for r in records]))
+    first = [kitti_calibration.read_oxts(r)[0, : len(kitti_calibration.OXTS_FIELDS)] for r in records]
+    T_world_imu = kitti_calibration.oxts_poses(np.array(first))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 
-def _stamps(path: Path, frames: Sequence[int], notes: Notes, read: Callable[[str], int | None]) -> dict[int, float]:
+def _stamps(path: Path, frames: Iterable[int], notes: Notes, read: Callable[[str], int | None]) -> dict[int, float]:
     """Stamps of the frames since scan 0 [s]; missing ones are interpolated."""
     times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "theirs are interpolated", read)
     if not times:
@@ -177,15 +175,13 @@ def _stamps(path: Path, frames: Sequence[int], notes: Notes, read: Callable[[str
     known, began = sorted(times), min(times.values())
     stamps_s = np.array([(times[i] - began) / 1e9 for i in known])
     period_s = float(np.median(np.diff(stamps_s) / np.diff(known))) if len(known) > 1 else PERIOD_S
-
-    def stamp_s(i: int) -> float:
-        beyond = min(i - known[0], 0) + max(i - known[-1], 0)
-        return float(np.interp(i, known, stamps_s)) + beyond * period_s
-
-    return {i: stamp_s(i) - stamp_s(0) for i in frames}
+    scans = np.array([0, *frames])
+    beyond = np.minimum(scans - known[0], 0) + np.maximum(scans - known[-1], 0)
+    first_s, *others_s = (np.interp(scans, known, stamps_s) + beyond * period_s).tolist()
+    return {i: stamp_s - first_s for i, stamp_s in zip(frames, others_s, strict=True)}
 
 
-def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
+def _raw_turns(folder: Path, frames: Iterable[int], notes: Notes) -> dict[int, float]:
     """Durations of the sweeps by frame [s]; empty where the time stamps are missing or wrong."""
     starts = _times_ns(folder / "timestamps_start.txt", frames, NO_SWEEP_TIMES, notes)
     ends = _times_ns(folder / "timestamps_end.txt", frames, NO_SWEEP_TIMES, notes) if starts else {}
@@ -202,7 +198,7 @@ def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, f
 
 def _times_ns(
     path: Path,
-    frames: Sequence[int],
+    frames: Iterable[int],
     cost: str,
     notes: Notes,
     cost_of_few: str = "",

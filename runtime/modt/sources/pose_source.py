@@ -14,7 +14,7 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse
 from modt.sources.stream import StreamInfo
-from modt.sources.text_file import read_lines
+from modt.sources.text_file import read_text
 from modt.types import Float64, Frame
 
 N_ELEMENTS = 12
@@ -97,9 +97,7 @@ def read_poses(path: Path) -> Float64:
     Raises:
         MisuseError: the file is unreadable or empty, or a line is no pose; the error names the line.
     """
-    lines = read_lines(path, "give a file of poses")
-    while lines and not lines[-1].strip():
-        lines.pop()
+    lines = read_text(path, "give a file of poses").rstrip().splitlines()
     if not lines:
         raise MisuseError(path, "no poses", "give twelve numbers a line")
     return np.stack([_pose(line, f"{path}:{number}") for number, line in enumerate(lines, 1)])

@@ -64,6 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import writing
     from modt_desk.comparison.window_fit_calibration import Workload
     from modt_desk.energy.board_fit import FitError
+    from modt_desk.energy.named_meter import choose_meter
 
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)
@@ -71,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
     loaded = choose(request.profile, scans[0], stream.info).config
-    meters = discover(loaded.energy).choose(arguments.meter).meters
+    meters = choose_meter(discover(loaded.energy), arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = PointNet(limits, loaded.sensor)
     segmenter = assembly.segmenter(loaded, FieldOfView(), assembly.chosen_kernels(loaded.segmentation.kernels))

@@ -44,6 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_desk.comparison.compare_view import compare_document, compare_plots
     from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
+    from modt_desk.energy.named_meter import choose_meter
     from modt_desk.reporting.document import document_page, save
     from modt_desk.reporting.quantity import to_json
 
@@ -53,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info).config
     board, info = loaded.energy, stream.info
-    meters = discover(board).choose(arguments.meter).meters
+    meters = choose_meter(discover(board), arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
     comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
     repetitions = []
