@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,20 +48,12 @@ class Observations:
         """A copy, displaced by steps (P, 2) [m, world]."""
         box = self.box.copy()
         box[:, :2] += step
-        return Observations(
-            box=box,
-            centroid=self.centroid + step,
-            kdop=self.kdop + DIRECTIONS.T @ step.T,
-            bottom=self.bottom,
-            top=self.top,
-            count=self.count,
-            range_m=self.range_m,
-            sensor_xy=self.sensor_xy,
-        )
+        return replace(self, box=box, centroid=self.centroid + step, kdop=self.kdop + DIRECTIONS.T @ step.T)
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""
-        return Observations(
+        return replace(
+            self,
             box=self.box.take(rows, axis=0),
             centroid=self.centroid.take(rows, axis=0),
             kdop=self.kdop.take(rows, axis=1),
@@ -69,7 +61,6 @@ class Observations:
             top=self.top[rows],
             count=self.count[rows],
             range_m=self.range_m[rows],
-            sensor_xy=self.sensor_xy,
         )
 
     def put(self, rows: Int, few: Observations) -> None:

@@ -6,11 +6,9 @@ number of proposals in a frame, M the number of tracks alive, N the number of po
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from enum import IntFlag
 from functools import cache
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -250,29 +248,20 @@ class Tracks:
     def _blank_row(cls) -> tuple[NDArray[Any], ...]:
         return tuple(f.metadata["blank"] for f in fields(cls))
 
-    @classmethod
-    @cache
-    def _getter(cls) -> attrgetter[tuple[NDArray[Any], ...]]:
-        return attrgetter(*(f.name for f in fields(cls)))
-
-    def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Every column with its name."""
-        return zip((f.name for f in fields(self)), self._columns(), strict=True)
-
-    def _columns(self) -> tuple[NDArray[Any], ...]:
-        columns: tuple[NDArray[Any], ...] = self._getter()(self)
-        return columns
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name."""
+        return {name: getattr(self, name) for name in self.__match_args__}
 
     def copy(self) -> Self:
         """The same rows, independent of these."""
-        return type(self)(*[column.copy() for column in self._columns()])
+        return type(self)(*[column.copy() for column in self.columns().values()])
 
     def renewed(self, kept: Int, n: int) -> Self:
         """The rows kept, by index, then n blank ones."""
         if not len(self):
             return self.blank(n)
         rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
-        columns = [column.take(rows, axis=0) for column in self._columns()]
+        columns = [column.take(rows, axis=0) for column in self.columns().values()]
         for column, blank in zip(columns, self._blank_row(), strict=True):
             column[len(kept) :] = blank
         return type(self)(*columns)

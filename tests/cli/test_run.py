@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.cli.profile import main as modt_profile
 from modt.sinks.tracks import SCHEMA
+from modt_desk.cli.profile import main as modt_profile
 from modt_desk.reporting.records import read_records
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.desk import recorded
@@ -215,8 +215,7 @@ def test_check_names_each_shortcoming_with_its_remedy_and_fails_without_a_sensor
 
 def test_a_power_limit_is_kept_and_named_an_estimate_where_it_is_one(scans, tmp_path):
     own = tmp_path / "robot.yaml"
-    text = profile.to_yaml(profile.dump(profile.load("vlp-16")))
-    own.write_text(text.replace("power_W: null", "power_W: 0.5").replace("min_s: 1.0", "min_s: 0.2"))
+    own.write_text("extends: vlp-16\nloop: {power_W: 0.5}\n")
     done = modt("run", scans, "--profile", own, "--out", tmp_path / "run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     status = json.loads((tmp_path / "run" / "status.json").read_text())

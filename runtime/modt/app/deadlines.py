@@ -142,13 +142,13 @@ class NoDeadlines:
     """Every frame of a replay is processed, and may spend the budget of its profile.
 
     Args:
-        report: report of the playback.
+        rate_hz: frames a second; None for no limit.
     """
 
     reduced = False
 
-    def __init__(self, report: Callable[[], dict[str, Any]]) -> None:
-        self.report = report
+    def __init__(self, rate_hz: float | None) -> None:
+        self._rate_hz = rate_hz
 
     def admit(self, arrived_s: float) -> bool:
         """True."""
@@ -163,6 +163,10 @@ class NoDeadlines:
 
     def power(self, watts: float, limit_W: float) -> None:
         """No effect."""
+
+    def report(self) -> dict[str, Any]:
+        """Rate of the frames."""
+        return {"rate_hz": self._rate_hz}
 
 
 def _figures_ms(times_ns: Histogram) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Load shedding: steps that the loop goes up under load, and down again when there is slack."""
+"""Load shedding: the loop takes one step after the other under load, and takes them back when there is slack."""
 
 from __future__ import annotations
 

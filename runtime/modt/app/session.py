@@ -315,7 +315,7 @@ def replay(
         labels=request.labels,
     )
     meters = discover(stages.config.energy).best.meters
-    deadlines, failures = NoDeadlines(source.report), Containment(contains=False)
+    deadlines, failures = NoDeadlines(request.rate_hz), Containment(contains=False)
     return Session(source, stages, recording, sinks, deadlines, failures, stop, meters, core)
 
 

@@ -25,10 +25,6 @@ class Histogram:
         self._bits = bits
         self._occurrences: Counter[int] = Counter()
 
-    def __len__(self) -> int:
-        """Number of distinct values that are held."""
-        return len(self._occurrences)
-
     def add(self, value: int) -> None:
         """Add one value."""
         value = max(value, 0)

@@ -134,18 +134,16 @@ class _Output(FileIO):
     def __init__(self, path: Path) -> None:
         with writing(path):
             super().__init__(path, "xb")
-        self.path, self.size, self.frames = path, 0, 0
+        self.path, self.frames = path, 0
         self.error: OSError | None = None
 
     def write(self, data: Any) -> int:
         """Write, and return how much was written."""
         try:
-            written = super().write(data)
+            return super().write(data)
         except OSError as error:
             self.error = error
             raise
-        self.size += written
-        return written
 
 
 class McapFile:
@@ -177,7 +175,7 @@ class McapFile:
         Raises:
             ModtError: the file cannot be written.
         """
-        if self._output.error is not None or self._output.size > self._max_bytes / PARTS:
+        if self._output.error is not None or self._output.tell() > self._max_bytes / PARTS:
             self.close()
             self._output, self._writer, self._flushed_s = self._part()
         self._channels.write(result)

@@ -13,7 +13,7 @@ from typing import Any
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sinks.background import Background
-from modt.sinks.output import Health, LineFile, writing
+from modt.sinks.output import Health, LineFile, Writer, writing
 from modt.sinks.tracks import frame_line, frame_parts
 from modt.types import FrameResult
 
@@ -25,7 +25,7 @@ LONGEST_LINE = 1 << 22
 """Longest incomplete line that is searched for at the end of a continued file [bytes]."""
 
 
-class Descriptor:
+class Descriptor(Writer[str]):
     """Writes text to a file descriptor and never closes it."""
 
     def __init__(self, number: int) -> None:
@@ -40,9 +40,6 @@ class Descriptor:
         data = text.encode()
         while data:
             data = data[os.write(self._number, data) :]
-
-    def close(self) -> None:
-        """No effect."""
 
 
 def open_stdout(address: Address) -> Background[str]:

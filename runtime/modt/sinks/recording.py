@@ -12,7 +12,7 @@ from modt.config import RecordingConfig
 from modt.errors import ModtError
 from modt.geometry import Camera
 from modt.sinks.kitti import KittiResults, PointLabels
-from modt.sinks.output import Health, LineFile, Writer
+from modt.sinks.output import Health, LineFile, Sink, Writer
 from modt.sinks.records import line
 from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
 from modt.sinks.tracks import frame_line
@@ -40,7 +40,7 @@ CLOSE_S = 1.0
 Job = Callable[[], None]
 
 
-class AtOnce:
+class AtOnce(Writer[Job]):
     """Runs jobs where they are handed over."""
 
     def write(self, job: Job, /) -> None:
@@ -51,11 +51,8 @@ class AtOnce:
         """No job is ever dropped."""
         return {"dropped": 0}
 
-    def close(self) -> None:
-        """No effect."""
 
-
-class Recording:
+class Recording(Sink):
     """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted; the loop continues.
 
     Once a second it checks that its files are in place, and begins another part if they were removed or moved.
@@ -96,7 +93,7 @@ class Recording:
         """Begin the first part."""
         self.writer.write(self._begin)
 
-    def write(self, result: FrameResult) -> None:
+    def write(self, result: FrameResult, /) -> None:
         """Hand over the line of a frame."""
         if TRACKS in KEPT[self.config.keep] and self._allows():
             text = frame_line(result)
@@ -124,9 +121,6 @@ class Recording:
             "parts": self.parts,
         }
         return {"keep": self.config.keep, **counts, "failing": self.cause}
-
-    def close(self) -> None:
-        """No effect: `finish` ends the files on their own thread."""
 
     def state(self, status: str) -> None:
         """Write the status beside the records or in memory, and make the lines so far survive a power cut."""
@@ -263,7 +257,7 @@ class WholeRecording(Recording):
         if self._labels:
             self._more.append(PointLabels(path / "labels"))
 
-    def write(self, result: FrameResult) -> None:
+    def write(self, result: FrameResult, /) -> None:
         """Write a frame."""
         super().write(result)
         for writer in self._more:

@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from modt.errors import MisuseError, ModtError
-from modt.sinks.output import replace_file, sync_folder, writing
+from modt.sinks.output import replace_file, writing
 
 RUN, TRACKS, LEDGER, SUMMARY, STATUS = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"
 MARK = "service: true"
@@ -112,8 +112,12 @@ class RunDirectory:
             ModtError: the disk reports a failure.
         """
         with writing(self.path):
-            sync_folder(self.path)
-            sync_folder(self.path.parent)
+            for folder in (self.path, self.path.parent):
+                number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+                try:
+                    os.fsync(number)
+                finally:
+                    os.close(number)
 
     def kept(self) -> list[Path]:
         """Earlier parts, the oldest first."""

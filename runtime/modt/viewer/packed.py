@@ -1,4 +1,4 @@
-"""Arrays as text for a page: columns of differences, byte by byte, deflated, in base64."""
+"""Arrays as text for a page: each number less the one before it, byte by byte, deflated, in base64."""
 
 from __future__ import annotations
 
@@ -27,19 +27,14 @@ def planes(numbers: Int, n_bytes: int) -> bytes:
     return each[:, :n_bytes].T.tobytes()
 
 
-def differences(numbers: Int) -> Int:
-    """(n,) the first number, then the difference of each number from the one before."""
-    return np.diff(numbers, prepend=0)
-
-
 def packed_cells(cells: Cells, level: int = LEVEL) -> str:
     """Cells of a sweep: differences of the cells in CELL_BYTES planes, then the levels."""
-    return packed(planes(differences(cells.cell), CELL_BYTES) + planes(cells.level, 1), level)
+    return packed(planes(np.diff(cells.cell, prepend=0), CELL_BYTES) + planes(cells.level, 1), level)
 
 
 def packed_table(table: Int, level: int = LEVEL) -> str:
     """(R, C) table, column by column: differences in NUMBER_BYTES planes."""
-    return packed(b"".join(planes(differences(column), NUMBER_BYTES) for column in table.T), level)
+    return packed(b"".join(planes(column, NUMBER_BYTES) for column in np.diff(table, axis=0, prepend=0).T), level)
 
 
 SIDE = 4096

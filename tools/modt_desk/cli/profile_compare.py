@@ -15,7 +15,7 @@ from modt.errors import MisuseError
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    count = options.integer(1, 1000, "a count")
+    count = options.bounded(int, 1, 1000, "a count")
     p = commands.add_parser("compare", help="run all modes on the same stream, interleaved")
     options.add_stream_options(p)
     options.add(p, "fov", "meter", "json", "html")
@@ -44,6 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_desk.comparison.compare_view import compare_document, compare_plots
     from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
+    from modt_desk.energy.named_meter import choose_meter
     from modt_desk.reporting.document import document_page, save
     from modt_desk.reporting.quantity import to_json
 
@@ -53,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info).config
     board, info = loaded.energy, stream.info
-    meters = discover(board).choose(arguments.meter).meters
+    meters = choose_meter(discover(board), arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
     comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
     repetitions = []
