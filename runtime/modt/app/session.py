@@ -285,7 +285,7 @@ class Session:
         directory, writer = self.recording.directory, self.recording.writer
         if isinstance(self.deadlines, Deadlines):
             last = self.status()
-            self.summary |= {"status": last, "lateness": self.deadlines.timing.late_or_later()}
+            self.summary |= {"status": last, "lateness": self.deadlines.late_or_later()}
             writer.write(lambda: self._show(last))
         writer.write(self.recording.finish)
         text = json.dumps(self.summary, indent=2) + "\n"
