@@ -87,7 +87,7 @@ class TrackedObjects:
         return len(self.id)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
-        """One row, as in as_dicts; iteration yields the rows too."""
+        """One row, as in as_dicts. Iteration yields the rows too."""
         return self.take(np.array([range(len(self))[index(row)]])).as_dicts()[0]
 
     def __repr__(self) -> str:
@@ -111,13 +111,13 @@ class TrackedObjects:
         return self.take((self.object_class != ObjectClass.BACKGROUND) & self.visible)
 
     def as_dicts(self) -> list[dict[str, Any]]:
-        """One dictionary a row, of plain numbers and lists; object_class is a name."""
+        """One dictionary a row, of plain numbers and lists. Its object_class is a name."""
         columns = {name: column.tolist() for name, column in self._columns().items()}
         columns["object_class"] = [CLASS_NAMES[c] for c in self.object_class.tolist()]
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def to_pandas(self) -> Any:
-        """pandas.DataFrame with the columns of as_dicts; MisuseError if pandas is not installed."""
+        """pandas.DataFrame with the columns of as_dicts. Raises MisuseError if pandas is not installed."""
         try:
             pandas = import_module("pandas")
         except ModuleNotFoundError as error:
@@ -163,7 +163,7 @@ class Pipeline:
 
     @classmethod
     def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:
-        """Make a pipeline from profiles by name or file; later ones win key by key.
+        """Make a pipeline from profiles by name or file. Later ones win key by key.
 
         If no profile names the sensor, it is that of the default, or the one that the first sweep shows.
 
@@ -188,7 +188,7 @@ class Pipeline:
             points: a frame of `open`, which needs no other argument; or (N, 3) or (N, 4) x, y, z [m, sensor frame:
                 x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
-            T_world_sensor: (4, 4) pose at the stamp; None estimates the motion of the sensor from the proposals.
+            T_world_sensor: (4, 4) pose at the stamp. None estimates the motion of the sensor from the proposals.
             turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
 
         Raises:
@@ -243,7 +243,7 @@ class Pipeline:
 
 
 def _checked(points: ArrayLike) -> Float32:
-    """(N, 4) finite points; a missing fourth column is filled with unrecorded reflectance."""
+    """(N, 4) finite points. A missing fourth column is filled with unrecorded reflectance."""
     rows = np.array(points, np.float32)
     if rows.ndim != 2 or rows.shape[1] not in (3, 4):
         raise MisuseError("points", f"of shape {rows.shape}", "give rows of x, y, z or x, y, z, reflectance")

@@ -15,7 +15,7 @@ from modt.types import Bool, Float64, Int, Proposals
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """The proposals of a frame in the world; P rows.
+    """The proposals of a frame in the world, P rows.
 
     Attributes:
         box: (P, 7) world frame.
@@ -87,7 +87,7 @@ def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKern
 
 @dataclass(frozen=True, slots=True)
 class StaticTracks:
-    """The tracks after a frame, as the odometry needs them; M rows in the order of their ids.
+    """The tracks after a frame, as the odometry needs them, M rows in the order of their ids.
 
     Attributes:
         id: (M,) ascending.

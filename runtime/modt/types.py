@@ -29,7 +29,7 @@ Bool = NDArray[np.bool_]
 NONE = -1
 """Index that stands for no proposal or no track."""
 UNRECORDED = -1.0
-"""Reflectance of a return whose reflectance was not recorded; any value below 0 means the same."""
+"""Reflectance of a return whose reflectance was not recorded. Any value below 0 means the same."""
 N_REFLECTANCE = 5
 """Number of statistics of a proposal's reflectance."""
 
@@ -190,7 +190,7 @@ def column(kind: type, *shape: int, fill: float = 0) -> Any:
 
 @dataclass(slots=True)
 class Tracks:
-    """The tracks alive, one row each; every stage writes the columns it owns in place, and no other's."""
+    """The tracks alive, one row each. Every stage writes the columns that it owns, in place, and no others."""
 
     # Columns of the tracker
     id: Int = column(int, fill=NONE)  # never used twice in a run
@@ -240,7 +240,7 @@ class Tracks:
 
     @classmethod
     def blank(cls, m: int = 0) -> Self:
-        """M rows: no identity, no proposal, no view yet, all classes alike."""
+        """M rows without identity, proposal and view, with all classes alike."""
         return cls(*(np.repeat(entry[None], m, axis=0) for entry in cls._blank_row()))
 
     @classmethod
@@ -285,7 +285,7 @@ class TrackedFrame:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """Limits of one frame's classification; None means no limit."""
+    """Limits of one frame's classification. None means no limit."""
 
     calls: int | None = None  # proposals classified
     cpu_ms: float | None = None  # CPU time by the cost model [ms]

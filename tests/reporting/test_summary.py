@@ -1,7 +1,6 @@
 """The summary's figures from hand-made records."""
 
 import re
-from array import array
 
 import pytest
 
@@ -53,26 +52,6 @@ def test_empty_run_has_no_ratio():
     assert figures["beta"] is None
     assert figures["tracks"] == {"count": 0, "N_go": None}
     assert "0 frames" in summary_text(figures)
-
-
-def test_memory_is_bounded_in_a_long_run():
-    summary, held = Summary(), []
-    for frame in range(3000):
-        r = result(frame, [5, 5], {0: frame, 1: frame + 1}, {})
-        summary.add_result(r)
-        summary.add_ledger(ledger_line(frame, 1 + frame % 100))
-        if frame in (999, 2999):
-            held.append(entries(summary))
-    assert held[0] == held[1]
-
-
-def entries(thing):
-    """Entries of all containers in a thing."""
-    if isinstance(thing, dict):
-        return len(thing) + sum(map(entries, thing.values()))
-    if isinstance(thing, list | tuple | set | array):
-        return len(thing) + sum(map(entries, thing))
-    return entries(vars(thing)) if hasattr(thing, "__dict__") else 0
 
 
 def test_the_nearest_return_of_each_class_is_of_the_last_frame():

@@ -44,7 +44,7 @@ class Windows:
         self._open()
 
     def add(self, line: Line) -> Line | None:
-        """Add a ledger line; returns the line of the window if that closes, else None."""
+        """Add a ledger line, and return the line of the window if that closes, else None."""
         self._frames.append(line["frame"])
         for stage, row in line["stages"].items():
             total = self._stages.setdefault(stage, dict.fromkeys(row, 0))
@@ -56,7 +56,7 @@ class Windows:
         return self.close() if self._clocks.monotonic_ns() - self._start_ns >= 1e9 * self._least_s else None
 
     def close(self) -> Line:
-        """Close the open window, however short, and return its line; the next one begins.
+        """Close the open window, however short, return its line, and begin the next one.
 
         The stages' wall_ns, overhead_ns and idle_ns sum to wall_ns exactly.
         """

@@ -16,7 +16,7 @@ _SCHEMA = "modt.summary/1"
 
 
 class Summary:
-    """Totals of a run of any length in bounded memory: of the tracks only those alive are held."""
+    """Totals of a run of any length in bounded memory. Of the tracks only those alive are held."""
 
     def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
@@ -45,7 +45,7 @@ class Summary:
                 histogram.add(row[f"{clock}_ns"])
 
     def result(self) -> dict[str, Any]:
-        """The summary as plain data; a ratio without a denominator is None.
+        """The summary as plain data. A ratio without a denominator is None.
 
         beta is classifications over those of tracking-by-detection (section V-A); N_go the number of frames in which
         a track has a proposal, averaged over tracks (section IV-C). The last class of a track counts.

@@ -32,7 +32,7 @@ class Descriptor(Writer[str]):
         self._number = number
 
     def write(self, text: str, /) -> None:
-        """Write the whole text; waits for the reader.
+        """Write the whole text, and wait for the reader.
 
         Raises:
             OSError: the reader has left.
@@ -93,7 +93,7 @@ class Datagrams:
         self._state = "ok"
 
     def write(self, result: FrameResult, /) -> None:
-        """Send the line of a frame, or its parts; the rest of a frame is dropped where a part cannot be sent.
+        """Send the line of a frame, or its parts. If a part cannot be sent, the rest of the frame is dropped.
 
         Raises:
             ValueError: a number is not finite.
@@ -111,7 +111,7 @@ class Datagrams:
         self._socket.close()
 
     def health(self) -> Health:
-        """Frames sent, dropped at a full queue of the receiver, failed without a receiver; the last failure."""
+        """Frames sent, dropped at a full queue of the receiver, failed without a receiver, and the last failure."""
         return {"written": self._written, "dropped": self._dropped, "failed": self._failed, "state": self._state}
 
     def _miss(self, error: OSError) -> None:

@@ -62,7 +62,7 @@ class KittiResults(LineFile[FrameResult]):
 
 
 def _image_boxes(boxes: Float64, camera: Camera) -> Float64:
-    """(n, 4) left, top, right, bottom [pixel]; -1 for boxes behind the camera."""
+    """(n, 4) left, top, right, bottom [pixel], or -1 for boxes behind the camera."""
     z = boxes[:, 2, None] + np.array([-0.5, 0.5]) * boxes[:, 5, None]
     xyz = np.dstack([corners(boxes).repeat(2, axis=1), np.tile(z, 4)])
     P = camera.P_image_sensor

@@ -89,7 +89,7 @@ def topics(
 
 
 def seen(result: FrameResult, background: bool = False) -> Int:
-    """Rows of the tracks with a proposal; tracks of the background only if `background`."""
+    """Rows of the tracks with a proposal, those of the background only if `background`."""
     tracks = result.tracks
     return np.flatnonzero((tracks.proposal != NONE) & (background | (tracks.object_class != ObjectClass.BACKGROUND)))
 
@@ -115,7 +115,7 @@ def detections(result: FrameResult, frame_id: str, background: bool = False) -> 
 def _detection(
     header: tuple[str, ...], class_: int
 ) -> tuple[tuple[str, ...], list[tuple[int, tuple[float | bytes, ...]]]]:
-    """Fields of a detection of a class up to its id; class and name of each hypothesis in their order."""
+    """Fields of a detection of a class up to its id, and class and name of each hypothesis in their order."""
     order = [class_, *(k for k in range(len(CLASS_NAMES)) if k != class_)]
     names = [(k, text_fields(CLASS_NAMES[k])) for k in order]
     results = chain.from_iterable((*fields, "d", "7d", UNKNOWN_COVARIANCE) for _, (fields, _) in names)

@@ -23,10 +23,10 @@ class Writer(Protocol[T_contra]):
     """Takes items one by one."""
 
     def write(self, item: T_contra, /) -> None:
-        """Write one item; the operating system has it on return."""
+        """Write one item. The operating system has it on return."""
 
     def close(self) -> None:
-        """Close the files; no effect where none stays open."""
+        """Close the files, where any stay open."""
         return  # a default for all writers, which a body without a statement would not be
 
 
@@ -82,7 +82,7 @@ def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
 
 
 class LineFile(Generic[T]):
-    """An unbuffered text file of whole lines; `encode` gives the lines of an item.
+    """An unbuffered text file of whole lines. `encode` gives the lines of an item.
 
     Mode "ab" continues a file, "wb" begins a new one.
     """
@@ -93,7 +93,7 @@ class LineFile(Generic[T]):
             self._file: BinaryIO = path.open(mode, buffering=0)
 
     def write(self, item: T, /) -> None:
-        """Append the lines of an item; a partial line on a full disk is removed.
+        """Append the lines of an item. A partial line on a full disk is removed.
 
         Raises:
             ModtError: the file cannot be written.
@@ -113,7 +113,7 @@ class LineFile(Generic[T]):
         self._written += 1
 
     def sync(self) -> None:
-        """Make all written lines survive a power cut; waits for the disk.
+        """Make all written lines survive a power cut, and wait for the disk.
 
         Raises:
             ModtError: the disk reports a failure.

@@ -31,12 +31,12 @@ RESERVED_BYTES = 20_000
 RETRY_S = 1.0
 """Time from a failure to the next attempt to write [s]."""
 WHOLE_BYTES = 5e8
-"""Records of frames that are written whole before `gb_per_day` thins them: a run on a desk loses no frame."""
+"""Records of frames that are written whole before `gb_per_day` thins them, so that a run on a desk loses no frame."""
 DAY_S = 86_400.0
 JOBS = 128
 """Length of the queue of jobs."""
 CLOSE_S = 1.0
-"""Time limit for the last jobs of a service [s]; half of it is reserved for draining the queue."""
+"""Time limit for the last jobs of a service [s]. Half of it is reserved for draining the queue."""
 Job = Callable[[], None]
 
 
@@ -53,7 +53,7 @@ class AtOnce(Writer[Job]):
 
 
 class Recording(Sink):
-    """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted; the loop continues.
+    """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted.
 
     Once a second it checks that its files are in place, and begins another part if they were removed or moved.
 
@@ -69,7 +69,7 @@ class Recording(Sink):
         lost: number of those that could not be written, or may be missing since their file was removed or not synced.
         thinned: number left out to keep to `gb_per_day`.
         pauses, parts: number of times that writing failed, and of parts begun.
-        cause: why nothing can be written now; None while all is well.
+        cause: why nothing can be written now, or None.
     """
 
     def __init__(
@@ -227,7 +227,7 @@ class Recording(Sink):
 
 
 class WholeRecording(Recording):
-    """The records of a replay: all of them, in one part, written at once. A failure ends the run.
+    """All records of a replay, in one part and written at once. A failure ends the run.
 
     Args:
         directory, describe: as in Recording.
@@ -264,7 +264,7 @@ class WholeRecording(Recording):
             writer.write(result)
 
     def follow(self, config: RecordingConfig) -> None:
-        """Describe another profile; what is kept stays the same."""
+        """Describe another profile, and keep the same records."""
         super().follow(self.config)
 
     def finish(self) -> None:

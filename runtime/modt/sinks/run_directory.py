@@ -15,7 +15,7 @@ from modt.sinks.output import replace_file, writing
 
 RUN, TRACKS, LEDGER, SUMMARY, STATUS = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"
 MARK = "service: true"
-"""Line of run.yaml in the directories of a service: no other directory is ever deleted."""
+"""Line of run.yaml in the directories of a service. No other directory is ever deleted."""
 MEMORY = Path("/dev/shm")
 """Folder of the status while the disk of the records cannot be written."""
 _KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) for form in ("{}", ".{}.part")}
@@ -28,7 +28,7 @@ def status_paths(directory: Path) -> tuple[Path, Path]:
 
 
 class RunDirectory:
-    """The parts of a run. Each is complete in itself; an incomplete one, left by a failed start, is replaced.
+    """The parts of a run. Each is complete in itself. An incomplete one, left by a failed start, is replaced.
 
     Attributes:
         path: the directory.
@@ -95,7 +95,7 @@ class RunDirectory:
         return os.path.isfile(self.path / RUN)
 
     def in_memory(self, status: str | None) -> None:
-        """Keep the status in memory; None removes it. Failures are ignored. Another run's status is left alone."""
+        """Keep the status in memory. None removes it. Failures are ignored. Another run's status is left alone."""
         if self._shut_out:
             return
         path = status_paths(self.path)[1]

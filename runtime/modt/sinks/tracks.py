@@ -99,7 +99,7 @@ def _doubts(result: FrameResult) -> Int:
 
 
 def _rows(result: FrameResult) -> text.Text:
-    """(M, w) text of the JSON of each track, made column by column; each row begins with a comma.
+    """(M, w) text of the JSON of each track, made column by column. Each row begins with a comma.
 
     Raises:
         ValueError: a number is not finite.
@@ -108,7 +108,7 @@ def _rows(result: FrameResult) -> text.Text:
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
     id_, proposal, points, age, missed = text.integers(np.stack(counts))
     boxes = np.vstack([result.proposals.box, np.zeros(len(BOX_KEYS))])  # the last row stands for NONE
-    box = _objects(BOX_KEYS, text.rounded_to_3(boxes[tracks.proposal]))
+    box = _group(text.rounded_to_3(boxes[tracks.proposal]), BOX_KEYS)
     for value in (proposal, box):
         value[lost] = 0
         value[lost, 0] = NULL
@@ -116,8 +116,8 @@ def _rows(result: FrameResult) -> text.Text:
         "id": id_,
         "state": _words(result.state_names)[tracks.state],
         "class": _words(CLASS_NAMES)[tracks.object_class],
-        "posterior": _lists(text.probabilities(tracks.posterior)),
-        "witness": _lists(text.rounded_to_3(tracks.witness)),
+        "posterior": _group(text.probabilities(tracks.posterior)),
+        "witness": _group(text.rounded_to_3(tracks.witness)),
         "viewed": _words(BOOLEANS)[tracks.viewed.astype(np.int64)],
         "final": _words(BOOLEANS)[tracks.final.astype(np.int64)],
         "uncertain": _words(UNCERTAIN)[_doubts(result)],
@@ -126,8 +126,8 @@ def _rows(result: FrameResult) -> text.Text:
         "age": age,
         "missed": missed,
         "box": box,
-        "size": _lists(text.rounded_to_3(tracks.size_m)),
-        "world": _objects(WORLD_KEYS, text.rounded_to_3(tracks.x)),
+        "size": _group(text.rounded_to_3(tracks.size_m)),
+        "world": _group(text.rounded_to_3(tracks.x), WORLD_KEYS),
     }
     keyed = [part for key, column in columns.items() for part in (f',"{key}":', column)]
     keyed[0] = ',{"id":'
@@ -143,17 +143,9 @@ def _words(words: tuple[str | bool | None, ...]) -> text.Text:
 NULL = text.encode("null")[0]
 
 
-def _objects(keys: tuple[str, ...], values: text.Text) -> text.Text:
-    """(n, w) text of JSON objects with some keys and values (n, k, v)."""
-    return _enclosed([f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)], values, "}")
-
-
-def _lists(values: text.Text) -> text.Text:
-    """(n, w) text of JSON lists of values (n, k, v)."""
-    return _enclosed(["," if k else "[" for k in range(values.shape[1])], values, "]")
-
-
-def _enclosed(prefixes: list[str], values: text.Text, end: str) -> text.Text:
-    """(n, w) text of values (n, k, v), each after its prefix."""
-    parts = [part for k, prefix in enumerate(prefixes) for part in (prefix, values[:, k])]
+def _group(values: text.Text, keys: tuple[str, ...] = ()) -> text.Text:
+    """(n, w) text of JSON lists of values (n, k, v), or of objects with these keys."""
+    names = [f'"{key}":' for key in keys] or [""] * values.shape[1]
+    begin, end = "{}" if keys else "[]"
+    parts = [part for k, name in enumerate(names) for part in (("," if k else begin) + name, values[:, k])]
     return text.join_columns(len(values), *parts, end)

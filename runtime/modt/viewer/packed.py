@@ -11,7 +11,7 @@ import numpy as np
 from modt.types import Float32, Int
 
 LEVEL = 6
-"""Level of the compression; higher ones take longer and gain little."""
+"""Level of the compression. Higher ones take longer and gain little."""
 CELL_BYTES = 3
 NUMBER_BYTES = 4
 
@@ -38,10 +38,10 @@ def packed_table(table: Int, level: int = LEVEL) -> str:
 
 
 SIDE = 4096
-"""Cells of the grid along x and along y: three bytes count them all."""
+"""Cells of the grid along x and along y. Three bytes count them all."""
 LEVEL_M = 0.1
 LEVELS = 64
-"""Heights above ground are whole multiples of LEVEL_M below LEVELS; level 0 is ground."""
+"""Heights above ground are whole multiples of LEVEL_M below LEVELS. Level 0 is ground."""
 
 
 @dataclass(frozen=True, slots=True)

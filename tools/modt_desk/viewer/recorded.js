@@ -3,6 +3,11 @@
 const speed = add(document.querySelector("footer"), "select", "", { ariaLabel: "speed" });
 for (const times of [0.25, 0.5, 1, 2, 4]) add(speed, "option", `${times} ×`, { value: times, selected: times === 1 });
 
+costOf = (rows) => {
+  const spent = rows.reduce((sum, row) => sum + (row.classified ? frames[row.at].call_mJ || 0 : 0), 0);
+  return `; ${spent.toFixed(1)} mJ of classification (estimated)`;
+};
+
 state.truth = Boolean(run.truth);
 if (run.truth) {
   element("states").insertAdjacentHTML("afterend", '<h2>Truth (dotted, key G)</h2><div class="legend" id="truth"></div>');

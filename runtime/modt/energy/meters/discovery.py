@@ -242,7 +242,7 @@ def _adc_text(command: str) -> str:
 
 
 def rail_power_W(text: str, known: set[str]) -> float:
-    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`; no `known` rail may be missing."""
+    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`. No `known` rail may be missing."""
     amperes: dict[str, float] = {}
     volts: dict[str, float] = {}
     for rail, quantity, value in _RAIL_VALUE.findall(text):
@@ -271,7 +271,7 @@ class Discovery:
 
     @property
     def best(self) -> Candidate:
-        """The first usable candidate; the model always is usable."""
+        """The first usable candidate. The model is always usable."""
         return next(c for c in self.candidates if c.usable)
 
 

@@ -9,7 +9,8 @@ const add = (parent, tag, text = "", more = {}) => {
 // Seconds from the begin of a recording, or the time of day of a stamp that counts from 1970.
 const time = (stamp) => stamp < 1e8 ? `${stamp.toFixed(2)} s` : new Date(1000 * stamp).toISOString().slice(11, 22);
 
-let factsOf = (frame) => []; // a page may replace it: further names and values of a frame
+// A page may replace these: further names and values of a frame, and what the classification of a track cost.
+let factsOf = (frame) => [], costOf = (rows) => "";
 
 function showFrame() {
   const frame = frames[state.at], rows = rowsAt[state.at] || [], list = element("frame");
@@ -65,12 +66,10 @@ function showStory() {
   box.replaceChildren();
   const row = rows.find((row) => row.at === state.at);
   add(box, "b", row ? label(row) : `#${id}, not in this frame`);
-  let spent = 0;
-  for (const row of rows) if (row.classified) spent += frames[row.at].call_mJ || 0;
   const pace = row && `${row.world_speed_mps.toFixed(1)} m/s, motion says ${motion(row)}`;
   const now = row ? `${stateOf(row)}, ${row.points} points, ${pace}; ` : "";
   const [begin, end] = [rows[0], rows[rows.length - 1]].map((row) => frames[row.at].frame);
-  add(box, "div", `${now}frames ${begin} to ${end}; ${spent.toFixed(1)} mJ of classification (estimated)`);
+  add(box, "div", `${now}frames ${begin} to ${end}${costOf(rows)}`);
   const list = add(box, "ol");
   for (const [at, text] of events(rows))
     add(add(list, "li"), "button", `${frames[at].frame}: ${text}`, { onclick: () => go(at) });
