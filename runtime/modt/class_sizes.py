@@ -48,7 +48,7 @@ PART_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
 
 
 def unknown_near(result: FrameResult) -> Bool:
-    """(M,) visible background tracks that may be people: the view cuts them off below a third of a person's height."""
+    """(M,) visible background tracks that may be people: the view ends below a third of a person's height."""
     own, box = result.tracks.proposal, result.proposals.box
     may_be = (result.proposals.cut & Cut.TOP > 0) & (box[:, 5] < PERSON_M / 3) & (box[:, 3] < MAX_PERSON_M)
     unknown: Bool = np.append(may_be, False)[own]  # the last value is for NONE

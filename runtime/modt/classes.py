@@ -55,8 +55,3 @@ N_CLASSES = len(CLASSES)
 PERSON_M = 1.7  # height of a person
 OBJECTS = tuple(CLASSES)[1:]
 """Every class but background."""
-
-
-def class_of_kitti(kind: str) -> ObjectClass:
-    """Class of a KITTI object type, background where no class claims it."""
-    return next((c for c, spec in CLASSES.items() if kind in spec.kitti), ObjectClass.BACKGROUND)

@@ -223,8 +223,6 @@ class Pipeline:
         self._index, self._stamp_s = self._index + 1, float(stamp_s)
         result = self._pipeline.step(frame, self._budget)
         tracks, visible = result.tracks, result.tracks.proposal != NONE
-        box = np.full((len(tracks), 7), np.nan)
-        box[visible] = result.proposals.box[tracks.proposal[visible]]
         return TrackedObjects(
             id=tracks.id,
             object_class=tracks.object_class,
@@ -232,7 +230,7 @@ class Pipeline:
             final=tracks.final,
             visible=visible,
             unknown_near=unknown_near(result),
-            box_sensor=box,
+            box_sensor=np.vstack([result.proposals.box, np.full(7, np.nan)])[tracks.proposal],  # NONE: the last row
             box_world=tracks.box,
             position=tracks.x[:, :2],
             heading_rad=tracks.x[:, 2],

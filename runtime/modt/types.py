@@ -1,7 +1,7 @@
 """Data that the stages exchange.
 
-Everything is a structure of arrays: a frame's work is vectorised over points, proposals and tracks. P is the
-number of proposals in a frame, M the number of tracks alive, N the number of points.
+Everything is a structure of arrays, so that the work of a frame is vectorised over points, proposals and tracks. P is
+the number of proposals in a frame, M the number of tracks alive, N the number of points.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 NONE = -1
-"""Index of nothing: a track without a proposal, a proposal without a track."""
+"""Index that stands for no proposal or no track."""
 UNRECORDED = -1.0
 """Reflectance of a return whose reflectance was not recorded; any value below 0 means the same."""
 N_REFLECTANCE = 5
@@ -45,10 +45,10 @@ class Frame:
             UNRECORDED. Finite throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
         restarts: number of times that the odometry has begun anew in a world unrelated to the one before.
-        turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
-            ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
-            stamp, compensated or by a sensor that does not turn.
-        steady_s: time by a clock that nobody sets [s], where that of the stamps may be set; None: the stamp.
+        turn_s: duration of one turn of the head [s]. A turn begins and ends behind the sensor, and faces straight
+            ahead at the stamp. Clockwise seen from above is positive. With 0 all points are as if seen at the stamp,
+            because they are compensated or the sensor does not turn.
+        steady_s: time by a clock that is never set [s], if the clock of the stamps may be set; else None.
         R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
         frame_id: name of the frame of the points in the messages they came in; "" where those name none.
     """
@@ -74,7 +74,7 @@ class Frame:
 
 
 class Cut(IntFlag):
-    """Sides of a proposal that end where the view of the sensor ends: what lies beyond them is not known."""
+    """Sides of a proposal that end where the view of the sensor ends. The object may reach beyond them."""
 
     TOP = 1  # at the highest beam
     BOTTOM = 2  # at the lowest beam
@@ -142,7 +142,7 @@ class Proposals:
 
     @classmethod
     def empty(cls) -> Proposals:
-        """No proposals: a frame like any other."""
+        """No proposals."""
         return cls(
             members=np.zeros(0, np.int64),
             offsets=np.zeros(1, np.int64),
@@ -171,10 +171,10 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
 def regrouped(
     members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int
 ) -> tuple[Int, Float32, Int]:
-    """Members (K,) and (3, K) coordinates by label, below n, each in its order; (n,) count of each label.
+    """Sort members (K,) and (3, K) coordinates by label, below n, and count (n,) the members of each label.
 
-    Those of a group, by offsets (G + 1,), have its label (G,), but for the ones moved: rows (S,), ascending, and the
-    label (S,) of each.
+    Members keep their order within a label. A group, by offsets (G + 1,), has one label (G,). The rows `moved` (S,),
+    ascending, have a label (S,) of their own instead.
     """
     label = label.repeat(offsets[1:] - offsets[:-1])
     label[moved[0]] = moved[1]
@@ -195,7 +195,7 @@ class Tracks:
     # Columns of the tracker
     id: Int = column(int, fill=NONE)  # never used twice in a run
     state: Int = column(int)  # value of the state machine's enumeration
-    final: Bool = column(bool)  # that state's class is final: not asked for again unless the view improves
+    final: Bool = column(bool)  # the class of that state is confirmed, and asked for only if the view improves
     x: Float64 = column(float, 4)  # filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1)
     P: Float64 = column(float, 4, 4)  # its covariance
     box: Float64 = column(float, 7)  # last box seen, world frame
@@ -206,7 +206,7 @@ class Tracks:
     missed: Int = column(int)  # frames since the last proposal
     moved_m: Float64 = column(float)  # displacement within about two seconds, as far as both ends show it
     observed_s: Float64 = column(float)  # from the first proposal to the last
-    size_m: Float64 = column(float, 3)  # length, width and height, as large as they were seen for some frames
+    size_m: Float64 = column(float, 3)  # length, width and height that were seen for some frames
     hidden: Bool = column(bool)  # a person of whom the view cuts off the upper half
     # Columns of the fusion
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen

@@ -108,7 +108,7 @@ def test_every_sweep_in_time_goes_through():
     live = Live(10.0, sinks=[sink]).run()
     assert len(live.seen) == 100
     assert sink.indices == live.seen
-    assert live.deadlines.timing.missed == live.sensor.dropped == live.deadlines.shed == 0
+    assert live.deadlines.missed == live.sensor.dropped == live.deadlines.shed == 0
     assert live.deadlines.report()["lateness_ms"]["max"] == 0.0
     ((first, named),) = (made.args for made in live.stages.recognise.call_args_list)
     assert (first.index, named) == (1, "vlp-16")
@@ -140,7 +140,7 @@ def test_under_load_the_loop_sheds_and_is_back_within_a_second(caplog):
 def test_a_slow_loop_takes_the_newest_sweep_and_counts_what_it_misses():
     live = Live(20.0, lambda t: 0.15).run()
     assert len(live.seen) + live.sensor.dropped + live.deadlines.shed == 200
-    assert live.deadlines.timing.missed == len(live.seen) - 1  # all but the first one, which warms up
+    assert live.deadlines.missed == len(live.seen) - 1  # all but the first one, which warms up
     report = live.deadlines.report()
     assert 0.0 < report["lateness_ms"]["max"] < 100.0
     assert report["latency_ms"]["max"] == pytest.approx(report["lateness_ms"]["max"] + 150.0, abs=5.0)

@@ -58,6 +58,7 @@ def assert_live_is_as_recorded(address: str, port: int, capture: Path, least: in
             taken += [received.frame.points.tobytes()] if received else []
     live.close()
     sent.result()
+    assert taken
     assert len(taken) + live.dropped + live.faults.skipped >= least
     places = [expected.index(points) for points in taken]
     assert places == sorted(set(places))

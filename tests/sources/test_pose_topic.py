@@ -23,20 +23,11 @@ def pose(stamp_s, x_m, yaw=0.0):
     return write_odometry(stamp_s, "odom", "base_link", se3(rotation_zyx(0, 0, yaw), np.array([x_m, 0.0, 0.0])))
 
 
-@pytest.fixture(name="receive")
-def a_topic_that_sends(monkeypatch):
-    """A function that subscribes to a topic, from which batches of messages come."""
-
-    def receive(*batches, mount="0,0,0,0,0,0"):
-        monkeypatch.setattr(pose_topic, "participant", lambda domain: None)
-        monkeypatch.setattr(pose_topic, "Subscription", lambda *_, **__: Scripted(*batches))
-        return open_poses(f"ros2:///odom?base_to_sensor={mount}", OdometryConfig())
-
-    return receive
-
-
-def test_a_frame_has_the_pose_of_the_sensor_at_its_stamp(receive):
-    topic = receive([pose(10.0, 3.0), b"\0", pose(10.1, 4.0)], [pose(10.2, 5.0, 0.05)], mount="1,0,2,0,0,0")
+def test_a_frame_has_the_pose_of_the_sensor_at_its_stamp(monkeypatch):
+    sent = Scripted([pose(10.0, 3.0), b"\0", pose(10.1, 4.0)], [pose(10.2, 5.0, 0.05)])
+    monkeypatch.setattr(pose_topic, "participant", lambda domain: None)
+    monkeypatch.setattr(pose_topic, "Subscription", lambda *_, **__: sent)
+    topic = open_poses("ros2:///odom?base_to_sensor=1,0,2,0,0,0", OdometryConfig())
     T = topic.place(frame(10.05)).T_world_sensor
     np.testing.assert_allclose(T[:3, 3], [4.5, 0.0, 2.0])
     expected = [5.0 + np.cos(0.05), np.sin(0.05), 2.0]
@@ -46,6 +37,6 @@ def test_a_frame_has_the_pose_of_the_sensor_at_its_stamp(receive):
 
 
 @pytest.mark.parametrize("mount", ["1,2,3", "1,2,3,4,5,x", "nan,0,0,0,0,0", ""])
-def test_a_mount_that_is_no_pose_is_refused(mount, receive):
+def test_a_mount_that_is_no_pose_is_refused(mount):
     with pytest.raises(MisuseError, match=r"x,y,z,roll,pitch,yaw"):
-        receive(mount=mount)
+        open_poses(f"ros2:///odom?base_to_sensor={mount}", OdometryConfig())

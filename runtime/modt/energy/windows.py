@@ -26,9 +26,9 @@ class Clocks:
 MIN_S = 1.0
 """Shortest window [s]. RAPL counters step every millisecond; INA chips and batteries average over longer times."""
 SUSPEND_S = 0.2
-"""Time asleep [s], by the boot clock, from which a window is marked suspended and has no energy."""
+"""A window in which the machine sleeps longer than this [s] is marked suspended and has no energy."""
 PRIMING_S = 0.05
-"""Length of the first window of a counter [s]. It has no energy, as no power is known yet to judge it by."""
+"""Length of the first window of a counter [s]. It has no energy, because no power is known yet to compare it with."""
 
 
 class Windows:

@@ -20,8 +20,8 @@ class Summary:
 
     def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
+        self.tracks, self._proposals = Tracks.blank(), Proposals.empty()  # those of the last frame
         self._ended = np.zeros((2, 2), np.int64)  # lengths of the tracks that are gone
-        self._last: tuple[Tracks, Proposals] | None = None
         self._calls: Counter[str] = Counter()
         self._items: Counter[str] = Counter()
         self._times: dict[str, dict[str, Histogram]] = defaultdict(lambda: {"wall": Histogram(), "cpu": Histogram()})
@@ -29,10 +29,8 @@ class Summary:
     def add_result(self, result: FrameResult) -> None:
         """Add the result of a frame."""
         tracks = result.tracks
-        if self._last is not None:
-            before, _ = self._last
-            self._ended += _lengths(before, ~np.isin(before.id, tracks.id))
-        self._last = tracks, result.proposals  # without the sweep, which would stay in memory
+        self._ended += _lengths(self.tracks, ~np.isin(self.tracks.id, tracks.id))
+        self.tracks, self._proposals = tracks, result.proposals  # without the sweep, which would stay in memory
         self.frames += 1
         self.proposals += len(result.proposals)
         self.classified += len(result.classified)
@@ -52,7 +50,7 @@ class Summary:
         beta is classifications over those of tracking-by-detection (section V-A); N_go the number of frames in which
         a track has a proposal, averaged over tracks (section IV-C). The last class of a track counts.
         """
-        lengths = self._ended + (_lengths(self._last[0]) if self._last else 0)
+        lengths = self._ended + _lengths(self.tracks)
         all_tracks, foreground = ({"count": n, "N_go": _ratio(frames, n)} for n, frames in lengths.tolist())
         return {
             "schema": _SCHEMA,
@@ -63,7 +61,7 @@ class Summary:
             "classifications_by_tracking_by_detection": self.proposals,
             "deferred": self.deferred,
             "beta": _ratio(self.classified, self.proposals),
-            "around": around(*self._last) if self._last else {},
+            "around": around(self.tracks, self._proposals),
             "tracks": all_tracks,
             "foreground_tracks": foreground,
             "energy_counts": {"E_seg": self._calls[SEGMENTATION], "E_class": self._items[CLASSIFICATION]},

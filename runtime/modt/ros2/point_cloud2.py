@@ -25,7 +25,7 @@ _PREFIX = re.compile(r"^(?:(?:scalar|field|vertex|lidar)[_ .])+")
 TIMES = ("time", "t", "timestamp", "offset_time", "time_stamp")
 MAX_FIELDS = 64
 MAX_DELAY_S = 1.0
-"""Largest difference between point times and header on the same clock [s]; otherwise they count from the header."""
+"""Greatest difference of the times of points from the header's stamp [s]. Beyond it they count from that stamp."""
 FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))
 """Limits and full scales: the first limit that more than MAX_SHARE_ABOVE of the reflectances exceed decides."""
 MAX_SHARE_ABOVE = 0.02
@@ -156,7 +156,7 @@ def _finite(points: Float32) -> None:
 TURN_SAMPLES = 512
 """Number of points that the motion is estimated from."""
 SPANS_S = (0.02, 0.5)
-"""Shortest and longest sweep [s]; the unit of the times is the one that puts their span between."""
+"""Shortest and longest sweep [s]. The unit of the times is the one in which their span lies between these."""
 UNITS_S = (1.0, 1e-6, 1e-9)
 MAX_RESIDUAL = 0.03
 """Share of a turn by which most points may deviate from the line of time over bearing."""

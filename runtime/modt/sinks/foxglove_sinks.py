@@ -121,7 +121,7 @@ def open_foxglove(address: Address) -> FoxgloveServer:
 
 
 FLUSH_S = 1.0
-"""Time between two flushes [s]: a crash loses no more."""
+"""Time between two flushes [s]. A crash loses no more than this."""
 OPTIONS = MCAPWriteOptions(profile="ros2", compression=MCAPCompression.Lz4, compression_threads=0)
 """LZ4 costs less CPU time than writing uncompressed."""
 PARTS = 8

@@ -20,7 +20,7 @@ from modt.types import FrameResult
 log = logging.getLogger(__name__)
 
 DEPTH = 100
-"""Number of lines that may wait for a stalled disk, 10 s at 10 Hz. No points wait: frames are encoded at once."""
+"""Number of lines that may wait for a stalled disk, 10 s at 10 Hz. Frames are encoded first, so no points wait."""
 LONGEST_LINE = 1 << 22
 """Longest incomplete line that is searched for at the end of a continued file [bytes]."""
 

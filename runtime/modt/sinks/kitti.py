@@ -106,6 +106,5 @@ def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
     rows = result.tracks.row_of_proposal(len(result.proposals))
     classes = result.tracks.object_class[rows]
     code = np.minimum(np.arange(len(rows)) + 1, MAX_INSTANCE) << 16 | np.where(rows == NONE, 0, classes)
-    out = np.zeros(len(result.frame.points), np.uint32)
-    out[result.proposals.members] = np.repeat(code, result.proposals.count).astype(np.uint32)
-    return out
+    of_points = result.proposals.label(len(result.frame.points))
+    return np.append(code, 0).astype(np.uint32)[of_points]  # the last one stands for NONE

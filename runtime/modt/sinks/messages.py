@@ -67,8 +67,8 @@ def topics(
 
     Args:
         prefix: begins the names.
-        frame_id: frame of the sensor; "": that of the input, else FRAME_ID.
-        world_frame_id: frame of the poses; "": WORLD_FRAME_ID, and no /tf.
+        frame_id: frame of the sensor; "" takes the frame of the input, or FRAME_ID if the input names none.
+        world_frame_id: frame of the poses; "" takes WORLD_FRAME_ID, without the topic /tf.
         background: whether detections hold the background too.
         points: whether the sweep is published.
     """

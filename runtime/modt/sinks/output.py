@@ -16,7 +16,7 @@ WRITE_REMEDY = "free or unlock the disk, or give another --out; what was recorde
 T = TypeVar("T")
 T_contra = TypeVar("T_contra", contravariant=True)
 Health = dict[str, int | str]
-"""Counts of a writer: items `written`, and lost by reason; its `state` in words."""
+"""Number of items `written`, of those lost for each reason, and the `state` of the writer in words."""
 
 
 class Writer(Protocol[T_contra]):

@@ -84,21 +84,21 @@ class BagStream:
         stamps, pose_stamps = StampCheck(self._began), None
         topics = {self._topic} if self._poses is None else {self._topic, self._poses[0]}
         for message in self._readable(topics):
-            if message.topic != self._topic:
+            is_sweep = message.topic == self._topic
+            index += is_sweep
+            if not is_sweep:
                 if pose_stamps is None:  # the clock of the poses is that of the sweeps
                     began_s = message.recorded_s - STEP_S / 2
                     pose_stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
                 self._keep(message, buffer, pose_stamps)
-            else:
-                index += 1
-            if held is not None and (message.topic == self._topic or buffer.newest_s >= held.stamp_s):
+            if held is not None and (is_sweep or buffer.newest_s >= held.stamp_s):
                 yield replace(held, T_world_sensor=buffer.at(held.stamp_s))
                 held = None
             if index >= self._last:
                 return
-            if message.topic == self._topic and index >= self._first:
+            if is_sweep and index >= self._first:
                 held = self._frame(index, message, stamps)
-            elif message.topic == self._topic:
+            elif is_sweep:
                 with suppress(MessageError):
                     stamps.doubt(CdrReader(message.data).stamp_s() or message.recorded_s, message.recorded_s)
         if held is not None:

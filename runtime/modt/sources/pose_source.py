@@ -19,7 +19,7 @@ from modt.types import Float64, Frame
 
 N_ELEMENTS = 12
 MAX_DISTANCE_M = 1e8
-"""Greatest coordinate of a pose, which holds for any frame of the Earth [m]."""
+"""Greatest coordinate of a pose [m]. Those of any frame fixed to the Earth are smaller."""
 MAX_SKEW = 0.01
 """Greatest element of R R' - I of a rotation; files hold at least six digits."""
 
@@ -60,8 +60,8 @@ class NoPoses(PoseSource):
 class PoseFile(PoseSource):
     """Poses of a file; line k, from 0, belongs to frame k.
 
-    The poses are the camera's (KITTI's rectified left one), without one the sensor's; `end` is the index of the last
-    frame plus one, None where unknown.
+    The poses are those of KITTI's rectified left camera, or of the sensor where `camera` is None; `end` is the index
+    of the last frame plus one, None where unknown.
 
     Raises:
         MisuseError: the file is missing, a line is no pose, or there are too few.

@@ -109,9 +109,9 @@ class PoseBuffer:
         return None if stamp_s > t1 and self.leaps(stamp_s, T) else T
 
     def _ends(self, stamp_s: float) -> list[tuple[float, Float64]] | None:
-        """Stamp and pose of the two poses to interpolate; twice the same one if it has this time.
+        """Stamps and poses to interpolate between; both are the same if a pose has this time, None without two.
 
-        After the latest pose they are the latest and one as long before it as the time is behind it.
+        After the latest pose they are the latest one and one that lies as far before it as the time lies after it.
         """
         stamps = np.array(self._stamps)
         after = int(np.searchsorted(stamps, stamp_s))

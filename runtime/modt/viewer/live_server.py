@@ -66,12 +66,12 @@ class LiveServer(ThreadingTCPServer):
             return self._number
 
     def leave(self) -> None:
-        """Count a page no longer."""
+        """Release the place of a page."""
         with self._changed:
             self._pages -= 1
 
     def event_after(self, number: int) -> tuple[int, bytes] | None:
-        """Wait for an event after the one of a number, and return the newest with its number; None at the end.
+        """Wait for an event newer than a number, and return the newest with its own number; None at the end.
 
         After ALIVE_S without an event it is a comment.
         """

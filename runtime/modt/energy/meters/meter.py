@@ -19,7 +19,7 @@ class Words(str, Enum):
 
 
 class Kind(Words):
-    """Reliability of a figure; every figure shown carries one."""
+    """Reliability of a figure. Every figure shown carries one."""
 
     MEASURED = "measured"  # counted by hardware or by this program
     INTEGRATED = "integrated"  # power samples integrated over time
@@ -33,7 +33,7 @@ def worst(kinds: Iterable[Kind]) -> Kind:
 
 
 class Scope(Words):
-    """The consumers a meter covers, in order of preference: this program has a larger share of a narrower scope."""
+    """Consumers that a meter covers, in order of preference. This program has a larger share of a narrower scope."""
 
     CPU = "CPU packages"
     CPU_RAIL = "the rail of the CPU, with what shares it"

@@ -9,6 +9,8 @@ const add = (parent, tag, text = "", more = {}) => {
 // Seconds from the begin of a recording, or the time of day of a stamp that counts from 1970.
 const time = (stamp) => stamp < 1e8 ? `${stamp.toFixed(2)} s` : new Date(1000 * stamp).toISOString().slice(11, 22);
 
+let factsOf = (frame) => []; // a page may replace it: further names and values of a frame
+
 function showFrame() {
   const frame = frames[state.at], rows = rowsAt[state.at] || [], list = element("frame");
   const cpu = Object.values(frame.cpu_ms || {}).reduce((a, b) => a + b, 0);
@@ -21,11 +23,8 @@ function showFrame() {
     ["budget", run.budget],
     ["CPU time", cpu ? `${cpu.toFixed(1)} ms` : "not recorded"],
     ["energy", frame.energy_mJ === undefined ? "not recorded" : `${frame.energy_mJ.toFixed(0)} mJ, ${frame.kind}`],
+    ...factsOf(frame),
   ];
-  if (frame.truth) {
-    const count = (outcome) => frame.truth.filter((object) => object.outcome === outcome).length;
-    facts.push(["found, missed, false", `${count("found")}, ${count("missed")}, ${frame.false.length}`]);
-  }
   list.replaceChildren();
   for (const [name, value] of facts.filter(([, value]) => value !== null)) add(list, "dt", name), add(list, "dd", value);
   element("stages").replaceChildren();
@@ -91,6 +90,4 @@ function legends() {
   legend("classes", run.classes, false);
   legend("states", run.states, true);
   legend("stage-legend", run.stages, false);
-  element("truth-title").hidden = !run.truth;
-  legend("truth", Object.entries(run.truth || {}).map(([name, { colour }]) => ({ name, colour })), true);
 }
