@@ -2,8 +2,9 @@
 
     python -m tools.fuzz [TARGET ...] --seconds 60 --seed 1
 
-The mutations are random. An error that no reader may raise is written to --out with its input, and the exit status
-is 1.
+Where the extra [fuzz] is installed, atheris mutates the inputs, led by coverage; else the mutations are random. An
+error that no reader may raise is written to --out with its input, and the exit status is 1. Inputs that cover more
+code are kept there too, and a later run begins with them.
 """
 
 from __future__ import annotations
@@ -12,11 +13,15 @@ import logging
 import mmap
 import multiprocessing
 import os
+import random
 import struct
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +31,7 @@ PATIENCE_S = 60.0
 """Time after which a process that exceeds its seconds is ended [s]."""
 MEMORY = Path("/dev/shm")
 """File system in memory for the inputs, used where it exists."""
+Feed = Callable[[bytes], None]
 
 
 class Witness:
@@ -62,6 +68,7 @@ class Job:
     seed: int
     out: Path
     folder: Path
+    coverage: bool
     witness: Witness
 
 
@@ -71,12 +78,15 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=10.0, help="for each target (default: %(default)s)")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--out", type=Path, default=Path("runs/fuzz"), help="folder (default: %(default)s)")
+    options.add_argument("--random", action="store_true", help="mutations at random even with atheris")
     arguments = options.parse_args()
-    from tests.fuzz.targets import TARGETS  # once: the processes are forks of this one
-
+    coverage = find_spec("atheris") is not None and not arguments.random
+    with _instrumented(coverage):  # once: the processes are forks of this one
+        from tests.fuzz.targets import TARGETS
     unknown = set(arguments.targets) - set(TARGETS)
     if unknown:
         options.error(f"no target {', '.join(sorted(unknown))}; there are {', '.join(TARGETS)}")
+    print("led by coverage (atheris)" if coverage else "at random")
     found = 0
     for name in arguments.targets or TARGETS:
         out = arguments.out / name
@@ -84,9 +94,18 @@ def main() -> None:
         for old in (*out.glob("*.txt"), *out.glob("*.input")):
             old.unlink()
         with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
-            job = Job(TARGETS[name], arguments.seconds, arguments.seed, out, Path(folder), Witness())
+            job = Job(TARGETS[name], arguments.seconds, arguments.seed, out, Path(folder), coverage, Witness())
             found += _supervise(job)
     sys.exit(1 if found else 0)
+
+
+def _instrumented(coverage: bool) -> AbstractContextManager[object]:
+    """Context in which imported modules of the package report their coverage."""
+    if not coverage:
+        return nullcontext()
+    import atheris
+
+    return atheris.instrument_imports(include=["modt"])
 
 
 def _supervise(job: Job) -> int:
@@ -121,23 +140,51 @@ def _fuzz(job: Job) -> None:
 
     logging.basicConfig(handlers=[logging.NullHandler()])
     places = set[str]()
-    try:
-        seeds, call = job.target.prepare(job.folder)
-    except pytest.skip.Exception as skipped:
-        print(f"{job.target.name}: {skipped}")
-        return
-    ends = time.monotonic() + job.seconds
-    with limits():
-        for raw in mutations(seeds, sys.maxsize, job.seed):
-            if time.monotonic() > ends:
-                os._exit(0)  # exit handlers of libraries may wait for threads that a fork does not have
-            job.witness.see(raw)
-            found = execute(call, raw, job.target.refusals)
-            if found is not None and found.place not in places:
-                places.add(found.place)
-                name = found.place.replace(":", "-")
-                (job.out / f"{name}.input").write_bytes(raw)
-                (job.out / f"{name}.txt").write_text(f"{found.error} ({found.place})\n\n{found.trace}")
+    with _instrumented(job.coverage):
+        try:
+            seeds, call = job.target.prepare(job.folder)
+        except pytest.skip.Exception as skipped:
+            print(f"{job.target.name}: {skipped}")
+            return
+        with limits():
+            ends = time.monotonic() + job.seconds
+
+            def feed(raw: bytes) -> None:
+                if time.monotonic() > ends:
+                    os._exit(0)  # exit handlers of libraries may wait for threads that a fork does not have
+                job.witness.see(raw)
+                found = execute(call, raw, job.target.refusals)
+                if found is not None and found.place not in places:
+                    places.add(found.place)
+                    name = found.place.replace(":", "-")
+                    (job.out / f"{name}.input").write_bytes(raw)
+                    (job.out / f"{name}.txt").write_text(f"{found.error} ({found.place})\n\n{found.trace}")
+
+            if job.coverage:
+                _by_coverage(job, seeds, feed)
+            else:
+                for raw in mutations(seeds, sys.maxsize, job.seed):
+                    feed(raw)
+
+
+def _by_coverage(job: Job, seeds: Any, feed: Feed) -> None:
+    """Feed mutations, half of them by atheris, half by the project's own, which also change words of a text."""
+    import atheris
+
+    from tests.fuzz.mutation import mutated
+
+    def mutate(raw: bytes, most: int, seed: int) -> bytes:
+        chance = random.Random(seed)
+        return atheris.Mutate(raw, most) if chance.random() < 0.5 else mutated(raw, seeds, chance)[:most]
+
+    corpus = job.out / "corpus"
+    corpus.mkdir(exist_ok=True)
+    for number, seed in enumerate(seeds):
+        (corpus / f"seed-{number}").write_bytes(seed)
+    limits = ["-rss_limit_mb=0", "-timeout=3600", f"-max_len={max(map(len, seeds)) + 4096}"]
+    quiet = ["-verbosity=0", f"-artifact_prefix={job.out}/"]
+    atheris.Setup(["fuzz", str(corpus), *limits, *quiet, f"-seed={job.seed}"], feed, custom_mutator=mutate)
+    atheris.Fuzz()
 
 
 if __name__ == "__main__":
