@@ -5,8 +5,9 @@ import shutil
 
 import pytest
 
-from tests.cli.commands import here, refusal
+from tests.cli.commands import here, modt, refusal
 from tests.desk.recorded import drive_and_run
+from tests.viewer.chromium import LOADED, WIDE
 
 pytestmark = pytest.mark.command
 
@@ -18,6 +19,17 @@ def drives(tmp_path_factory):
     """Two synthetic drives and the runs on them, by sensor."""
     root = tmp_path_factory.mktemp("drives")
     return {sensor: drive_and_run(root, sensor) for sensor in ("vlp-16", "hdl-32e")}
+
+
+def test_the_page_has_the_figures_and_their_plots(drives, tmp_path, chromium):
+    done = modt("evaluate", *drives["vlp-16"], "--html", "page.html", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with chromium.tab((tmp_path / "page.html").as_uri(), width=390, ready=LOADED) as tab:
+        assert not tab.value(WIDE)
+        assert done.stdout.strip() in tab.value("document.querySelector('pre').textContent")
+        titles = tab.value("[...document.querySelectorAll('.plots h2')].map((title) => title.textContent)")
+        assert len([title for title in titles if "by range" in title]) == 2
+        assert tab.value("document.querySelectorAll('polyline').length") >= 3
 
 
 def evaluated(capsys, *arguments):

@@ -24,6 +24,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     pairs = "run directories (of replay --labels) and their labels"
     p.add_argument("pairs", nargs="*", type=Path, metavar="RUN TRUTH", help=pairs)
     p.add_argument("--json", action="store_true", help="print JSON, modt.evaluation/1")
+    p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots as well")
     vans = "count KITTI's vans as cars (all), or ignore them (paper)"
     p.add_argument("--classes", choices=("all", "paper"), default="all", help=vans)
     what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
@@ -68,8 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
             raise MisuseError(f"--{option}", "is for one drive", "judge that drive alone")
     if arguments.unlabelled is None:
         judge_runs(arguments)
-    elif arguments.json:
-        raise MisuseError("--unlabelled", "makes a list, and no evaluation", "leave --json out")
+    elif arguments.json or arguments.html:
+        raise MisuseError("--unlabelled", "makes a list, and no evaluation", "leave --json and --html out")
     else:
         list_unlabelled(arguments)
     return 0
@@ -99,10 +100,11 @@ def opened(arguments: argparse.Namespace, path: Path, labels: Path) -> tuple[Run
 
 
 def judge_runs(arguments: argparse.Namespace) -> None:
-    """Print the evaluation of the runs by sensor and over all sensors.
+    """Print the evaluation of the runs by sensor and over all sensors; write its page where one is asked for.
 
     Raises:
         MisuseError: a run or its labels cannot be used, or do not belong together.
+        ModtError: the page cannot be written.
     """
     import json
     from dataclasses import asdict
@@ -117,6 +119,11 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     sensors = {name: evaluation(drives) for name, drives in by_sensor.items()}
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
+    if arguments.html is not None:
+        from modt_desk.reporting.document import save
+        from modt_desk.viewer.evaluation_page import evaluation_page
+
+        save(arguments.html, evaluation_page(sensors))
     if arguments.json:
         text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(scores) for name, scores in sensors.items()}})
         print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))

@@ -138,6 +138,11 @@ def plots(items: Iterable[Plot]) -> str:
     return f'<div class="plots">{"".join(cells)}</div>'
 
 
+def preformatted(text: str) -> str:
+    """Text whose lines and columns stay as they are."""
+    return f"<section><pre>{escape(text)}</pre></section>"
+
+
 def save(path: Path, text: str) -> None:
     """Write the page.
 
