@@ -132,8 +132,9 @@ def _points(table: NDArray[np.void], fields: dict[str, tuple[np.dtype[Any], int]
             for k, name in enumerate((*"xyz", reflectance)):
                 rows[..., k] = UNRECORDED if name is None else table[name]
         _scale(points[:, 3])
-        if not np.isfinite(np.dot(points.ravel(), points.ravel())):
-            _finite(points)
+    if not np.isfinite(points).all():  # most drivers mark points without a return by NaN
+        points[~np.isfinite(points[:, :3]).all(axis=1), :3] = 0.0
+        points[~np.isfinite(points[:, 3]), 3] = UNRECORDED
     return points
 
 
@@ -145,12 +146,6 @@ def _scale(reflectance: Float32) -> None:
     above = [(full, np.count_nonzero(sample > limit)) for limit, full in FULL_SCALES]
     full = next((full for full, count in above if count > MAX_SHARE_ABOVE * len(sample)), 1.0)
     reflectance[:] = np.minimum(reflectance / np.float32(full), np.float32(1.0))
-
-
-def _finite(points: Float32) -> None:
-    """Move points without a return, which most drivers mark by NaN, to the origin, in place."""
-    points[~np.isfinite(points[:, :3]).all(axis=1), :3] = 0.0
-    points[~np.isfinite(points[:, 3]), 3] = UNRECORDED
 
 
 TURN_SAMPLES = 512

@@ -87,9 +87,7 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     sensor = replace(sensor, reflectance=usable_scale(points, scale, sensor))
     if NONE not in {config.sensor.reflectance, scale} and scale != config.sensor.reflectance:
         of_sensor.append(f"reflectance of another scale than {config.sensor.reflectance}")
-    of_mount = _height_differences(config.sensor.height_m, sensor.height_m)
-    if floor is not None and not _is_open(config.sensor):
-        of_mount += _tilt_differences(mount, floor)
+    of_mount = _mount_differences(config.sensor, sensor.height_m, mount, floor)
     nearest, fitted = None, config
     if of_sensor:
         if sensor.height_m is not None:  # a small robot is near its sensor
@@ -117,15 +115,14 @@ def _pattern_differences(expected: SensorConfig, found: SensorConfig, tangent: F
     return differences
 
 
-def _tilt_differences(mount: Mount, floor: Floor) -> list[str]:
-    stated = np.array([0.0, 0.0, 1.0]) if mount.R_level_sensor is None else mount.R_level_sensor[2]
-    apart_deg = np.rad2deg(np.arccos(np.clip((stated * floor.up).sum(), -1.0, 1.0)))
-    roll, pitch = floor.roll_pitch_deg
-    return [f"rolled by {roll:.1f} and pitched by {pitch:.1f} deg"] if apart_deg > MIN_TILT_DEG else []
-
-
-def _height_differences(expected_m: float | None, found_m: float | None) -> list[str]:
-    if expected_m is None or found_m is None:
-        return []
-    differs = abs(found_m - expected_m) >= max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * expected_m)
-    return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"] if differs else []
+def _mount_differences(
+    expected: SensorConfig, height_m: float | None, mount: Mount, floor: Floor | None
+) -> list[str]:
+    differences, stated_m = [], expected.height_m
+    if stated_m and height_m and abs(height_m - stated_m) >= max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * stated_m):
+        differences.append(f"{height_m:.2f} m above the ground, not {stated_m:.2f}")
+    if floor is not None and not _is_open(expected):
+        stated = np.array([0.0, 0.0, 1.0]) if mount.R_level_sensor is None else mount.R_level_sensor[2]
+        if np.rad2deg(np.arccos(np.clip((stated * floor.up).sum(), -1.0, 1.0))) > MIN_TILT_DEG:
+            differences.append("rolled by {:.1f} and pitched by {:.1f} deg".format(*floor.roll_pitch_deg))
+    return differences

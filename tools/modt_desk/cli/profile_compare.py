@@ -20,14 +20,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_stream_options(p)
     options.add(p, "fov", "meter", "json", "html")
     p.add_argument("--repeat", type=count, default=3, metavar="K", help="repetitions (default: %(default)s)")
-    turn = "consecutive frames of one mode (default: 1, with a meter all frames)"
-    p.add_argument("--turn", type=count, metavar="N", help=turn)
     against = "measure how far this file of modt-profile predict was off"
     p.add_argument("--against", type=Path, metavar="PREDICTION", help=against)
     options.add_examples(
         p,
         "modt-profile compare DRIVE --frames 0:50         what tracking saves there",
-        "modt-profile compare DRIVE --json > costs.json   for modt-profile predict and regimes",
+        "modt-profile compare DRIVE --json > costs.json   for modt-profile predict",
     )
     p.set_defaults(run=run)
 
@@ -56,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     board, info = loaded.energy, stream.info
     meters = choose_meter(discover(board), arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
-    comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
+    comparison = Comparison(request, loaded, pinned, meters if metered else ())
     repetitions = []
     for number in range(arguments.repeat):
         if sys.stderr.isatty():
