@@ -78,7 +78,7 @@ def stages(kernels, sensor, fov=None):
 
 
 def both(kernels, points, sensor=None, fov=None):
-    """Both find the same proposals."""
+    """Assert that the compiled kernels and NumPy's find the same proposals."""
     numpy, native = stages(kernels, sensor or SensorConfig(), fov)
     assert same(numpy.segment(points.copy()), native.segment(points.copy()))
 

@@ -1,4 +1,4 @@
-"""Films."""
+"""Films of a run."""
 
 import os
 
