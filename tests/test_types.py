@@ -45,9 +45,3 @@ def test_tracks_are_renewed_in_every_column(kept, n):
         np.testing.assert_array_equal(column, np.concatenate([getattr(tracks, name)[rows], getattr(blank, name)]))
     assert (renewed.id[len(rows) :] == NONE).all()
     assert renewed.columns().keys() == {f.name for f in dataclasses.fields(Tracks)}
-
-
-def test_rows_by_proposal():
-    tracks = Tracks.blank(3)
-    tracks.proposal[:] = [2, NONE, 0]
-    assert tracks.row_of_proposal(4).tolist() == [2, NONE, 0, NONE]

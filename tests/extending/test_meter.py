@@ -40,10 +40,3 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
         line = windows.close()
     assert line["kind"] == "measured"
     assert abs(line["energy_J"] - 0.004) < 1e-9
-
-
-def test_a_machine_without_the_meter_names_the_cause(tmp_path, monkeypatch):
-    monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
-    found = discovery.discover(EnergyConfig())
-    assert found.best.name != "coulomb counter"
-    assert "energy_mJ" in next(c.why_not for c in found.candidates if c.name == "coulomb counter")

@@ -85,7 +85,7 @@ def model_metadata(folder: Path) -> Feed:
 
 
 def _report(run: Path) -> Callable[[], object]:
-    """The command, whose text goes nowhere."""
+    """The command on a run, without its output."""
 
     def read() -> None:
         with redirect_stdout(StringIO()):
@@ -139,7 +139,7 @@ def _judged(folder: Path) -> tuple[Path, Callable[[], object]]:
 
 @target()
 def judged_run(folder: Path) -> Feed:
-    """Evaluation of a run by its description and its tracks, which a line `---` separates."""
+    """Evaluation of a run by its description and its tracks, with a line `---` between."""
     run, judge = _judged(folder)
     lines = "".join(json.dumps(frame_record(index)) + "\n" for index in range(4))
 

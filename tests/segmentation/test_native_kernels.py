@@ -73,16 +73,14 @@ def same(one, other):
     return one == other
 
 
-def stages(kernels, sensor, fov=None, config=None):
-    return [Segmenter(config or SegmentationConfig(), sensor, fov or FieldOfView(), k) for k in (NUMPY, kernels)]
+def stages(kernels, sensor, fov=None):
+    return [Segmenter(SegmentationConfig(), sensor, fov or FieldOfView(), k) for k in (NUMPY, kernels)]
 
 
-def both(kernels, points, sensor=None, fov=None, config=None):
-    """Proposals of the two, which must be the same."""
-    numpy, native = stages(kernels, sensor or SensorConfig(), fov, config)
-    expected, found = numpy.segment(points.copy()), native.segment(points.copy())
-    assert same(expected, found)
-    return expected
+def both(kernels, points, sensor=None, fov=None):
+    """Assert that the compiled kernels and NumPy's find the same proposals."""
+    numpy, native = stages(kernels, sensor or SensorConfig(), fov)
+    assert same(numpy.segment(points.copy()), native.segment(points.copy()))
 
 
 def street(seed, n):
@@ -114,14 +112,6 @@ def test_hostile_sweeps(kernels, seed, share):
     values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), points.shape)]
     with np.errstate(all="ignore"):
         both(kernels, np.where(rng.random(points.shape) < share, values, points))
-
-
-@pytest.mark.parametrize(("name", "front"), [("vlp-16", False), ("hdl-64e", True), ("mid-360", False)])
-def test_simulated_sweeps(kernels, name, front):
-    config = profile.load(name)
-    for frame in SyntheticStream("street", name, 0.3, 4):
-        found = both(kernels, frame.points, config.sensor, FRONT if front else None, config.segmentation)
-        assert len(found) > 3
 
 
 @pytest.mark.slow
@@ -305,11 +295,11 @@ def test_observed_tracks(kernels, seed, n, dt_s):
     assert same(*tables)
 
 
-@pytest.mark.parametrize("name", ["vlp-16", "hdl-64e"])
-def test_tracks_of_simulated_sweeps(kernels, name):
+@pytest.mark.parametrize(("name", "fov"), [("vlp-16", FieldOfView()), ("hdl-64e", FieldOfView()), ("mid-360", FRONT)])
+def test_tracks_of_simulated_sweeps(kernels, name, fov):
     config, runs = profile.load(name), []
     for each in (NUMPY, kernels):
-        segmenter = Segmenter(config.segmentation, config.sensor, FieldOfView(), each)
+        segmenter = Segmenter(config.segmentation, config.sensor, fov, each)
         odometry, tracker = Odometry(each), Tracker(config.tracking, ACCURATE, kernels=each)
         runs.append([])
         for frame in SyntheticStream("street", name, 1.0, 4):
@@ -319,7 +309,7 @@ def test_tracks_of_simulated_sweeps(kernels, name):
             tracked.tracks.object_class = tracked.tracks.id // 2 % 4  # people and cars grow and lose parts
             runs[-1].append((tracker.conclude(np.zeros(0, np.int64), np.zeros(0, np.bool_)), tracked.proposals))
     assert all(map(same, *runs))
-    assert len(runs[0][-1][0]) > 5
+    assert len(runs[0][-1][0]) > 3
 
 
 def test_another_kind_of_array_is_refused(kernels):

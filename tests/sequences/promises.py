@@ -1,4 +1,4 @@
-"""What holds after every frame, whatever it was."""
+"""Promises that hold after every frame, whatever it was."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CALL_POINTS = np.full(8, 100)
 
 @dataclass
 class Clock:
-    """Of a test [ns]: the same readings for the same calls, at times none passes, at times it goes back."""
+    """A clock of a test [ns]: the same calls give the same readings, some of which stand still or go back."""
 
     back: int = 0
     _calls: int = 0
