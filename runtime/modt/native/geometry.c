@@ -2,14 +2,8 @@
  * offsets[i + 1]; none is empty. */
 #include "kernels.h"
 
-typedef float f4 __attribute__((vector_size(16)));
-typedef i32 i4 __attribute__((vector_size(16)));
 typedef double d4 __attribute__((vector_size(32), aligned(8)));
 typedef i64 l4 __attribute__((vector_size(32)));
-
-static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
-static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
-static inline f4 spread(float a) { return (f4){a, a, a, a}; }
 
 /* Least and greatest coordinates of points, at least one, along four axes of which x, y and z are given. */
 static ALWAYS_INLINE void ends_along(const float *x, const float *y, const float *z, i64 i, i64 end, const f4 axes[3],

@@ -146,8 +146,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     ) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
         n, coarse, fine = len(cells), clusterer.coarse.side, clusterer.fine.side
-        if len(self._work) < fine + 18 * n:
-            self._work = np.empty(fine + 18 * n, np.int32)
+        if len(self._work) < (room := 2 * fine + 15 * n + 8):
+            self._work = np.empty(room, np.int32)
         limits = clusterer.max_extent_m, MIN_SPLIT_M, clusterer.max_split_sqrt_range, MIN_PERSON_POINTS
         rules = array("f", (MAX_CELL_GAP_M, MAX_CELL_GAP_BEAMS, *limits, *attrgetter(*_PART_KEYS)(SPLIT_PERSON)))
         cluster, counts = np.empty(n, np.int64), np.empty((2, 2 * n), np.int64)
