@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -41,14 +42,6 @@ class PoolWeights:
         return cls(*(fraction(content, name) for name in ("network", "box", "reflectance")))
 
 
-def object_log_odds(log_box: Float64, log_frequency: Float64) -> Float64:
-    """(R,) log of P(box | object) / P(box | background), of log P(class | box) (R, 4) and log class frequency (4,).
-
-    Both up to a constant a row.
-    """
-    return _log_odds(log_box) - _log_odds(log_frequency[None])
-
-
 def _log_odds(log_probability: Float64) -> Float64:
     """(R,) of any object against background, of (R, 4)."""
     log_odds: Float64 = np.log(np.exp(log_probability[:, 1:] - log_probability[:, :1]).sum(axis=1))
@@ -64,9 +57,15 @@ def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Flo
         weight: exponent of the box.
     """
     out = np.repeat(log_frequency[None], len(log_box), axis=0)
-    if weight:
-        out[:, 1:] += weight * object_log_odds(log_box, log_frequency)[:, None]
+    if weight:  # P(box | object) / P(box | background)
+        out[:, 1:] += weight * (_log_odds(log_box) - _assumed_log_odds(log_frequency.tobytes()))[:, None]
     return out
+
+
+@cache
+def _assumed_log_odds(log_frequency: bytes) -> Float64:
+    """(1,) log of any object against background by the class frequency, the same in every frame."""
+    return _log_odds(np.frombuffer(log_frequency)[None])
 
 
 def log_pool(
