@@ -35,15 +35,15 @@ def test_some_of_the_proposals(counts, data):
 @given(st.lists(st.booleans(), max_size=6), st.integers(0, 5))
 def test_tracks_are_renewed_in_every_column(kept, n):
     tracks = Tracks.blank(len(kept))
-    for _, column in tracks.columns():
+    for column in tracks.columns().values():
         column[:] = np.arange(1, len(kept) + 1).reshape(-1, *[1] * (column.ndim - 1))
     rows = np.flatnonzero(kept)
     renewed = tracks.renewed(rows, n)
     blank = Tracks.blank(n)
-    for name, column in renewed.columns():
+    for name, column in renewed.columns().items():
         np.testing.assert_array_equal(column, np.concatenate([getattr(tracks, name)[rows], getattr(blank, name)]))
     assert (renewed.id[len(rows) :] == NONE).all()
-    assert {name for name, _ in renewed.columns()} == {f.name for f in dataclasses.fields(Tracks)}
+    assert renewed.columns().keys() == {f.name for f in dataclasses.fields(Tracks)}
 
 
 def test_rows_by_proposal():

@@ -210,6 +210,21 @@ def some_displacements(rng, n):
     return *random_kdops(rng, n), rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
 
 
+def some_assignments(rng, n):
+    k, ties = rng.integers(1, 13), rng.choice([0, 1, 2, 5, 9])
+    rows, columns = np.divmod(rng.permutation(n % 13 * k)[: rng.integers(0, n % 13 * k + 1)], k)
+    unequal = np.minimum(rng.uniform(-1, 1, len(rows)), 0.9)
+    return rows, columns, rng.integers(0, ties, len(rows)) / 10 if ties else unequal, 1.0
+
+
+def some_members(rng, n):
+    sizes, groups = rng.integers(0, 10, n % 9), int(rng.integers(1, 10))
+    offsets, label = np.cumsum([0, *sizes]), rng.integers(0, groups, len(sizes))
+    members, xyz = rng.permutation(offsets[-1]), rng.normal(0, 9, (3, offsets[-1])).astype(np.float32)
+    moved = (rng.random(offsets[-1]) < rng.choice([0.0, 0.3, 1.0])).nonzero()[0]
+    return members, xyz, offsets, label, (moved, rng.integers(0, groups, len(moved))), groups
+
+
 PASSES = {
     "merge_strips": some_strips,
     "kdop_ends": some_kdops,
@@ -217,12 +232,14 @@ PASSES = {
     "coverage": some_covered,
     "measured": some_displacements,
     "pair_costs": some_pairs,
+    "assign": some_assignments,
+    "regrouped": some_members,
 }
 
 
 @pytest.mark.parametrize(("name", "arguments"), PASSES.items())
 @given(seed=st.integers(0, 10_000), n=st.integers(0, 60))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=300, deadline=None)
 def test_passes_on_random_input(kernels, name, arguments, seed, n):
     given = arguments(np.random.default_rng(seed), n)
     assert same(*(getattr(each, name)(*given) for each in (NUMPY, kernels)))
@@ -251,25 +268,6 @@ def test_overlapping_pairs(kernels, seed, n, k, spread, scale):
     assert same(one, kernels.overlapping_pairs(np.asfortranarray(a), np.asfortranarray(b)))
     if spread == 0:
         assert len(one[0]) == k * (n - (n > 1)), "all overlap: more pairs than there was room for at first"
-
-
-@given(seed=st.integers(0, 10_000), n=st.integers(0, 12), k=st.integers(1, 12), ties=st.sampled_from([0, 1, 2, 5, 9]))
-@settings(max_examples=300, deadline=None)
-def test_assignment(kernels, seed, n, k, ties):
-    rng = np.random.default_rng(seed)
-    rows, columns = np.divmod(rng.permutation(n * k)[: rng.integers(0, n * k + 1)], k)
-    cost = rng.integers(0, ties, len(rows)) / 10 if ties else np.minimum(rng.uniform(-1, 1, len(rows)), 0.9)
-    assert same(*(each.assign(rows, columns, cost, 1.0) for each in (NUMPY, kernels)))
-
-
-@given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(0, 9), max_size=8), n=st.integers(1, 9))
-def test_regrouped_members(kernels, seed, sizes, n):
-    rng = np.random.default_rng(seed)
-    offsets, label = np.cumsum([0, *sizes]), rng.integers(0, n, len(sizes))
-    members, xyz = rng.permutation(offsets[-1]), rng.normal(0, 9, (3, offsets[-1])).astype(np.float32)
-    moved = (rng.random(offsets[-1]) < rng.choice([0.0, 0.3, 1.0])).nonzero()[0]
-    own = rng.integers(0, n, len(moved))
-    assert same(*(each.regrouped(members, xyz, offsets, label, (moved, own), n) for each in (NUMPY, kernels)))
 
 
 @given(seed=st.integers(0, 10_000), m=st.integers(0, 9), dt_s=st.sampled_from([0.0, 0.1, 3.0]))

@@ -139,7 +139,7 @@ class Run:
         assert all(number >= self._next_id for number in new)  # no identity comes back
         self._before, self._next_id = frozenset(ids), max([self._next_id - 1, *ids]) + 1
         assert set(result.classified.tolist()) <= set(tracks.id[tracks.proposal != NONE].tolist())
-        for name, column in tracks.columns():
+        for name, column in tracks.columns().items():
             assert np.isfinite(column).all(), name
 
     def _posteriors(self, result: FrameResult) -> None:

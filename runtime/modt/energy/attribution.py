@@ -24,7 +24,7 @@ def usable(line: Line) -> bool:
 
 
 def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
-    """Energy of idling, of each stage, and of the unattributed rest of a window [J]; empty without a reading.
+    """Energy of idling, of each stage, and of the unattributed rest of a window [J], or nothing without a reading.
 
     With P_idle of the board, E and T of the window and t of its CPU time, in all and of a stage,
 

@@ -34,7 +34,7 @@ class Ledger:
         self._wall0, self._cpu0 = wall_ns(), cpu_ns()
 
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Result of function(*args), timed as a span of the stage; its items are len(result), if defined."""
+        """Result of function(*args), timed as a span of the stage. Its items are len(result), if defined."""
         return self.timed(stage, function, *args, **kwargs)[0]
 
     def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
@@ -91,7 +91,7 @@ class Ledger:
         }
 
     def _measure_overhead(self, spans: int = 32, rounds: int = 32) -> tuple[int, int]:
-        """Cost of a span beyond the timed call, and of a frame beyond its spans [ns]; minimum over the rounds."""
+        """Cost of a span beyond the timed call, and of a frame beyond its spans [ns], the least of the rounds."""
         span_ns, frame_ns = [], []
         for _ in range(rounds):
             t0 = self._cpu_ns()

@@ -98,7 +98,7 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
 
 
 def live_cells(result: FrameResult) -> Cells:
-    """Cells of the sweep; points without a proposal count as ground."""
+    """Cells of the sweep. Points without a proposal count as ground."""
     x, y, z = (result.frame.points[:, k] for k in range(3))
     reach_m = (SIDE // 2 - 1) * STEP_CM / 100
     used = (np.abs(x) < reach_m) & (np.abs(y) < reach_m) & ((x != 0) | (y != 0))
