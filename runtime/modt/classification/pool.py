@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -27,10 +27,6 @@ class PoolWeights:
     network: float = 1.0
     box: float = 0.0
     reflectance: float = 0.0
-
-    def as_dict(self) -> dict[str, float]:
-        """Entries of a model's metadata."""
-        return asdict(self)
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> PoolWeights:

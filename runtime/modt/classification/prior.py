@@ -115,13 +115,8 @@ class BoxPrior:
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) rows of priors (M, 4) that give the objects together at least this probability."""
-        return object_probability_reaches(probability, threshold)
-
-
-def object_probability_reaches(probability: Float64, threshold: float) -> Bool:
-    """(M,) rows (M, 4) that give the objects together at least this probability."""
-    reaches: Bool = 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
-    return reaches
+        reaches: Bool = 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
+        return reaches
 
 
 def make_prior(scores: BoxScores, frequency: Float64) -> Prior:
