@@ -74,7 +74,7 @@ def layer(value: float, inputs: int = N_FEATURES, outputs: int = 4) -> list[obje
         *("[]", "{}", "no json"),
         *(
             json.dumps({"weights": dataclasses.asdict(WEIGHTS), "layers": layers})
-            for layers in ([], layer(np.nan), layer(1e300), layer(0.0, N_FEATURES - 1), layer(0.0, outputs=3), {}, 3)
+            for layers in (layer(np.nan), layer(1e300), layer(0.0, N_FEATURES - 1), layer(0.0, outputs=3), 3)
         ),
         *(
             json.dumps({"weights": weights, "layers": to_lists(LAYERS)})
