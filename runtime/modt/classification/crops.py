@@ -58,14 +58,14 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
         max_points: per crop.
     """
     starts, ends = (proposals.offsets[rows].tolist() for rows in (which, which + 1))
-    rows, offsets = [proposals.members[:0]], [0]
+    kept, offsets = [proposals.members[:0]], [0]
     for first, end in zip(starts, ends, strict=True):  # few: faster than all at once
         members = proposals.members[first:end]
         if len(members) > max_points:
             members = members[np.arange(max_points) * len(members) // max_points]
-        rows.append(members)
+        kept.append(members)
         offsets.append(offsets[-1] + len(members))
-    return Crops(points[np.concatenate(rows), :3], np.array(offsets))
+    return Crops(points[np.concatenate(kept), :3], np.array(offsets))
 
 
 def canonical(crops: Crops, ground_z_m: Float64) -> Crops:

@@ -132,15 +132,17 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *latest, i32 
         i32 place = span[k].place;
         for (; place >= start + side; start += side)
             latest[before] = k - 1;
-        i32 column = place - start, b = latest[column - 1], c = latest[column], d = latest[column + 1];
-        const Span *own = &span[k], *left = own - 1, *beyond = &span[b], *above = &span[c], *ahead = &span[d];
+        i32 column = place - start, *over = latest + column - 1;
+        const Span *own = &span[k], *left = own - 1;
+        const Span *beyond = &span[over[0]], *above = &span[over[1]], *ahead = &span[over[2]];
         i4 places = {left->place, beyond->place, above->place, ahead->place};
         f4 low = {left->low, beyond->low, above->low, ahead->low};
         f4 high = {left->high, beyond->high, above->high, ahead->high};
         f4 max_gap_m = {left->max_gap_m, beyond->max_gap_m, above->max_gap_m, ahead->max_gap_m};
         f4 gap_m = most4(low, spread(own->low)) - least4(high, spread(own->high));
         i4 joined = (places == place - back) & (gap_m < max_gap_m), alone = {k, k, k, k};
-        i4 roots = {parent[parent[k - 1]], parent[parent[b]], parent[parent[c]], parent[parent[d]]};
+        i4 roots = {parent[k - 1], parent[over[0]], parent[over[1]], parent[over[2]]};
+        roots = (i4){parent[roots[0]], parent[roots[1]], parent[roots[2]], parent[roots[3]]};
         roots = (roots & joined) | (alone & ~joined);
         i32 one = roots[0] < roots[1] ? roots[0] : roots[1], other = roots[2] < roots[3] ? roots[2] : roots[3];
         parent[k] = one = one < other ? one : other;
