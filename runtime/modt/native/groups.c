@@ -144,32 +144,37 @@ EXPORT void modt_group_sums(const float *values, i64 rows, i64 k, const i64 *off
 EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, const i64 *offsets, i64 n, i64 limit,
                                const float *cosines, const float *sines, i32 headings, float noise_m, i64 *best)
 {
-    enum { MOST = 64 };
-    float low[MOST], high[MOST];
-    double closeness[MOST / 2];
-    i32 axes = 2 * headings;
-    PROVEN(axes <= MOST);
+    enum { MOST = 32, LANES = 8 }; /* directions, of which as many are done together */
+    float c[2][MOST] = {{0.0f}}, s[2][MOST] = {{0.0f}}, low[2][MOST], high[2][MOST];
+    double closeness[MOST];
+    i32 padded = (headings + LANES - 1) / LANES * LANES;
+    PROVEN(padded <= MOST);
+    for (i32 a = 0; a < 2 * headings; a++)
+        c[a / headings][a % headings] = cosines[a], s[a / headings][a % headings] = sines[a];
     for (i64 g = 0; g < n; g++) {
-        for (i32 a = 0; a < axes; a++) {
-            low[a] = INFINITY;
-            high[a] = -INFINITY;
-            closeness[a / 2] = 0.0;
+        for (i32 a = 0; a < padded; a++) {
+            low[0][a] = low[1][a] = INFINITY;
+            high[0][a] = high[1][a] = -INFINITY;
+            closeness[a] = 0.0;
         }
         i64 stride = (offsets[g + 1] - offsets[g] + limit - 1) / limit;
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride)
-            for (i32 a = 0; a < axes; a++) {
-                float across = cosines[a] * x[rows[i]] + sines[a] * y[rows[i]];
-                low[a] = least(across, low[a]);
-                high[a] = most(across, high[a]);
-            }
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride)
-            for (i32 a = 0; a < headings; a++) {
-                i32 b = a + headings;
-                float here_x = x[rows[i]], here_y = y[rows[i]];
-                float u = cosines[a] * here_x + sines[a] * here_y, v = cosines[b] * here_x + sines[b] * here_y;
-                float nearest = least(least(u - low[a], high[a] - u), least(v - low[b], high[b] - v));
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
+            float here_x = x[rows[i]], here_y = y[rows[i]];
+            for (int v = 0; v < 2; v++)
+                for (i32 a = 0; a < padded; a++) {
+                    float across = c[v][a] * here_x + s[v][a] * here_y;
+                    low[v][a] = least(across, low[v][a]);
+                    high[v][a] = most(across, high[v][a]);
+                }
+        }
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
+            float here_x = x[rows[i]], here_y = y[rows[i]];
+            for (i32 a = 0; a < padded; a++) {
+                float u = c[0][a] * here_x + s[0][a] * here_y, v = c[1][a] * here_x + s[1][a] * here_y;
+                float nearest = least(least(u - low[0][a], high[0][a] - u), least(v - low[1][a], high[1][a] - v));
                 closeness[a] += 1.0f / most(nearest, noise_m);
             }
+        }
         best[g] = 0;
         for (i32 a = 1; a < headings; a++)
             if (closeness[a] > closeness[best[g]])
