@@ -188,22 +188,25 @@ EXPORT void modt_reflectance_statistics(const float *points, i64 width, const i6
 {
     i64 last = offsets[n];
     for (i64 g = 0; g < n; g++) {
-        double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0, *own = statistics[g];
+        double total = 0.0, squares = 0.0, *own = statistics[g];
+        i64 number = 0, brights = 0, darks = 0;
         float high = -INFINITY;
         for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
             __builtin_prefetch(&points[index[i + AHEAD < last ? i + AHEAD : i] * width + 3]);
             float r = points[index[i] * width + 3];
             if (r < 0.0f)
                 continue;
-            number += 1.0;
+            number++;
             total += r;
             squares += r * r;
             brights += r > bright;
             darks += r < dark;
             high = most(r, high);
         }
-        double mean = total / number, variance = squares / number - mean * mean; /* not a number without any */
+        double n_returns = (double)number, mean = total / n_returns; /* not a number without any */
+        double variance = squares / n_returns - mean * mean;
         own[0] = mean, own[1] = __builtin_sqrt(variance < 0.0 ? 0.0 : variance);
-        own[2] = number > 0.0 ? (double)high : mean, own[3] = brights / number, own[4] = darks / number;
+        own[2] = number ? (double)high : mean;
+        own[3] = (double)brights / n_returns, own[4] = (double)darks / n_returns;
     }
 }
