@@ -83,7 +83,7 @@ typedef struct {
 
 typedef struct {
     i64 *offsets, *index;
-    float *x, *y, *z, *ground_z;
+    float *columns; /* x, y, z and z of the ground, of as many members as there are */
 } Members;
 
 /* members_of: points by cluster, in input order within a cluster, given the cell of each point and the cluster of
@@ -92,13 +92,18 @@ EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, co
                          i64 n_cells, i64 n, Members *members)
 {
     i64 *next = members->offsets + 1; /* of each cluster, the place of its next point; its end, when all are placed */
+    i64 total = 0;
     for (i64 g = 0; g <= n; g++)
         members->offsets[g] = 0;
     for (i64 c = 0; c < n_cells; c++)
-        if (cluster[c] != NONE && cluster[c] + 1 < n)
-            next[cluster[c] + 1] += entries[c];
-    for (i64 g = 1; g < n; g++)
-        next[g] += next[g - 1];
+        if (cluster[c] != NONE)
+            next[cluster[c]] += entries[c];
+    for (i64 g = 0; g < n; g++) {
+        i64 count = next[g];
+        next[g] = total;
+        total += count;
+    }
+    float *x = members->columns, *y = x + total, *z = y + total, *ground_z = z + total;
     for (i64 i = 0; i < n_points; i++) {
         PROVEN(cell[i] >= 0 && cell[i] < n_cells && cluster[cell[i]] >= NONE && cluster[cell[i]] < n);
         i64 g = cluster[cell[i]];
@@ -106,10 +111,10 @@ EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, co
             continue;
         i64 at = next[g]++;
         members->index[at] = points->index[i];
-        members->x[at] = points->x[i];
-        members->y[at] = points->y[i];
-        members->z[at] = points->z[i];
-        members->ground_z[at] = points->z[i] - points->height[i];
+        x[at] = points->x[i];
+        y[at] = points->y[i];
+        z[at] = points->z[i];
+        ground_z[at] = points->z[i] - points->height[i];
     }
 }
 
