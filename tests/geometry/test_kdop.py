@@ -20,6 +20,7 @@ from modt.geometry.kdop import (
     shape_similarity,
     shift_between,
 )
+from modt.types import Proposals
 from tests.tracking.tracking_scenes import box, frame_of
 
 PAD_M = 0.15
@@ -92,7 +93,7 @@ def test_kdops_are_the_greatest_coordinates_of_the_points():
     for i in range(2):
         along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ DIRECTIONS
         np.testing.assert_allclose(found[:, i], along.max(axis=0), atol=1e-4)
-    assert kdops(proposals.take(np.zeros(0, np.int64)), T).shape == (8, 0)
+    assert kdops(Proposals.empty(), T).shape == (8, 0)
 
 
 def random_kdops(rng, n):
