@@ -40,7 +40,7 @@ def flood_fill(cells, beam_m):
 
 
 def trace(lowest, stands, range_m, height_m, max_slope_deg):
-    """(rings, SECTORS) ground cells, and cells on and beside a ramp, ring by ring and ray by ray."""
+    """(rings, SECTORS) ground cells, cells on and beside a ramp, and (SECTORS,) slope of the ramp at a ray's end."""
     max_slope, ramp_slope = (np.tan(np.deg2rad(v * max_slope_deg)) for v in (1.0, ground.RAMP_SHARE))
     is_ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
     last = [(-height_m, 0.0, 0.0)] * SECTORS
@@ -61,7 +61,8 @@ def trace(lowest, stands, range_m, height_m, max_slope_deg):
             steep[ring, ray] = abs(slope) > ramp_slope
         for ray in range(SECTORS):
             ramp[ring, ray] = steep[ring, [(ray + k * ground.FLANK_SECTORS) % SECTORS for k in (-1, 0, 1)]].any()
-    return is_ground, ramp
+    slope = np.array([of[2] for of in last])
+    return is_ground, ramp, np.where(np.abs(slope) > ramp_slope, slope, 0.0)
 
 
 def closeness(x, y, noise_m):

@@ -131,21 +131,28 @@ static void advance(i32 sectors, const uint8_t *restrict kind, int all, const fl
     }
 }
 
-/* Surface of a ring, given the ground cell after each cell and the one before it, whose height is in `surface`. */
-static void blend(i32 sectors, float range_m, const float *restrict value, const float *restrict at,
-                  float *restrict surface, const float *restrict near)
+/* Surface of a ring, given the ground cell after each cell, or the slope where there is none, and the one before it,
+ * whose height is in `surface`. */
+static void blend(const Ground *g, float range_m, const float *restrict value, const float *restrict at,
+                  const float *restrict slope, const float *restrict lowest, float *restrict surface,
+                  const float *restrict near)
 {
+    i32 sectors = g->sectors;
+    float max_gap_m = g->max_gap_m;
     for (i32 k = 0; k < sectors; k++) {
-        float from = surface[k], high = at[k] < 0.0f ? from : value[k], far = at[k] < 0.0f ? near[k] : at[k];
-        surface[k] = from + (high - from) * ((range_m - near[k]) / most(far - near[k], 1e-3f));
+        float from = surface[k], since = range_m - near[k];
+        float between = from + (value[k] - from) * (since / most(at[k] - near[k], 1e-3f));
+        float ramp = from + slope[k] * least(since, max_gap_m);
+        surface[k] = at[k] < 0.0f ? least(ramp, most(lowest[k], from)) : between; /* a ramp rises above no return */
     }
 }
 
-/* GroundEstimator._interpolate: linear from the ground cell before each cell to the one after it */
+/* GroundEstimator._interpolate: linear from the ground cell before each cell to the one after it, or on with the
+ * slope of its ramp; `ray` comes from trace */
 static void interpolate(const Ground *g, float height_m, const float *range_m, Scratch *s, float *ray)
 {
     i32 sectors = g->sectors;
-    float *value = ray, *at = ray + sectors, *low = s->surface, *near = s->other;
+    float *value = ray, *at = ray + sectors, *slope = ray + 2 * sectors, *low = s->surface, *near = s->other;
     for (i32 k = 0; k < sectors; k++) {
         value[k] = -height_m;
         at[k] = range_m[0];
@@ -157,9 +164,11 @@ static void interpolate(const Ground *g, float height_m, const float *range_m, S
     }
     for (i32 k = 0; k < sectors; k++)
         at[k] = -1.0f; /* nothing beyond */
+    for (i32 k = 0; k < sectors; k++)
+        slope[k] = magnitude(slope[k]) > g->ramp_slope ? slope[k] : 0.0f;
     for (i32 ring = g->rings - 1, row = ring * sectors; ring >= 0; ring--, row -= sectors) {
         advance(sectors, s->kind + row, ring == 0, low + row, range_m[ring], value, at);
-        blend(sectors, range_m[ring], value, at, low + row, near + row);
+        blend(g, range_m[ring], value, at, slope, s->lowest + row, low + row, near + row);
     }
 }
 

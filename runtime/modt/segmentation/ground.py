@@ -23,7 +23,7 @@ NOISE_M = 0.1
 NEAR_M = 1.5
 """Greatest distance over which ground rises by `max_slope_deg`, from one ground cell of a ray to the next."""
 MAX_GAP_M = 6.0
-"""The same on and beside a ramp; reach of the running slope."""
+"""The same on and beside a ramp; distance over which the running slope of a ray is extrapolated."""
 RAMP_SHARE = 0.3
 """A ray is on a ramp when its running slope exceeds this share of `max_slope_deg`."""
 SLOPE_GAIN = 0.2
@@ -80,7 +80,7 @@ class GroundEstimator:
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` over a
     short way, on and beside a ramp over a longer one, and not at all where something stands in the cell, since it may
     be a flank. It may lie lower by `max_slope_deg` all the way, since nothing else does. Cells without ground are
-    interpolated along the ray.
+    interpolated along the ray; beyond its last one, the ground is level, but a ramp goes on for MAX_GAP_M.
 
     Args:
         sensor: range.
@@ -99,9 +99,8 @@ class GroundEstimator:
         """(N,) height of each point above the ground [m]."""
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
-        is_ground, is_ramp = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
-        known = np.where(is_ground, lowest, np.float32(-sensor_height_m))
-        surface = _median_across(self._interpolate(known, is_ground))
+        is_ground, is_ramp, slope = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
+        surface = _median_across(self._interpolate(lowest, is_ground, slope, sensor_height_m))
         beside = _median_across(surface, FLANK_SECTORS)
         flank = surface - beside > np.float32(FLANK_M)
         np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))  # what stands on a ramp hides it
@@ -125,9 +124,10 @@ class GroundEstimator:
         stands.ravel()[cell[points.z > flat.ravel().take(cell)]] = True
         return stands
 
-    def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> tuple[Bool, Bool]:
+    def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> tuple[Bool, Bool, Float32]:
         """(rings, SECTORS) ground cells, and cells on and beside a ramp, where no surface is a vehicle's side.
 
+        With them comes the (SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0.
         All rays advance together, ring by ring, from the foot of the sensor.
         """
         max_slope, ramp = np.float32(self.max_slope), np.float32(self.ramp_slope)
@@ -152,22 +152,29 @@ class GroundEstimator:
             on = np.abs(slope) > ramp
             is_ramp[ring] = on | np.roll(on, FLANK_SECTORS) | np.roll(on, -FLANK_SECTORS)
             bend_m = np.where(is_ramp[ring], max_gap, near)
-        return is_ground, is_ramp
+        return is_ground, is_ramp, slope * on
 
-    def _interpolate(self, ground: Float32, is_ground: Bool) -> Float32:
-        """(rings, SECTORS) surface: linear between the ground cells of a ray, level beyond the last one."""
+    def _interpolate(self, lowest: Float32, is_ground: Bool, slope: Float32, sensor_height_m: float) -> Float32:
+        """(rings, SECTORS) surface, linear between the ground cells of a ray.
+
+        Beyond the last one it goes on with the (SECTORS,) slope for MAX_GAP_M, but rises above no return.
+        """
+        ground = np.where(is_ground, lowest, np.float32(-sensor_height_m))
         rings, sectors = ground.shape
         is_ground = is_ground.copy()
         is_ground[0] = True
         cell = np.arange(rings * sectors).reshape(rings, sectors)
         before = np.maximum.accumulate(np.where(is_ground, cell, 0), axis=0)
         after = np.minimum.accumulate(np.where(is_ground, cell, cell.size)[::-1], axis=0)[::-1]
-        after = np.where(after == cell.size, before, after)
+        beyond = after == cell.size
+        after = np.where(beyond, before, after)
         range_of = np.repeat(self.grid.range_m, sectors)
         low, near = ground.take(before), range_of.take(before)
         high, far = ground.take(after), range_of.take(after)
         since = self.grid.range_m[:, None] - near
-        surface: Float32 = low + (high - low) * (since / np.maximum(far - near, np.float32(1e-3)))
+        ramp = low + slope * np.minimum(since, np.float32(MAX_GAP_M))
+        between = low + (high - low) * (since / np.maximum(far - near, np.float32(1e-3)))
+        surface: Float32 = np.where(beyond, np.minimum(ramp, np.maximum(lowest, low)), between)
         return surface
 
 
