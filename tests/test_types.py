@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.types import NONE, Tracks
+from modt_desk.experiments.segmented import chosen
 from tests.results import proposals
 
 
@@ -23,7 +24,7 @@ def test_labels_and_counts_agree(counts):
 def test_some_of_the_proposals(counts, data):
     found = proposals(counts)
     which = data.draw(st.lists(st.sampled_from(range(len(counts))), min_size=1, unique=True))
-    some = found.take(np.array(which))
+    some = chosen(found, np.array(which))
     assert some.count.tolist() == [counts[k] for k in which]
     for i, k in enumerate(which):
         own, those = (slice(*p.offsets[n : n + 2]) for p, n in ((some, i), (found, k)))

@@ -294,11 +294,9 @@ class SensorConfig(StageConfig):
     @property
     def beams(self) -> Beams:
         """Spacing of the beams."""
-        from modt.geometry.beams import BeamTable, EvenBeams  # NumPy, which commands import after they are pinned
+        from modt.geometry.beams import beams_of  # NumPy, which commands import after they are pinned
 
-        if self.elevations_deg is None:
-            return EvenBeams(self.elevation_step_deg)
-        return BeamTable(self.elevations_deg)
+        return beams_of(self.elevations_deg, self.elevation_step_deg)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

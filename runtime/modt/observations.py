@@ -44,11 +44,11 @@ class Observations:
         """(P, 2) centre of the k-DOP along x and y [m]."""
         return centres(self.kdop)[::2].T
 
-    def moved(self, step: Float64) -> Observations:
-        """A copy, displaced by steps (P, 2) [m, world]."""
-        box = self.box.copy()
-        box[:, :2] += step
-        return replace(self, box=box, centroid=self.centroid + step, kdop=self.kdop + DIRECTIONS.T @ step.T)
+    def move(self, step: Float64) -> None:
+        """Displace all in place by steps (P, 2) [m, world]."""
+        self.box[:, :2] += step
+        self.centroid[:] += step
+        self.kdop[:] += DIRECTIONS.T @ step.T
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""

@@ -135,11 +135,6 @@ class Proposals:
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
 
-    def take(self, which: Int) -> Proposals:
-        """A copy of the rows given, in their order."""
-        runs = np.stack([self.offsets[which], self.offsets[which + 1]])
-        return self.regrouped(*copy_runs(self.members, self.coordinates, runs), self.count[which], which)
-
     @classmethod
     def empty(cls) -> Proposals:
         """No proposals."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -47,9 +48,7 @@ class Windows:
         """Add a ledger line, and return the line of the window if that closes, else None."""
         self._frames.append(line["frame"])
         for stage, row in line["stages"].items():
-            total = self._stages.setdefault(stage, dict.fromkeys(row, 0))
-            for key, value in row.items():
-                total[key] += value
+            self._stages[stage].update(row)
         self._overhead_ns += line["overhead_ns"]
         if "clock" in line["marks"]:
             self._marks.append("clock")
@@ -116,6 +115,6 @@ class Windows:
         self._start_ns, self._boot0_ns = clocks.monotonic_ns(), clocks.boot_ns()
         self._process0_ns = clocks.process_ns()
         self._frames: list[int] = []
-        self._stages: dict[str, dict[str, int]] = {}
+        self._stages: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self._overhead_ns = 0
         self._marks: list[str] = []

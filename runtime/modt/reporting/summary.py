@@ -22,8 +22,7 @@ class Summary:
         self.frames = self.proposals = self.classified = self.deferred = 0
         self.tracks, self._proposals = Tracks.blank(), Proposals.empty()  # those of the last frame
         self._ended = np.zeros((2, 2), np.int64)  # lengths of the tracks that are gone
-        self._calls: Counter[str] = Counter()
-        self._items: Counter[str] = Counter()
+        self._work: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger by stage
         self._times: dict[str, dict[str, Histogram]] = defaultdict(lambda: {"wall": Histogram(), "cpu": Histogram()})
 
     def add_result(self, result: FrameResult) -> None:
@@ -39,8 +38,7 @@ class Summary:
     def add_ledger(self, line: dict[str, Any]) -> None:
         """Add the ledger line of a frame."""
         for stage, row in line["stages"].items():
-            self._calls[stage] += row["calls"]
-            self._items[stage] += row["items"]
+            self._work[stage].update(row)
             for clock, histogram in self._times[stage].items():
                 histogram.add(row[f"{clock}_ns"])
 
@@ -50,7 +48,7 @@ class Summary:
         beta is classifications over those of tracking-by-detection (section V-A); N_go the number of frames in which
         a track has a proposal, averaged over tracks (section IV-C). The last class of a track counts.
         """
-        lengths = self._ended + _lengths(self.tracks)
+        work, lengths = self._work, self._ended + _lengths(self.tracks)
         all_tracks, foreground = ({"count": n, "N_go": _ratio(frames, n)} for n, frames in lengths.tolist())
         return {
             "schema": _SCHEMA,
@@ -64,7 +62,7 @@ class Summary:
             "around": around(self.tracks, self._proposals),
             "tracks": all_tracks,
             "foreground_tracks": foreground,
-            "energy_counts": {"E_seg": self._calls[SEGMENTATION], "E_class": self._items[CLASSIFICATION]},
+            "energy_counts": {"E_seg": work[SEGMENTATION]["calls"], "E_class": work[CLASSIFICATION]["items"]},
             "stages": {stage: self._stage(stage) for stage in self._times},
         }
 
@@ -73,7 +71,7 @@ class Summary:
             f"{clock}_ms": histogram.figures(1e6, p50=0.5, p95=0.95, p99=0.99)
             for clock, histogram in self._times[stage].items()
         }
-        return {"calls": self._calls[stage], "items": self._items[stage], **times}
+        return {key: self._work[stage][key] for key in ("calls", "items")} | times
 
 
 def _lengths(tracks: Tracks, rows: Bool | slice = slice(None)) -> Int:

@@ -26,6 +26,7 @@ class LiveServer(ThreadingTCPServer):
 
     Attributes:
         page: HTML.
+        port: port that is bound.
         names: host names that a request may use, or None for all. On the loopback they are limited, because a page of
             another site could reach it by a name of its own.
 
@@ -40,6 +41,7 @@ class LiveServer(ThreadingTCPServer):
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         self.address_family = family
         super().__init__((str(address[0]), int(address[1])), _Handler)
+        self.port = int(self.server_address[1])
         local = ip_address(str(address[0])).is_loopback
         self.names = {"localhost", "127.0.0.1", "[::1]", host} if local else None
         self._free, self._changed = threading.Semaphore(MOST_CONNECTIONS), threading.Condition()

@@ -51,9 +51,6 @@ class Cells:
     cell: Int  # (n,) SIDE * row + column, ascending; column and row count from -x and -y, the sensor at SIDE / 2
     level: Int  # (n,) height above ground [LEVEL_M], 0 for ground
 
-    def __len__(self) -> int:
-        return len(self.cell)
-
     def thinned(self, most: int) -> Cells:
         """At most `most` cells. Cells of the ground are left out first."""
         kept = [np.flatnonzero(self.level > 0), np.flatnonzero(self.level == 0)]
