@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
+import onnx.parser
 
 from modt import assets, profile
 from modt.classification.pointnet import PointNet
@@ -37,18 +37,15 @@ SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.spl
 
 
 def network() -> onnx.ModelProto:
-    """A small model with the metadata of a shipped one."""
-    weight = onnx.numpy_helper.from_array(np.zeros((3, 4), np.float32), "w")
-    ends = [
-        onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, shape)
-        for name, shape in (("points", ["batch", "n", 3]), ("probability", ["batch", 4]))
-    ]
-    nodes = [
-        onnx.helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0),
-        onnx.helper.make_node("MatMul", ["pooled", "w"], ["probability"]),
-    ]
-    graph = onnx.helper.make_graph(nodes, "net", ends[:1], ends[1:], [weight])
-    return onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 13)], ir_version=8)
+    """A small model with the inputs and outputs of a shipped one."""
+    zeros = ", ".join("0" * 12)
+    return onnx.parser.parse_model(f"""
+        <ir_version: 8, opset_import: ["": 13]>
+        net (float[batch, n, 3] points) => (float[batch, 4] probability) <float[3, 4] w = {{{zeros}}}> {{
+            pooled = ReduceMax <axes = [1], keepdims = 0> (points)
+            probability = MatMul (pooled, w)
+        }}
+    """)
 
 
 def load(path: Path) -> PointNet:
