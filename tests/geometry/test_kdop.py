@@ -13,13 +13,13 @@ from modt.geometry.kdop import (
     Shapes,
     certain_pairs,
     coverage,
-    kdops,
     measured,
     overlapping_pairs,
     pair_costs,
     shape_similarity,
     shift_between,
 )
+from modt.observations import observe
 from modt.types import Proposals
 from tests.tracking.tracking_scenes import box, frame_of
 
@@ -88,12 +88,12 @@ def test_kdops_are_the_greatest_coordinates_of_the_points():
     c, s = np.cos(0.4), np.sin(0.4)
     T = np.array([[c, -s, 0, 5], [s, c, 0, -3], [0, 0, 1, 1.7], [0, 0, 0, 1.0]])
     frame, proposals = frame_of([box(10, 0, yaw=0.3), box(-4, 7)], 0, T)
-    found = kdops(proposals, T)
+    found = observe(proposals, T).kdop
     world = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
     for i in range(2):
         along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ DIRECTIONS
         np.testing.assert_allclose(found[:, i], along.max(axis=0), atol=1e-4)
-    assert kdops(Proposals.empty(), T).shape == (8, 0)
+    assert observe(Proposals.empty(), T).kdop.shape == (8, 0)
 
 
 def random_kdops(rng, n):

@@ -72,22 +72,16 @@ def one(x, y, length, width):
     )
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "share"), [(10, 0, 0.0), (0, 10, -0.25), (0, -10, 0.25), (-7, 7, -0.375), (-7, -7, 0.375)]
-)
-def test_the_delay_is_zero_ahead_and_its_sign_follows_the_rotation(x, y, share):
-    assert delays(one(x, y, 1.0, 1.0), 0.1)[0] == pytest.approx(0.1 * share)
-    assert delays(one(x, y, 1.0, 1.0), -0.1)[0] == pytest.approx(-0.1 * share)
-
-
-@given(st.floats(2, 30), st.floats(-0.999, 0.999), st.floats(0.2, 4))
-def test_the_delay_across_the_seam_is_the_mean_over_the_bearings(distance, side, length):
+@pytest.mark.parametrize("towards", [0.0, 0.5 * np.pi, -0.75 * np.pi, np.pi])
+@given(st.floats(2, 30), st.floats(-0.999, 0.999), st.floats(0.2, 4), st.sampled_from([1.0, -0.1]))
+def test_the_delay_is_the_mean_over_the_bearings_also_across_the_seam(towards, distance, side, length, turn_s):
+    """It is zero ahead, and its sign follows the rotation."""
     wide = np.arctan2(length / 2, distance)
-    bearing = np.pi + side * wide  # the seam is within it
+    bearing = towards + side * wide
     parts = np.linspace(bearing - wide, bearing + wide, 20001)
     mean = np.angle(np.exp(1j * parts)).mean()
-    found = delays(one(distance * np.cos(bearing), distance * np.sin(bearing), length, 0.0), 1.0)[0]
-    assert found == pytest.approx(-mean / (2 * np.pi), abs=1e-3)
+    found = delays(one(distance * np.cos(bearing), distance * np.sin(bearing), length, 0.0), turn_s)[0]
+    assert found == pytest.approx(-turn_s * mean / (2 * np.pi), abs=1e-3)
 
 
 def drive(turn_s, known, posed=False, frames=25):
