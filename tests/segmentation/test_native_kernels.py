@@ -97,21 +97,15 @@ def street(seed, n):
 
 
 @pytest.mark.slow
-@given(seed=st.integers(0, 10_000), n=st.integers(0, 3000), front=st.booleans())
-@settings(max_examples=80, deadline=None)
-def test_random_sweeps(kernels, seed, n, front):
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 3000), front=st.booleans(), share=st.just(0.0) | st.floats(0, 1))
+@settings(max_examples=160, deadline=None)
+def test_random_sweeps_with_a_share_of_hostile_coordinates(kernels, seed, n, front, share):
     sensor = SensorConfig(reflectance="hdl-64e", height_m=(None, 1.73)[seed % 2])
-    both(kernels, street(seed, n), sensor, FRONT if front else None)
-
-
-@pytest.mark.slow
-@given(seed=st.integers(0, 10_000), share=st.floats(0, 1))
-@settings(max_examples=80, deadline=None)
-def test_hostile_sweeps(kernels, seed, share):
-    rng, points = np.random.default_rng(seed), street(seed, 500)
-    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), points.shape)]
+    rng, points = np.random.default_rng(seed), street(seed, n)
+    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), (n, 3))]
+    np.copyto(points[:, :3], values, where=rng.random((n, 3)) < share)
     with np.errstate(all="ignore"):
-        both(kernels, np.where(rng.random(points.shape) < share, values, points))
+        both(kernels, points, sensor, FRONT if front else None)
 
 
 @pytest.mark.slow
