@@ -165,18 +165,21 @@ class Regrouping:
         return Pairs(rows, part, within, around, free)
 
     def _beside(self, tracks: TrackTable, observations: Observations, own: Int, owner: Int) -> tuple[Int, Int]:
-        """Proposals of cars (K,), and others (K,) beside them that fit into one car with them and may be its parts.
+        """Proposals of cars (K,) and others (K,) beside them that fit into one car with all that is known of it.
 
-        A part belongs to no track, or to a new one of fewer points than the car shows.
+        Such a part belongs to no track, or to a new one of fewer points than the car shows.
         """
         box, kdop, count = observations.box, observations.kdop, observations.count
-        hosts = own[(tracks.object_class == ObjectClass.CAR.value) & (own != NONE)]
+        rows = ((tracks.object_class == ObjectClass.CAR.value) & (own != NONE)).nonzero()[0]
+        hosts, extent = own[rows], tracks.known_kdops(rows)
         known = np.append((tracks.hits >= ESTABLISHED_HITS) | IS_PERSON[tracks.object_class], False)[owner]
         person = PART_PERSON.fits(widths(kdop).max(axis=0, initial=0.0), observations.bottom, observations.top)
         parts = (~known & ~person).nonzero()[0]
         i, j = self._kernels.overlapping_pairs(kdop.take(hosts, axis=1) + BESIDE_M, kdop.take(parts, axis=1))
         hosts, parts = hosts[i], parts[j]
+        whole = np.maximum(extent.take(i, axis=1), kdop.take(parts, axis=1))
         fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(i), 1)))
+        fit &= widths(whole).max(axis=0, initial=0.0) < CAR_SIZE_M[0]
         fit &= (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
         return hosts[fit], parts[fit]
 
