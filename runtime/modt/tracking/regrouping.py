@@ -171,16 +171,18 @@ class Regrouping:
         """
         box, kdop, count = observations.box, observations.kdop, observations.count
         rows = ((tracks.object_class == ObjectClass.CAR.value) & (own != NONE)).nonzero()[0]
-        hosts, extent = own[rows], tracks.known_kdops(rows)
         known = np.append((tracks.hits >= ESTABLISHED_HITS) | IS_PERSON[tracks.object_class], False)[owner]
-        person = PART_PERSON.fits(widths(kdop).max(axis=0, initial=0.0), observations.bottom, observations.top)
-        parts = (~known & ~person).nonzero()[0]
-        i, j = self._kernels.overlapping_pairs(kdop.take(hosts, axis=1) + BESIDE_M, kdop.take(parts, axis=1))
-        hosts, parts = hosts[i], parts[j]
-        whole = np.maximum(extent.take(i, axis=1), kdop.take(parts, axis=1))
-        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(i), 1)))
-        fit &= widths(whole).max(axis=0, initial=0.0) < CAR_SIZE_M[0]
-        fit &= (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
+        parts = (~known).nonzero()[0]
+        i, j = self._kernels.overlapping_pairs(kdop.take(own[rows], axis=1) + BESIDE_M, kdop.take(parts, axis=1))
+        rows, parts = rows[i], parts[j]
+        hosts, part = own[rows], kdop.take(parts, axis=1)
+        fit = (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
+        fit &= ~PART_PERSON.fits(
+            widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts]
+        )
+        fit &= widths(np.maximum(tracks.known_kdops(rows), part)).max(axis=0, initial=0.0) < CAR_SIZE_M[0]
+        hosts, parts = hosts[fit], parts[fit]
+        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(hosts), 1)))
         return hosts[fit], parts[fit]
 
     def _regrouped(
