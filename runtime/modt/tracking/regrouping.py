@@ -170,19 +170,20 @@ class Regrouping:
         Such a part belongs to no track, or to a new one of fewer points than the car shows.
         """
         box, kdop, count = observations.box, observations.kdop, observations.count
-        rows = ((tracks.object_class == ObjectClass.CAR.value) & (own != NONE)).nonzero()[0]
-        known = np.append((tracks.hits >= ESTABLISHED_HITS) | IS_PERSON[tracks.object_class], False)[owner]
-        parts = (~known).nonzero()[0]
-        i, j = self._kernels.overlapping_pairs(kdop.take(own[rows], axis=1) + BESIDE_M, kdop.take(parts, axis=1))
-        rows, parts = rows[i], parts[j]
-        hosts, part = own[rows], kdop.take(parts, axis=1)
-        fit = (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
-        fit &= ~PART_PERSON.fits(
-            widths(part).max(axis=0, initial=0.0), observations.bottom[parts], observations.top[parts]
-        )
-        fit &= widths(np.maximum(tracks.known_kdops(rows), part)).max(axis=0, initial=0.0) < CAR_SIZE_M[0]
-        hosts, parts = hosts[fit], parts[fit]
-        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(hosts), 1)))
+        cars = ((tracks.object_class == ObjectClass.CAR.value) & (own != NONE)).nonzero()[0]
+        known = np.append((tracks.hits >= ESTABLISHED_HITS) | IS_PERSON[tracks.object_class], False)
+        parts = (~known[owner]).nonzero()[0]
+        i, j = self._kernels.overlapping_pairs(kdop.take(own[cars], axis=1) + BESIDE_M, kdop.take(parts, axis=1))
+        rows, parts = cars[i], parts[j]
+        hosts = own[rows]
+        near = ((hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))).nonzero()[0]
+        if not len(near):
+            return near, near
+        rows, hosts, parts = rows[near], hosts[near], parts[near]
+        part, bottom, top = kdop.take(parts, axis=1), observations.bottom[parts], observations.top[parts]
+        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(near), 1)))
+        fit &= widths(np.maximum(tracks.known_kdops(rows), part)).max(axis=0) < CAR_SIZE_M[0]
+        fit &= ~PART_PERSON.fits(widths(part).max(axis=0), bottom, top)
         return hosts[fit], parts[fit]
 
     def _regrouped(
