@@ -176,14 +176,14 @@ class Regrouping:
         i, j = self._kernels.overlapping_pairs(kdop.take(own[cars], axis=1) + BESIDE_M, kdop.take(parts, axis=1))
         rows, parts = cars[i], parts[j]
         hosts = own[rows]
-        near = ((hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))).nonzero()[0]
-        if not len(near):
-            return near, near
-        rows, hosts, parts = rows[near], hosts[near], parts[near]
-        part, bottom, top = kdop.take(parts, axis=1), observations.bottom[parts], observations.top[parts]
-        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(near), 1)))
-        fit &= widths(np.maximum(tracks.known_kdops(rows), part)).max(axis=0) < CAR_SIZE_M[0]
-        fit &= ~PART_PERSON.fits(widths(part).max(axis=0), bottom, top)
+        near = (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
+        near &= widths(np.maximum(tracks.known_kdops(rows), kdop.take(parts, axis=1))).max(axis=0) < CAR_SIZE_M[0]
+        hosts, parts = hosts[near], parts[near]
+        if not len(parts):
+            return hosts, parts
+        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(parts), 1)))
+        extent_m = widths(kdop.take(parts, axis=1)).max(axis=0)
+        fit &= ~PART_PERSON.fits(extent_m, observations.bottom[parts], observations.top[parts])
         return hosts[fit], parts[fit]
 
     def _regrouped(
