@@ -1,15 +1,9 @@
-"""Sizes of the classes, and of what may be a person."""
+"""Sizes of what may be a person."""
 
 import numpy as np
 import pytest
 
-from modt.class_sizes import IS_PERSON, MAX_SIZE_M, PersonSize
-from modt.classes import CLASSES
-
-
-def test_the_arrays_are_the_table():
-    for c, spec in CLASSES.items():
-        assert (*MAX_SIZE_M[c], IS_PERSON[c]) == (spec.max_length_m, spec.max_width_m, spec.person)
+from modt.class_sizes import PersonSize
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -18,9 +19,9 @@ def test_lists_of_cores_of_the_kernel(text, cores):
     assert host.core_list(text) == cores
 
 
-@pytest.mark.parametrize("module", ["main", "profile"])
+@pytest.mark.parametrize("module", ["modt.cli.main", "modt_desk.cli.profile"])
 def test_commands_load_what_sizes_thread_pools_only_once_they_are_pinned(module):
-    code = f"import modt.cli.{module}, sys; print({{'numpy', 'scipy', 'onnxruntime'}} & set(sys.modules))"
+    code = f"import {module}, sys; print({{'numpy', 'scipy', 'onnxruntime'}} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
 
@@ -47,18 +48,17 @@ def test_threads_begun_elsewhere_stay_there_and_the_loop_where_it_is():
     assert seen == [others]
 
 
-def refuse(*_):
-    raise PermissionError(1, "Operation not permitted")
-
-
 def test_what_is_not_permitted_has_a_remedy(monkeypatch):
     monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: os.SCHED_OTHER)
-    monkeypatch.setattr(host.os, "sched_setscheduler", refuse)
+    monkeypatch.setattr(host.os, "sched_setscheduler", Mock(side_effect=PermissionError(1, "Not permitted")))
     monkeypatch.setattr(host.sys, "setswitchinterval", lambda _: None)
     monkeypatch.setattr(host, "_lock_memory", lambda: "the limit of locked memory is finite")
-    lacking = host.take_real_time_priority()
-    assert len(lacking) == 2
-    assert all("; " in what for what in lacking)
+    refusals = host.take_real_time_priority()
+    assert len(refusals) == 2
+    assert all("; " in refusal for refusal in refusals)
+    monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: os.SCHED_FIFO)  # the loop has it, a receiver has not
+    monkeypatch.setattr(host.os, "sched_getparam", lambda _: os.sched_param(10))
+    assert "LimitRTPRIO=9" in host.serve_loop(None)
 
 
 @pytest.mark.parametrize(("loop", "asked"), [(10, [9]), (1, [1]), (None, [])])
@@ -70,13 +70,6 @@ def test_a_thread_that_serves_the_loop_is_real_time_below_it(monkeypatch, loop, 
     monkeypatch.setattr(host.os, "sched_setscheduler", lambda _, __, p: given.append(p.sched_priority))
     assert host.serve_loop(None) == ""
     assert given == asked
-
-
-def test_a_receiver_without_permission_has_a_remedy(monkeypatch):
-    monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: os.SCHED_FIFO)
-    monkeypatch.setattr(host.os, "sched_getparam", lambda _: os.sched_param(10))
-    monkeypatch.setattr(host.os, "sched_setscheduler", refuse)
-    assert "LimitRTPRIO=9" in host.serve_loop(None)
 
 
 def machine(folder, *, runtime="950000", cgroup="", share=None, capabilities="0"):

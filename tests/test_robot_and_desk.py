@@ -6,12 +6,12 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from modt.app.assembly import chosen_kernels
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import environment
+from tests.desk import recorded
 
 MAX_MODULES = 130
 """A robot loads what it uses: the readers of other sensors and recordings are none of it."""
@@ -38,38 +38,20 @@ def loaded(*arguments: object, cwd: Path, until: Path | None = None) -> list[str
     return printed.split("\n")[-2].split()
 
 
-@pytest.fixture(name="scans")
-def a_folder_of_scans(tmp_path):
-    folder = tmp_path / "scans"
-    folder.mkdir()
-    random = np.random.default_rng(0)
-    for number in range(2):
-        random.uniform((-20, -20, -2, 0), (20, 20, 2, 1), (2000, 4)).astype(np.float32).tofile(
-            folder / f"{number:06d}.bin"
-        )
-    return folder
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "until"),
-    [(("run", "velodyne://127.0.0.1:0"), "out/status.json"), (("replay", "scans", "--quiet"), None)],
+    [
+        (("run", "velodyne://127.0.0.1:0"), "out/status.json"),
+        (("run", "scans"), None),
+        (("replay", "scans", "--quiet"), None),
+    ],
 )
-def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, until, scans, tmp_path):
+def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk_or_of_scipy(arguments, until, tmp_path):
+    recorded.scans(tmp_path / "scans", SyntheticStream("street", "vlp-16", 1.5, 0))
     modules = loaded(*arguments, "--core", "none", "--out", "out", cwd=tmp_path, until=until and tmp_path / until)
-    assert "modt.pipeline" in modules
+    assert {"modt.pipeline", "modt.sensor_fit.recognition"} <= set(modules)
     assert [name for name in modules if name.startswith("modt_desk")] == []
     assert len(modules) <= MAX_MODULES
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(chosen_kernels("auto").name == "numpy", reason="the kernels in NumPy use SciPy")
-@pytest.mark.parametrize("command", ["run", "replay"])
-def test_no_frame_loads_scipy(command, tmp_path):
-    drive = SyntheticStream("street", "vlp-16", 1.5, 0)
-    (tmp_path / "scans").mkdir()
-    for frame in drive:
-        frame.points.tofile(tmp_path / "scans" / f"{frame.index:06d}.bin")
-    modules = loaded(command, "scans", "--core", "none", "--out", "out", cwd=tmp_path)
-    assert "modt.sensor_fit.recognition" in modules
-    assert [name for name in modules if name.startswith("scipy")] == []
+    if chosen_kernels("auto").name != "numpy":  # the kernels in NumPy use SciPy
+        assert [name for name in modules if name.startswith("scipy")] == []

@@ -70,8 +70,3 @@ def test_what_is_no_address_of_a_sink_is_refused_with_what_is_wrong(text, part):
         pytest.importorskip("foxglove")
     with pytest.raises(MisuseError, match=re.escape(part)):
         open_sink(text)
-
-
-def test_forms_begin_with_their_scheme():
-    for table in (SENSORS, SINKS, POSES):
-        assert all(scheme.form.startswith(f"{name}://") for name, scheme in table.items())

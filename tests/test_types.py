@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.types import NONE, Tracks
+from modt_desk.experiments.segmented import chosen
 from tests.results import proposals
 
 
@@ -23,7 +24,7 @@ def test_labels_and_counts_agree(counts):
 def test_some_of_the_proposals(counts, data):
     found = proposals(counts)
     which = data.draw(st.lists(st.sampled_from(range(len(counts))), min_size=1, unique=True))
-    some = found.take(np.array(which))
+    some = chosen(found, np.array(which))
     assert some.count.tolist() == [counts[k] for k in which]
     for i, k in enumerate(which):
         own, those = (slice(*p.offsets[n : n + 2]) for p, n in ((some, i), (found, k)))
@@ -35,18 +36,12 @@ def test_some_of_the_proposals(counts, data):
 @given(st.lists(st.booleans(), max_size=6), st.integers(0, 5))
 def test_tracks_are_renewed_in_every_column(kept, n):
     tracks = Tracks.blank(len(kept))
-    for _, column in tracks.columns():
+    for column in tracks.columns().values():
         column[:] = np.arange(1, len(kept) + 1).reshape(-1, *[1] * (column.ndim - 1))
     rows = np.flatnonzero(kept)
     renewed = tracks.renewed(rows, n)
     blank = Tracks.blank(n)
-    for name, column in renewed.columns():
+    for name, column in renewed.columns().items():
         np.testing.assert_array_equal(column, np.concatenate([getattr(tracks, name)[rows], getattr(blank, name)]))
     assert (renewed.id[len(rows) :] == NONE).all()
-    assert {name for name, _ in renewed.columns()} == {f.name for f in dataclasses.fields(Tracks)}
-
-
-def test_rows_by_proposal():
-    tracks = Tracks.blank(3)
-    tracks.proposal[:] = [2, NONE, 0]
-    assert tracks.row_of_proposal(4).tolist() == [2, NONE, 0, NONE]
+    assert renewed.columns().keys() == {f.name for f in dataclasses.fields(Tracks)}

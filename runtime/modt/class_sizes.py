@@ -18,12 +18,12 @@ IS_PERSON: Bool = np.array([spec.person for spec in CLASSES.values()])
 
 @dataclass(frozen=True, slots=True)
 class PersonSize:
-    """Bounds, all exclusive, on what may be a person [m]: they differ by what is measured and what a mistake costs.
+    """Exclusive bounds on the size of a possible person [m]. They depend on what is measured and what an error costs.
 
     Attributes:
-        max_extent_m, min_extent_m: from above.
-        min_height_m: top less bottom of what is seen.
-        min_top_m, max_top_m: above ground.
+        max_extent_m, min_extent_m: extent seen from above.
+        min_height_m: height of the visible part.
+        min_top_m, max_top_m: height of its top above the ground.
     """
 
     max_extent_m: float
@@ -40,18 +40,18 @@ class PersonSize:
 
 
 SPLIT_PERSON = PersonSize(1.3, min_height_m=0.5, min_top_m=1.1, max_top_m=2.2, min_extent_m=0.2)
-"""A part of a cluster that is split off: from a child of five to a tall person on a kerb, in stride."""
+"""Bounds for a part that is split off a cluster, from a child of five to a tall person in stride on a kerb."""
 STRIP_PERSON = PersonSize(0.9, min_height_m=0.7, min_top_m=1.1)
-"""A strip that becomes no part of a car; its extent is the width across the ray."""
+"""Bounds for a strip that is not merged into a car. Its extent is its width across the ray."""
 PART_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
-"""A proposal that becomes no part of background: from a child of five on."""
+"""Bounds for a proposal that is not merged into background, from a child of five on."""
 
 
 def unknown_near(result: FrameResult) -> Bool:
-    """(M,) tracks in view, background as far as is known, that may be people: cut above, below a third of one."""
+    """(M,) visible background tracks that may be people: the view ends below a third of a person's height."""
     own, box = result.tracks.proposal, result.proposals.box
     may_be = (result.proposals.cut & Cut.TOP > 0) & (box[:, 5] < PERSON_M / 3) & (box[:, 3] < MAX_PERSON_M)
-    unknown: Bool = np.append(may_be, False)[own]  # the last is that of NONE
+    unknown: Bool = np.append(may_be, False)[own]  # the last value is for NONE
     unknown &= result.tracks.object_class == ObjectClass.BACKGROUND
     return unknown
 

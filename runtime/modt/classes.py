@@ -23,7 +23,7 @@ class ClassSpec:
         kitti: KITTI object types that count as the class; results are written as the first.
         semantic_kitti: SemanticKITTI labels that count as the class.
         max_length_m, max_width_m: greatest size of one object, with room for the noise of its outline [m].
-        person: is or carries a person: never part of a larger object.
+        person: whether it is or carries a person, and so is never part of a larger object.
         missed_cost: cost of a missed object, relative to a false one.
         point_change: relative change of the number of points that makes a view independent (alpha of Equation 4).
         colour: in pictures and pages.
@@ -40,7 +40,7 @@ class ClassSpec:
 
 
 CLASSES: dict[ObjectClass, ClassSpec] = {
-    # What counts as background may be a car that is not recognised yet: its size is that of a car.
+    # Background has the size of a car, because it may be a car that is not recognised yet.
     ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, False, 0.0, 0.5, "#8a8f98"),
     ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 1.5, 0.2, "#2f6fde"),
     ObjectClass.PEDESTRIAN: ClassSpec(
@@ -55,8 +55,3 @@ N_CLASSES = len(CLASSES)
 PERSON_M = 1.7  # height of a person
 OBJECTS = tuple(CLASSES)[1:]
 """Every class but background."""
-
-
-def class_of_kitti(kind: str) -> ObjectClass:
-    """Class of a KITTI object type, background where no class claims it."""
-    return next((c for c, spec in CLASSES.items() if kind in spec.kitti), ObjectClass.BACKGROUND)

@@ -27,11 +27,7 @@ REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 
 
 class ValueRangeError(MisuseError):
-    """A configuration value of the wrong type or out of its range; `key` names it."""
-
-    def __init__(self, key: str, cause: str, remedy: str) -> None:
-        super().__init__(key, cause, remedy)
-        self.key = key
+    """A configuration value of the wrong type or out of its range. Its subject is the key."""
 
 
 def number(default: float | None, low: float, high: float, unit: str, meaning: str) -> Any:
@@ -56,7 +52,8 @@ def per_class(
     """Field of a number for each class; the defaults are a column of the class table, null without one."""
     values = tuple(getattr(CLASSES[c], column) for c in classes) if column else None
     meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in classes)}."
-    return field(default=values, metadata={"low": low, "high": high, "length": len(classes), "meaning": meaning})
+    facts = {"low": low, "high": high, "least": len(classes), "most": len(classes), "meaning": meaning}
+    return field(default=values, metadata=facts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,19 +89,15 @@ def check(declared: Field[Any], value: object) -> None:
 
 
 def _check_numbers(key: str, value: object, whole: bool, bounds: Mapping[str, Any]) -> None:
-    several = "length" in bounds or "most" in bounds
-    numbers = value if several and isinstance(value, tuple) else (value,)
+    numbers = value if "most" in bounds and isinstance(value, tuple) else (value,)
     noun = "a whole number" if whole else "a number"
     span = f"{noun} from {bounds['low']:g} to {bounds['high']:g}"
-    if "length" in bounds:
-        span = f"{bounds['length']} values, each {span}"
-        if len(numbers) != bounds["length"]:
-            raise ValueRangeError(key, f"{value!r} does not fit", f"give {span}")
     if "most" in bounds:
-        span = f"{bounds['least']} to {bounds['most']} values, each {span}"
-        if not bounds["least"] <= len(numbers) <= bounds["most"]:
+        least, most = bounds["least"], bounds["most"]
+        span = f"{most if least == most else f'{least} to {most}'} values, each {span}"
+        if not least <= len(numbers) <= most:
             raise ValueRangeError(key, f"{len(numbers)} values", f"give {span}")
-        if bounds["pairs"] and len(numbers) % 2:
+        if bounds.get("pairs") and len(numbers) % 2:
             raise ValueRangeError(key, f"{len(numbers)} values are no pairs", "give from and to of each, in one list")
     remedy = f"give {span} {bounds.get('unit', '')}".rstrip()
     for number in numbers:
@@ -301,11 +294,9 @@ class SensorConfig(StageConfig):
     @property
     def beams(self) -> Beams:
         """Spacing of the beams."""
-        from modt.geometry.beams import BeamTable, EvenBeams  # NumPy, which commands import after they are pinned
+        from modt.geometry.beams import beams_of  # NumPy, which commands import after they are pinned
 
-        if self.elevations_deg is None:
-            return EvenBeams(self.elevation_step_deg)
-        return BeamTable(self.elevations_deg)
+        return beams_of(self.elevations_deg, self.elevation_step_deg)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -87,7 +87,7 @@ class TrackedObjects:
         return len(self.id)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
-        """One row, as in as_dicts; iteration yields the rows too."""
+        """One row, as in as_dicts. Iteration yields the rows too."""
         return self.take(np.array([range(len(self))[index(row)]])).as_dicts()[0]
 
     def __repr__(self) -> str:
@@ -111,13 +111,13 @@ class TrackedObjects:
         return self.take((self.object_class != ObjectClass.BACKGROUND) & self.visible)
 
     def as_dicts(self) -> list[dict[str, Any]]:
-        """One dictionary a row, of plain numbers and lists; object_class is a name."""
+        """One dictionary a row, of plain numbers and lists. Its object_class is a name."""
         columns = {name: column.tolist() for name, column in self._columns().items()}
         columns["object_class"] = [CLASS_NAMES[c] for c in self.object_class.tolist()]
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def to_pandas(self) -> Any:
-        """pandas.DataFrame with the columns of as_dicts; MisuseError if pandas is not installed."""
+        """pandas.DataFrame with the columns of as_dicts. Raises MisuseError if pandas is not installed."""
         try:
             pandas = import_module("pandas")
         except ModuleNotFoundError as error:
@@ -163,7 +163,7 @@ class Pipeline:
 
     @classmethod
     def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:
-        """Make a pipeline from profiles by name or file; later ones win key by key.
+        """Make a pipeline from profiles by name or file. Later ones win key by key.
 
         If no profile names the sensor, it is that of the default, or the one that the first sweep shows.
 
@@ -188,7 +188,7 @@ class Pipeline:
             points: a frame of `open`, which needs no other argument; or (N, 3) or (N, 4) x, y, z [m, sensor frame:
                 x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
-            T_world_sensor: (4, 4) pose at the stamp; None estimates the motion of the sensor from the proposals.
+            T_world_sensor: (4, 4) pose at the stamp. None estimates the motion of the sensor from the proposals.
             turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
 
         Raises:
@@ -223,8 +223,6 @@ class Pipeline:
         self._index, self._stamp_s = self._index + 1, float(stamp_s)
         result = self._pipeline.step(frame, self._budget)
         tracks, visible = result.tracks, result.tracks.proposal != NONE
-        box = np.full((len(tracks), 7), np.nan)
-        box[visible] = result.proposals.box[tracks.proposal[visible]]
         return TrackedObjects(
             id=tracks.id,
             object_class=tracks.object_class,
@@ -232,7 +230,7 @@ class Pipeline:
             final=tracks.final,
             visible=visible,
             unknown_near=unknown_near(result),
-            box_sensor=box,
+            box_sensor=np.vstack([result.proposals.box, np.full(7, np.nan)])[tracks.proposal],  # NONE: the last row
             box_world=tracks.box,
             position=tracks.x[:, :2],
             heading_rad=tracks.x[:, 2],
@@ -245,7 +243,7 @@ class Pipeline:
 
 
 def _checked(points: ArrayLike) -> Float32:
-    """(N, 4) finite points; a missing fourth column is filled with unrecorded reflectance."""
+    """(N, 4) finite points. A missing fourth column is filled with unrecorded reflectance."""
     rows = np.array(points, np.float32)
     if rows.ndim != 2 or rows.shape[1] not in (3, 4):
         raise MisuseError("points", f"of shape {rows.shape}", "give rows of x, y, z or x, y, z, reflectance")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from modt.types import Bool, Float64, Int, Proposals
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """The proposals of a frame in the world; P rows.
+    """The proposals of a frame in the world, P rows.
 
     Attributes:
         box: (P, 7) world frame.
@@ -44,24 +44,16 @@ class Observations:
         """(P, 2) centre of the k-DOP along x and y [m]."""
         return centres(self.kdop)[::2].T
 
-    def moved(self, step: Float64) -> Observations:
-        """A copy, displaced by steps (P, 2) [m, world]."""
-        box = self.box.copy()
-        box[:, :2] += step
-        return Observations(
-            box=box,
-            centroid=self.centroid + step,
-            kdop=self.kdop + DIRECTIONS.T @ step.T,
-            bottom=self.bottom,
-            top=self.top,
-            count=self.count,
-            range_m=self.range_m,
-            sensor_xy=self.sensor_xy,
-        )
+    def move(self, step: Float64) -> None:
+        """Displace all in place by steps (P, 2) [m, world]."""
+        self.box[:, :2] += step
+        self.centroid[:] += step
+        self.kdop[:] += DIRECTIONS.T @ step.T
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""
-        return Observations(
+        return replace(
+            self,
             box=self.box.take(rows, axis=0),
             centroid=self.centroid.take(rows, axis=0),
             kdop=self.kdop.take(rows, axis=1),
@@ -69,7 +61,6 @@ class Observations:
             top=self.top[rows],
             count=self.count[rows],
             range_m=self.range_m[rows],
-            sensor_xy=self.sensor_xy,
         )
 
     def put(self, rows: Int, few: Observations) -> None:
@@ -96,7 +87,7 @@ def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKern
 
 @dataclass(frozen=True, slots=True)
 class StaticTracks:
-    """The tracks after a frame, as the odometry needs them; M rows in the order of their ids.
+    """The tracks after a frame, as the odometry needs them, M rows in the order of their ids.
 
     Attributes:
         id: (M,) ascending.

@@ -71,7 +71,7 @@ class Tracker(Protocol):
         """Predict, associate and update; afterwards every proposal belongs to one track."""
 
     def conclude(self, rows: Int, certain: Bool) -> Tracks:
-        """Tell the state machine of the frame's classifications; a copy of the tracks."""
+        """Apply the frame's classifications to the state machine; returns a copy of the tracks."""
 
 
 class Classifier(Protocol):
@@ -91,7 +91,7 @@ class Fusion(Protocol):
         """(M,) tracks whose view of this frame is worth a classification."""
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Write the posterior of the rows; (R,) whether each class is confirmed."""
+        """Write the posteriors of the rows; returns (R,) whether each class is confirmed."""
 
 
 @dataclass(frozen=True, slots=True)

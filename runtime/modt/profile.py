@@ -95,13 +95,6 @@ def from_yaml(text: str, origin: Path | str) -> Any:
         raise MisuseError(origin, "no YAML", "give the run directory of a whole run") from None
 
 
-def value_text(value: Any) -> str:
-    """A value on one line."""
-    plain = list(value) if isinstance(value, tuple) else value
-    text: str = yaml.safe_dump(plain, default_flow_style=True, allow_unicode=True, width=float("inf"))
-    return text.removesuffix("\n").removesuffix("\n...")
-
-
 def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int) -> dict[str, Any]:
     """Values of the keys of a stage."""
     known = {f.name: f for f in fields(kind)}
@@ -161,12 +154,10 @@ class Resolved:
 
     Attributes:
         layers: the profiles that are asked for, each after those that it extends; later ones win.
-        assumed: the DEFAULT profile, on which they are based if none of them sets a key of the sensor.
-        config: the resulting configuration.
+        config: the resulting configuration, based on the DEFAULT if none of them sets a key of the sensor.
     """
 
     layers: tuple[Layer, ...]
-    assumed: tuple[Layer, ...]
     config: ProfileConfig
 
     def used(self, default: str) -> tuple[str, ...]:
@@ -187,17 +178,6 @@ class Resolved:
         """
         return _configured(self.layers, base)
 
-    def shown(self) -> str:
-        """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
-        text, layers = "", (*reversed(self.layers), *reversed(self.assumed))
-        for stage, values in dump(self.config).items():
-            text += f"{stage}:\n"
-            for key, value in values.items():
-                set_by = next((layer.name for layer in layers if key in layer.settings.get(stage, ())), "default")
-                text += f"  {key}: {value_text(value)} # {set_by}\n"
-        near_m = self.config.sensor.person_seen_from_m
-        return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
-
 
 def load(names: Names = None) -> ProfileConfig:
     """Configuration of profiles by name or file, of the DEFAULT if there are none; raises as `resolve` does."""
@@ -213,7 +193,7 @@ def resolve(names: Names = None) -> Resolved:
     """
     layers = _layers((names,) if isinstance(names, str | Path) else names or ())
     assumed = () if any(layer.of_sensor for layer in layers) else _layers([DEFAULT])
-    return Resolved(layers, assumed, _configured((*assumed, *layers), ProfileConfig()))
+    return Resolved(layers, _configured((*assumed, *layers), ProfileConfig()))
 
 
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
@@ -276,4 +256,4 @@ def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:
         return replace(base, **{stage: replace(getattr(base, stage), **values) for stage, values in merged.items()})
     except ValueRangeError as error:
         names = ", ".join(layer.name for layer in layers)
-        raise MisuseError(f"{names}: {error.key}", error.cause, error.remedy) from None
+        raise MisuseError(f"{names}: {error.subject}", error.cause, error.remedy) from None

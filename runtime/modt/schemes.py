@@ -10,10 +10,9 @@ from modt.address import Address, Scheme, open_address
 
 if TYPE_CHECKING:
     from modt.config import OdometryConfig
-    from modt.sinks.output import Sink, Writer
+    from modt.sinks.output import Sink
     from modt.sources.live.live_stream import LiveStream
     from modt.sources.pose_source import PoseSource
-    from modt.types import FrameResult
 
 
 def open_sensor(text: str, cores: frozenset[int] | None = None) -> LiveStream:
@@ -59,13 +58,13 @@ def _opener(module: str, name: str) -> Callable[..., Any]:
 
 def _background(module: str, name: str, depth: int) -> Callable[[Address], Sink]:
     """Opener of a writer that may wait; at most `depth` frames, with their points, wait for it."""
-    return lambda address: _in_background(address, _opener(module, name)(address), depth)
 
+    def opened(address: Address) -> Sink:
+        from modt.sinks.background import Background
 
-def _in_background(address: Address, writer: Writer[FrameResult], depth: int) -> Sink:
-    from modt.sinks.background import Background
+        return Background(address.text, _opener(module, name)(address), depth)
 
-    return Background(address.text, writer, depth)
+    return opened
 
 
 def _pose_socket(address: Address, config: OdometryConfig) -> PoseSource:

@@ -1,16 +1,14 @@
 """Data that the stages exchange.
 
-Everything is a structure of arrays: a frame's work is vectorised over points, proposals and tracks. P is the
-number of proposals in a frame, M the number of tracks alive, N the number of points.
+Everything is a structure of arrays, so that the work of a frame is vectorised over points, proposals and tracks. P is
+the number of proposals in a frame, M the number of tracks alive, N the number of points.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from enum import IntFlag
 from functools import cache
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,9 +27,9 @@ Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 NONE = -1
-"""Index of nothing: a track without a proposal, a proposal without a track."""
+"""Index that stands for no proposal or no track."""
 UNRECORDED = -1.0
-"""Reflectance of a return whose reflectance was not recorded; any value below 0 means the same."""
+"""Reflectance of a return whose reflectance was not recorded. Any value below 0 means the same."""
 N_REFLECTANCE = 5
 """Number of statistics of a proposal's reflectance."""
 
@@ -47,10 +45,10 @@ class Frame:
             UNRECORDED. Finite throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
         restarts: number of times that the odometry has begun anew in a world unrelated to the one before.
-        turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
-            ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
-            stamp, compensated or by a sensor that does not turn.
-        steady_s: time by a clock that nobody sets [s], where that of the stamps may be set; None: the stamp.
+        turn_s: duration of one turn of the head [s]. A turn begins and ends behind the sensor, and faces straight
+            ahead at the stamp. Clockwise seen from above is positive. With 0 all points are as if seen at the stamp,
+            because they are compensated or the sensor does not turn.
+        steady_s: time by a clock that is never set [s], if the clock of the stamps may be set; else None.
         R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
         frame_id: name of the frame of the points in the messages they came in; "" where those name none.
     """
@@ -76,7 +74,7 @@ class Frame:
 
 
 class Cut(IntFlag):
-    """Sides of a proposal that end where the view of the sensor ends: what lies beyond them is not known."""
+    """Sides of a proposal that end where the view of the sensor ends. The object may reach beyond them."""
 
     TOP = 1  # at the highest beam
     BOTTOM = 2  # at the lowest beam
@@ -137,14 +135,9 @@ class Proposals:
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
 
-    def take(self, which: Int) -> Proposals:
-        """A copy of the rows given, in their order."""
-        runs = np.stack([self.offsets[which], self.offsets[which + 1]])
-        return self.regrouped(*copy_runs(self.members, self.coordinates, runs), self.count[which], which)
-
     @classmethod
     def empty(cls) -> Proposals:
-        """No proposals: a frame like any other."""
+        """No proposals."""
         return cls(
             members=np.zeros(0, np.int64),
             offsets=np.zeros(1, np.int64),
@@ -173,10 +166,10 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
 def regrouped(
     members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int
 ) -> tuple[Int, Float32, Int]:
-    """Members (K,) and (3, K) coordinates by label, below n, each in its order; (n,) count of each label.
+    """Sort members (K,) and (3, K) coordinates by label, below n, and count (n,) the members of each label.
 
-    Those of a group, by offsets (G + 1,), have its label (G,), but for the ones moved: rows (S,), ascending, and the
-    label (S,) of each.
+    Members keep their order within a label. A group, by offsets (G + 1,), has one label (G,). The rows `moved` (S,),
+    ascending, have a label (S,) of their own instead.
     """
     label = label.repeat(offsets[1:] - offsets[:-1])
     label[moved[0]] = moved[1]
@@ -192,12 +185,12 @@ def column(kind: type, *shape: int, fill: float = 0) -> Any:
 
 @dataclass(slots=True)
 class Tracks:
-    """The tracks alive, one row each; every stage writes the columns it owns in place, and no other's."""
+    """The tracks alive, one row each. Every stage writes the columns that it owns, in place, and no others."""
 
     # Columns of the tracker
     id: Int = column(int, fill=NONE)  # never used twice in a run
     state: Int = column(int)  # value of the state machine's enumeration
-    final: Bool = column(bool)  # that state's class is final: not asked for again unless the view improves
+    final: Bool = column(bool)  # the class of that state is confirmed, and asked for only if the view improves
     x: Float64 = column(float, 4)  # filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1)
     P: Float64 = column(float, 4, 4)  # its covariance
     box: Float64 = column(float, 7)  # last box seen, world frame
@@ -208,7 +201,7 @@ class Tracks:
     missed: Int = column(int)  # frames since the last proposal
     moved_m: Float64 = column(float)  # displacement within about two seconds, as far as both ends show it
     observed_s: Float64 = column(float)  # from the first proposal to the last
-    size_m: Float64 = column(float, 3)  # length, width and height, as large as they were seen for some frames
+    size_m: Float64 = column(float, 3)  # length, width and height that were seen for some frames
     hidden: Bool = column(bool)  # a person of whom the view cuts off the upper half
     # Columns of the fusion
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen
@@ -242,7 +235,7 @@ class Tracks:
 
     @classmethod
     def blank(cls, m: int = 0) -> Self:
-        """M rows: no identity, no proposal, no view yet, all classes alike."""
+        """M rows without identity, proposal and view, with all classes alike."""
         return cls(*(np.repeat(entry[None], m, axis=0) for entry in cls._blank_row()))
 
     @classmethod
@@ -250,29 +243,20 @@ class Tracks:
     def _blank_row(cls) -> tuple[NDArray[Any], ...]:
         return tuple(f.metadata["blank"] for f in fields(cls))
 
-    @classmethod
-    @cache
-    def _getter(cls) -> attrgetter[tuple[NDArray[Any], ...]]:
-        return attrgetter(*(f.name for f in fields(cls)))
-
-    def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Every column with its name."""
-        return zip((f.name for f in fields(self)), self._columns(), strict=True)
-
-    def _columns(self) -> tuple[NDArray[Any], ...]:
-        columns: tuple[NDArray[Any], ...] = self._getter()(self)
-        return columns
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name."""
+        return {name: getattr(self, name) for name in self.__match_args__}
 
     def copy(self) -> Self:
         """The same rows, independent of these."""
-        return type(self)(*[column.copy() for column in self._columns()])
+        return type(self)(*[column.copy() for column in self.columns().values()])
 
     def renewed(self, kept: Int, n: int) -> Self:
         """The rows kept, by index, then n blank ones."""
         if not len(self):
             return self.blank(n)
         rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
-        columns = [column.take(rows, axis=0) for column in self._columns()]
+        columns = [column.take(rows, axis=0) for column in self.columns().values()]
         for column, blank in zip(columns, self._blank_row(), strict=True):
             column[len(kept) :] = blank
         return type(self)(*columns)
@@ -296,7 +280,7 @@ class TrackedFrame:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """Limits of one frame's classification; None means no limit."""
+    """Limits of one frame's classification. None means no limit."""
 
     calls: int | None = None  # proposals classified
     cpu_ms: float | None = None  # CPU time by the cost model [ms]

@@ -1,4 +1,4 @@
-"""Assembly of the pipeline: `segmentation.kernels`, warming up, and a budget that buys something."""
+"""Assembly of the pipeline: `segmentation.kernels`, and a budget that buys something."""
 
 import dataclasses
 import itertools
@@ -8,7 +8,6 @@ import pytest
 
 from modt import profile
 from modt.app import assembly
-from modt.classification.pointnet import PointNet
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.native.library import NotAvailableError
@@ -20,20 +19,6 @@ BASE = profile.load("vlp-16")
 def pipeline(mode="accurate", **scheduler):
     config = dataclasses.replace(BASE, scheduler=dataclasses.replace(BASE.scheduler, **scheduler))
     return assembly.pipeline(assembly.MODES[mode], config, FieldOfView())
-
-
-def test_the_network_has_run_on_every_size_of_batch_before_the_first_frame(monkeypatch):
-    batches, infer = set(), PointNet.infer
-
-    def noted(self, batch, *more):
-        batches.add(batch.shape[:2])
-        return infer(self, batch, *more)
-
-    monkeypatch.setattr(PointNet, "infer", noted)
-    pipeline()
-    batch, most = BASE.classification.batch, BASE.classification.max_points
-    assert {(1, most), (batch, most)} <= batches
-    assert min(points for _, points in batches) < most
 
 
 @pytest.mark.parametrize(

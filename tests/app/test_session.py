@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment, OncePerSecond
-from modt.app.deadlines import Deadlines, Timing
+from modt.app.deadlines import Deadlines
 from modt.app.ladder import Step
 from modt.app.playback import Playback
 from modt.app.session import WAIT_S, Session
@@ -108,12 +108,13 @@ def test_every_sweep_in_time_goes_through():
     live = Live(10.0, sinks=[sink]).run()
     assert len(live.seen) == 100
     assert sink.indices == live.seen
-    assert live.deadlines.timing.missed == live.sensor.dropped == live.deadlines.shed == 0
+    assert live.deadlines.missed == live.sensor.dropped == live.deadlines.shed == 0
     assert live.deadlines.report()["lateness_ms"]["max"] == 0.0
     ((first, named),) = (made.args for made in live.stages.recognise.call_args_list)
     assert (first.index, named) == (1, "vlp-16")
     assert [made.args[0].index for made in live.stages.watch.call_args_list] == live.seen
-    assert live.deadlines.report()["latency_ms"]["max"] == pytest.approx(20.0)
+    report = live.deadlines.report()
+    assert (report["execution_ms"]["max"], report["latency_ms"]["max"]) == pytest.approx((20.0, 20.0))
     live.supervisor.ready.assert_called_once_with()
     assert len(live.reports) in (10, 11)
     assert live.stages.steps[-1][1] == Budget(16, pytest.approx(80.0)), "of the time that is left to the deadline"
@@ -139,7 +140,10 @@ def test_under_load_the_loop_sheds_and_is_back_within_a_second(caplog):
 def test_a_slow_loop_takes_the_newest_sweep_and_counts_what_it_misses():
     live = Live(20.0, lambda t: 0.15).run()
     assert len(live.seen) + live.sensor.dropped + live.deadlines.shed == 200
-    assert live.deadlines.timing.missed == len(live.seen) - 1  # all but the first one, which warms up
+    assert live.deadlines.missed == len(live.seen) - 1  # all but the first one, which warms up
+    report = live.deadlines.report()
+    assert 0.0 < report["lateness_ms"]["max"] < 100.0
+    assert report["latency_ms"]["max"] == pytest.approx(report["lateness_ms"]["max"] + 150.0, abs=5.0)
 
 
 def test_after_a_long_first_frame_the_loop_begins_afresh():
@@ -220,17 +224,6 @@ def test_a_signal_ends_the_loop_though_the_sensor_is_silent():
     assert live.run().time.now < 103.0 + 0.5
 
 
-def test_a_frame_is_missed_when_its_result_comes_after_the_next_sweep():
-    timing = Timing()
-    assert timing.add(10.0, 10.001, 10.05, 0.1) == pytest.approx(0.5)
-    assert timing.add(10.1, 10.15, 10.21, 0.1) == pytest.approx(1.1)
-    report = timing.report()
-    assert (report["frames"], report["missed_deadlines"]) == (2, 1)
-    assert report["lateness_ms"]["max"] == pytest.approx(50.0)
-    assert report["execution_ms"]["max"] == pytest.approx(60.0)
-    assert report["latency_ms"]["max"] == pytest.approx(110.0)
-
-
 def line(**ms):
     return {"stages": {stage: {"wall_ns": int(1e6 * value)} for stage, value in ms.items()}}
 
@@ -255,7 +248,7 @@ class Frames(list):
 
 
 def starts(work, period=0.1):
-    """Times at which frames begin that take so long, and the playback after the last one."""
+    """Times at which frames begin that take so long."""
     time, out = Time(), list[float]()
     playback = Playback(Frames(work), Ledger(), 1 / period, time.sleep, time)
     for _ in work:
@@ -264,31 +257,20 @@ def starts(work, period=0.1):
         time.now += seconds
     with pytest.raises(StreamEndedError):
         playback.take(0.0)
-    return out, playback
+    return out
 
 
-@pytest.mark.parametrize(
-    ("work", "begins", "missed", "late_ms"),
-    [
-        ([0.03, 0.09, 0.0, 0.05], [0.0, 0.1, 0.2, 0.3], 0, 0),
-        ([0.35, 0.01, 0.01, 0.01], [0.0, 0.35, 0.45, 0.55], 2, 250),
-    ],
-    ids=["in time", "a stall, without a burst after it"],
-)
-def test_frames_start_at_absolute_deadlines_and_a_stall_is_counted(work, begins, missed, late_ms):
-    out, playback = starts(work)
-    assert out == pytest.approx(begins)
-    assert playback.report()["missed_deadlines"] == missed
-    assert playback.report()["max_lateness_ms"] == pytest.approx(late_ms)
+def test_frames_start_at_absolute_times_and_a_stall_is_followed_by_no_burst():
+    assert starts([0.03, 0.09, 0.0, 0.05]) == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert starts([0.35, 0.01, 0.01, 0.01]) == pytest.approx([0.0, 0.35, 0.45, 0.55])
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
 def test_frames_never_start_early_nor_in_a_burst(work):
-    out, playback = starts(work)
+    out = starts(work)
     for i, first in enumerate(out):
         for steps, later in enumerate(out[i:]):
             assert later - first >= (steps - 1) * 0.1 - 1e-6  # one frame at most is made up for, never a row of them
-    assert playback.report()["missed_deadlines"] >= sum(w > 0.21 for w in work[:-1])
 
 
 def test_a_signal_ends_a_long_sleep_of_naps_that_add_up_to_it():

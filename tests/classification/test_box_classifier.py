@@ -23,8 +23,6 @@ from modt.classification.box_classifier import (
     from_metadata,
     logits,
     proposal_features,
-    to_lists,
-    to_metadata,
 )
 from modt.classification.crops import gather, ground_z_m
 from modt.classification.pool import PoolWeights
@@ -37,6 +35,7 @@ from modt.types import Cut, Float64
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.classification.scenes import blobs
 from tools.train.dataset import Sensors, crop_features
+from tools.train.export_pointnet import classifier_entry, to_lists
 
 RNG = np.random.default_rng(5)
 SENSOR = SensorConfig()
@@ -56,7 +55,7 @@ def test_logits_agree_with_the_reference_also_in_single_precision(feature: Float
 
 
 def test_a_model_keeps_layers_in_single_precision_and_weights() -> None:
-    loaded = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
+    loaded = from_metadata({METADATA_KEY: json.dumps(classifier_entry(LAYERS, WEIGHTS))})
     assert loaded.weights == WEIGHTS
     features, whole = RNG.normal(size=(6, N_FEATURES)), np.zeros(6, np.int64)
     single = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in LAYERS]
@@ -74,12 +73,12 @@ def layer(value: float, inputs: int = N_FEATURES, outputs: int = 4) -> list[obje
     [
         *("[]", "{}", "no json"),
         *(
-            json.dumps({"weights": WEIGHTS.as_dict(), "layers": layers})
-            for layers in ([], layer(np.nan), layer(1e300), layer(0.0, N_FEATURES - 1), layer(0.0, outputs=3), {}, 3)
+            json.dumps({"weights": dataclasses.asdict(WEIGHTS), "layers": layers})
+            for layers in (layer(np.nan), layer(1e300), layer(0.0, N_FEATURES - 1), layer(0.0, outputs=3), 3)
         ),
         *(
             json.dumps({"weights": weights, "layers": to_lists(LAYERS)})
-            for weights in (WEIGHTS.as_dict() | {"network": 1.5}, {"network": 0.5, "box": 0.5}, None)
+            for weights in (dataclasses.asdict(WEIGHTS) | {"network": 1.5}, {"network": 0.5, "box": 0.5}, None)
         ),
     ],
 )

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from modt.classification import fusion as rule
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews, FusedTracks
 from modt.classification.motion_witness import log_likelihood
-from modt.classification.prior import FrequencyPrior, object_probability_reaches
+from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
@@ -41,7 +41,7 @@ class FixedPrior:
         return self.rows
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
-        return object_probability_reaches(probability, threshold)
+        return 1.0 - probability[:, 0] >= threshold
 
 
 @pytest.mark.parametrize("fusion", ALL)

@@ -30,47 +30,26 @@ def load(path: Path) -> PointNet:
     return PointNet(ClassificationConfig(model=str(path)), SensorConfig())
 
 
-def external(tensor: TensorProto) -> None:
+def elsewhere(tensor: TensorProto) -> TensorProto:
+    """The tensor, whose numbers are in another file."""
     tensor.ClearField("raw_data")
     tensor.data_location = TensorProto.EXTERNAL
     for key, value in (("location", SECRET), ("length", "48")):
-        entry = tensor.external_data.add()
-        entry.key, entry.value = key, value
+        tensor.external_data.add(key=key, value=value)
+    return tensor
 
 
-def weight_elsewhere(model: onnx.ModelProto) -> None:
-    external(model.graph.initializer[0])
-
-
-def constant_elsewhere(model: onnx.ModelProto) -> None:
-    tensor = numpy_helper.from_array(np.zeros(12, np.float32), "c")
-    external(tensor)
-    model.graph.node.append(helper.make_node("Constant", [], ["c"], value=tensor))
-
-
-def sparse_weight_elsewhere(model: onnx.ModelProto) -> None:
-    sparse = model.graph.sparse_initializer.add()
-    sparse.values.name = "s"
-    external(sparse.values)
-
-
-def sparse_zeros(model: onnx.ModelProto) -> None:
-    sparse = model.graph.sparse_initializer.add(dims=[1 << 20, 1 << 12])
-    sparse.values.CopyFrom(numpy_helper.from_array(np.zeros(1, np.float32), "s"))
-    sparse.indices.CopyFrom(numpy_helper.from_array(np.zeros(1, np.int64), "s_indices"))
-
-
-def branch(model: onnx.ModelProto) -> None:
-    graph = helper.make_graph([], "branch", [], [])
-    model.graph.node.append(helper.make_node("If", ["x"], ["y"], then_branch=graph, else_branch=graph))
-
-
-def function(model: onnx.ModelProto) -> None:
-    model.functions.append(helper.make_function("own", "f", ["a"], ["a"], [], []))
+def zeros(name: str, n: int = 1, kind: type = np.float32) -> TensorProto:
+    return numpy_helper.from_array(np.zeros(n, kind), name)
 
 
 def initializer(tensor: TensorProto) -> Callable[[onnx.ModelProto], None]:
     return lambda model: model.graph.initializer.append(tensor)
+
+
+def sparse(values: TensorProto, **options: object) -> Callable[[onnx.ModelProto], None]:
+    made = onnx.SparseTensorProto(values=values, **options)
+    return lambda model: model.graph.sparse_initializer.append(made)
 
 
 def node(kind: str, **attributes: object) -> Callable[[onnx.ModelProto], None]:
@@ -79,7 +58,10 @@ def node(kind: str, **attributes: object) -> Callable[[onnx.ModelProto], None]:
 
 TEXT = helper.make_tensor("t", TensorProto.STRING, [2], [b"a", b"b"])
 EMPTY_TEXT = TensorProto(name="t", data_type=TensorProto.STRING, dims=[1 << 26])
-EMPTY = TensorProto(name="t", data_type=TensorProto.FLOAT, dims=[1 << 20, 1 << 12])
+LARGE_DIMS = [1 << 20, 1 << 12]
+EMPTY = TensorProto(name="t", data_type=TensorProto.FLOAT, dims=LARGE_DIMS)
+BRANCH = helper.make_graph([], "branch", [], [])
+FUNCTION = helper.make_function("own", "f", ["a"], ["a"], [], [])
 
 
 @pytest.mark.parametrize(
@@ -88,16 +70,19 @@ EMPTY = TensorProto(name="t", data_type=TensorProto.FLOAT, dims=[1 << 20, 1 << 1
         (initializer(TEXT), "text"),
         (initializer(EMPTY_TEXT), "text"),
         (initializer(EMPTY), "more numbers than the file holds"),
-        (sparse_zeros, "more numbers than the file holds"),
+        (
+            sparse(zeros("s"), indices=zeros("i", kind=np.int64), dims=LARGE_DIMS),
+            "more numbers than the file holds",
+        ),
         (node("ConstantOfShape", value=TEXT), "text"),
         (node("Constant", value_string="a"), "text"),
         (node("Constant", value_strings=["a", "b"]), "text"),
         (node("Cast", to=TensorProto.STRING), "text"),
-        (weight_elsewhere, "another file"),
-        (constant_elsewhere, "another file"),
-        (sparse_weight_elsewhere, "another file"),
-        (branch, "a graph within a node"),
-        (function, "functions"),
+        (lambda model: elsewhere(model.graph.initializer[0]), "another file"),
+        (node("Constant", value=elsewhere(zeros("c", 12))), "another file"),
+        (sparse(elsewhere(zeros("s"))), "another file"),
+        (node("If", then_branch=BRANCH, else_branch=BRANCH), "a graph within a node"),
+        (lambda model: model.functions.append(FUNCTION), "functions"),
     ],
 )
 def test_what_reaches_beyond_the_file_is_refused_before_it_runs(change, cause, tmp_path, monkeypatch):

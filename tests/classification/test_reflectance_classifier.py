@@ -13,7 +13,14 @@ from scipy.special import softmax
 
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
-from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, from_lists, logits, proposal_features
+from modt.classification.box_classifier import (
+    N_FEATURES,
+    Layers,
+    MlpBoxClassifier,
+    from_lists,
+    logits,
+    proposal_features,
+)
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, BoxScores, make_prior
@@ -22,12 +29,12 @@ from modt.classification.reflectance_classifier import (
     MlpReflectanceClassifier,
     NoReflectanceClassifier,
     from_metadata,
-    to_metadata,
 )
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import N_REFLECTANCE, Cut, Proposals
 from tests.classification.scenes import blobs
+from tools.train.export_pointnet import classifier_entry, to_lists
 
 RNG = np.random.default_rng(6)
 BOX_LAYERS = from_lists([[RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4)]], N_FEATURES)
@@ -41,8 +48,15 @@ WITHOUT = BoxPrior(BoxScores(BOXES, NoReflectanceClassifier(), SENSOR), FREQUENC
 """The prior without reflectance."""
 WEIGHTS = PoolWeights(network=0.7, box=0.3, reflectance=0.5)
 OTHER_LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH)
+
+
+def metadata_of(classifiers: dict[str, tuple[Layers, PoolWeights]]) -> str:
+    """Metadata entry of classifiers by their scales."""
+    return json.dumps({scale: classifier_entry(*own) for scale, own in classifiers.items()})
+
+
 METADATA = {
-    METADATA_KEY: to_metadata(
+    METADATA_KEY: metadata_of(
         {"hdl-64e": (LAYERS, PoolWeights(reflectance=0.5)), "pandar64": (OTHER_LAYERS, PoolWeights(reflectance=0.8))}
     )
 }
@@ -96,10 +110,10 @@ def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
     np.testing.assert_array_equal(probability[[0, 2]], prior.probability(whole)[[0, 2]])
 
 
-MALFORMED = "{}", "[]", "no json", '{"hdl-64e": null}', to_metadata({"hdl-46e": (LAYERS, WEIGHTS)})
+MALFORMED = "{}", "[]", "no json", '{"hdl-64e": null}', metadata_of({"hdl-46e": (LAYERS, WEIGHTS)})
 
 
-@pytest.mark.parametrize("text", [*MALFORMED, to_metadata({"hdl-64e": (LAYERS, PoolWeights(reflectance=2.0))})])
+@pytest.mark.parametrize("text", [*MALFORMED, metadata_of({"hdl-64e": (LAYERS, PoolWeights(reflectance=2.0))})])
 def test_malformed_metadata_is_rejected(text: str) -> None:
     with pytest.raises((KeyError, TypeError, ValueError)):
         from_metadata({METADATA_KEY: text}, SENSOR)
@@ -118,8 +132,8 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     points, _ = blobs([10, 30, 60], np.random.default_rng(0))
     proposals, which = measured(), np.array([2, 0])
     metadata = {
-        box_classifier.METADATA_KEY: box_classifier.to_metadata(BOX_LAYERS, PoolWeights(0.8, 0.2)),
-        METADATA_KEY: to_metadata({"hdl-64e": (LAYERS, WEIGHTS)}),
+        box_classifier.METADATA_KEY: json.dumps(classifier_entry(BOX_LAYERS, PoolWeights(0.8, 0.2))),
+        METADATA_KEY: metadata_of({"hdl-64e": (LAYERS, WEIGHTS)}),
         CLASS_FREQUENCY_KEY: json.dumps(FREQUENCY.tolist()),
     }
     alone = PointNet(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
@@ -166,7 +180,7 @@ def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path: 
     box[:, 2], box[:, 5] = -1.0, 0.5  # lower than a person
     proposals = dataclasses.replace(blob, box=box, cut=np.array([Cut.TOP, 0, Cut.TOP]))
     whole = dataclasses.replace(proposals, cut=np.zeros(3, np.int64))
-    metadata = {box_classifier.METADATA_KEY: box_classifier.to_metadata(BOX_LAYERS, PoolWeights(0.8, 0.2))}
+    metadata = {box_classifier.METADATA_KEY: json.dumps(classifier_entry(BOX_LAYERS, PoolWeights(0.8, 0.2)))}
     model = _with_metadata(tmp_path / "net.onnx", metadata)
     alone = PointNet(model, SensorConfig()).classify(points, proposals, np.arange(3))
     np.testing.assert_array_equal(PointNet(model, SensorConfig()).classify(points, whole, np.arange(3)), alone)
@@ -175,7 +189,7 @@ def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path: 
     last = next(i for i in beside.graph.initializer if i.name == "bias5")
     last.CopyFrom(onnx.numpy_helper.from_array(np.float32([0.0, 0.0, 30.0, 0.0]), "bias5"))  # all are people
     bounds = [(np.zeros((box_classifier.N_BOUND_FEATURES, 4)), np.zeros(4))]
-    text = {box_classifier.BOUNDS_KEY: json.dumps(box_classifier.to_lists(bounds))}
+    text = {box_classifier.BOUNDS_KEY: json.dumps(to_lists(bounds))}
     onnx.helper.set_model_props(beside, text)
     (tmp_path / "net-near.onnx").write_bytes(beside.SerializeToString())
     found = PointNet(model, SensorConfig()).classify(points, proposals, np.array([2, 1, 0]))

@@ -7,8 +7,9 @@ import subprocess
 import pytest
 
 from modt import assets
-from modt.cli import main, profile
+from modt.cli import main
 from modt.schemes import SENSORS
+from modt_desk.cli import profile
 from modt_desk.cli.completion import SHELLS, commands
 
 

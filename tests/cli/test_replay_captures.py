@@ -1,16 +1,21 @@
-"""`modt replay` of packets and point clouds."""
+"""`modt replay` of packets, and of recordings of ROS 2."""
 
 import json
 
 import numpy as np
 import pytest
 
+from modt.app.supervisor import Supervisor
+from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
-from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
+from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.records import read_records
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-from .commands import here, modt, refusal
+from .commands import here, modt, refusal, session
 
 pytestmark = pytest.mark.command
 
@@ -53,3 +58,19 @@ def test_topics_are_named_on_the_command_line(tmp_path, capsys):
     path = write_mcap(tmp_path / "drive", recorded)
     assert "choose by --capture topic=NAME: /a, /b" in refusal(capsys, "replay", path, "--quiet")
     assert here("replay", path, "--capture", "topic=/b", "--quiet", "--out", tmp_path / "run") == 0
+
+
+def test_a_recording_of_sweeps_and_poses_gives_the_tracks_of_what_was_recorded(tmp_path):
+    """Boxes differ by the rounding of stamps and poses."""
+    recorded = []
+    for frame in SyntheticStream("street", "hdl-64e", 10.0, seed=0).between(0, 5):
+        s = BEGAN_S + frame.stamp_s
+        recorded.append(("/odom", ODOMETRY, s, write_odometry(s, "odom", "lidar", frame.T_world_sensor)))
+        recorded.append(("/points", CLOUD, s, write_cloud(s, "lidar", frame.points)))
+    found = []
+    for out, path in ((tmp_path / "bag", write_mcap(tmp_path / "drive", recorded)), (tmp_path / "own", None)):
+        session(out, 5, path=path, profile="hdl-64e").run(Supervisor())
+        frames = read_records(out / "tracks.jsonl", SCHEMA)
+        found.append([(t["id"], *(t["box"] or {}).values()) for frame in frames for t in frame["tracks"]])
+    assert [row[0] for row in found[0]] == [row[0] for row in found[1]]
+    np.testing.assert_allclose(*(sum((row[1:] for row in rows), ()) for rows in found), atol=0.002)

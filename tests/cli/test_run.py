@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.cli.profile import main as modt_profile
 from modt.sinks.tracks import SCHEMA
+from modt_desk.cli.profile import main as modt_profile
 from modt_desk.reporting.records import read_records
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.desk import recorded
@@ -88,7 +88,8 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     sensor = status["sensor"]
     assert sensor["sweeps"] == 15
     assert len(frames) == status["counts"]["frames"]
-    assert len(frames) + sensor["dropped_sweeps"] + status["loop"]["shed_sweeps"] == 15
+    left_out = sensor["dropped_sweeps"] + status["loop"]["shed_sweeps"] + sensor["faults"]  # on a busy machine
+    assert len(frames) + left_out == 15
     described = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())
     assert described["service"] is True
     assert described["recognition"]["used"] == "as found"
@@ -98,7 +99,7 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert "<h2>Lateness</h2>" in page.read_text()
     pytest.importorskip("foxglove")
     assert here("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap") == 0
-    assert (tmp_path / "run.mcap").stat().st_size > 15 * 100_000  # with the points
+    assert (tmp_path / "run.mcap").stat().st_size > len(frames) * 100_000  # with the points
 
 
 def test_a_reload_before_it_is_ready_does_not_end_it(start):
@@ -158,6 +159,8 @@ def test_the_run_is_seen_in_a_browser_while_it_goes_on(start, chromium):
         before = tab.value("last")
         tab.until(f"last > {before} + 2")
         assert tab.value("[state.at, canvas.dataset.frame === String(frames[1].frame)]") == [1, True]
+        story = "(state.kept = rowsAt[1][0].id, showStory(), element('story').innerText)"
+        assert "mJ" not in tab.value(story)  # what a track cost is known afterwards
         tab.press("End")
         tab.until(f"state.at > {before}")
     assert service.end()[0] == 0
@@ -215,8 +218,7 @@ def test_check_names_each_shortcoming_with_its_remedy_and_fails_without_a_sensor
 
 def test_a_power_limit_is_kept_and_named_an_estimate_where_it_is_one(scans, tmp_path):
     own = tmp_path / "robot.yaml"
-    text = profile.to_yaml(profile.dump(profile.load("vlp-16")))
-    own.write_text(text.replace("power_W: null", "power_W: 0.5").replace("min_s: 1.0", "min_s: 0.2"))
+    own.write_text("extends: vlp-16\nloop: {power_W: 0.5}\n")
     done = modt("run", scans, "--profile", own, "--out", tmp_path / "run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     status = json.loads((tmp_path / "run" / "status.json").read_text())

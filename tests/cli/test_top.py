@@ -1,74 +1,55 @@
-"""`modt top` in a terminal of its own."""
+"""`modt top`: the page follows the status."""
 
-import fcntl
 import json
-import os
-import pty
-import struct
-import subprocess
 import sys
-import termios
-import time
-from select import select
+from unittest.mock import Mock
 
 import pytest
 
+from modt.cli.status import CLEAR
+from modt.sinks.run_directory import STATUS
 from tests.results import status
 
-from .commands import environment, here, refusal
+from .commands import here, refusal
 
 pytestmark = pytest.mark.command
 
-DEADLINE_S = 60.0
+
+@pytest.fixture(name="write")
+def a_function_that_writes_the_status(tmp_path):
+    return lambda **changes: (tmp_path / STATUS).write_text(json.dumps(status(**changes)))
 
 
-def write(folder, content):
-    partial = folder / "partial"
-    partial.write_text(json.dumps(content))
-    partial.rename(folder / "status.json")
+def test_in_a_terminal_the_page_follows_the_status_until_ctrl_c(write, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    meanwhile = iter([lambda: write(rate_hz=5.0), (tmp_path / STATUS).unlink, lambda: write(rate_hz=7.0)])
+
+    def sleep(seconds):
+        for change in meanwhile:
+            return change()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("modt.cli.status.time.sleep", sleep)
+    write()
+    assert here("top", tmp_path) == 0
+    first, *pages = capsys.readouterr().out.split(CLEAR)[1:]
+    assert "10.0 Hz, 7 tracks (2 car)" in first
+    assert "udp://x" in first
+    assert "a?[2Jb" in first, "escape sequences are replaced"
+    assert [words in page for words, page in zip(("5.0 Hz", "no status", "7.0 Hz"), pages, strict=True)] == [True] * 3
 
 
-def test_in_a_terminal_the_page_follows_the_status_until_ctrl_c(tmp_path):
-    write(tmp_path, status())
-    side, far = pty.openpty()
-    fcntl.ioctl(far, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
-    # The first terminal that a session opens is its own: Ctrl-C in it reaches the command.
-    opened = ["sh", "-c", 'exec "$@" <"$0" >"$0" 2>&1', os.ttyname(far)]
-    command = [*opened, sys.executable, "-m", "modt.cli.main", "top", str(tmp_path)]
-    process = subprocess.Popen(command, env=environment(), start_new_session=True)
-    shown = ""
-
-    def read_until(text):
-        nonlocal shown
-        end_s = time.monotonic() + DEADLINE_S
-        while text not in shown:
-            ready, _, _ = select([side], [], [], max(end_s - time.monotonic(), 0))
-            assert ready, f"no {text!r} in {shown!r}"
-            shown += os.read(side, 4096).decode()
-        before, _, shown = shown.partition(text)
-        return before
-
-    try:
-        page = read_until("udp://x")
-        assert "10.0 Hz, 7 tracks (2 car)" in page
-        assert "a?[2Jb" in page, "escape sequences are replaced"
-        write(tmp_path, status(rate_hz=5.0))
-        read_until("5.0 Hz")
-        (tmp_path / "status.json").unlink()
-        read_until("no status")
-        write(tmp_path, status(rate_hz=7.0))
-        read_until("7.0 Hz")
-        os.write(side, b"\x03")
-        assert process.wait(DEADLINE_S) == 0
-    finally:
-        process.kill()
-        process.wait()
-        os.close(side)
-        os.close(far)
+def test_a_low_terminal_shows_the_first_lines(write, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setattr("modt.cli.status.time.sleep", Mock(side_effect=KeyboardInterrupt))
+    monkeypatch.setenv("LINES", "4")
+    write()
+    assert here("top", tmp_path) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 3
 
 
-def test_without_a_terminal_it_is_printed_once(tmp_path, capsys):
+def test_without_a_terminal_it_is_printed_once(write, tmp_path, capsys):
     assert refusal(capsys, "top", tmp_path)
-    write(tmp_path, status(stages_J={}))
+    write(stages_J={})
     assert here("top", tmp_path) == 0
     assert "10.0 Hz, 7 tracks" in capsys.readouterr().out

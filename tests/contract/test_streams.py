@@ -1,37 +1,16 @@
 """Contract of every source."""
 
 import itertools
-import json
-import socket
 
 import numpy as np
 import pytest
 
-from modt.config import OdometryConfig
-from modt.sources.pose_socket import PoseSocket
-from modt.sources.pose_source import NoPoses, PoseFile, PoseSource
 from modt.sources.recognise import open_stream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets
 from tests.sources.point_clouds import pcd
-from tests.sources.posed_stream import PosedStream
 from tools.send.pcap_writer import write_capture
-
-
-def listed(root):
-    stream = open_stream(layouts.bare(root))
-    (root / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 2\n" * 3)
-    return PosedStream(stream, PoseFile(root / "poses.txt", stream.info.camera, stream.info.end))
-
-
-def sent(root):
-    stream = open_stream(layouts.bare(root))
-    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    for frame in stream:
-        there.send(json.dumps({"stamp": frame.stamp_s, "x": 1.0, "y": 0.0, "yaw": 0.1}).encode())
-    there.close()
-    return PosedStream(stream, PoseSocket(here, OdometryConfig(), "sent"))
 
 
 def clouds(root):
@@ -53,10 +32,6 @@ SOURCES = {
     "odometry": lambda root: open_stream(layouts.odometry(root)),
     "bare": lambda root: open_stream(layouts.bare(root)),
     "street": lambda root: SyntheticStream("street", "hdl-64e", 0.4, seed=3),
-    "recorded": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), PoseSource()),
-    "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoPoses()),
-    "listed": listed,
-    "sent": sent,
     "bag": lambda root: open_stream(bags.write_rosbag2(root / "bag", bags.by_time(bags.clouds(), bags.poses()))),
     "clouds": clouds,
     "capture": capture,
@@ -66,10 +41,7 @@ SOURCES = {
 
 @pytest.fixture(params=SOURCES, name="stream")
 def a_stream(request, tmp_path):
-    stream = SOURCES[request.param](tmp_path)
-    yield stream
-    if isinstance(stream, PosedStream):
-        stream.odometry.close()
+    return SOURCES[request.param](tmp_path)
 
 
 def test_frames_have_valid_points_and_poses_and_increasing_stamps(stream):

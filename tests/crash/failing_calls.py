@@ -146,12 +146,12 @@ class Faults:
             yield
 
     def monotonic(self) -> float:
-        """Monotonic clock, which leaps as after a stop of the process."""
+        """Monotonic clock. It leaps as it does after the process was stopped."""
         self.call("monotonic", lambda: None)
         return self.now_s
 
     def calendar(self) -> float:
-        """Calendar clock, which steps as when it is set."""
+        """Calendar clock. It steps as it does when it is set."""
         self.call("calendar", lambda: None)
         return self.now_s + self.calendar_s
 

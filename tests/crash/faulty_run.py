@@ -92,7 +92,7 @@ class Turns(LiveStream):
 
 
 def stages_with(odometry: PoseSocket) -> Mock:
-    """Stages that see a car and are no part of the test, and the poses, which are."""
+    """Stages that see a car, with the poses of the test. Only the poses are tested."""
 
     def step(frame: Frame, budget: Any, *, reduced: bool) -> Any:
         odometry.place(frame)

@@ -8,6 +8,7 @@ from modt.energy.meters import meter as meter_module
 from modt.energy.meters.discovery import discover, find_batteries, find_hwmon, find_pmic, find_powercap
 from modt.energy.meters.meter import Kind, MeterLostError, Scope, model_meter
 from modt.errors import MisuseError
+from modt_desk.energy.named_meter import choose_meter
 
 from .meter_files import write_files, write_zone
 
@@ -48,7 +49,7 @@ def test_packages_are_summed_without_overlapping_zones(tmp_path):
     why = {c.name: c.why_not for c in find_powercap(tmp_path)}
     assert why["powercap intel-rapl:0:0 (core)"] == "counted by intel-rapl:0"
     assert why["powercap intel-rapl-mmio:0 (package-0)"] == "the same package again"
-    (platform,) = look(tmp_path).choose("psys").meters
+    (platform,) = choose_meter(look(tmp_path), "psys").meters
     assert (platform.facts.scope, platform.read()) == (Scope.BOARD, pytest.approx(20.0))
 
 
@@ -93,7 +94,7 @@ def test_a_counter_that_cannot_be_read_is_listed_with_its_remedy(tmp_path):
     found = look(tmp_path)
     assert found.best.facts.kind is Kind.ESTIMATED
     with pytest.raises(MisuseError, match=r"RAPL packages: .*energy_uj: Is a directory.*CAP_DAC_READ_SEARCH"):
-        found.choose("rapl")
+        choose_meter(found, "rapl")
 
 
 CHIP = {"name": "ina226", "in1_input": 5000, "curr1_input": 900}
@@ -137,7 +138,7 @@ def board(sys, rails, model=""):
 
 
 def watts_of(found, name):
-    return sum(meter.read() for meter in found.choose(name).meters)
+    return sum(meter.read() for meter in choose_meter(found, name).meters)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +156,7 @@ def watts_of(found, name):
 @pytest.mark.parametrize("named", [True, False])
 def test_the_rails_of_a_module_follow_the_table_of_its_board(tmp_path, rails, model, module, watts, best, named):
     found = board(tmp_path, rails, model if named else "")
-    chosen = found.choose(module)
+    chosen = choose_meter(found, module)
     assert watts_of(found, module) == pytest.approx(watts)
     assert {meter.facts.scope for meter in chosen.meters} == {Scope.MODULE}
     assert best in found.best.name
@@ -165,7 +166,7 @@ def test_the_rails_of_a_module_follow_the_table_of_its_board(tmp_path, rails, mo
 def test_rails_beside_a_module_are_listed_and_never_added(tmp_path):
     """VIN_SYS_5V0 feeds the memory's rail, NC is not connected, and VDD_GPU_SOC is switched off."""
     found = board(tmp_path, AGX_ORIN | {"NC": (0, 0), "VDDQ_VDD2_1V8AO": (5000, 200)})
-    assert found.choose("hwmon ina3221 VIN_SYS_5V0").meters[0].facts.scope is Scope.RAIL
+    assert choose_meter(found, "hwmon ina3221 VIN_SYS_5V0").meters[0].facts.scope is Scope.RAIL
     assert watts_of(found, "hwmon ina3221 VIN_SYS_5V0") == pytest.approx(4.5)
     write_files(tmp_path / "class" / "hwmon" / "hwmon0", in1_enable=0)
     write_files(tmp_path / "class" / "hwmon" / "hwmon1", in4_label="sum", in4_input=2, curr4_input=1900)
@@ -185,7 +186,7 @@ def test_a_module_is_usable_without_one_of_its_rails_but_not_if_it_draws_less_th
     assert watts_of(look(tmp_path), "VDD_IN") == pytest.approx(5.0)
     found = board(tmp_path, NX | {"VDD_IN": (5000, 400)})
     with pytest.raises(MisuseError, match="less than the rails that it feeds"):
-        found.choose("VDD_IN")
+        choose_meter(found, "VDD_IN")
 
 
 def test_two_chips_with_one_label_are_two_rails(tmp_path):
@@ -254,7 +255,7 @@ def test_without_meters_the_model_is_used(tmp_path):
     assert len(unusable) == 4
     assert all(c.why_not and c.remedy for c in unusable)
     with pytest.raises(MisuseError, match="model 3 W idle"):
-        found.choose("wattmeter")
+        choose_meter(found, "wattmeter")
 
 
 def test_candidates_are_ordered_measured_integrated_estimated(tmp_path):

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from modt.config import EnergyConfig
 from modt.energy.attribution import attribute
 from modt.energy.ledger import Ledger
-from modt.energy.meters.discovery import find_hwmon, find_powercap
+from modt.energy.meters.discovery import find_powercap
 from modt.energy.meters.meter import Conditions, model_meter
 from modt.energy.windows import SCHEMA, Clocks, Windows
 
@@ -15,12 +15,12 @@ STEP_UJ, IDLE_W = 61.035, 3.0
 
 
 class Machine:
-    """A machine that draws power, its ledger, and the windows of its counter or of other meters.
+    """A machine that draws power, its ledger, and the windows of its counter.
 
     Its clocks advance with its work. It counts energy in a powercap file, in steps and with overflow.
     """
 
-    def __init__(self, sys, *meters, tick_ns=0):
+    def __init__(self, sys, tick_ns=0):
         self.true_J, self.tick_ns = 1e-6 * RANGE_UJ - 7.0, tick_ns
         self.now_ns = self.cpu_ns = 1_000_000_000
         self.slept_ns = 0
@@ -31,7 +31,7 @@ class Machine:
         self.wait(0.0)
         self.clocks = Clocks(lambda: self.now_ns, lambda: self.now_ns + self.slept_ns, lambda: self.cpu_ns)
         self.ledger = Ledger(self.ticking_ns, lambda: self.cpu_ns)
-        self.windows = Windows(meters or find_powercap(sys)[0].meters, self.clocks, Conditions(0, sys))
+        self.windows = Windows(find_powercap(sys)[0].meters, self.clocks, Conditions(0, sys))
 
     def ticking_ns(self):
         self.now_ns += self.tick_ns
@@ -107,18 +107,6 @@ def test_window_of_a_suspension_has_no_energy(machine):
     assert line["energy_J"] is None
     assert "suspended" in line["marks"]
     assert machine.second()["energy_J"] == pytest.approx(3.5, abs=1e-3)
-
-
-def test_power_is_integrated_between_edges(tmp_path):
-    files = {"name": "ina226", "power1_input": 4_000_000, "in1_input": 5000, "curr1_input": 800}
-    rail = write_files(tmp_path / "class" / "hwmon" / "hwmon0", **files)
-    machine = Machine(tmp_path, *find_hwmon(tmp_path)[0].meters)
-    (rail / "power1_input").write_text("6000000\n")
-    line = machine.second()
-    assert (line["energy_J"], line["kind"]) == (pytest.approx(5.0), "integrated")
-    (rail / "power1_input").write_text("-20000\n")
-    line = machine.second()
-    assert (line["energy_J"], line["kind"], line["marks"]) == (None, "unavailable", ["negative"])
 
 
 FRAMES = st.lists(st.tuples(st.floats(0, 0.6), st.floats(0, 0.6), st.integers(0, 4)), max_size=8)

@@ -82,6 +82,6 @@ def test_every_mode_and_sink_knows_the_class(source, profile):
         assert " Truck " in results.read_text()
         labels = np.fromfile(sorted((out / "labels").iterdir())[-1], np.uint32)
         assert 4 in labels & 0xFFFF
-    assert "frames" in run(source, "modt.cli.profile", "report", str(out))
+    assert "frames" in run(source, "modt_desk.cli.profile", "report", str(out))
     judged = json.loads(run(source, "modt", "evaluate", str(out), str(drive), "--json"))
     assert "truck" in json.dumps(judged)

@@ -1,4 +1,4 @@
-"""One input read, within a CPU time and a memory."""
+"""Reading of one input within limits of CPU time and memory."""
 
 import resource
 import signal

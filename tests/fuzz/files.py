@@ -1,11 +1,12 @@
 """Scans and KITTI's files."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from modt.geometry import Camera
-from modt.sources import kitti_calibration, oxts
+from modt.sources import kitti_calibration
 from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import read_scan
@@ -13,34 +14,42 @@ from modt_desk.box_tracking import detections as boxes
 from modt_desk.evaluation.kitti_labels import read_labels
 from modt_desk.evaluation.truth_files import open_truth
 from tests.desk.evaluation.test_truth_files import CUBOID, ITEM, LABEL, POSE
-from tests.fuzz.target import Feed, of_file, target
+from tests.fuzz.target import Feed, of_file, target, targets_of_files
 from tests.sources import layouts, point_clouds
 
-TABLE = point_clouds.table(x="f4", y="f4", z="f4", intensity="u1")
+PLY = ("binary_little_endian", "binary_big_endian", "ascii")
 AB3DMOT = "0,2,296.0,160.7,452.1,288.4,9.8,1.5,1.6,3.7,-2.9,1.8,13.5,-1.6,-1.3\n"
 TRACKLETS = ITEM.format(type="Car", first=1, poses="".join(POSE.format(y=y) for y in (8, 9)))
+CAR = LABEL.format(type="Car", edges="0 0 9 9")
+PLACES = "1 0 0 5 0 1 0 0 0 0 1 0\n" * 3
+CAMERA = Camera(np.eye(3, 4), np.eye(4), 1242.0, 375.0)
 
 
-@target()
-def scan(folder: Path) -> Feed:
-    path = folder / "a.bin"
-    return of_file(path, lambda: read_scan(path), layouts.scan(0).tobytes())
+def read_detections(path: Path) -> None:
+    for sequence in boxes.read([path]):
+        list(sequence.frames())
 
 
-@target()
-def pcd(folder: Path) -> Feed:
-    path = folder / "a.pcd"
-    encodings = ("binary", "ascii", "binary_compressed")
-    return of_file(path, lambda: read_scan(path), *(point_clouds.pcd(TABLE, data) for data in encodings))
+def clouds(write: Callable[..., bytes], z: str, *encodings: str) -> list[bytes]:
+    rows = point_clouds.table(x="f4", y="f4", z=z, intensity="u1")
+    return [write(rows, encoding) for encoding in encodings]
 
 
-@target()
-def ply(folder: Path) -> Feed:
-    path = folder / "a.ply"
-    encodings = ("binary_little_endian", "binary_big_endian", "ascii")
-    rows = point_clouds.table(x="f4", y="f4", z="f8", intensity="u1")
-    seeds = (point_clouds.ply(rows, data) for data in encodings)
-    return of_file(path, lambda: read_scan(path), *seeds)
+targets_of_files(
+    {
+        "scan": ("a.bin", read_scan, [layouts.scan(0).tobytes()]),
+        "pcd": ("a.pcd", read_scan, clouds(point_clouds.pcd, "f4", "binary", "ascii", "binary_compressed")),
+        "ply": ("a.ply", read_scan, clouds(point_clouds.ply, "f8", *PLY)),
+        "oxts_records": (
+            "0003.txt",
+            lambda path: kitti_calibration.oxts_poses(kitti_calibration.read_oxts(path)),
+            ["\n".join(layouts.oxts_line(2.0 * f) for f in range(3))],
+        ),
+        "poses": ("poses.txt", read_poses, [PLACES]),
+        "labels_of_frame": ("labels.txt", lambda path: read_labels(path, CAMERA, tracking=False), [CAR * 2]),
+        "detections": ("0003.txt", read_detections, [AB3DMOT * 2, f"0 -1 {CAR.strip()} 0.9\n" * 2]),
+    }
+)
 
 
 @target()
@@ -73,13 +82,6 @@ def calibration_of_drive(folder: Path) -> Feed:
 
 
 @target()
-def oxts_records(folder: Path) -> Feed:
-    path = folder / "0003.txt"
-    seed = "\n".join(layouts.oxts_line(2.0 * f) for f in range(3))
-    return of_file(path, lambda: oxts.poses(oxts.read_records(path)), seed)
-
-
-@target()
 def time_stamps(folder: Path) -> Feed:
     """Time stamps of the sweeps, the same for their begin and their end."""
     drive = layouts.raw_drive(folder)
@@ -100,12 +102,6 @@ def times_of_sequence(folder: Path) -> Feed:
 
 
 @target()
-def poses(folder: Path) -> Feed:
-    path = folder / "poses.txt"
-    return of_file(path, lambda: read_poses(path), "1 0 0 5 0 1 0 0 0 0 1 0\n" * 3)
-
-
-@target()
 def truth_of_drive(folder: Path) -> Feed:
     drive = layouts.raw_drive(folder)
     seed = f"<root><tracklets>{TRACKLETS}</tracklets></root>"
@@ -113,35 +109,16 @@ def truth_of_drive(folder: Path) -> Feed:
 
 
 @target()
-def labels_of_frame(folder: Path) -> Feed:
-    path, camera = folder / "labels.txt", Camera(np.eye(3, 4), np.eye(4), 1242.0, 375.0)
-    seed = LABEL.format(type="Car", edges="0 0 9 9") * 2
-    return of_file(path, lambda: read_labels(path, camera, tracking=False), seed)
-
-
-@target()
 def truth_of_sequence(folder: Path) -> Feed:
     scans = layouts.tracking(folder)
     path = scans.parents[1] / "label_02" / "0003.txt"
     path.parent.mkdir()
-    parts = [LABEL.format(type=kind, edges="0 0 9 9") for kind in ("Car", "DontCare")]
-    return of_file(path, lambda: open_truth(path, scans), f"0 4 {parts[0]}0 -1 {parts[1]}2 4 {parts[0]}")
+    other = LABEL.format(type="DontCare", edges="0 0 9 9")
+    return of_file(path, lambda: open_truth(path, scans), f"0 4 {CAR}0 -1 {other}2 4 {CAR}")
 
 
 @target()
 def cuboids(folder: Path) -> Feed:
-    (folder / "poses.txt").write_text("1 0 0 5 0 1 0 0 0 0 1 0\n" * 3)
+    (folder / "poses.txt").write_text(PLACES)
     seed = CUBOID + "0,3,Car,9,1,0.5,2,1,1.5,0.1\n2,3,Car,9,1,0.5,2,1,1.5,0.1\n"
     return of_file(folder / "truth.csv", lambda: open_truth(folder), seed)
-
-
-@target()
-def detections(folder: Path) -> Feed:
-    path = folder / "0003.txt"
-    label = "0 -1 " + LABEL.format(type="Car", edges="0 0 9 9").strip() + " 0.9\n"
-
-    def read() -> None:
-        for sequence in boxes.read([path]):
-            list(sequence.frames())
-
-    return of_file(path, read, AB3DMOT * 2, label * 2)

@@ -1,4 +1,4 @@
-"""Inputs of a running robot: sweeps of any numbers, and requests for its page."""
+"""Inputs of a running robot: sweeps with any values, and requests for its page."""
 
 import ctypes
 from io import BytesIO

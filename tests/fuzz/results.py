@@ -21,7 +21,7 @@ def json_lines(records: Iterable[dict[str, Any]]) -> bytes:
 
 @target()
 def viewed_run(folder: Path) -> Feed:
-    """The view of a run from its ledger and its tracks, which a line `---` separates."""
+    """The view of a run by its ledger and its tracks, with a line `---` between."""
     run = described(write_run(folder / "run", frames=2))
     ledger, tracks, costs = run / "ledger.jsonl", run / "tracks.jsonl", [ledger_line(k, 1) for k in range(2)]
     seed = [*costs, window(0, costs, 1.5)]

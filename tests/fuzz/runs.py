@@ -23,7 +23,7 @@ from modt_desk.evaluation.truth_files import open_truth
 from tests.cli.test_top import status as status_record
 from tests.desk.evaluation.test_truth_files import tracklets
 from tests.desk.reporting.test_run_report import track, write_run
-from tests.fuzz.target import Feed, of_file, target
+from tests.fuzz.target import Feed, of_file, target, targets_of_files
 from tests.sources import layouts
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -34,15 +34,6 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 DESCRIPTION = "schema: modt.run/1\nstream: {name: street, path: null}\nmode: efficient\nfov: full\nprofile: {}\n"
 DESCRIPTION += "recognition: {used: vlp-16}\n"
 SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.splitlines())}]}}\n"
-
-
-@target()
-def profiles(folder: Path) -> Feed:
-    files = (assets.folder("profiles") / f"{name}.yaml" for name in ("hdl-64e", "vlp-16"))
-    stages = (profile.to_yaml({stage: values}) for stage, values in profile.dump(ProfileConfig()).items())
-    path = folder / "robot.yaml"
-    seeds = [file.read_bytes() for file in files]
-    return of_file(path, lambda: profile.load(path), *seeds, *stages, BOMB, SENSOR_BOMB)
 
 
 def network() -> onnx.ModelProto:
@@ -60,21 +51,24 @@ def network() -> onnx.ModelProto:
     return onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 13)], ir_version=8)
 
 
-def _loading(path: Path) -> Callable[[], object]:
-    return lambda: PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+def load(path: Path) -> PointNet:
+    return PointNet(ClassificationConfig(model=str(path)), SensorConfig())
 
 
-@target()
-def models(folder: Path) -> Feed:
-    path = folder / "net.onnx"
-    return of_file(path, _loading(path), network().SerializeToString())
+SHIPPED = [(assets.folder("profiles") / f"{name}.yaml").read_bytes() for name in ("hdl-64e", "vlp-16")]
+STAGES = [profile.to_yaml({stage: values}) for stage, values in profile.dump(ProfileConfig()).items()]
+targets_of_files(
+    {
+        "profiles": ("robot.yaml", profile.load, [*SHIPPED, *STAGES, BOMB, SENSOR_BOMB]),
+        "models": ("net.onnx", load, [network().SerializeToString()]),
+    }
+)
 
 
 @target()
 def model_metadata(folder: Path) -> Feed:
     """The classifiers of boxes and of reflectance, and the class frequency, a line each."""
     path = folder / "net.onnx"
-    load = _loading(path)
     weights = {"network": 0.8, "box": 0.5, "reflectance": 0.3}
     box = {"weights": weights, "layers": [[[[0.1] * 4] * 7, [0.2] * 4]]}
     reflectance = {"hdl-64e": {"weights": weights, "layers": [[[[0.1] * 4] * 12, [0.2] * 4]]}}
@@ -85,13 +79,13 @@ def model_metadata(folder: Path) -> Feed:
         for key, value in zip(entries, raw.split(b"\n"), strict=False):
             model.metadata_props.add(key=key, value=value.decode("utf-8", "replace"))
         path.write_bytes(model.SerializeToString())
-        load()
+        load(path)
 
     return ["\n".join(map(json.dumps, entries.values())).encode()], call
 
 
 def _report(run: Path) -> Callable[[], object]:
-    """The command, whose text goes nowhere."""
+    """The command on a run, without its output."""
 
     def read() -> None:
         with redirect_stdout(StringIO()):
@@ -145,7 +139,7 @@ def _judged(folder: Path) -> tuple[Path, Callable[[], object]]:
 
 @target()
 def judged_run(folder: Path) -> Feed:
-    """Evaluation of a run by its description and its tracks, which a line `---` separates."""
+    """Evaluation of a run by its description and its tracks, with a line `---` between."""
     run, judge = _judged(folder)
     lines = "".join(json.dumps(frame_record(index)) + "\n" for index in range(4))
 

@@ -17,7 +17,7 @@ from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Reception
-from tests.fuzz.target import Feed, of_file, target
+from tests.fuzz.target import Feed, of_file, target, targets_of_files
 from tests.ros2 import messages
 from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets
@@ -26,6 +26,18 @@ from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
 
 LENGTH = struct.Struct("<Id")
 """Header of a packet in an input: its length, and the time of its reception."""
+
+
+targets_of_files(
+    {
+        "hesai_calibration": ("ideal.csv", read_angles, [ideal_calibration(LAYOUTS["xt-32"])]),
+        "velodyne_calibration": (
+            "ideal.yaml",
+            lambda path: VelodyneDecoder("sensor", None, path),
+            [ideal_calibration(LAYOUTS["vlp-16"])],
+        ),
+    }
+)
 
 
 @target()
@@ -52,18 +64,6 @@ def hesai_packets(folder: Path) -> Feed:
 @target()
 def livox_packets(folder: Path) -> Feed:
     return _of_packets(LivoxDecoder("sensor"), _framed(packets("mid-360", 3)[150:450]))
-
-
-@target()
-def hesai_calibration(folder: Path) -> Feed:
-    path = folder / "ideal.csv"
-    return of_file(path, lambda: read_angles(path), ideal_calibration(LAYOUTS["xt-32"]))
-
-
-@target()
-def velodyne_calibration(folder: Path) -> Feed:
-    path = folder / "ideal.yaml"
-    return of_file(path, lambda: VelodyneDecoder("sensor", None, path), ideal_calibration(LAYOUTS["vlp-16"]))
 
 
 @target()

@@ -1,7 +1,8 @@
 """Targets of fuzzing: readers, the bytes that they are fed with, and how they may refuse them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from modt.errors import ModtError
@@ -31,6 +32,16 @@ def target(*refusals: type[Exception]) -> Callable[[Callable[[Path], Feed]], Cal
         return prepare
 
     return made
+
+
+def targets_of_files(readers: Mapping[str, tuple[str, Callable[[Path], object], Sequence[bytes | str]]]) -> None:
+    """Make a target of each reader of one file: by its name, the name of the file, the reader and valid contents."""
+
+    def prepared(folder: Path, file: str, read: Callable[[Path], object], seeds: Sequence[bytes | str]) -> Feed:
+        return of_file(folder / file, lambda: read(folder / file), *seeds)
+
+    for name, (file, read, seeds) in readers.items():
+        TARGETS[name] = Target(name, partial(prepared, file=file, read=read, seeds=seeds), (ModtError,))
 
 
 def of_file(path: Path, read: Callable[[], object], *seeds: bytes | str) -> Feed:

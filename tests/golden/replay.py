@@ -71,7 +71,7 @@ def summary(result: FrameResult) -> dict[str, Any]:
 
 
 def differences(found: dict[str, Any], expected: dict[str, Any], tolerance: int = 1) -> list[str]:
-    """What differs between two frames: integers at all, boxes by more than a tolerance [mm, mrad]."""
+    """Fields that differ between two frames: integers at all, boxes by more than a tolerance [mm, mrad]."""
     keys = found.keys() | expected.keys()
     different = [key for key in keys - {"box", "box_sum"} if found.get(key) != expected.get(key)]
     if found["box"].keys() != expected["box"].keys():

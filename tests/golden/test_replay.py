@@ -35,18 +35,11 @@ def test_what_is_final_is_what_the_state_machine_says(scene, mode):
         assert result.state_names == machine.names
 
 
-@each_case
-def test_a_swapped_identity_is_noticed(scene, mode):
-    for frame in replay.read(scene, mode):
-        swapped = copy.deepcopy(frame)
-        swapped["id"][0], swapped["id"][-1] = swapped["id"][-1], swapped["id"][0]
-        assert replay.differences(swapped, frame) == ["id"]
-
-
 @pytest.mark.parametrize(
     ("change", "noticed"),
     [
         (lambda f: f.update(deferred=f["deferred"] + 1), ["deferred"]),
+        (lambda f: f["id"].reverse(), ["id"]),
         (lambda f: f["points"].__setitem__(0, f["points"][0] + 1), ["points"]),
         (lambda f: f.update(state="9" + f["state"][1:]), ["state"]),
         (lambda f: f.update({"class": f["class"].swapcase()}), ["class"]),

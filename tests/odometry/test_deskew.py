@@ -31,11 +31,6 @@ def skewed_points(xyz, time_s, turn_s, speed, turn):
     return np.c_[local.real, local.imag, xyz[:, 2]], late
 
 
-def corrected(proposals, turn_s, motion, T):
-    """(P, 2) correction of the positions of skewed proposals that a pose at the stamp yields [m, world]."""
-    return motion.displacement(proposals.centroid[:, :2], delays(proposals, turn_s)) @ T[:2, :2].T
-
-
 def skewed(boxes, index, turn_s, speed, turn, posed):
     """A frame of boxes of the world (P, 7) as a turning head on a moving carrier sees them."""
     frame, proposals = frame_of(boxes, index, points=80)
@@ -131,7 +126,7 @@ def test_a_placement_deskews_positions_like_the_proposals_there(speed, yaw_rate,
     T = se3(rotation_zyx(0, 0, 0.7), np.array([3.0, -2.0, 0.0]))
     motion = PlanarMotion(complex(speed, 0.1 * speed), yaw_rate)
     proposals = one(9 * np.cos(bearing), 9 * np.sin(bearing), 0.0, 0.0)
-    step = corrected(proposals, turn_s, motion, T)
+    step = motion.displacement(proposals.centroid[:, :2], delays(proposals, turn_s)) @ T[:2, :2].T
     position = observe(proposals, T).centroid
     np.testing.assert_allclose(Placement(T, motion, turn_s).deskew(position), step, atol=1e-9)
     assert not Placement(T, motion).deskew(position).any()

@@ -21,17 +21,12 @@ def gentle_curve(i):
     return se3(rotation_zyx(0, 0, yaw), np.array([0.8 * i, 0.003 * i * i, 0.0]))
 
 
-def local(T, boxes):
-    """Boxes of the world in the frame of a sensor at T."""
-    return transform_boxes(inverse(T), boxes)
-
-
 def drive(frames, pose=gentle_curve, given_pose=lambda i: None, world=None, restarts=lambda i: 0, points=150):
     """Odometry and tracker after a drive past a world of boxes, with given_pose(i) as input of the odometry."""
     follower = Follower()
     world = street(n=N_OBJECTS) if world is None else world
     for i in range(frames):
-        boxes = local(pose(i), world(i) if callable(world) else world)
+        boxes = transform_boxes(inverse(pose(i)), world(i) if callable(world) else world)
         frame, proposals = frame_of(boxes, i, given_pose(i), points=points)
         follower.follow(replace(frame, restarts=restarts(i)), proposals)
     return follower

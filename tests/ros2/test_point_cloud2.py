@@ -43,7 +43,7 @@ def test_any_layout_is_read_as_point_by_point(points, padding, little):
     cloud = read_cloud(raw)
     expected = [[point[name] for name in "xyz"] for point in points.reshape(-1)]
     np.testing.assert_array_equal(cloud.points[:, :3], np.array(expected, np.float32))
-    assert (cloud.stamp_s, cloud.frame_id) == (1.0, "lidar")
+    assert (cloud.ahead_s, cloud.frame_id) == (1.0, "lidar")
     assert cloud.points.dtype == np.float32
     assert cloud.points.flags.writeable
     if "intensity" not in points.dtype.names:
@@ -137,5 +137,4 @@ def test_times_on_the_clock_of_the_header_are_not_added_to_it(unit):
 @pytest.mark.parametrize("odd", [{"seam": 0.0}, {"turn_s": 3.0, "unit": 1.0}, {"turn_s": 0.0}])
 def test_a_seam_elsewhere_and_times_of_no_head_are_not_used(odd):
     cloud = turning(**odd)
-    assert cloud.turn is None
     assert (cloud.turn_s, cloud.ahead_s) == (0.0, 1000.0)

@@ -61,7 +61,7 @@ def test_the_lowest_returns_of_a_ceiling_above_the_greatest_height_used_join_nob
 @pytest.mark.slow
 @pytest.mark.parametrize(("sensor", "height_m"), [("vlp-16", 0.8), ("os1-64", 0.5), ("mid-360", 0.3)])
 def test_people_under_a_low_ceiling_are_found_by_the_profile_of_the_sensor(sensor, height_m):
-    """Of 20 points or more, more than half of which they share with a proposal, in a hall 2.5 m high."""
+    """The hall is 2.5 m high. A person of 20 points or more is found if a proposal shares more than half of them."""
     stage, people, found = stage_of(sensor, height_m), 0, 0
     simulator = SyntheticStream("hall", sensor, 3.0, 901, height_m=height_m).simulator
     for frame, truth in (simulator.sweep(6 * k) for k in range(5)):

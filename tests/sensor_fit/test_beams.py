@@ -50,10 +50,6 @@ def test_a_sensor_without_beams_has_the_spacing_of_its_returns():
     assert found.spacing_deg == found.azimuth_step_deg == pytest.approx(1.03, rel=0.1)
 
 
-def test_few_points_tell_nothing():
-    assert find_beams([recording("vlp-16").sweeps[0][:500]]) is None
-
-
 @pytest.mark.kitti
 def test_beams_of_a_pandar64_on_the_road(kitti_root):
     calibration = kitti_root / "packets" / "calibration" / "Pandar64.csv"

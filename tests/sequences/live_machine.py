@@ -1,4 +1,4 @@
-"""Sequences of what a live robot receives, as hypothesis makes them: a rule a kind of misfortune."""
+"""Random sequences of the inputs of a live robot by hypothesis, with a rule for each kind of fault."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Datagrams(ReceivedPoses):
 
 
 class Held:
-    """A subscription that holds what a test hands over, of which it gives the latest."""
+    """A subscription to the messages that a test hands over. It gives the latest ones."""
 
     def __init__(self, depth: int) -> None:
         self.depth, self.held = depth, list[Any]()
@@ -83,7 +83,7 @@ class Lines(logging.Handler):
 
 
 class Reader:
-    """Has the reception of a source; the world hands its sweeps over itself."""
+    """The reader of a source with its reception alone. The world hands the sweeps over."""
 
     profile = None
 
@@ -130,7 +130,7 @@ class LiveWorld:
         return self.now_s + self.set_s
 
     def packet(self, payload: bytes, received_s: float | None = None) -> None:
-        """The sensor's port receives something."""
+        """Hand a packet to the port of the sensor."""
         self.messages += 1
         self.reader.reception.messages += 1
         received_s = self.calendar_s if received_s is None else received_s
@@ -141,7 +141,7 @@ class LiveWorld:
         return self.maker.stamped(payload, self.now_s + self.sensor_s + ahead_s)
 
     def cloud(self, stamp_s: float, points: Any, frame_id: str = "lidar") -> None:
-        """The topic receives a sweep."""
+        """Hand a sweep to the topic."""
         from modt.ros2 import dds
 
         self.messages += 1
@@ -159,7 +159,7 @@ class LiveWorld:
             self.stream._put(sweep)
 
     def pose(self, stamp_s: float, x_m: float, y_m: float = 0.0, yaw: float = 0.0) -> None:
-        """The odometry sends a pose."""
+        """Send a pose of the odometry."""
         self.messages += 1
         if np.isfinite([x_m, y_m]).all():
             self.sent.append((x_m, y_m, 0.0))
@@ -175,12 +175,12 @@ class LiveWorld:
             self.poses._subscription.held.append(dds.Message(write_odometry(stamp_s, "odom", "base", T), stamp_s))
 
     def honest_pose(self, ahead_s: float = 0.0) -> None:
-        """The pose of a robot that drives straight on."""
+        """Send the pose of a robot that drives straight on."""
         x_m, y_m = self.origin_m + np.array([SPEED_MPS * (self.now_s + ahead_s), 0.0])
         self.pose(self.calendar_s + ahead_s, float(x_m), float(y_m))
 
     def take(self) -> None:
-        """The loop looks for a sweep, and places it."""
+        """Let the loop take a sweep and place it."""
         received = self.stream.take(0.0)
         if received is None:
             return
@@ -200,7 +200,7 @@ class LiveWorld:
         assert np.linalg.norm(np.array(self.sent) - T[:3, 3], axis=1).min() <= REACH_M, "a pose that nobody sent"
 
     def drive(self, turns: int, *, posed: bool = True, sensing: bool = True, faults: Any = None) -> None:
-        """All that comes and is taken in some turns of the sensor; `faults` may change a turn's packets."""
+        """Send and take everything of some turns of the sensor; `faults` may change the packets of a turn."""
         for _ in range(turns):
             n = len(self.payloads)
             packets_ = [(k / n * TURN_S, payload, 0.0) for k, payload in enumerate(self.payloads)]
@@ -249,7 +249,7 @@ class LiveWorld:
         assert len(self.stream.faults.first) <= MAX_KEPT_FAULTS
 
     def recovers(self) -> None:
-        """Three seconds after everything is honest again, sweeps come and have their poses."""
+        """Check that sweeps and their poses come again three seconds after the last fault."""
         self.drive(30)
         frames, posed = self.stream.sweeps, self.poses.posed
         refused = self.stream.faults.skipped

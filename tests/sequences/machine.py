@@ -1,4 +1,4 @@
-"""Sequences as hypothesis makes them: a rule a kind of frame."""
+"""Random sequences of frames by hypothesis, with a rule for each kind of frame."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def _ouster() -> tuple[Any, Any, tuple[bytes, ...]]:
 
 
 class OusterSensor:
-    """Number of the frame that an Ouster sends, which goes up where its columns begin anew."""
+    """An Ouster, whose frame number rises where its columns begin anew."""
 
     def __init__(self) -> None:
         self.frame = self.column = 0

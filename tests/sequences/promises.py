@@ -1,4 +1,4 @@
-"""What holds after every frame, whatever it was."""
+"""Promises that hold after every frame, whatever it was."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CALL_POINTS = np.full(8, 100)
 
 @dataclass
 class Clock:
-    """Of a test [ns]: the same readings for the same calls, at times none passes, at times it goes back."""
+    """A clock of a test [ns]: the same calls give the same readings, some of which stand still or go back."""
 
     back: int = 0
     _calls: int = 0
@@ -139,7 +139,7 @@ class Run:
         assert all(number >= self._next_id for number in new)  # no identity comes back
         self._before, self._next_id = frozenset(ids), max([self._next_id - 1, *ids]) + 1
         assert set(result.classified.tolist()) <= set(tracks.id[tracks.proposal != NONE].tolist())
-        for name, column in tracks.columns():
+        for name, column in tracks.columns().items():
             assert np.isfinite(column).all(), name
 
     def _posteriors(self, result: FrameResult) -> None:

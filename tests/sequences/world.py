@@ -48,7 +48,7 @@ class World:
         return scan(boxes, seed=self.index, **SENSORS[self.sensor])[0]
 
     def frame(self, points: Float32) -> Frame:
-        """The next frame, of these points."""
+        """The next frame, which has these points."""
         pose = self.pose.copy() if self.posed else None
         made = Frame(self.index, self.stamp_s, points, pose, self.restarts, self.turn_s)
         self.index += 1

@@ -7,28 +7,20 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.class_sizes import unknown_near
-from modt.classes import CLASS_NAMES, ObjectClass
+from modt.classes import CLASS_NAMES
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.records import line
 from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
 from modt.types import NONE, Cut
 from modt_desk.evaluation.recorded_result import recorded_pose
-from tests.results import CAR, PEDESTRIAN, frame_record, result
+from tests.results import PEDESTRIAN, frame_record, result
 
 
-def test_a_record_describes_the_frame_and_its_tracks():
-    record = frame_record(result(3, [7, 5], {0: 11, 1: 12}, {11: CAR}, lost=(9,), classified=2))
-    assert record["schema"] == SCHEMA
-    assert (record["frame"], record["stamp_s"], record["proposals"]) == (3, 0.3, 2)
-    assert (record["classifications"], record["deferred"]) == (2, 0)
-    seen, unsure, lost = record["tracks"]
-    assert (seen["id"], seen["state"], seen["class"], seen["proposal"]) == (11, "tracked", "car", 0)
-    assert seen["posterior"] == CAR
-    assert seen["box"] == {"x": 10.0, "y": 0.0, "z": -1.0, "l": 4.0, "w": 2.0, "h": 1.5, "yaw": 0.0}
-    assert seen["size"] == [0.0] * 3
-    assert seen["world"] == {"x": 0.0, "y": 0.0, "heading": 0.0, "speed_mps": 0.0}
-    assert unsure["class"] == "background"
-    assert (lost["proposal"], lost["box"], lost["state"]) == (None, None, "lost")
+def test_a_record_counts_what_was_done_in_its_frame():
+    record = frame_record(result(3, [7, 5], {0: 11, 1: 12}, lost=(9,), classified=2))
+    del record["tracks"], record["T_world_sensor"]
+    counts = {"proposals": 2, "classifications": 2, "deferred": 0, "classified": [0, 1]}
+    assert record == {"schema": SCHEMA, "frame": 3, "stamp_s": 0.3} | counts
 
 
 @pytest.mark.parametrize(
@@ -46,14 +38,6 @@ def test_a_possible_person_too_near_to_be_recognised_is_reported_as_uncertain(si
     r.proposals.box[0, 3:6], r.proposals.cut[0] = size, cut
     assert [track["uncertain"] for track in frame_record(r)["tracks"]] == [said, None]
     assert unknown_near(r).tolist() == [said is not None, False]
-
-
-@pytest.mark.parametrize(("pedestrian", "said"), [(0.45, "pedestrian?"), (0.55, None)])
-def test_an_object_of_less_than_one_half_is_reported_with_a_question_mark(pedestrian, said):
-    r = result(3, [7, 5], {0: 11}, {11: [0.9 - pedestrian, 0.05, pedestrian, 0.05]})
-    r.tracks.object_class[0] = ObjectClass.PEDESTRIAN
-    track = frame_record(r)["tracks"][0]
-    assert (track["class"], track["uncertain"]) == ("pedestrian", said)
 
 
 def test_the_pose_of_the_sensor_is_recorded_and_read_back():
@@ -84,11 +68,13 @@ def results(draw):
     ):
         column[:] = draw(arrays(np.float64, column.shape, elements=elements))
     t.final[:] = draw(arrays(np.bool_, len(t)))
+    t.object_class[:] = draw(arrays(np.int64, len(t), elements=st.integers(0, 3)))
     r.proposals.cut[:] = draw(arrays(np.int64, tracked, elements=st.sampled_from([0, Cut.TOP])))
     return r
 
 
-def _question(t, k):
+def question(t, k):
+    """The class with a question mark where an object has a posterior below one half."""
     class_ = t.object_class[k]
     return f"{CLASS_NAMES[class_]}?" if class_ > 0 and t.posterior[k, class_] < 0.5 else None
 
@@ -106,7 +92,7 @@ def tracks_one_by_one(r):
             "witness": np.round(t.witness[k], 3).tolist(),
             "viewed": bool(t.viewed[k]),
             "final": bool(t.final[k]),
-            "uncertain": UNKNOWN_NEAR if unknown_near(r)[k] else _question(t, k),
+            "uncertain": UNKNOWN_NEAR if unknown_near(r)[k] else question(t, k),
             "proposal": None if proposal == NONE else proposal,
             "points": int(t.points[k]),
             "age": int(t.age[k]),

@@ -37,11 +37,9 @@ def raw_drive(
     day = root / "2011_09_26"
     drive = day / "2011_09_26_drive_9999_sync"
     write_scans(drive / "velodyne_points" / "data", frames, digits=10)
-    stamps = "".join(f"2011-09-26 13:02:{25 + f / 10:012.9f}\n" for f in range(max(frames) + 1))
-    (drive / "velodyne_points" / "timestamps.txt").write_text(stamps)
-    for end, later in (("start", -0.05), ("end", 0.05)):  # the head turns once in 0.1 s
+    for end, later in (("", 0.0), ("_start", -0.05), ("_end", 0.05)):  # the head turns once in 0.1 s
         times = "".join(f"2011-09-26 13:02:{25 + f / 10 + later:012.9f}\n" for f in range(max(frames) + 1))
-        (drive / "velodyne_points" / f"timestamps_{end}.txt").write_text(times)
+        (drive / "velodyne_points" / f"timestamps{end}.txt").write_text(times)
     if calibrated:
         (day / "calib_cam_to_cam.txt").write_text(
             f"calib_time: 09-Jan-2012\nS_rect_02: 200 100\nR_rect_00: {CAMERA['R']}\nP_rect_02: {CAMERA['P']}\n"

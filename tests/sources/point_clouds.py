@@ -50,11 +50,6 @@ def ply(rows, data="binary_little_endian", before="", n=None):
     properties = "".join(f"property {PLY[rows.dtype[name].str[1:]]} {name}\n" for name in rows.dtype.names)
     count = len(rows) if n is None else n
     head = f"ply\nformat {data} 1.0\ncomment by a test\n{before}element vertex {count}\n{properties}"
-    body = (
-        text(rows) if data == "ascii" else rows.astype(swapped(rows.dtype) if "big" in data else rows.dtype).tobytes()
-    )
+    in_order = rows.astype(rows.dtype.newbyteorder(">" if "big" in data else "<"))
+    body = text(rows) if data == "ascii" else in_order.tobytes()
     return f"{head}element face 0\nproperty list uchar int vertex_indices\nend_header\n".encode() + body
-
-
-def swapped(kind):
-    return np.dtype([(name, kind[name].newbyteorder(">")) for name in kind.names])

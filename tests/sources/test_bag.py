@@ -49,7 +49,7 @@ def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(write, tmp_
     ("others", "note"),
     [
         ([], "no nav_msgs/Odometry: no poses"),
-        (poses("base_link"), "/tf_static does not lead from base_link, of which they are, to lidar"),
+        (poses("base_link"), "/tf_static does not lead from base_link, their frame, to lidar"),
         (by_time(poses(), poses(topic="/wheels")), "several topics of odometry (/odom, /wheels)"),
     ],
 )

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.errors import ScanError
 from modt.ros2.point_cloud2 import read_cloud
@@ -11,7 +9,7 @@ from modt.sources.point_cloud_file import decompress
 from modt.sources.scan_file import read_scan
 from modt.types import UNRECORDED
 from tests.ros2 import messages
-from tests.sources.point_clouds import literal, pcd, ply, table
+from tests.sources.point_clouds import pcd, ply, table
 
 WRITERS = {
     f"{write.__name__} {data}": (write, data)
@@ -143,11 +141,6 @@ ROWS = table(x="f4", y="f4", z="f4", i="u1")
 def test_a_hostile_or_broken_file_is_one_clear_error(tmp_path, name, raw, cause):
     with pytest.raises(ScanError, match=cause):
         read(tmp_path / name, raw)
-
-
-@given(st.binary(max_size=300))
-def test_lzf_of_literals(data):
-    assert decompress(literal(data), len(data)) == data
 
 
 def test_lzf_repeats():

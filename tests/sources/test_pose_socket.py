@@ -18,7 +18,7 @@ from modt.geometry import rotation_zyx, se3
 from modt.ros2.cdr import MessageError
 from modt.schemes import POSES, open_poses
 from modt.sources.pose_socket import PoseSocket, open_socket, read_datagram
-from modt.sources.received_poses import MAX_AGE_S, PoseBuffer, interpolate
+from modt.sources.received_poses import MAX_AGE_S, PoseBuffer
 from modt.types import Frame
 from tests.fuzz.mutation import mutations
 
@@ -219,11 +219,6 @@ def test_what_the_kernel_drops_is_counted():
     assert report["received"] + report["overflowed"] == 4001
     assert report["received"] == report["used"] + sum(report["refused"].values())
     odometry.close()
-
-
-def test_a_turn_is_interpolated_along_the_shorter_way():
-    a, b = matrix([458_000.0, 5_430_000.0, 3.0]), matrix([458_001.0, 5_430_000.0, -3.0])
-    np.testing.assert_allclose(interpolate(a, b, 0.5), matrix([458_000.5, 5_430_000.0, np.pi]), rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("path", ["", "127.0.0.1", "127.0.0.1:99999", "127.0.0.1:x", "[::1:5"])

@@ -1,17 +1,20 @@
 """Poses from files: their coordinate frames, and the errors of invalid files."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
-from modt.sources.pose_source import PoseFile, read_poses
+from modt.sources.kitti_calibration import oxts_poses
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, read_poses
 from modt.sources.recognise import open_stream
 
 from . import layouts
-from .posed_stream import PosedStream
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 CAMERA = Camera(np.zeros((3, 4)), T_CAMERA_SENSOR, 100.0, 100.0)
@@ -65,10 +68,19 @@ def test_camera_poses_are_converted_and_sensor_poses_unchanged(tmp_path):
 def test_a_line_belongs_to_the_frame_of_its_index(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     path = write(tmp_path / "p.txt", [se3(np.eye(3), np.array([0.0, 0.0, float(k)])) for k in range(5)])
-    posed = PosedStream(stream, PoseFile(path, stream.info.camera, stream.info.end))
+    poses = PoseFile(path, stream.info.camera, stream.info.end)
     # z of this camera is x of the sensor
-    assert [f.T_world_sensor[0, 3] for f in posed] == [0, 1, 4]
-    assert [f.T_world_sensor[0, 3] for f in posed.between(1, 5)] == [1, 4]
+    assert [poses.place(frame).T_world_sensor[0, 3] for frame in stream] == [0, 1, 4]
+    assert [poses.place(frame).T_world_sensor[0, 3] for frame in stream.between(1, 5)] == [1, 4]
+
+
+def test_a_source_of_poses_says_whether_a_stream_has_some(tmp_path):
+    path = write(tmp_path / "p.txt", [np.eye(4)] * 4)
+    for build, recorded in ((layouts.raw_drive, True), (layouts.bare, False)):
+        stream = open_stream(build(tmp_path))
+        for poses, known in ((PoseSource(), recorded), (NoPoses(), False), (PoseFile(path, None, None), True)):
+            assert poses.of_stream(stream.info).has_poses is known
+            assert all((poses.place(frame).T_world_sensor is not None) is known for frame in stream)
 
 
 def test_too_few_lines_are_refused_before_the_start_if_the_end_is_known(tmp_path):
@@ -78,3 +90,29 @@ def test_too_few_lines_are_refused_before_the_start_if_the_end_is_known(tmp_path
     for end, frames in ((stream.info.end, []), (None, stream)):
         with pytest.raises(MisuseError, match="3 poses, too few for frame 4"):
             list(map(PoseFile(path, None, end).place, frames))
+
+
+small = st.floats(-1e-3, 1e-3)
+records = arrays(np.float64, (4, 6), elements=small).map(lambda a: a + np.array([49.0, 8.4, 110.0, 0.01, 0.02, 1.0]))
+
+
+def mercator_pose(record, scale):
+    lat, lon, alt, roll, pitch, yaw = record
+    er = 6378137.0
+    tx = scale * lon * math.pi * er / 180
+    ty = scale * er * math.log(math.tan((90 + lat) * math.pi / 360))
+    rx = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    ry = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    rz = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    T = np.eye(4)
+    T[:3, :3] = rz @ ry @ rx
+    T[:3, 3] = tx, ty, alt
+    return T
+
+
+@given(records)
+def test_poses_of_oxts_records_equal_those_of_the_development_kit(rows):
+    scale = math.cos(rows[0, 0] * math.pi / 180)
+    origin = np.linalg.inv(mercator_pose(rows[0], scale))
+    expected = np.stack([origin @ mercator_pose(r, scale) for r in rows])
+    np.testing.assert_allclose(oxts_poses(rows), expected, atol=1e-6)

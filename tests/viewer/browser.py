@@ -1,10 +1,9 @@
-"""Control of a Chromium without a window, by its DevTools protocol through a pipe."""
+"""Control of a Chromium without a window, by its DevTools protocol."""
 
-import fcntl
 import json
 import os
-import selectors
 import shutil
+import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -32,12 +31,11 @@ def find() -> str | None:
 
 
 class Browser:
-    """A browser that reads commands at one descriptor and answers at another."""
+    """A browser at the other end of a socket."""
 
-    def __init__(self, to: int, back: int) -> None:
-        self._to, self._back, self._buffer, self._number = to, back, b"", 0
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(back, selectors.EVENT_READ)
+    def __init__(self, commands: socket.socket) -> None:
+        self._socket, self._buffer, self._number = commands, b"", 0
+        self._socket.settimeout(WAIT_S)
         self.events: list[dict[str, Any]] = []
 
     def call(self, method: str, session: str | None = None, **params: Any) -> dict[str, Any]:
@@ -46,10 +44,9 @@ class Browser:
         message = {"id": self._number, "method": method, "params": params} | (
             {"sessionId": session} if session else {}
         )
-        os.write(self._to, json.dumps(message).encode() + b"\0")
-        end_s = time.monotonic() + WAIT_S
+        self._socket.sendall(json.dumps(message).encode() + b"\0")
         while True:
-            answer = self._message(end_s)
+            answer = self._message()
             if answer.get("id") != self._number:
                 self.events.append(answer)
             elif "error" in answer:
@@ -57,11 +54,9 @@ class Browser:
             else:
                 return dict(answer["result"])
 
-    def _message(self, end_s: float) -> dict[str, Any]:
+    def _message(self) -> dict[str, Any]:
         while b"\0" not in self._buffer:
-            if not self._selector.select(max(end_s - time.monotonic(), 0)):
-                raise TimeoutError("the browser does not answer")
-            part = os.read(self._back, 1 << 20)
+            part = self._socket.recv(1 << 20)
             if not part:
                 raise RuntimeError("the browser has ended")
             self._buffer += part
@@ -138,25 +133,23 @@ class Tab:
 @contextmanager
 def browser(path: str) -> Iterator[Browser]:
     """Start a browser, and end it on leaving the context."""
-    to_browser, from_browser = os.pipe(), os.pipe()
-    # Above the descriptors 3 and 4, at which the browser expects them.
-    ends = [fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 10) for fd in (*to_browser, *from_browser)]
-    for fd in (*to_browser, *from_browser):
-        os.close(fd)
-    read, to, back, write = ends
-    with TemporaryDirectory(prefix="browser-", ignore_cleanup_errors=True) as profile, open(os.devnull, "w") as null:
-        actions = [(os.POSIX_SPAWN_DUP2, read, 3), (os.POSIX_SPAWN_DUP2, write, 4)]
-        actions += [(os.POSIX_SPAWN_DUP2, null.fileno(), fd) for fd in (1, 2)]
+    ours, theirs = socket.socketpair()
+    with (
+        TemporaryDirectory(prefix="browser-", ignore_cleanup_errors=True) as profile,
+        open(os.devnull, "w") as null,
+        ours,
+    ):
+        # It reads commands at descriptor 3, and answers at 4.
+        ends = [(null.fileno(), 1), (null.fileno(), 2), (theirs.fileno(), 3), (theirs.fileno(), 4)]
         command = [path, *OPTIONS, f"--user-data-dir={profile}", "about:blank"]
-        pid = os.posix_spawn(path, command, os.environ, file_actions=actions)
-        os.close(read)
-        os.close(write)
-        started = Browser(to, back)
+        pid = os.posix_spawn(
+            path, command, os.environ, file_actions=[(os.POSIX_SPAWN_DUP2, own, fd) for own, fd in ends]
+        )
+        theirs.close()
+        started = Browser(ours)
         try:
             yield started
         finally:
             with suppress(Exception):
                 started.call("Browser.close")
             os.waitpid(pid, 0)
-            os.close(to)
-            os.close(back)

@@ -28,7 +28,7 @@ SHOWN = """({
   boxes: drawn.filter(([name]) => name === "fill").length,
   facts: [...element("frame").children].map((child) => child.textContent).join(" "),
   story: element("story").innerText,
-  legends: ["classes", "states", "stage-legend", "truth"].map((id) => element(id).textContent),
+  legends: ["classes", "states", "stage-legend", "truth"].map((id) => element(id)?.textContent),
   wide: document.documentElement.scrollWidth > innerWidth,
   small: [...document.body.querySelectorAll("*")]
     .filter((e) => e.innerText && parseFloat(getComputedStyle(e).fontSize) < 12).map((e) => e.outerHTML),

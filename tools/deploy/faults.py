@@ -143,7 +143,7 @@ def _hangup(_world: World, on: bool) -> None:
 
 def _late_frames(session: Any) -> int:
     """Frames that began late, and steps of the ladder; a hog need not cost a deadline."""
-    lateness = session.deadlines.timing.late_or_later()
+    lateness = session.deadlines.late_or_later()
     late = max((n for ms, n in zip(lateness["ms"], lateness["frames"], strict=True) if ms > LATE_MS), default=0)
     return int(late) + session.deadlines.changes.total()
 

@@ -78,7 +78,7 @@ class Witness:
         assert isinstance(deadlines, Deadlines)
         self.times_s.append(time.monotonic())
         self.full.append(deadlines.ladder.step is Step.ALL)
-        self.missed.append(deadlines.timing.missed)
+        self.missed.append(deadlines.missed)
         if len(self.times_s) % 50 == 0:
             self.resident_mb.append(host.resident_mb())
             self.descriptors.append(len(os.listdir("/proc/self/fd")))

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 from modt import assets
 from modt.config import ProfileConfig
-from modt.profile import value_text
+from modt_desk.cli.profile_group import value_text
 from modt_desk.cli.profile_schema import FILE, keys, schema_text
 from tools.docs.sections import DOCS, replace_section, write
 

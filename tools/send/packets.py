@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import takewhile
 from pathlib import Path
 
-from modt.cli.options import frames, real
+from modt.cli.options import bounded, frames
 from modt.errors import ModtError
 from modt.sources.packets.capture import open_capture
 from modt.sources.recognise import CAPTURES, open_stream
@@ -88,7 +88,7 @@ def main() -> None:
     options.add_argument("--once", action="store_true", help="do not repeat")
     options.add_argument("--seconds", type=float, default=float("inf"), help="default: until it is ended")
     options.add_argument("--write", type=Path, metavar="FILE", help="PCAP file to write instead of sending")
-    share = real(0.0, 1.0, "a share")
+    share = bounded(float, 0.0, 1.0, "a share")
     for name in ("loss", "duplicates", "reordering", "garbage"):
         options.add_argument(f"--{name}", type=share, default=0.0, metavar="SHARE")
     options.add_argument("--seed", type=int, default=0)

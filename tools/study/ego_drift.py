@@ -23,7 +23,7 @@ from modt.app import assembly
 from modt.cli.options import frames as frame_range
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
 from modt.profile import load
-from modt.sources import kitti_calibration, oxts
+from modt.sources import kitti_calibration
 from modt.sources.pose_source import NoPoses
 from modt.sources.recognise import open_scans
 from modt.sources.stream import Stream
@@ -90,7 +90,7 @@ def by_kiss_icp(stream: Stream) -> Float64:
 def integrated(drive: Path, indices: Iterable[int]) -> Float64:
     """(n, 4, 4) sensor poses from the integrated velocities and the attitudes of the records."""
     folder = drive / "oxts"
-    records = np.concatenate([oxts.read_records(folder / "data" / f"{i:010d}.txt")[:1] for i in indices])
+    records = np.concatenate([kitti_calibration.read_oxts(folder / "data" / f"{i:010d}.txt")[:1] for i in indices])
     texts = (folder / "timestamps.txt").read_text(encoding="ascii").splitlines()
     stamps = [datetime.fromisoformat(texts[i][:26]) for i in indices]
     step_s = np.diff([(s - stamps[0]).total_seconds() for s in stamps])

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,16 @@ Layer = tuple[NDArray[Any], NDArray[Any]]
 """(in, out) weight and (out,) bias."""
 N_SHARED = 3
 OPSET, IR = 17, 8
+
+
+def to_lists(layers: Layers) -> list[list[Any]]:
+    """Layers for JSON."""
+    return [[weight.tolist(), bias.tolist()] for weight, bias in layers]
+
+
+def classifier_entry(layers: Layers, weights: PoolWeights) -> dict[str, Any]:
+    """A box or reflectance classifier, as a model's metadata holds it."""
+    return {"weights": asdict(weights), "layers": to_lists(layers)}
 
 
 class GraphWriter:
@@ -227,15 +238,14 @@ def export(
     network = graph(layers)
     metadata = {CLASS_FREQUENCY_KEY: json.dumps(report["class_frequency"])}
     if reflectance:
-        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
+        metadata[reflectance_classifier.METADATA_KEY] = json.dumps(
             {
-                facts["sensor"]: (own, PoolWeights.from_dict(facts["weights"]))
+                facts["sensor"]: classifier_entry(own, PoolWeights.from_dict(facts["weights"]))
                 for own, facts in zip(reflectance, report["reflectance"], strict=True)
             }
         )
-    metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(
-        boxes, PoolWeights.from_dict(report["boxes"]["weights"])
-    )
+    weights = PoolWeights.from_dict(report["boxes"]["weights"])
+    metadata[box_classifier.METADATA_KEY] = json.dumps(classifier_entry(boxes, weights))
     helper.set_model_props(network, metadata)
     model = network.SerializeToString(deterministic=True)
     out.write_bytes(model)

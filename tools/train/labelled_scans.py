@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from modt import profile
-from modt.classes import CLASSES, ObjectClass, class_of_kitti
+from modt.classes import CLASSES, ObjectClass
 from modt.config import ProfileConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.geometry import Camera, FieldOfView
@@ -20,6 +20,7 @@ from modt_desk.evaluation import overlap
 from modt_desk.evaluation.kitti_labels import DONT_CARE, read_labels
 from modt_desk.evaluation.truth import PANDASET_TYPES, Regions, Role
 
+KITTI_CLASS = {kind: c for c, spec in CLASSES.items() for kind in spec.kitti}
 SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.semantic_kitti} | dict.fromkeys(
     (18, 258), ObjectClass.BACKGROUND
 )
@@ -177,7 +178,7 @@ def object_scan(path: Path, label: Path, camera: Camera | None, drive: str) -> S
         edges = np.array([item.image_box for item in labels if item.type_ == DONT_CARE]).reshape(-1, 4)
         fov, unlabelled = FieldOfView.of_camera(camera), Regions(edges, camera).contains(points)
     boxes = on_bottom(np.array([item.box for item in objects]).reshape(-1, 7))
-    kinds = [class_of_kitti(item.type_) for item in objects]
+    kinds = [KITTI_CLASS.get(item.type_, ObjectClass.BACKGROUND) for item in objects]
     return scan_from_boxes(path.stem, drive, points, boxes, kinds, fov, unlabelled)
 
 
@@ -236,7 +237,7 @@ def argoverse_scans(folder: Path) -> Iterator[Scan]:
         columns = ("x_m", "y_m", "z_centre_m", "length_m", "width_m", "height_m", "yaw_rad")
         boxes = on_bottom(np.array([[float(row[c]) for c in columns] for row in objects]))
         boxes[:, :3] -= ARGOVERSE_SENSOR_M
-        kinds = [class_of_kitti(ARGOVERSE_CLASS.get(row["category"], "")) for row in objects]
+        kinds = [KITTI_CLASS.get(ARGOVERSE_CLASS.get(row["category"], ""), ObjectClass.BACKGROUND) for row in objects]
         drive = f"argoverse2/{path.stem.split('_')[0]}"
         none = np.zeros(len(points), np.bool_)
         scan = scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes, kinds, FieldOfView(), none)

@@ -5,6 +5,7 @@ Crops are augmented as for the PointNet, and the boxes fitted to the augmented c
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,7 @@ def cross_validate(
     valid, box = held.validation, held.probability
     weights, pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
     return held.calibration, {
-        "weights": weights.as_dict(),
+        "weights": asdict(weights),
         "cross_validation": by_sensor(np.log(box), valid, valid.clear),
         "pool": by_sensor(pool, valid, valid.clear),
         "ruled_out": ruled_out(held.probability[valid.clear], valid.label[valid.clear]),

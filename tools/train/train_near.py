@@ -33,7 +33,7 @@ from modt.types import Bool, Cut, Float64, Int
 from tools.options import make_torch_deterministic, parser
 from tools.train.augment import subsample
 from tools.train.dataset import Dataset, crop_features, dataset_features, load
-from tools.train.export_pointnet import N_SHARED, Layer, graph
+from tools.train.export_pointnet import N_SHARED, Layer, graph, to_lists
 from tools.train.near_batches import SHARE, NearSource, cut_flags, distance_m
 from tools.train.network import Batch, MaxPooledLinear, train_mlp
 from tools.train.train_pointnet import POINTS, tensors
@@ -188,7 +188,7 @@ def main() -> None:
     bounds = train_bounds(source, args.seed)
     net, loss = train(first, source, args.steps, args.seed)
     network = graph(net.layers())
-    helper.set_model_props(network, {box_classifier.BOUNDS_KEY: json.dumps(box_classifier.to_lists(bounds))})
+    helper.set_model_props(network, {box_classifier.BOUNDS_KEY: json.dumps(to_lists(bounds))})
     raw = network.SerializeToString(deterministic=True)
     args.out.write_bytes(raw)
 

@@ -5,7 +5,7 @@ The crops of a sensor are those of this name, thinned ones too.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -99,7 +99,7 @@ def cross_validate(
     weights, pool = fit_pool(network, by_box.probability, evidence, valid, weight)
     clear = valid.clear & known
     return calibration, {
-        "weights": weights.as_dict(),
+        "weights": asdict(weights),
         "cross_validation": by_sensor(box + evidence, valid, known),
         "pool": by_sensor(pool, valid, known),
         "ruled_out": train_box_classifier.ruled_out(softmax((box + evidence)[clear], axis=1), valid.label[clear]),

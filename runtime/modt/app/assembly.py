@@ -135,7 +135,7 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
 
 
 def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledger | None = None) -> Pipeline:
-    """The stages of a mode; the default ledger is their own.
+    """The stages of a mode. Without a ledger they have one of their own.
 
     Raises:
         MisuseError: the model cannot be used.

@@ -22,53 +22,19 @@ _BITS = 5
 log = logging.getLogger(__name__)
 
 
-class Timing:
-    """Lateness (start less release), execution, and latency (result less release) of frames.
-
-    A sweep is released when it is complete; its deadline is a period later.
-    """
-
-    def __init__(self) -> None:
-        self.lateness, self.execution, self.latency = (Histogram(_BITS) for _ in range(3))
-        self.missed = 0
-
-    def add(self, release_s: float, start_s: float, finish_s: float, period_s: float) -> float:
-        """Add a frame; returns its latency in periods, beyond 1 when it missed its deadline."""
-        self.lateness.add(round(1e9 * (start_s - release_s)))
-        self.execution.add(round(1e9 * (finish_s - start_s)))
-        self.latency.add(round(1e9 * (finish_s - release_s)))
-        share = (finish_s - release_s) / period_s
-        self.missed += share > 1.0
-        return share
-
-    def report(self) -> dict[str, Any]:
-        """Figures for status and summary [ms]."""
-        return {
-            "frames": self.latency.count,
-            "missed_deadlines": self.missed,
-            "lateness_ms": _figures_ms(self.lateness),
-            "execution_ms": _figures_ms(self.execution),
-            "latency_ms": _figures_ms(self.latency),
-        }
-
-    def late_or_later(self) -> dict[str, list[float]]:
-        """Lateness that occurred [ms], and the number of frames that were as late or later."""
-        held = self.lateness.occurrences()
-        ms = (1e-6 * np.array(held["values"])).round(4).tolist()
-        return {"ms": ms, "frames": np.cumsum(held["counts"][::-1])[::-1].tolist()}
-
-
 class Deadlines:
     """Decides which sweeps are processed and what their frames may spend. All times are monotonic [s].
 
-    The first frame warms up: its deadline is a period after its start, and sweeps that arrive before its end are left
-    out.
+    A sweep is released when it is complete, and its result is due a period later. The first frame warms up: it is due
+    a period after its start, and sweeps that arrive before its end are left out.
 
     Args:
         period_s: period of the sensor.
 
     Attributes:
-        ladder, timing: state formed by the frames so far.
+        ladder: the present step of load shedding.
+        lateness, execution, latency: start less release, result less start, result less release [ns].
+        missed: number of frames whose result was late.
         rest_ms: cost of a frame beside its classification: a maximum over the last frames that decays.
         changes: number of times that each step of the ladder was entered.
         shed: sweeps left out by the last step, or that arrived during the first frame.
@@ -76,7 +42,9 @@ class Deadlines:
     """
 
     def __init__(self, period_s: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self.ladder, self.timing, self.rest_ms = Ladder(), Timing(), 0.0
+        self.ladder, self.rest_ms = Ladder(), 0.0
+        self.lateness, self.execution, self.latency = (Histogram(_BITS) for _ in range(3))
+        self.missed = 0
         self.changes: Counter[str] = Counter()
         self.shed = 0
         self.budget_ms = 0.0
@@ -114,7 +82,11 @@ class Deadlines:
         if self._fresh_s is None:
             self._fresh_s = now_s
             return
-        share = self.timing.add(arrived_s, self._start_s, now_s, self._period_s)
+        self.lateness.add(round(1e9 * (self._start_s - arrived_s)))
+        self.execution.add(round(1e9 * (now_s - self._start_s)))
+        self.latency.add(round(1e9 * (now_s - arrived_s)))
+        share = (now_s - arrived_s) / self._period_s
+        self.missed += share > 1.0
         self._changed(self.ladder.frame(now_s, share))
 
     def power(self, watts: float, limit_W: float) -> None:
@@ -122,15 +94,25 @@ class Deadlines:
         self._changed(self.ladder.power(self._clock(), watts, limit_W))
 
     def report(self) -> dict[str, Any]:
-        """Figures for the status."""
+        """Figures for the status, times in ms."""
         return {
-            **self.timing.report(),
+            "frames": self.latency.count,
+            "missed_deadlines": self.missed,
+            "lateness_ms": _figures_ms(self.lateness),
+            "execution_ms": _figures_ms(self.execution),
+            "latency_ms": _figures_ms(self.latency),
             "budget_ms": round(self.budget_ms, 3),
             "other_stages_ms": round(self.rest_ms, 3),
             "step": self.ladder.step.name.lower(),
             "steps_entered": dict(self.changes),
             "shed_sweeps": self.shed,
         }
+
+    def late_or_later(self) -> dict[str, list[float]]:
+        """Lateness that occurred [ms], and the number of frames that were as late or later."""
+        held = self.lateness.occurrences()
+        ms = (1e-6 * np.array(held["values"])).round(4).tolist()
+        return {"ms": ms, "frames": np.cumsum(held["counts"][::-1])[::-1].tolist()}
 
     def _changed(self, event: Event | None) -> None:
         if event is not None:
@@ -142,13 +124,13 @@ class NoDeadlines:
     """Every frame of a replay is processed, and may spend the budget of its profile.
 
     Args:
-        report: report of the playback.
+        rate_hz: frames a second; None for no limit.
     """
 
     reduced = False
 
-    def __init__(self, report: Callable[[], dict[str, Any]]) -> None:
-        self.report = report
+    def __init__(self, rate_hz: float | None) -> None:
+        self._rate_hz = rate_hz
 
     def admit(self, arrived_s: float) -> bool:
         """True."""
@@ -163,6 +145,10 @@ class NoDeadlines:
 
     def power(self, watts: float, limit_W: float) -> None:
         """No effect."""
+
+    def report(self) -> dict[str, Any]:
+        """Rate of the frames."""
+        return {"rate_hz": self._rate_hz}
 
 
 def _figures_ms(times_ns: Histogram) -> dict[str, float]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 STREET = "modt_desk.simulation.synthetic_stream"
 """Module of the synthetic street, loaded only where no recording is given."""
 RECORDED, NONE = "recording", "none"
-"""Odometries that need no address."""
+"""Values of --odometry that are no addresses."""
 log = logging.getLogger(__name__)
 
 

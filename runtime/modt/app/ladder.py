@@ -1,4 +1,4 @@
-"""Load shedding: steps that the loop goes up under load, and down again when there is slack."""
+"""Load shedding: the loop takes one step after the other under load, and takes them back when there is slack."""
 
 from __future__ import annotations
 
@@ -47,13 +47,6 @@ class Event(Enum):
     AMPLE = "ample slack"
 
 
-def step_after(step: Step, event: Event) -> Step:
-    """The next step: up or down by one, and from ample slack to the first at once."""
-    if event is Event.AMPLE:
-        return Step.ALL
-    return Step(max(step - 1, Step.ALL) if event is Event.SLACK else min(step + 1, Step.DROPPED))
-
-
 class Ladder:
     """Present step, by the times of the frames and the power. All times are monotonic [s].
 
@@ -89,8 +82,10 @@ class Ladder:
         return self._fire(Event.OVER_POWER, now_s) if watts > limit_W else None
 
     def _fire(self, event: Event, now_s: float) -> Event | None:
+        """Change the step by one, at ample slack to the first; returns the event if that changes anything."""
         before = self.step
-        self.step = step_after(before, event)
+        change = {Event.AMPLE: -before, Event.SLACK: -1}.get(event, 1)
+        self.step = Step(min(max(before + change, Step.ALL), Step.DROPPED))
         if self.step > before:
             failed = now_s - self._down_s < PROBE_S
             self.patience_s = min(2 * self.patience_s, MAX_PATIENCE_S) if failed else CALM_S

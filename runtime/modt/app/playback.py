@@ -14,7 +14,7 @@ from modt.sources.stream import Received, Stream, StreamEndedError
 class Playback:
     """The frames of a stream. Reading a frame is a span of the ledger.
 
-    At a rate, frames begin at absolute deadlines, which restart after an overrun so that no burst follows.
+    At a rate, frames begin at absolute times, which restart after an overrun so that no burst follows.
 
     Args:
         rate_hz: frames a second; None for no limit.
@@ -30,9 +30,9 @@ class Playback:
     ) -> None:
         self.info, self.faults, self.profile = stream.info, stream.faults, stream.info.profile
         self._frames, self._ledger = iter(stream), ledger
-        self._rate_hz, self._clock, self._sleep = rate_hz, clock, sleep
-        self._max_lateness_s = self._lost_s = 0.0  # largest delay, and time by which deadlines were put off
-        self._deadline_s: float | None = None
+        self._period_s = None if rate_hz is None else 1.0 / rate_hz
+        self._clock, self._sleep = clock, sleep
+        self._due_s: float | None = None  # time of the next frame
 
     def start(self) -> None:
         """No effect."""
@@ -43,8 +43,8 @@ class Playback:
         Raises:
             StreamEndedError: there is none.
         """
-        if self._rate_hz is not None:
-            self._wait(1.0 / self._rate_hz)  # before the frame is read, so that poses received meanwhile apply to it
+        if self._period_s is not None:
+            self._wait(self._period_s)  # before the frame is read, so that poses received meanwhile apply to it
         frame = self._ledger.run(SOURCE, next, self._frames, None)
         if frame is None:
             raise StreamEndedError
@@ -54,30 +54,14 @@ class Playback:
         """No counts: nothing is received."""
         return {}
 
-    def report(self) -> dict[str, Any]:
-        """Rate, periods without a frame, and largest delay [ms]."""
-        if self._rate_hz is None:
-            return {"rate_hz": None}
-        return {
-            "rate_hz": self._rate_hz,
-            "missed_deadlines": int(self._lost_s * self._rate_hz + 1e-6),
-            "max_lateness_ms": 1e3 * self._max_lateness_s,
-        }
-
     def close(self) -> None:
         """No effect."""
 
     def _wait(self, period_s: float) -> None:
-        """Sleep until the deadline. After a delay of more than a period the deadlines start anew."""
+        """Sleep until the frame is due. After a delay of more than a period the due times start anew."""
         now_s = self._clock()
-        if self._deadline_s is None:
-            self._deadline_s = now_s
-        if now_s < self._deadline_s:
-            self._sleep(self._deadline_s - now_s)
+        due_s = now_s if self._due_s is None else self._due_s
+        if now_s < due_s:
+            self._sleep(due_s - now_s)
             now_s = self._clock()
-        late_s = now_s - self._deadline_s
-        self._max_lateness_s = max(self._max_lateness_s, late_s)
-        if late_s > period_s:
-            self._lost_s += late_s
-            self._deadline_s = now_s
-        self._deadline_s += period_s
+        self._due_s = period_s + (now_s if now_s - due_s > period_s else due_s)

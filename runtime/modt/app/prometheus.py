@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from modt.app.ladder import Step
 from modt.errors import ModtError
 from modt.sinks.output import replace_file
 
@@ -24,7 +25,6 @@ LABELS = {
     "stages_J": "stage",
 }
 """Label of the keys of each table."""
-STEPS = ("all", "deferred", "reduced", "dropped")
 
 
 def metrics_text(status: Mapping[str, Any]) -> str:
@@ -52,7 +52,7 @@ Sample = tuple[str, dict[str, str], float]
 def _samples(status: Mapping[str, Any]) -> Iterator[Sample]:
     for key in ("time_s", "up_s", "period_s"):
         yield f"modt_{key}", {}, status[key]
-    yield "modt_loop_step", {}, STEPS.index(status["loop"]["step"])
+    yield "modt_loop_step", {}, Step[status["loop"]["step"].upper()]
     for part in ("counts", "loop", "power", "sensor", "odometry", "recording", "host"):
         yield from _of_table(f"modt_{part}", status[part], {})
     for sink, health in status["sinks"].items():

@@ -35,7 +35,7 @@ from modt.sinks.output import LedgerSink, Sink, close_together
 from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecording
 from modt.sinks.run_directory import SUMMARY, RunDirectory
 from modt.sources.stream import Received, StreamEndedError
-from modt.types import FrameResult, Tracks
+from modt.types import FrameResult
 
 if TYPE_CHECKING:
     from modt.sources.live.live_stream import LiveStream
@@ -89,7 +89,6 @@ class Session:
         self._counts = Counts(self._totals, self._began_s)
         self._reloads = self._refused_reloads = 0
         self._without_reflectance = 0
-        self._tracks: Tracks | None = None  # tracks of the last frame
         self._tick: Tick = lambda result: None
 
     def run(self, supervisor: Supervisor, tick: Tick | None = None) -> dict[str, Any]:
@@ -204,7 +203,7 @@ class Session:
             "mode": self.stages.request.mode,
             "profile": self.stages.chosen.name,
             "period_s": info.period_s,
-            "counts": self._counts.report(now_s, self._tracks),
+            "counts": self._counts.report(now_s),
             "loop": self.deadlines.report() | {"failures": dict(self.failures.counts)} | reloads,
             "power": self.power.report() | {"limit_W": self.stages.config.loop.power_W},
             "sensor": self.source.health()
@@ -235,7 +234,6 @@ class Session:
             self._followed = self.stages.chosen
             self.recording.follow(self._followed.config.recording)
         config = self._followed.config
-        self._tracks = result.tracks
         self._totals.add_result(result)
         self._totals.add_ledger(line)
         self._ledger(line)
@@ -287,7 +285,7 @@ class Session:
         directory, writer = self.recording.directory, self.recording.writer
         if isinstance(self.deadlines, Deadlines):
             last = self.status()
-            self.summary |= {"status": last, "lateness": self.deadlines.timing.late_or_later()}
+            self.summary |= {"status": last, "lateness": self.deadlines.late_or_later()}
             writer.write(lambda: self._show(last))
         writer.write(self.recording.finish)
         text = json.dumps(self.summary, indent=2) + "\n"
@@ -315,7 +313,7 @@ def replay(
         labels=request.labels,
     )
     meters = discover(stages.config.energy).best.meters
-    deadlines, failures = NoDeadlines(source.report), Containment(contains=False)
+    deadlines, failures = NoDeadlines(request.rate_hz), Containment(contains=False)
     return Session(source, stages, recording, sinks, deadlines, failures, stop, meters, core)
 
 

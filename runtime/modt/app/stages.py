@@ -27,7 +27,7 @@ from modt.types import Budget, Float32, Frame, FrameResult
 SWEEPS = 10
 """Number of sweeps of another size in a row, after which the sensor is recognised anew."""
 RATIO = 2.0
-"""Ratio of the numbers of returns, from which a sweep is of another size."""
+"""Ratio of the numbers of returns from which a sweep counts as one of another size."""
 RANGE_SHARE = 0.6
 """Share of sensor.max_range_m that is kept while the range is reduced."""
 

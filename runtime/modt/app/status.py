@@ -10,7 +10,7 @@ from modt.classes import CLASS_NAMES
 from modt.config import EnergyConfig
 from modt.energy.attribution import attribute
 from modt.reporting.summary import Summary
-from modt.types import NONE, Tracks
+from modt.types import NONE
 
 SCHEMA = "modt.status/1"
 MIN_RATE_S = 0.5
@@ -31,17 +31,17 @@ class Counts:
         self._totals, self._rate_hz = totals, 0.0
         self._frames, self._since_s = 0, now_s  # when the rate was last computed
 
-    def report(self, now_s: float, tracks: Tracks | None) -> dict[str, Any]:
+    def report(self, now_s: float) -> dict[str, Any]:
         """Figures for the status, with the tracks of the last frame. The rate is the one since the last report."""
-        totals, seconds = self._totals, now_s - self._since_s
+        totals, tracks, seconds = self._totals, self._totals.tracks, now_s - self._since_s
         if seconds >= MIN_RATE_S:
             self._rate_hz = (totals.frames - self._frames) / seconds
             self._frames, self._since_s = totals.frames, now_s
-        seen = np.zeros(0, np.int64) if tracks is None else tracks.object_class[tracks.proposal != NONE]
+        seen = tracks.object_class[tracks.proposal != NONE]
         return {
             "frames": totals.frames,
             "rate_hz": round(self._rate_hz, 2),
-            "tracks": 0 if tracks is None else len(tracks),
+            "tracks": len(tracks),
             "visible": dict(zip(CLASS_NAMES, np.bincount(seen, minlength=len(CLASS_NAMES)).tolist(), strict=True)),
             "proposals": totals.proposals,
             "classifications": totals.classified,

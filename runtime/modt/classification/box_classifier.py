@@ -35,11 +35,6 @@ def logits(layers: Layers, features: Float64) -> Float64:
     return output
 
 
-def to_lists(layers: Layers) -> list[list[Any]]:
-    """Layers for JSON."""
-    return [[weight.tolist(), bias.tolist()] for weight, bias in layers]
-
-
 def from_lists(lists: Any, n_features: int) -> Layers:
     """Layers from JSON, in single precision: half the time of double.
 
@@ -143,11 +138,6 @@ def proposal_features(proposals: Proposals, sensor: SensorConfig) -> Float64:
     """(P, 7) box features of the proposals."""
     beam_sr = beam_solid_angle_sr(sensor, proposals.box)
     return box_features(proposals.count, proposals.box, ground_z_m(proposals, slice(None), sensor), beam_sr)
-
-
-def to_metadata(layers: Layers, weights: PoolWeights) -> str:
-    """Metadata entry of a box classifier."""
-    return json.dumps({"weights": weights.as_dict(), "layers": to_lists(layers)})
 
 
 def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None = None) -> BoxClassifier:

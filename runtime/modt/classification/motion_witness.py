@@ -68,9 +68,9 @@ def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int
         observed_s: (R,) time since the first proposal [s].
         length_m: (R,) length of the track [m].
     """
-    still = np.searchsorted(YOUNG_S, observed_s, side="right")
-    gone = np.searchsorted(MOVED_M, moved_m, side="right") + len(YOUNG_S)
-    return np.searchsorted(LENGTH_M, length_m, side="right"), np.where(moved_m < MOVED_M[0], still, gone)
+    still = YOUNG_S.searchsorted(observed_s, side="right")
+    gone = MOVED_M.searchsorted(moved_m, side="right") + len(YOUNG_S)
+    return LENGTH_M.searchsorted(length_m, side="right"), np.where(moved_m < MOVED_M[0], still, gone)
 
 
 def log_likelihood(moved_m: Float64, observed_s: Float64, size_m: Float64) -> Float64:

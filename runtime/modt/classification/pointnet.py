@@ -241,7 +241,7 @@ class PointNet:
         """(R, 4) P(class | points, box, reflectance)."""
         if not self.box_scores.informative:
             return network
-        boxes, reflectance = self.box_scores.of(proposals).take(which, axis=1)
+        boxes, reflectance = (scores.take(which, axis=0) for scores in self.box_scores.of(proposals))
         weights = self.box_scores.weights
         return softmax(log_pool(network, boxes, reflectance, self._log_frequency, weights))
 

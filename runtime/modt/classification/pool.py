@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,10 +28,6 @@ class PoolWeights:
     box: float = 0.0
     reflectance: float = 0.0
 
-    def as_dict(self) -> dict[str, float]:
-        """Entries of a model's metadata."""
-        return asdict(self)
-
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> PoolWeights:
         """Read from a model's metadata.
@@ -39,14 +36,6 @@ class PoolWeights:
             KeyError, TypeError, ValueError: missing, not a number, or out of range.
         """
         return cls(*(fraction(content, name) for name in ("network", "box", "reflectance")))
-
-
-def object_log_odds(log_box: Float64, log_frequency: Float64) -> Float64:
-    """(R,) log of P(box | object) / P(box | background), of log P(class | box) (R, 4) and log class frequency (4,).
-
-    Both up to a constant a row.
-    """
-    return _log_odds(log_box) - _log_odds(log_frequency[None])
 
 
 def _log_odds(log_probability: Float64) -> Float64:
@@ -64,9 +53,15 @@ def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Flo
         weight: exponent of the box.
     """
     out = np.repeat(log_frequency[None], len(log_box), axis=0)
-    if weight:
-        out[:, 1:] += weight * object_log_odds(log_box, log_frequency)[:, None]
+    if weight:  # P(box | object) / P(box | background)
+        out[:, 1:] += weight * (_log_odds(log_box) - _assumed_log_odds(log_frequency.tobytes()))[:, None]
     return out
+
+
+@cache
+def _assumed_log_odds(log_frequency: bytes) -> Float64:
+    """(1,) log of any object against background by the class frequency, the same in every frame."""
+    return _log_odds(np.frombuffer(log_frequency)[None])
 
 
 def log_pool(

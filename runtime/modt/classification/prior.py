@@ -29,7 +29,7 @@ class BoxScores:
     def __init__(self, boxes: BoxClassifier, reflectance: ReflectanceClassifier, sensor: SensorConfig) -> None:
         self.boxes, self.reflectance, self._sensor = boxes, reflectance, sensor
         self._proposals = Proposals.empty()
-        self._scores = np.zeros((2, 0, N_CLASSES))
+        self._scores = np.zeros((0, N_CLASSES)), np.zeros((0, N_CLASSES))
 
     @property
     def informative(self) -> bool:
@@ -42,13 +42,13 @@ class BoxScores:
         told = None if self._proposals.reflectance is None else self.reflectance.weights
         return told or self.boxes.weights
 
-    def of(self, proposals: Proposals) -> Float64:
-        """(2, P, 4) log P(class | box) and log P(reflectance | class, box) of each proposal, up to constants."""
+    def of(self, proposals: Proposals) -> tuple[Float64, Float64]:
+        """(P, 4) log P(class | box) and (P, 4) log P(reflectance | class, box), up to constants."""
         if proposals is not self._proposals:
             features = proposal_features(proposals, self._sensor)
             boxes = self.boxes.log_probability(features, proposals.cut)
             reflectance = self.reflectance.log_likelihood(features, proposals.reflectance)
-            self._proposals, self._scores = proposals, np.stack([boxes, reflectance])
+            self._proposals, self._scores = proposals, (boxes, reflectance)
             self._bound = is_bound(features, proposals.cut)
         return self._scores
 
@@ -110,17 +110,13 @@ class BoxPrior:
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) of each proposal of a frame."""
-        return softmax(self._scores.of(proposals).sum(axis=0))
+        boxes, reflectance = self._scores.of(proposals)
+        return softmax(boxes + reflectance)
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) rows of priors (M, 4) that give the objects together at least this probability."""
-        return object_probability_reaches(probability, threshold)
-
-
-def object_probability_reaches(probability: Float64, threshold: float) -> Bool:
-    """(M,) rows (M, 4) that give the objects together at least this probability."""
-    reaches: Bool = 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
-    return reaches
+        reaches: Bool = 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
+        return reaches
 
 
 def make_prior(scores: BoxScores, frequency: Float64) -> Prior:

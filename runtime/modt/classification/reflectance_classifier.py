@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.classification.box_classifier import N_FEATURES, Layers, from_lists, logits, to_lists
+from modt.classification.box_classifier import N_FEATURES, Layers, from_lists, logits
 from modt.classification.pool import PoolWeights
 from modt.config import REFLECTANCE_SCALES, SensorConfig
 from modt.types import N_REFLECTANCE, Float64
@@ -68,16 +68,6 @@ class MlpReflectanceClassifier:
 
 
 ReflectanceClassifier = NoReflectanceClassifier | MlpReflectanceClassifier
-
-
-def to_metadata(classifiers: Mapping[str, tuple[Layers, PoolWeights]]) -> str:
-    """Metadata entry of the reflectance classifiers of a model, by their scales."""
-    return json.dumps(
-        {
-            scale: {"weights": weights.as_dict(), "layers": to_lists(layers)}
-            for scale, (layers, weights) in classifiers.items()
-        }
-    )
 
 
 def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> ReflectanceClassifier:

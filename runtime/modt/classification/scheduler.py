@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -16,18 +15,18 @@ from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tra
 
 
 def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
-    """Points that the network processes, padding included, for proposals of (R,) points."""
-    return partial(padded_points, max_points=limits.max_points, batch=limits.batch, min_points=limits.min_points)
-
-
-def padded_points(count: Int, max_points: int, batch: int, min_points: int = 1) -> int:
-    """Points processed by the network, padding included, for R proposals of (R,) count points.
+    """Points that the network processes, padding included, for proposals of (R,) points.
 
     A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them and
     to min_points.
     """
-    size = sorted(max(min(n, max_points), min_points) for n in count.tolist())  # few: faster than arrays
-    return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
+    most, least, batch = limits.max_points, limits.min_points, limits.batch
+
+    def padded(count: Int) -> int:
+        size = sorted(max(min(n, most), least) for n in count.tolist())  # few: faster than arrays
+        return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
+
+    return padded
 
 
 UNCERTAINTY_WEIGHT, NEARNESS_WEIGHT, NOVELTY_WEIGHT = 0.4, 0.3, 0.3

@@ -1,1 +1,1 @@
-"""The command line, and the assembly of the parts."""
+"""The command line `modt`, and its commands on a robot."""

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from modt import host
 from modt.cli import options
-from modt.cli.run import OUT
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -15,8 +13,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("check", help="check this machine, and a sensor, for modt run; print remedies")
     source = "address of the sensor to listen to, or a recording (default: none)"
     p.add_argument("source", nargs="?", metavar="SOURCE", help=source)
-    options.add(p, "profile", "core")
-    p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
+    options.add(p, "profile", "core", "out")
     options.add_examples(
         p,
         "modt check                                this machine, with the default profile",

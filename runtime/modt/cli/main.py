@@ -20,12 +20,12 @@ COMMANDS = {
     "export": "modt_desk.cli.export",
     "simulate": "modt_desk.cli.simulate",
     "track": "modt_desk.cli.track",
-    "profile": "modt.cli.profile_group",
-    "profiles": "modt.cli.profile_group",
+    "profile": "modt_desk.cli.profile_group",
+    "profiles": "modt_desk.cli.profile_group",
     "completion": "modt_desk.cli.completion",
     "service": "modt_desk.cli.service",
 }
-"""Module of each command. Only this table names modules of the desk."""
+"""Module of each command. Nothing else in this package names modules of the desk."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from modt import host
 from modt.profile import DEFAULT
@@ -14,6 +15,8 @@ from modt.schemes import SINKS
 Parser = argparse.ArgumentParser
 MODES = ("conventional", "efficient", "accurate")
 CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
+OUT = Path("runs/live")
+"""Run directory of a service."""
 
 
 def capture(text: str) -> tuple[str, str]:
@@ -40,31 +43,20 @@ def core(text: str) -> int | None:
     """Parse the number of a core; None leaves the affinity unchanged."""
     if text in ("last", "none"):
         return host.last_core() if text == "last" else None
-    return integer(0, 65535, "the number of a core, or none")(text)
+    return bounded(int, 0, 65535, "the number of a core, or none")(text)
 
 
-def integer(low: int, high: int, what: str) -> Callable[[str], int]:
-    """Parser of an integer within bounds."""
-
-    def parse(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise argparse.ArgumentTypeError(f"{text!r}: write {what}, from {low} to {high}")
-        return int(text)
-
-    return parse
+N = TypeVar("N", bound=float)
 
 
-def real(low: float, high: float, what: str) -> Callable[[str], float]:
-    """Parser of a number within bounds."""
+def bounded(kind: type[N], low: N, high: N, what: str) -> Callable[[str], N]:
+    """Parser of a number of a kind, int or float, within bounds."""
 
-    def parse(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = float("nan")
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text!r}: write {what}, from {low:g} to {high:g}")
-        return value
+    def parse(text: str) -> N:
+        with suppress(ValueError):
+            if low <= (value := kind(text)) <= high:
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r}: write {what}, from {low} to {high}")
 
     return parse
 
@@ -75,6 +67,7 @@ _CAPTURE = (
     "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai, metadata=FILE of "
     "an Ouster; of a ROS 2 recording with several topics of point clouds: topic=NAME; repeatable"
 )
+_ODOMETRY = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
 _SINKS = f"send tracks to {', '.join(scheme.form for scheme in SINKS.values())}; repeatable"
 SHARED: dict[str, dict[str, Any]] = {
     "capture": {"type": capture, **_REPEATABLE, "metavar": "KEY=VALUE", "help": _CAPTURE},
@@ -84,6 +77,8 @@ SHARED: dict[str, dict[str, Any]] = {
     "json": {"action": "store_true", "help": "print JSON"},
     "meter": {"metavar": "NAME", "help": "meter to read (default: the best)"},
     "mode": {"choices": MODES, "default": "accurate", "help": "default: %(default)s"},
+    "odometry": {"default": "recording", "metavar": "SOURCE", "help": _ODOMETRY},
+    "out": {"type": Path, "default": OUT, "metavar": "DIR", "help": "run directory (default: %(default)s)"},
     "profile": {**_REPEATABLE, "metavar": "NAME|FILE", "help": _PROFILES},
     "sink": {**_REPEATABLE, "metavar": "ADDRESS", "help": _SINKS},
 }

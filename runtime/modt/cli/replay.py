@@ -17,16 +17,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("replay", help="process a recorded stream, or the built-in synthetic one")
     options.add_stream_options(p)
     options.add(p, "fov")
-    p.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/STREAM-MODE)")
+    options.add(p, "out", default=None, help="run directory (default: runs/STREAM-MODE)")
     options.add(p, "mode")
     p.add_argument("--rate", type=rate, dest="rate_hz", metavar="HZ|max", help="frames a second (default: max)")
     motion = p.add_mutually_exclusive_group()
     file = "poses in KITTI odometry's format, instead of the recorded ones"
     motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
-    source = (
-        "poses: recording (the stream's, default), none, or received: udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
-    )
-    motion.add_argument("--odometry", default="recording", metavar="SOURCE", help=source)
+    options.add(motion, "odometry")
     options.add(p, "sink")
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
@@ -41,7 +38,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def rate(text: str) -> float | None:
     """Frames a second, or None for no limit."""
-    return None if text == "max" else options.real(0.01, 1000, "frames a second, or max")(text)
+    return None if text == "max" else options.bounded(float, 0.01, 1000, "frames a second, or max")(text)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,8 +16,6 @@ from modt.cli.command import INTERRUPTED
 
 log = logging.getLogger(__name__)
 
-OUT = Path("runs/live")
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
@@ -27,10 +25,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add(p, "sink")
     view = "show the run to browsers at http://HOST:PORT/ (default: 127.0.0.1:8766, which no other machine reaches)"
     p.add_argument("--view", nargs="?", const="", metavar="HOST:PORT", help=view)
-    options.add(p, "profile", "core", "mode")
-    odometry = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
-    p.add_argument("--odometry", default="recording", metavar="SOURCE", help=odometry)
-    p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
+    options.add(p, "profile", "core", "mode", "odometry", "out")
     p.add_argument("--metrics", type=Path, metavar="FILE", help="file of metrics for Prometheus")
     options.add_examples(
         p,

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from modt.cli import options
-from modt.cli.run import OUT
 from modt.errors import MisuseError, refuse_pipe
 
 REMEDY = "give the run directory of a modt run"
@@ -28,7 +27,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     q = commands.add_parser("top", help="show what a running modt run is doing, until Ctrl-C is pressed")
     for command, function in ((p, run), (q, run_top)):
         run_directory = "its run directory (default: %(default)s)"
-        command.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
+        command.add_argument(
+            "directory", nargs="?", type=Path, default=options.OUT, metavar="DIR", help=run_directory
+        )
         command.set_defaults(run=function)
     options.add(p, "json")
     options.add_examples(

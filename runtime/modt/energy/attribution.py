@@ -6,11 +6,10 @@ A board is described by E_window = P_idle T + e_seg N_seg + e_class N_class + e_
 from __future__ import annotations
 
 from modt.config import EnergyConfig
-from modt.energy.ledger import Line
+from modt.energy.ledger import NO_WORK, Line
 from modt.energy.meters.meter import Kind
 
 SEGMENTATION, CLASSIFICATION = "segmentation", "classification"
-NO_WORK = {"calls": 0, "items": 0, "points": 0}
 _HARMLESS_MARKS = frozenset({"wrap"})
 _MAX_W = 10_000.0
 """Power above which the record of a window is not believed [W]."""
@@ -24,7 +23,7 @@ def usable(line: Line) -> bool:
 
 
 def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
-    """Energy of idling, of each stage, and of the unattributed rest of a window [J]; empty without a reading.
+    """Energy of idling, of each stage, and of the unattributed rest of a window [J], or nothing without a reading.
 
     With P_idle of the board, E and T of the window and t of its CPU time, in all and of a stage,
 

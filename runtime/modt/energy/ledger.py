@@ -18,8 +18,8 @@ Line = dict[str, Any]
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_COLUMNS = ("calls", "items", "points", "wall_ns", "cpu_ns")
-_CALLS, _ITEMS, _POINTS, _WALL, _CPU = range(5)
+NO_WORK = {"calls": 0, "items": 0, "points": 0, "wall_ns": 0, "cpu_ns": 0}
+"""Row of a stage that has not run."""
 
 
 class Ledger:
@@ -27,14 +27,14 @@ class Ledger:
 
     def __init__(self, wall_ns: Clock = time.perf_counter_ns, cpu_ns: Clock = time.thread_time_ns) -> None:
         self._wall_ns, self._cpu_ns = wall_ns, cpu_ns
-        self._stages: dict[str, list[int]] = {}
+        self._stages: dict[str, dict[str, int]] = {}
         self._wall0, self._cpu0 = wall_ns(), cpu_ns()
         self.span_overhead_ns = self.frame_overhead_ns = 0
         self.span_overhead_ns, self.frame_overhead_ns = self._measure_overhead()
         self._wall0, self._cpu0 = wall_ns(), cpu_ns()
 
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Result of function(*args), timed as a span of the stage; its items are len(result), if defined."""
+        """Result of function(*args), timed as a span of the stage. Its items are len(result), if defined."""
         return self.timed(stage, function, *args, **kwargs)[0]
 
     def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
@@ -44,20 +44,20 @@ class Ledger:
             result = function(*args, **kwargs)
         finally:
             cpu1, wall1 = self._cpu_ns(), self._wall_ns()
-            row = self._stages.setdefault(stage, [0, 0, 0, 0, 0])
-            row[_CALLS] += 1
-            row[_WALL] += wall1 - wall0
-            row[_CPU] += cpu1 - cpu0
+            row = self._stages.setdefault(stage, NO_WORK.copy())
+            row["calls"] += 1
+            row["wall_ns"] += wall1 - wall0
+            row["cpu_ns"] += cpu1 - cpu0
         length = getattr(result, "__len__", None)
         if length is not None:
-            row[_ITEMS] += length()
+            row["items"] += length()
         return result, cpu1 - cpu0
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
         """Add work to the stage beyond the length of its result."""
-        row = self._stages.setdefault(stage, [0, 0, 0, 0, 0])
-        row[_ITEMS] += items
-        row[_POINTS] += points
+        row = self._stages.setdefault(stage, NO_WORK.copy())
+        row["items"] += items
+        row["points"] += points
 
     def close_frame(self, index: int) -> Line:
         """Line of the frame: its stages, and the parts of the time since the last line.
@@ -71,10 +71,10 @@ class Ledger:
         rows, self._stages = self._stages, {}
         marks: list[str] = []
         for row in rows.values():
-            if row[_WALL] < 0 or row[_CPU] < 0:
+            if row["wall_ns"] < 0 or row["cpu_ns"] < 0:
                 marks = ["clock"]
-                row[_WALL], row[_CPU] = max(row[_WALL], 0), max(row[_CPU], 0)
-        calls, spans = (sum(row[k] for row in rows.values()) for k in (_CALLS, _WALL))
+                row["wall_ns"], row["cpu_ns"] = max(row["wall_ns"], 0), max(row["cpu_ns"], 0)
+        calls, spans = (sum(row[key] for row in rows.values()) for key in ("calls", "wall_ns"))
         if frame_wall < spans or frame_cpu < 0:
             marks = ["clock"]
             frame_wall, frame_cpu = max(frame_wall, spans), max(frame_cpu, 0)
@@ -82,7 +82,7 @@ class Ledger:
         return {
             "schema": SCHEMA,
             "frame": index,
-            "stages": {stage: dict(zip(_COLUMNS, row, strict=True)) for stage, row in rows.items()},
+            "stages": rows,
             "wall_ns": frame_wall,
             "cpu_ns": frame_cpu,
             "overhead_ns": overhead,
@@ -91,7 +91,7 @@ class Ledger:
         }
 
     def _measure_overhead(self, spans: int = 32, rounds: int = 32) -> tuple[int, int]:
-        """Cost of a span beyond the timed call, and of a frame beyond its spans [ns]; minimum over the rounds."""
+        """Cost of a span beyond the timed call, and of a frame beyond its spans [ns], the least of the rounds."""
         span_ns, frame_ns = [], []
         for _ in range(rounds):
             t0 = self._cpu_ns()
@@ -101,7 +101,7 @@ class Ledger:
             for _ in range(spans):
                 self.run("", _nothing)
             t2 = self._cpu_ns()
-            self._stages = {stage: [0, 0, 0, 0, 0] for stage in STAGES}
+            self._stages = {stage: NO_WORK.copy() for stage in STAGES}
             t3 = self._cpu_ns()
             self.close_frame(0)
             t4 = self._cpu_ns()

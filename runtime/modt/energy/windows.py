@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,9 +27,9 @@ class Clocks:
 MIN_S = 1.0
 """Shortest window [s]. RAPL counters step every millisecond; INA chips and batteries average over longer times."""
 SUSPEND_S = 0.2
-"""Time asleep [s], by the boot clock, from which a window is marked suspended and has no energy."""
+"""A window in which the machine sleeps longer than this [s] is marked suspended and has no energy."""
 PRIMING_S = 0.05
-"""Length of the first window of a counter [s]. It has no energy, as no power is known yet to judge it by."""
+"""Length of the first window of a counter [s]. It has no energy, because no power is known yet to compare it with."""
 
 
 class Windows:
@@ -44,19 +45,17 @@ class Windows:
         self._open()
 
     def add(self, line: Line) -> Line | None:
-        """Add a ledger line; returns the line of the window if that closes, else None."""
+        """Add a ledger line, and return the line of the window if that closes, else None."""
         self._frames.append(line["frame"])
         for stage, row in line["stages"].items():
-            total = self._stages.setdefault(stage, dict.fromkeys(row, 0))
-            for key, value in row.items():
-                total[key] += value
+            self._stages[stage].update(row)
         self._overhead_ns += line["overhead_ns"]
         if "clock" in line["marks"]:
             self._marks.append("clock")
         return self.close() if self._clocks.monotonic_ns() - self._start_ns >= 1e9 * self._least_s else None
 
     def close(self) -> Line:
-        """Close the open window, however short, and return its line; the next one begins.
+        """Close the open window, however short, return its line, and begin the next one.
 
         The stages' wall_ns, overhead_ns and idle_ns sum to wall_ns exactly.
         """
@@ -116,6 +115,6 @@ class Windows:
         self._start_ns, self._boot0_ns = clocks.monotonic_ns(), clocks.boot_ns()
         self._process0_ns = clocks.process_ns()
         self._frames: list[int] = []
-        self._stages: dict[str, dict[str, int]] = {}
+        self._stages: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self._overhead_ns = 0
         self._marks: list[str] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -51,3 +52,9 @@ class BeamTable:
         cell = ((tangent - np.float32(self._low)) * self._scale).astype(np.int32)
         step_rad: Float32 = self._step_rad.take(cell, mode="clip")
         return step_rad
+
+
+@cache
+def beams_of(elevations_deg: tuple[float, ...] | None, step_deg: float) -> Beams:
+    """Spacing by the elevations of all beams, or the same everywhere where those are not known."""
+    return EvenBeams(step_deg) if elevations_deg is None else BeamTable(elevations_deg)

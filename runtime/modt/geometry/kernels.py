@@ -30,20 +30,13 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
         return certain
     from scipy.optimize import linear_sum_assignment  # large, and the compiled kernels do without
 
-    i, n = _compact(rows[contested])
-    j, k = _compact(columns[contested])
-    matrix, chosen = np.full((n, k), limit), np.zeros((n, k), np.bool_)
+    (one, i), (other, j) = (np.unique(index[contested], return_inverse=True) for index in (rows, columns))
+    matrix, chosen = np.full((len(one), len(other)), limit), np.zeros((len(one), len(other)), np.bool_)
     matrix[i, j] = cost[contested]
     chosen[linear_sum_assignment(matrix)] = True
     pairs: Int = np.concatenate([certain, contested[chosen[i, j]]])
     pairs.sort()
     return pairs
-
-
-def _compact(index: Int) -> tuple[Int, int]:
-    """Indices renumbered without gaps, and how many there are."""
-    number = (np.bincount(index) > 0).cumsum()
-    return number[index] - 1, int(number[-1])
 
 
 class GeometryKernels:

@@ -83,21 +83,35 @@ static void join(i32 *parent, i32 a, i32 b)
     }
 }
 
-/* One stable pass of a radix sort: n rows in the order of their digits, shifted right, which are below `base`. */
-static void sort_by(const i32 *digit, int shift, i32 base, const i32 *rows, i64 n, i32 *next, i32 *sorted)
+typedef struct {
+    uint16_t row, column; /* of a grid of a side below 2^16 */
+    i32 cell;
+} Place;
+
+/* Places of the cells used, of a grid 2^shift times as wide, in its order, by a radix sort; returns how many. Scratch:
+ * `next` of 2 side, `half` of n_cells. */
+static i32 sort_places(const Cells *cells, const uint8_t *use, i64 n_cells, int shift, i32 side, i32 *next, Place *half,
+                       Place *sorted)
 {
-    i32 total = 0;
-    for (i32 d = 0; d < base; d++)
-        next[d] = 0;
-    for (i64 k = 0; k < n; k++)
-        next[digit[rows[k]] >> shift]++;
-    for (i32 d = 0; d < base; d++) {
-        i32 count = next[d];
-        next[d] = total;
-        total += count;
+    i32 *of_row = next, *of_column = next + side, used = 0, rows = 0, columns = 0;
+    for (i32 d = 0; d < side; d++)
+        of_row[d] = of_column[d] = 0;
+    for (i64 i = 0; i < n_cells; i++) {
+        i32 row = cells->row[i] >> shift, column = cells->column[i] >> shift;
+        PROVEN(row >= 0 && row < side && column > 0 && column < side - 1);
+        sorted[used] = (Place){(uint16_t)row, (uint16_t)column, (i32)i}; /* overwritten by the next, unless it is used */
+        used += use[i], of_row[row] += use[i], of_column[column] += use[i];
     }
-    for (i64 k = 0; k < n; k++)
-        sorted[next[digit[rows[k]] >> shift]++] = rows[k];
+    for (i32 d = 0; d < side; d++) {
+        i32 in_row = of_row[d], in_column = of_column[d];
+        of_row[d] = rows, of_column[d] = columns;
+        rows += in_row, columns += in_column;
+    }
+    for (i32 k = 0; k < used; k++)
+        half[of_column[sorted[k].column]++] = sorted[k];
+    for (i32 k = 0; k < used; k++)
+        sorted[of_row[half[k].row]++] = half[k];
+    return used;
 }
 
 typedef struct {
@@ -105,66 +119,70 @@ typedef struct {
     float low, high, max_gap_m;
 } Span;
 
-static inline int near(const Span *before, const Span *after)
+/* First cell of the component of each of n cells in the order of the grid, from 1 on, where the neighbours of a cell are
+ * the one before it and up to three of the row before; the cell 0 is nowhere. Scratch: `latest`, of `side`. Without
+ * branches, but for the few cells that connect components, since no processor foresees which neighbours there are. */
+static void find_components(const Span *span, i32 n, i32 side, i32 *latest, i32 *parent)
 {
-    return most(before->low, after->low) - least(before->high, after->high) < before->max_gap_m;
-}
-
-/* First cell of the component of each of n cells in the order of the grid, where the neighbours of a cell are the one
- * before it and up to three of the row before. */
-static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
-{
-    i32 above = 0;
-    for (i32 k = 0; k < n; k++) {
+    const i4 back = {1, side + 1, side, side - 1};
+    for (i32 c = 0; c < side; c++)
+        latest[c] = 0;
+    parent[0] = 0;
+    for (i32 k = 1, start = 0, before = 0; k <= n; k++) {
         i32 place = span[k].place;
-        i32 own = parent[k] = k;
-        if (k && span[k - 1].place == place - 1 && near(&span[k - 1], &span[k]))
-            own = parent[k - 1];
-        while (span[above].place < place - side - 1)
-            above++;
-        for (i32 a = above; span[a].place <= place - side + 1; a++) /* ends at k */
-            if (parent[a] != own && near(&span[a], &span[k])) {
-                join(parent, parent[a], own);
-                own = parent[own];
-            }
-        parent[k] = own;
+        for (; place >= start + side; start += side)
+            latest[before] = k - 1;
+        i32 column = place - start, *over = latest + column - 1;
+        const Span *own = &span[k], *left = own - 1;
+        const Span *beyond = &span[over[0]], *above = &span[over[1]], *ahead = &span[over[2]];
+        i4 places = {left->place, beyond->place, above->place, ahead->place};
+        f4 low = {left->low, beyond->low, above->low, ahead->low};
+        f4 high = {left->high, beyond->high, above->high, ahead->high};
+        f4 max_gap_m = {left->max_gap_m, beyond->max_gap_m, above->max_gap_m, ahead->max_gap_m};
+        f4 gap_m = most4(low, spread(own->low)) - least4(high, spread(own->high));
+        i4 joined = (places == place - back) & (gap_m < max_gap_m), alone = {k, k, k, k};
+        i4 roots = {parent[k - 1], parent[over[0]], parent[over[1]], parent[over[2]]};
+        roots = (i4){parent[roots[0]], parent[roots[1]], parent[roots[2]], parent[roots[3]]};
+        roots = (roots & joined) | (alone & ~joined);
+        i32 one = roots[0] < roots[1] ? roots[0] : roots[1], other = roots[2] < roots[3] ? roots[2] : roots[3];
+        parent[k] = one = one < other ? one : other;
+        i4 apart = (roots != alone) & (roots != one);
+        for (int j = 0; j < 4 && (apart[0] | apart[1] | apart[2] | apart[3]); j++)
+            if (apart[j])
+                join(parent, roots[j], one);
+        latest[before] = k - 1; /* only now: the neighbour above it was looked up last */
+        before = column;
     }
-    for (i32 k = 0; k < n; k++)
+    for (i32 k = 1; k <= n; k++)
         parent[k] = parent[parent[k]];
 }
 
 /* connect and connect_coarse: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
  * used lies, NONE for the others; in the order of the first of their wide cells, those in the order of their last
- * cells. Returns how many components there are. Scratch: `next`, of side + 9 n_cells. */
+ * cells. Returns how many components there are. Scratch: `next`, of 2 side + 10 n_cells + 8. */
 static i64 connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift, i32 side,
                    i32 *next, i64 *component)
 {
-    Span *span = (Span *)(next + side);
-    i32 *order = next + side + 4 * n_cells, *parent = order + n_cells, *wide = parent + n_cells, *last = wide + n_cells;
-    i32 used = 0, n = 0, count = 0, before = NONE;
-    for (i64 i = 0; i < n_cells; i++) {
-        PROVEN(cells->row[i] >= 0 && cells->row[i] >> shift < side && cells->column[i] >> shift > 0 &&
-               cells->column[i] >> shift < side - 1);
-        wide[used] = (i32)i;
-        used += use[i];
-    }
-    sort_by(cells->column, shift, side, wide, used, next, parent);
-    sort_by(cells->row, shift, side, parent, used, next, order);
-    for (i64 k = 0; k < used; k++) {
-        i32 i = order[k], place = (cells->row[i] >> shift) * side + (cells->column[i] >> shift);
+    Span *span = (Span *)(next + 2 * side);
+    Place *order = (Place *)(span + n_cells + 1);
+    i32 *parent = (i32 *)(order + n_cells), *wide = parent + n_cells + 1, *last = wide + n_cells;
+    i32 used = sort_places(cells, use, n_cells, shift, side, next, (Place *)span, order), n = 0, count = 0, before = NONE;
+    for (i32 k = 0; k < used; k++) {
+        i32 i = order[k].cell, place = order[k].row * side + order[k].column;
         int begins = place != before;
         n += begins;
-        Span *own = &span[n - 1];
+        Span *own = &span[n];
         own->low = least(cells->low[i], begins ? INFINITY : own->low);
         own->high = most(cells->high[i], begins ? -INFINITY : own->high);
         own->place = before = place;
         own->max_gap_m = max_gap_m[i];
-        last[n - 1] = i;
-        wide[i] = n - 1;
+        last[n] = i;
+        wide[i] = n;
     }
-    find_components(span, n, side, parent);
-    i32 *number = order, *ends = last + n_cells, m = 0; /* of the component of each root; cells that are the last */
-    for (i32 c = 0; c < n; c++)
+    span[0] = (Span){-3 * side, INFINITY, -INFINITY, 0.0f};
+    find_components(span, n, side, next, parent);
+    i32 *number = (i32 *)order, *ends = last + n_cells + 1, m = 0; /* of each root's component; last cells */
+    for (i32 c = 1; c <= n; c++)
         number[c] = NONE;
     for (i64 i = 0; i < n_cells; i++) {
         ends[m] = wide[i];
@@ -184,32 +202,31 @@ typedef struct {
     uint8_t *is_part;
 } Sizes;
 
-/* ClusterSizes.of_cells of n clusters. Scratch: `edge`, of 4 n. */
+typedef float u4 __attribute__((vector_size(16), aligned(4)));
+
+/* ClusterSizes.of_cells of n clusters. Scratch: `ends`, the least and the greatest x, y and height of each. */
 static void measure(const Cells *cells, const Samples *points, const float *beam_m, const i64 *cluster, i64 n_cells,
-                    i64 n, float *edge, const Sizes *sizes)
+                    i64 n, u4 (*ends)[2], const Sizes *sizes)
 {
-    float *min_x = edge, *max_x = min_x + n, *min_y = max_x + n, *max_y = min_y + n;
     for (i64 g = 0; g < n; g++) {
-        min_x[g] = min_y[g] = sizes->bottom_m[g] = INFINITY;
-        max_x[g] = max_y[g] = sizes->top_m[g] = -INFINITY;
+        ends[g][0] = spread(INFINITY), ends[g][1] = spread(-INFINITY);
         sizes->points[g] = sizes->cell[g] = 0;
     }
-    for (i64 i = 0; i < n_cells; i++) {
-        i64 g = cluster[i];
-        PROVEN(g >= NONE && g < n);
-        if (g == NONE)
-            continue;
-        min_x[g] = least(points->x[i], min_x[g]);
-        max_x[g] = most(points->x[i], max_x[g]);
-        min_y[g] = least(points->y[i], min_y[g]);
-        max_y[g] = most(points->y[i], max_y[g]);
-        sizes->bottom_m[g] = least(cells->low[i], sizes->bottom_m[g]);
-        sizes->top_m[g] = most(cells->high[i], sizes->top_m[g]);
-        sizes->points[g] += cells->entries[i];
-        sizes->cell[g] = i;
-    }
+    i64 part = (n_cells + 3) / 4;
+    for (i64 k = 0; k < part; k++) /* neighbours share clusters: those far apart do not wait for one another */
+        for (i64 i = k; i < n_cells; i += part) {
+            i64 g = cluster[i];
+            PROVEN(g >= NONE && g < n);
+            if (g == NONE)
+                continue;
+            f4 low = {points->x[i], points->y[i], cells->low[i]}, high = {points->x[i], points->y[i], cells->high[i]};
+            ends[g][0] = least4(low, ends[g][0]), ends[g][1] = most4(high, ends[g][1]);
+            sizes->points[g] += cells->entries[i];
+            sizes->cell[g] = i > sizes->cell[g] ? i : sizes->cell[g];
+        }
     for (i64 g = 0; g < n; g++) {
-        float width = max_x[g] - min_x[g], depth = max_y[g] - min_y[g];
+        float width = ends[g][1][0] - ends[g][0][0], depth = ends[g][1][1] - ends[g][0][1];
+        sizes->bottom_m[g] = ends[g][0][2], sizes->top_m[g] = ends[g][1][2];
         sizes->extent_m[g] = __builtin_sqrtf(width * width + depth * depth);
         sizes->sqrt_range[g] = points->sqrt_range[sizes->cell[g]];
         sizes->beam_m[g] = beam_m[sizes->cell[g]];
@@ -239,20 +256,21 @@ static int may_be_person(const Rules *r, const Sizes *s, i64 g)
 }
 
 /* CellClusterer.cluster: cluster of each cell; returns how many there are. There is room for the sizes of 2 n_cells.
- * Scratch: `work`, of fine_side + 18 n_cells. */
+ * Scratch: `work`, of 2 fine_side + 15 n_cells + 8. */
 EXPORT i64 modt_cluster(const Rules *rules, const Cells *cells, const Samples *points, const float *beam_m,
                         i64 n_cells, i32 coarse_side, i32 fine_side, i32 *work, i64 *cluster, const Sizes *sizes)
 {
-    i64 *part = (i64 *)work; /* 2 n_cells; then 9 n_cells and a side for connect, of which measure takes 4 */
-    i32 *next = work + 2 * n_cells, *number = next + fine_side + 9 * n_cells;
-    float *gap_m = (float *)(number + n_cells), *edge = (float *)next;
+    i64 *part = (i64 *)work; /* 2 n_cells; then 10 n_cells + 8 and two sides for connect, of which measure takes 8 */
+    i32 *next = work + 2 * n_cells, *number = next + 2 * fine_side + 10 * n_cells + 8;
+    float *gap_m = (float *)(number + n_cells);
+    u4 (*ends)[2] = (u4 (*)[2])next;
     uint8_t *use = (uint8_t *)(gap_m + n_cells);
     for (i64 i = 0; i < n_cells; i++) {
         gap_m[i] = rules->max_gap_m + rules->max_gap_beams * beam_m[i];
         use[i] = 1;
     }
     i64 n = connect(cells, gap_m, use, n_cells, 1, coarse_side, next, cluster);
-    measure(cells, points, beam_m, cluster, n_cells, n, edge, sizes);
+    measure(cells, points, beam_m, cluster, n_cells, n, ends, sizes);
     for (i64 g = 0; g < n; g++)
         number[g] = may_split(rules, sizes, g);
     for (i64 i = 0; i < n_cells; i++)
@@ -260,7 +278,7 @@ EXPORT i64 modt_cluster(const Rules *rules, const Cells *cells, const Samples *p
     i64 parts = connect(cells, gap_m, use, n_cells, 0, fine_side, next, part);
     Sizes own = {sizes->points + n,     sizes->cell + n,   sizes->extent_m + n, sizes->bottom_m + n, sizes->top_m + n,
                  sizes->sqrt_range + n, sizes->beam_m + n, sizes->is_part + n};
-    measure(cells, points, beam_m, part, n_cells, parts, edge, &own);
+    measure(cells, points, beam_m, part, n_cells, parts, ends, &own);
     for (i64 p = 0; p < parts; p++) {
         i64 owner = cluster[own.cell[p]];
         own.is_part[p] = sizes->extent_m[owner] >= rules->max_extent_m;

@@ -2,14 +2,9 @@
  * offsets[i + 1]; none is empty. */
 #include "kernels.h"
 
-typedef float f4 __attribute__((vector_size(16)));
-typedef i32 i4 __attribute__((vector_size(16)));
-typedef double d4 __attribute__((vector_size(32), aligned(8)));
+typedef float f8 __attribute__((vector_size(32), aligned(4)));
+typedef i32 i8 __attribute__((vector_size(32)));
 typedef i64 l4 __attribute__((vector_size(32)));
-
-static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
-static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
-static inline f4 spread(float a) { return (f4){a, a, a, a}; }
 
 /* Least and greatest coordinates of points, at least one, along four axes of which x, y and z are given. */
 static ALWAYS_INLINE void ends_along(const float *x, const float *y, const float *z, i64 i, i64 end, const f4 axes[3],
@@ -71,31 +66,33 @@ EXPORT void modt_upright_boxes(const float *x, const float *y, const float *z, c
 }
 
 /* overlapping_pairs: pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y. Returns how many there are;
- * no more than `limit` are written. Scratch: `least`, 64 numbers for each sixteen of b. */
-EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, d4 (*least)[4][4], i64 limit,
+ * no more than `limit` are written. Rounding keeps the order of numbers, so that pairs which do not overlap in single
+ * precision need no other look. Scratch: `least`, 64 numbers for each sixteen of b. */
+EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, f8 (*least)[4][2], i64 limit,
                                   i64 *one, i64 *other)
 {
+    const double *to[4] = {b + 4 * k, b, b + 6 * k, b + 2 * k}; /* what the ends of a, negated, have to reach */
     i64 groups = (k + 15) / 16, count = 0;
     for (i64 j = 0; j < 16 * groups; j++)
-        for (int side = 0; side < 4; side++) { /* what the ends to the east, west, north and south of a have to reach */
-            double end = j < k ? -b[(side / 2 * 2 + (side % 2 ? 0 : 4)) * k + j] : __builtin_nan(""); /* not reached */
-            least[j / 16][side][j / 4 % 4][j % 4] = end;
-        }
+        for (int side = 0; side < 4; side++)
+            least[j / 16][side][j / 8 % 2][j % 8] = j < k ? (float)-to[side][j] : __builtin_nanf(""); /* not reached */
     for (i64 i = 0; i < n; i++) {
-        double east = a[i], north = a[2 * n + i], west = a[4 * n + i], south = a[6 * n + i];
+        double end[4] = {a[i], a[4 * n + i], a[2 * n + i], a[6 * n + i]}; /* to the east, west, north and south */
+        float east = (float)end[0], west = (float)end[1], north = (float)end[2], south = (float)end[3];
         for (i64 g = 0; g < groups; g++) {
-            l4 near[4], any;
-            for (int f = 0; f < 4; f++)
+            i8 near[2];
+            for (int f = 0; f < 2; f++)
                 near[f] = (east >= least[g][0][f]) & (west >= least[g][1][f]) & (north >= least[g][2][f]) &
                           (south >= least[g][3][f]);
-            any = near[0] | near[1] | near[2] | near[3];
+            l4 any = (l4)(near[0] | near[1]);
             if (!(any[0] | any[1] | any[2] | any[3]))
                 continue;
-            for (int at = 0; at < 16; at++)
-                if (near[at / 4][at % 4]) {
+            for (i64 at = 0, j = 16 * g; at < 16; at++, j++)
+                if (near[at / 8][at % 8] && end[0] >= -to[0][j] && end[1] >= -to[1][j] && end[2] >= -to[2][j] &&
+                    end[3] >= -to[3][j]) {
                     if (count < limit) {
                         one[count] = i;
-                        other[count] = 16 * g + at;
+                        other[count] = j;
                     }
                     count++;
                 }

@@ -56,11 +56,12 @@ static void find_bounds(const Ground *g, float height_m, const float *z, const f
         int plausible = (magnitude(z[i] + height_m) < reach) & (sqrt_range[i] > g->min_sqrt_range);
         candidate[i] = plausible ? z[i] : INFINITY;
     }
-    for (i64 i = 0; i < n; i++) {
-        PROVEN(cell[i] >= 0 && cell[i] < g->rings * g->sectors);
-        lowest[cell[i]] = least(candidate[i], lowest[cell[i]]);
-        highest[cell[i]] = most(z[i], highest[cell[i]]);
-    }
+    for (i64 k = 0; k < BLOCK / 4; k++) /* neighbours share cells: those far apart do not wait for one another */
+        for (i64 part = 0, i = k; part < 4 && i < n; part++, i += BLOCK / 4) {
+            PROVEN(cell[i] >= 0 && cell[i] < g->rings * g->sectors);
+            lowest[cell[i]] = least(candidate[i], lowest[cell[i]]);
+            highest[cell[i]] = most(z[i], highest[cell[i]]);
+        }
 }
 
 /* GroundEstimator._stands: a return lies far above the lowest if the highest does; flat_m by ring */

@@ -83,7 +83,7 @@ typedef struct {
 
 typedef struct {
     i64 *offsets, *index;
-    float *x, *y, *z, *ground_z;
+    float *columns; /* x, y, z and z of the ground, of as many members as there are */
 } Members;
 
 /* members_of: points by cluster, in input order within a cluster, given the cell of each point and the cluster of
@@ -92,13 +92,18 @@ EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, co
                          i64 n_cells, i64 n, Members *members)
 {
     i64 *next = members->offsets + 1; /* of each cluster, the place of its next point; its end, when all are placed */
+    i64 total = 0;
     for (i64 g = 0; g <= n; g++)
         members->offsets[g] = 0;
     for (i64 c = 0; c < n_cells; c++)
-        if (cluster[c] != NONE && cluster[c] + 1 < n)
-            next[cluster[c] + 1] += entries[c];
-    for (i64 g = 1; g < n; g++)
-        next[g] += next[g - 1];
+        if (cluster[c] != NONE)
+            next[cluster[c]] += entries[c];
+    for (i64 g = 0; g < n; g++) {
+        i64 count = next[g];
+        next[g] = total;
+        total += count;
+    }
+    float *x = members->columns, *y = x + total, *z = y + total, *ground_z = z + total;
     for (i64 i = 0; i < n_points; i++) {
         PROVEN(cell[i] >= 0 && cell[i] < n_cells && cluster[cell[i]] >= NONE && cluster[cell[i]] < n);
         i64 g = cluster[cell[i]];
@@ -106,10 +111,10 @@ EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, co
             continue;
         i64 at = next[g]++;
         members->index[at] = points->index[i];
-        members->x[at] = points->x[i];
-        members->y[at] = points->y[i];
-        members->z[at] = points->z[i];
-        members->ground_z[at] = points->z[i] - points->height[i];
+        x[at] = points->x[i];
+        y[at] = points->y[i];
+        z[at] = points->z[i];
+        ground_z[at] = points->z[i] - points->height[i];
     }
 }
 
@@ -144,32 +149,37 @@ EXPORT void modt_group_sums(const float *values, i64 rows, i64 k, const i64 *off
 EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, const i64 *offsets, i64 n, i64 limit,
                                const float *cosines, const float *sines, i32 headings, float noise_m, i64 *best)
 {
-    enum { MOST = 64 };
-    float low[MOST], high[MOST];
-    double closeness[MOST / 2];
-    i32 axes = 2 * headings;
-    PROVEN(axes <= MOST);
+    enum { MOST = 32, LANES = 8 }; /* directions, of which as many are done together */
+    float c[2][MOST] = {{0.0f}}, s[2][MOST] = {{0.0f}}, low[2][MOST], high[2][MOST];
+    double closeness[MOST];
+    i32 padded = (headings + LANES - 1) / LANES * LANES;
+    PROVEN(padded <= MOST);
+    for (i32 a = 0; a < 2 * headings; a++)
+        c[a / headings][a % headings] = cosines[a], s[a / headings][a % headings] = sines[a];
     for (i64 g = 0; g < n; g++) {
-        for (i32 a = 0; a < axes; a++) {
-            low[a] = INFINITY;
-            high[a] = -INFINITY;
-            closeness[a / 2] = 0.0;
+        for (i32 a = 0; a < padded; a++) {
+            low[0][a] = low[1][a] = INFINITY;
+            high[0][a] = high[1][a] = -INFINITY;
+            closeness[a] = 0.0;
         }
         i64 stride = (offsets[g + 1] - offsets[g] + limit - 1) / limit;
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride)
-            for (i32 a = 0; a < axes; a++) {
-                float across = cosines[a] * x[rows[i]] + sines[a] * y[rows[i]];
-                low[a] = least(across, low[a]);
-                high[a] = most(across, high[a]);
-            }
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride)
-            for (i32 a = 0; a < headings; a++) {
-                i32 b = a + headings;
-                float here_x = x[rows[i]], here_y = y[rows[i]];
-                float u = cosines[a] * here_x + sines[a] * here_y, v = cosines[b] * here_x + sines[b] * here_y;
-                float nearest = least(least(u - low[a], high[a] - u), least(v - low[b], high[b] - v));
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
+            float here_x = x[rows[i]], here_y = y[rows[i]];
+            for (int v = 0; v < 2; v++)
+                for (i32 a = 0; a < padded; a++) {
+                    float across = c[v][a] * here_x + s[v][a] * here_y;
+                    low[v][a] = least(across, low[v][a]);
+                    high[v][a] = most(across, high[v][a]);
+                }
+        }
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
+            float here_x = x[rows[i]], here_y = y[rows[i]];
+            for (i32 a = 0; a < padded; a++) {
+                float u = c[0][a] * here_x + s[0][a] * here_y, v = c[1][a] * here_x + s[1][a] * here_y;
+                float nearest = least(least(u - low[0][a], high[0][a] - u), least(v - low[1][a], high[1][a] - v));
                 closeness[a] += 1.0f / most(nearest, noise_m);
             }
+        }
         best[g] = 0;
         for (i32 a = 1; a < headings; a++)
             if (closeness[a] > closeness[best[g]])
@@ -183,22 +193,25 @@ EXPORT void modt_reflectance_statistics(const float *points, i64 width, const i6
 {
     i64 last = offsets[n];
     for (i64 g = 0; g < n; g++) {
-        double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0, *own = statistics[g];
+        double total = 0.0, squares = 0.0, *own = statistics[g];
+        i64 number = 0, brights = 0, darks = 0;
         float high = -INFINITY;
         for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
             __builtin_prefetch(&points[index[i + AHEAD < last ? i + AHEAD : i] * width + 3]);
             float r = points[index[i] * width + 3];
             if (r < 0.0f)
                 continue;
-            number += 1.0;
+            number++;
             total += r;
             squares += r * r;
             brights += r > bright;
             darks += r < dark;
             high = most(r, high);
         }
-        double mean = total / number, variance = squares / number - mean * mean; /* not a number without any */
+        double n_returns = (double)number, mean = total / n_returns; /* not a number without any */
+        double variance = squares / n_returns - mean * mean;
         own[0] = mean, own[1] = __builtin_sqrt(variance < 0.0 ? 0.0 : variance);
-        own[2] = number > 0.0 ? (double)high : mean, own[3] = brights / number, own[4] = darks / number;
+        own[2] = number ? (double)high : mean;
+        own[3] = (double)brights / n_returns, own[4] = (double)darks / n_returns;
     }
 }

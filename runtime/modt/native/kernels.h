@@ -24,11 +24,16 @@
 
 typedef int32_t i32;
 typedef int64_t i64;
+typedef float f4 __attribute__((vector_size(16)));
+typedef i32 i4 __attribute__((vector_size(16)));
 
 static inline float least(float a, float b) { return a < b ? a : b; }
 static inline float most(float a, float b) { return a > b ? a : b; }
 static inline double low(double a, double b) { return a < b ? a : b; }
 static inline double high(double a, double b) { return a > b ? a : b; }
+static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
+static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
+static inline f4 spread(float a) { return (f4){a, a, a, a}; }
 static inline float magnitude(float a) { return __builtin_fabsf(a); }
 
 #endif

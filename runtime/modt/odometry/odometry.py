@@ -88,10 +88,10 @@ class Odometry:
 
         def observed(placement: Placement) -> Observations:
             observations = observe(proposals, placement.T_world_sensor, self._kernels)
-            if delay_s is None or first:
-                return observations
-            step = placement.motion.displacement(proposals.centroid[:, :2], delay_s)
-            return observations.moved(step @ placement.T_world_sensor[:2, :2].T)
+            if delay_s is not None and not first:
+                step = placement.motion.displacement(proposals.centroid[:, :2], delay_s)
+                observations.move(step @ placement.T_world_sensor[:2, :2].T)
+            return observations
 
         if given is not None and self._T_world_odometry is not None:
             self._landmarks.clear()

@@ -229,9 +229,7 @@ def _mutual(i: Int, j: Int, cost: Float64) -> Int:
     """Indices of the pairs that are the best of their row and of their column."""
     worst_first = np.argsort(cost, kind="stable")[::-1]
     best_of_i, best_of_j = (np.empty(int(index.max(initial=0)) + 1, np.int64) for index in (i, j))
-    best_of_i[i[worst_first]] = best_of_j[j[worst_first]] = (
-        worst_first  # later values overwrite earlier ones: the best remains
-    )
+    best_of_i[i[worst_first]] = best_of_j[j[worst_first]] = worst_first  # the best is written last and remains
     k = np.arange(len(cost))
     return np.flatnonzero((best_of_i[i] == k) & (best_of_j[j] == k))
 

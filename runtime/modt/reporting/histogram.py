@@ -9,11 +9,11 @@ import numpy as np
 from modt.types import Int
 
 BITS = 8
-"""Leading bits held of each value: values below 256 are exact, quantiles of greater ones within 0.4 %."""
+"""Leading bits held of each value. Values below 256 are exact, quantiles of greater ones within 0.4 %."""
 
 
 class Histogram:
-    """Count, sum, maximum and quantiles of integers; negative ones count as 0.
+    """Count, sum, maximum and quantiles of integers. Negative ones count as 0.
 
     Count, sum and maximum are exact. For quantiles each value is replaced by the middle of those that share its
     leading `bits`, an error of at most 2^-bits. Integers of 63 bits have fewer than 2^(bits - 1) (65 - bits) such
@@ -24,10 +24,6 @@ class Histogram:
         self.count = self.total = self.maximum = 0
         self._bits = bits
         self._occurrences: Counter[int] = Counter()
-
-    def __len__(self) -> int:
-        """Number of distinct values that are held."""
-        return len(self._occurrences)
 
     def add(self, value: int) -> None:
         """Add one value."""
@@ -45,11 +41,11 @@ class Histogram:
 
     @property
     def mean(self) -> float:
-        """Mean of all values; 0 without values."""
+        """Mean of all values, 0 without values."""
         return self.total / max(self.count, 1)
 
     def quantile(self, share: float) -> float:
-        """Quantile at that share, interpolated between neighbouring values; 0 without values."""
+        """Quantile at that share, interpolated between neighbouring values, 0 without values."""
         if not self.count:
             return 0.0
         values, counts = self._sorted()

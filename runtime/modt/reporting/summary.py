@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,73 +10,46 @@ import numpy as np
 from modt.classes import CLASS_NAMES, OBJECTS, ObjectClass
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE
 from modt.reporting.histogram import Histogram
-from modt.types import NONE, FrameResult, Proposals, Tracks
+from modt.types import NONE, Bool, FrameResult, Int, Proposals, Tracks
 
 _SCHEMA = "modt.summary/1"
 
 
-class TrackLengths:
-    """Count of the tracks, and of the frames in which they had a proposal; only live tracks are held."""
-
-    def __init__(self) -> None:
-        self._alive: dict[int, tuple[int, bool]] = {}
-        self._ended = {True: [0, 0], False: [0, 0]}  # foreground: tracks, frames with a proposal
-
-    def add(self, tracks: Iterable[tuple[int, bool, bool]]) -> None:
-        """Add the tracks of one frame: id, whether it has a proposal, whether it is foreground."""
-        present: dict[int, tuple[int, bool]] = {}
-        for id_, visible, foreground in tracks:
-            seen, _ = self._alive.pop(id_, (0, False))
-            present[id_] = (seen + visible, foreground)
-        for seen, foreground in self._alive.values():
-            self._ended[foreground][0] += 1
-            self._ended[foreground][1] += seen
-        self._alive = present
-
-    def totals(self, *, foreground_only: bool) -> tuple[int, int]:
-        """Number of tracks and of their frames with a proposal; the last class of a track counts."""
-        groups = (True,) if foreground_only else (True, False)
-        alive = [seen for seen, foreground in self._alive.values() if foreground in groups]
-        tracks, frames = (sum(self._ended[g][k] for g in groups) for k in (0, 1))
-        return tracks + len(alive), frames + sum(alive)
-
-
 class Summary:
-    """Totals of a run of any length; memory is bounded (`Histogram`, `TrackLengths`)."""
+    """Totals of a run of any length in bounded memory. Of the tracks only those alive are held."""
 
     def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
-        self._lengths = TrackLengths()
-        self._last: tuple[Tracks, Proposals] | None = None
-        self._calls: Counter[str] = Counter()
-        self._items: Counter[str] = Counter()
+        self.tracks, self._proposals = Tracks.blank(), Proposals.empty()  # those of the last frame
+        self._ended = np.zeros((2, 2), np.int64)  # lengths of the tracks that are gone
+        self._work: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger by stage
         self._times: dict[str, dict[str, Histogram]] = defaultdict(lambda: {"wall": Histogram(), "cpu": Histogram()})
 
     def add_result(self, result: FrameResult) -> None:
         """Add the result of a frame."""
         tracks = result.tracks
-        self._last = tracks, result.proposals  # without the sweep, which would stay in memory
+        self._ended += _lengths(self.tracks, ~np.isin(self.tracks.id, tracks.id))
+        self.tracks, self._proposals = tracks, result.proposals  # without the sweep, which would stay in memory
         self.frames += 1
         self.proposals += len(result.proposals)
         self.classified += len(result.classified)
         self.deferred += result.n_deferred
-        seen, foreground = tracks.proposal != NONE, tracks.object_class != ObjectClass.BACKGROUND
-        self._lengths.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))
 
     def add_ledger(self, line: dict[str, Any]) -> None:
         """Add the ledger line of a frame."""
         for stage, row in line["stages"].items():
-            self._calls[stage] += row["calls"]
-            self._items[stage] += row["items"]
+            self._work[stage].update(row)
             for clock, histogram in self._times[stage].items():
                 histogram.add(row[f"{clock}_ns"])
 
     def result(self) -> dict[str, Any]:
-        """The summary as plain data; a ratio without a denominator is None.
+        """The summary as plain data. A ratio without a denominator is None.
 
         beta is classifications over those of tracking-by-detection (section V-A); N_go the number of frames in which
-        a track has a proposal, averaged over tracks (section IV-C).
+        a track has a proposal, averaged over tracks (section IV-C). The last class of a track counts.
         """
+        work, lengths = self._work, self._ended + _lengths(self.tracks)
+        all_tracks, foreground = ({"count": n, "N_go": _ratio(frames, n)} for n, frames in lengths.tolist())
         return {
             "schema": _SCHEMA,
             "frames": self.frames,
@@ -87,23 +59,25 @@ class Summary:
             "classifications_by_tracking_by_detection": self.proposals,
             "deferred": self.deferred,
             "beta": _ratio(self.classified, self.proposals),
-            "around": around(*self._last) if self._last else {},
-            "tracks": self._tracks(foreground_only=False),
-            "foreground_tracks": self._tracks(foreground_only=True),
-            "energy_counts": {"E_seg": self._calls[SEGMENTATION], "E_class": self._items[CLASSIFICATION]},
+            "around": around(self.tracks, self._proposals),
+            "tracks": all_tracks,
+            "foreground_tracks": foreground,
+            "energy_counts": {"E_seg": work[SEGMENTATION]["calls"], "E_class": work[CLASSIFICATION]["items"]},
             "stages": {stage: self._stage(stage) for stage in self._times},
         }
-
-    def _tracks(self, *, foreground_only: bool) -> dict[str, Any]:
-        tracks, frames = self._lengths.totals(foreground_only=foreground_only)
-        return {"count": tracks, "N_go": _ratio(frames, tracks)}
 
     def _stage(self, stage: str) -> dict[str, Any]:
         times = {
             f"{clock}_ms": histogram.figures(1e6, p50=0.5, p95=0.95, p99=0.99)
             for clock, histogram in self._times[stage].items()
         }
-        return {"calls": self._calls[stage], "items": self._items[stage], **times}
+        return {key: self._work[stage][key] for key in ("calls", "items")} | times
+
+
+def _lengths(tracks: Tracks, rows: Bool | slice = slice(None)) -> Int:
+    """(2, 2) number of tracks, and of their frames with a proposal: of all classes, then of objects."""
+    hits, of_object = tracks.hits[rows], tracks.object_class[rows] != ObjectClass.BACKGROUND
+    return np.array([[len(hits), hits.sum()], [np.count_nonzero(of_object), hits[of_object].sum()]])
 
 
 def _ratio(a: float, b: float) -> float | None:
@@ -153,11 +127,6 @@ def summary_text(summary: dict[str, Any]) -> str:
     if "frames_per_s" in run:
         lines.append(
             f"  {run['frames_per_s']:.1f} frames/s with all of it, {run['real_time_factor']:.1f} x real time"
-        )
-    if run.get("missed_deadlines"):
-        lines.append(
-            f"  missed {run['missed_deadlines']} deadlines at {run['rate_hz']:g} frames/s, the latest frame began "
-            f"{run['max_lateness_ms']:.0f} ms late"
         )
     if "host" in summary:
         lines.append(_host_line(summary["host"]))

@@ -1,4 +1,4 @@
-"""sensor_msgs/PointCloud2, read into a sweep by one copy."""
+"""Messages of type sensor_msgs/PointCloud2."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
@@ -24,7 +25,7 @@ _PREFIX = re.compile(r"^(?:(?:scalar|field|vertex|lidar)[_ .])+")
 TIMES = ("time", "t", "timestamp", "offset_time", "time_stamp")
 MAX_FIELDS = 64
 MAX_DELAY_S = 1.0
-"""Largest difference between point times and header on the same clock [s]; otherwise they count from the header."""
+"""Greatest difference of the times of points from the header's stamp [s]. Beyond it they count from that stamp."""
 FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))
 """Limits and full scales: the first limit that more than MAX_SHARE_ABOVE of the reflectances exceed decides."""
 MAX_SHARE_ABOVE = 0.02
@@ -42,44 +43,16 @@ class PointCloud:
     """A sweep as received.
 
     Attributes:
-        stamp_s: stamp of the header [s]; 0 if the driver states none.
+        ahead_s: time of straight ahead, or the stamp of a sweep that is not skewed [s]; 0 if the driver states none.
         frame_id: frame of the coordinates.
         points: (N, 4) float32 x, y, z [m], reflectance or UNRECORDED. Points without a return lie at the origin.
-        turn: motion of the head by the times of the points; None if unknown.
+        turn_s: as in Frame.turn_s, by the times of the points; 0 if they tell none.
     """
 
-    stamp_s: float
+    ahead_s: float
     frame_id: str
     points: Float32
-    turn: Turn | None
-
-    @property
-    def ahead_s(self) -> float:
-        """Time of straight ahead, or the stamp of a sweep that is not skewed [s]; 0 if unknown."""
-        if self.turn is None or not self.stamp_s:
-            return self.stamp_s
-        absolute = abs(self.turn.ahead_s - self.stamp_s) < MAX_DELAY_S
-        return self.turn.ahead_s if absolute else self.stamp_s + self.turn.ahead_s
-
-    @property
-    def turn_s(self) -> float:
-        """Value of Frame.turn_s; 0 if the turn is unknown."""
-        return 0.0 if self.turn is None else self.turn.turn_s
-
-
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """The points in the message; `fields` are types and offsets by lower-case name."""
-
-    data: memoryview
-    shape: tuple[int, int]
-    strides: tuple[int, int]
-    fields: dict[str, tuple[np.dtype[Any], int]]
-
-    def columns(self, name: str, n: int = 1) -> NDArray[np.generic]:
-        """(height, width, n) view of a field and of the numbers of its type that follow it."""
-        kind, offset = self.fields[name]
-        return np.ndarray((*self.shape, n), kind, self.data, offset, (*self.strides, kind.itemsize))
+    turn_s: float
 
 
 def read_cloud(message: bytes) -> PointCloud:
@@ -102,12 +75,17 @@ def read_cloud(message: bytes) -> PointCloud:
         raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
     fields = {name: (np.dtype(order + kind), offset) for name, (kind, offset) in kinds.items()}
     fields = {name: (kind, at) for name, (kind, at) in fields.items() if at + kind.itemsize <= point_step}
-    table = _Table(data, (height, width), strides, fields)
-    points = _points(table)
+    formats, offsets = [kind for kind, _ in fields.values()], [at for _, at in fields.values()]
+    row = np.dtype({"names": [*fields], "formats": formats, "offsets": offsets, "itemsize": point_step})
+    table = np.ndarray((height, width), row, data, 0, strides)
+    points = _points(table, fields)
     time = next((name for name in TIMES if name in fields), None)
     with np.errstate(all="ignore"):  # times may be any numbers
-        turn = None if time is None else turn_of(points, table.columns(time).reshape(-1))
-    return PointCloud(stamp_s, frame_id, points, turn)
+        turn = None if time is None else turn_of(points, table[time].reshape(-1))
+    turn_s, ahead_s = turn or (0.0, 0.0)
+    if turn and stamp_s:
+        stamp_s = ahead_s if abs(ahead_s - stamp_s) < MAX_DELAY_S else stamp_s + ahead_s
+    return PointCloud(stamp_s, frame_id, points, turn_s)
 
 
 def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
@@ -137,33 +115,26 @@ def _fields(cdr: CdrReader) -> dict[str, tuple[str, int]]:
     return fields
 
 
-def _points(table: _Table) -> Float32:
-    xyz = [table.fields[name] for name in "xyz" if name in table.fields]
+def _points(table: NDArray[np.void], fields: dict[str, tuple[np.dtype[Any], int]]) -> Float32:
+    xyz = [fields[name] for name in "xyz" if name in fields]
     if len(xyz) < 3 or any(kind.kind != "f" for kind, _ in xyz):
         kinds = ": they are " + ", ".join(kind.name for kind, _ in xyz) if len(xyz) == 3 else ""
-        there = ", ".join(table.fields) or "none"
+        there = ", ".join(fields) or "none"
         raise MessageError("fields", f"no x, y, z of floating point among {there}{kinds}")
-    reflectance = reflectance_name(table.fields)
-    points = np.empty((table.shape[0] * table.shape[1], 4), np.float32)
+    reflectance = reflectance_name(fields)
+    points = np.empty((table.size, 4), np.float32)
     rows = points.reshape(*table.shape, 4)
     kind, offset = xyz[0]
-    row = [(kind, offset + k * kind.itemsize) for k in range(4)]
-    whole = reflectance is not None and [*xyz, table.fields[reflectance]] == row
     with np.errstate(all="ignore"):  # float64 beyond float32, and NaN
-        if whole:
-            rows[...] = table.columns("x", 4)
-        elif xyz == row[:3]:
-            rows[..., :3] = table.columns("x", 3)
+        if [*xyz, reflectance and fields[reflectance]] == [(kind, offset + k * kind.itemsize) for k in range(4)]:
+            rows[...] = as_strided(table["x"], rows.shape, (*table.strides, kind.itemsize))
         else:
-            for k, name in enumerate("xyz"):
-                rows[..., k] = table.columns(name)[..., 0]
-        if reflectance is None:
-            rows[..., 3] = UNRECORDED
-        elif not whole:
-            rows[..., 3] = table.columns(reflectance)[..., 0]
+            for k, name in enumerate((*"xyz", reflectance)):
+                rows[..., k] = UNRECORDED if name is None else table[name]
         _scale(points[:, 3])
-        if not np.isfinite(np.dot(points.ravel(), points.ravel())):
-            _finite(points)
+    if not np.isfinite(points).all():  # most drivers mark points without a return by NaN
+        points[~np.isfinite(points[:, :3]).all(axis=1), :3] = 0.0
+        points[~np.isfinite(points[:, 3]), 3] = UNRECORDED
     return points
 
 
@@ -177,31 +148,19 @@ def _scale(reflectance: Float32) -> None:
     reflectance[:] = np.minimum(reflectance / np.float32(full), np.float32(1.0))
 
 
-def _finite(points: Float32) -> None:
-    """Move points without a return, which most drivers mark by NaN, to the origin, in place."""
-    points[~np.isfinite(points[:, :3]).all(axis=1), :3] = 0.0
-    points[~np.isfinite(points[:, 3]), 3] = UNRECORDED
-
-
 TURN_SAMPLES = 512
 """Number of points that the motion is estimated from."""
 SPANS_S = (0.02, 0.5)
-"""Shortest and longest sweep [s]; the unit of the times is the one that puts their span between."""
+"""Shortest and longest sweep [s]. The unit of the times is the one in which their span lies between these."""
 UNITS_S = (1.0, 1e-6, 1e-9)
 MAX_RESIDUAL = 0.03
 """Share of a turn by which most points may deviate from the line of time over bearing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """A turn of the head: duration as in Frame.turn_s, and time of straight ahead by the clock of the points [s]."""
+def turn_of(points: Float32, times: NDArray[np.generic]) -> tuple[float, float] | None:
+    """Duration of a turn, as in Frame.turn_s, and time of straight ahead by the clock of the points [s].
 
-    turn_s: float
-    ahead_s: float
-
-
-def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | None:
-    """The turn of a sweep whose seam lies behind the sensor; None for another seam, or times that fit no turn.
+    None for a sweep whose seam does not lie behind the sensor, or times that fit no turn.
 
     Args:
         points: (N, 4) points of the sweep; those at the origin are ignored.
@@ -224,4 +183,4 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | None:
     off = np.quantile(np.abs(t - slope * bearing - ahead_s), 0.9)
     if not off <= MAX_RESIDUAL * abs(turn_s):
         return None
-    return Turn(float(turn_s), float(begin * unit_s + ahead_s))
+    return float(turn_s), float(begin * unit_s + ahead_s)

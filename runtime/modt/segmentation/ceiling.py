@@ -54,7 +54,7 @@ def below_ceiling_m(count: Int) -> float | None:
 def below_grazed_m(z: Float32, sensor_height_m: float, max_height_m: float) -> float | None:
     """The same for a ceiling about the greatest height used, by (N,) sampled heights relative to the sensor [m]."""
     z = np.ascontiguousarray(z)
-    upper = z[z > np.float32(ABOVE_M - sensor_height_m)] + np.float32(sensor_height_m)
+    upper = z.compress(z > np.float32(ABOVE_M - sensor_height_m)) + np.float32(sensor_height_m)
     on_ceiling = np.count_nonzero((upper > max_height_m + GRAZED_M[0]) & (upper < max_height_m + GRAZED_M[1]))
     if SAMPLED * len(upper) < MIN_RETURNS or on_ceiling < MIN_SHARE * len(upper):
         return None

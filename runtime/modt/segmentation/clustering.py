@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
@@ -86,7 +84,8 @@ class Clusterer:
         clusters = Clusters(points, height, cell, cells, sample, sampled, cluster, len(sizes))
         target = self.merger.merge(clusters, sizes, self._valid(sizes) | ~sizes.is_part)
         valid = self._valid(sizes.merged(target))
-        return replace(clusters, of_cell=consecutive(valid)[target].take(cluster), n=int(valid.sum()))
+        of_cell, n = consecutive(valid)[target].take(cluster), int(np.count_nonzero(valid))
+        return Clusters(points, height, cell, cells, sample, sampled, of_cell, n)  # faster than to replace two fields
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""

@@ -120,9 +120,12 @@ class ClusterSizes:
 
         The extent stays that of the target: merging is limited to the size of an object.
         """
-        n = len(self)
-        points = np.bincount(target, self.points, n).astype(np.int64)
-        bottom_m, top_m = label_min(self.bottom_m, target, n), label_max(self.top_m, target, n)
+        points, bottom_m, top_m = self.points.copy(), self.bottom_m.copy(), self.top_m.copy()
+        moved = (target != np.arange(len(target))).nonzero()[0]  # few
+        into, points[moved] = target[moved], 0
+        np.add.at(points, into, self.points[moved])
+        np.minimum.at(bottom_m, into, self.bottom_m[moved])
+        np.maximum.at(top_m, into, self.top_m[moved])
         return replace(self, points=points, bottom_m=bottom_m, top_m=top_m)
 
 

@@ -29,7 +29,7 @@ from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, 
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
-from modt.types import N_REFLECTANCE, NONE, Float32, Float64, Int
+from modt.types import N_REFLECTANCE, Float32, Float64, Int
 
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
@@ -146,8 +146,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     ) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
         n, coarse, fine = len(cells), clusterer.coarse.side, clusterer.fine.side
-        if len(self._work) < fine + 18 * n:
-            self._work = np.empty(fine + 18 * n, np.int32)
+        if len(self._work) < (room := 2 * fine + 15 * n + 8):
+            self._work = np.empty(room, np.int32)
         limits = clusterer.max_extent_m, MIN_SPLIT_M, clusterer.max_split_sqrt_range, MIN_PERSON_POINTS
         rules = array("f", (MAX_CELL_GAP_M, MAX_CELL_GAP_BEAMS, *limits, *attrgetter(*_PART_KEYS)(SPLIT_PERSON)))
         cluster, counts = np.empty(n, np.int64), np.empty((2, 2 * n), np.int64)
@@ -189,12 +189,12 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     def members_of(self, clusters: Clusters, index: Int) -> Members:
         """Points of each cluster, given (K,) the row of each point in the sweep."""
         points, cells, of_cell = clusters.points, clusters.cells, clusters.of_cell
-        m = int(cells.entries.sum(where=of_cell != NONE))
-        offsets, rows, own = np.empty(clusters.n + 1, np.int64), np.empty(m, np.int64), np.empty((4, m), np.float32)
-        given, out = structure(points.x, points.y, points.z, clusters.height, index), pointers(offsets, rows, own)
-        sizes = len(index), of_cell, cells.entries, len(cells), clusters.n
-        self.library.modt_members(given, clusters.cell, *sizes, out)
-        return Members(offsets, rows, own)
+        k, offsets = len(index), np.empty(clusters.n + 1, np.int64)
+        rows, own = np.empty(k, np.int64), np.empty(4 * k, np.float32)
+        given, out = structure(points.x, points.y, points.z, clusters.height, index), structure(offsets, rows, own)
+        self.library.modt_members(given, clusters.cell, k, of_cell, cells.entries, len(cells), clusters.n, out)
+        m = int(offsets[-1])
+        return Members(offsets, rows[:m], own[: 4 * m].reshape(4, m))
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""

@@ -223,11 +223,11 @@ def _without_beams(sweeps: Sequence[Float32]) -> BeamPattern:
 MAX_LIKENESS_RATIO = 1.2
 """Greatest ratio of spacings at which a shipped profile counts as one of the same beams."""
 SAMPLE = 20
-"""One point in so many is compared."""
+"""Step between the points that are compared."""
 
 
 def tangents(points: Float32) -> Float32:
-    """(n,) tangents of the elevations of a sample of (N, 4) points; at the sensor itself, level."""
+    """(n,) tangents of the elevations of a sample of (N, 4) points; 0 for a point at the sensor itself."""
     some = points[::SAMPLE]
     range_m = np.hypot(some[:, 0], some[:, 1])
     return np.asarray(some[:, 2] / np.where(range_m > 0, range_m, np.inf), np.float32)

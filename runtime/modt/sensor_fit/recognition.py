@@ -33,9 +33,9 @@ class Recognition:
     """Differences between a profile and a sweep.
 
     Attributes:
-        differences: in words, none if the profile fits.
+        differences: a phrase for each, none if the profile fits.
         nearest: name of the shipped profile of the same beams, None where there is none.
-        fitted: the profile, with the findings in the place of what differs.
+        fitted: the profile, in which measured values replace those that differ.
         tilt_deg: roll and pitch of the sensor where the profile leaves them open and they are not small.
         same_sensor: whether all differences are those of the mount.
     """
@@ -87,9 +87,7 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     sensor = replace(sensor, reflectance=usable_scale(points, scale, sensor))
     if NONE not in {config.sensor.reflectance, scale} and scale != config.sensor.reflectance:
         of_sensor.append(f"reflectance of another scale than {config.sensor.reflectance}")
-    of_mount = _height_differences(config.sensor.height_m, sensor.height_m)
-    if floor is not None and not _is_open(config.sensor):
-        of_mount += _tilt_differences(mount, floor)
+    of_mount = _mount_differences(config.sensor, sensor.height_m, mount, floor)
     nearest, fitted = None, config
     if of_sensor:
         if sensor.height_m is not None:  # a small robot is near its sensor
@@ -103,32 +101,28 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
 
 
 def _is_open(sensor: SensorConfig) -> bool:
-    """Whether a profile leaves roll and pitch to the first sweep."""
+    """Whether roll and pitch are measured in the first sweep, because a profile has none."""
     return sensor.roll_deg is None and sensor.pitch_deg is None
 
 
 def _pattern_differences(expected: SensorConfig, found: SensorConfig, tangent: Float32) -> list[str]:
-    said = []
+    differences = []
     if spacing_ratio(expected, found, tangent) > MAX_SPACING_RATIO:
         steps = (float(np.rad2deg(np.median(s.beams.step_rad(tangent)))) for s in (found, expected))
-        said.append("beams {:.2f} deg apart, not {:.2f}".format(*steps))
+        differences.append("beams {:.2f} deg apart, not {:.2f}".format(*steps))
     if azimuth_ratio(expected, found) > MAX_AZIMUTH_RATIO:
-        said.append(f"returns {found.azimuth_step_deg:.2f} deg apart, not {expected.azimuth_step_deg:.2f}")
-    return said
+        differences.append(f"returns {found.azimuth_step_deg:.2f} deg apart, not {expected.azimuth_step_deg:.2f}")
+    return differences
 
 
-def _tilt_differences(mount: Mount, floor: Floor) -> list[str]:
-    stated = np.array([0.0, 0.0, 1.0]) if mount.R_level_sensor is None else mount.R_level_sensor[2]
-    apart_deg = np.rad2deg(np.arccos(np.clip((stated * floor.up).sum(), -1.0, 1.0)))
-    roll, pitch = floor.roll_pitch_deg
-    return [f"rolled by {roll:.1f} and pitched by {pitch:.1f} deg"] if apart_deg > MIN_TILT_DEG else []
-
-
-def _height_differences(expected_m: float | None, found_m: float | None) -> list[str]:
-    if (
-        expected_m is None
-        or found_m is None
-        or abs(found_m - expected_m) < max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * expected_m)
-    ):
-        return []
-    return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"]
+def _mount_differences(
+    expected: SensorConfig, height_m: float | None, mount: Mount, floor: Floor | None
+) -> list[str]:
+    differences, stated_m = [], expected.height_m
+    if stated_m and height_m and abs(height_m - stated_m) >= max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * stated_m):
+        differences.append(f"{height_m:.2f} m above the ground, not {stated_m:.2f}")
+    if floor is not None and not _is_open(expected):
+        stated = np.array([0.0, 0.0, 1.0]) if mount.R_level_sensor is None else mount.R_level_sensor[2]
+        if np.rad2deg(np.arccos(np.clip((stated * floor.up).sum(), -1.0, 1.0))) > MIN_TILT_DEG:
+            differences.append("rolled by {:.1f} and pitched by {:.1f} deg".format(*floor.roll_pitch_deg))
+    return differences

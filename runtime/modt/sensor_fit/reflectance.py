@@ -1,4 +1,4 @@
-"""Recognition of the sensor on whose scale reflectances are."""
+"""Recognition of the scale of reflectances, which is named after a sensor."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ def reflectance_scale(reflectance: Float32) -> str:
 def usable_scale(points: Float32, scale: str, sensor: SensorConfig) -> str:
     """The scale of (N, 4) points if a model may use it, else NONE.
 
-    Sensors may share a scale. Without hundredths it counts only with the beams of the sensor that models know.
+    Sensors may share a scale, so one without hundredths is usable only with the beams of the sensor that it is named
+    after.
     """
     known = SCALES.get(scale)
     usable = known and (known.hundredths or nearest_profile(sensor, tangents(points)) == scale)

@@ -29,7 +29,7 @@ MIN_CUBES = 30
 MIN_TILT_DEG = 2.0
 """Least tilt that is corrected [deg]: streets slope to their sides, and cars lean on their springs."""
 OTHER_SHARE = 0.25
-"""A plane is no floor if its depth differs from the height of the mount by this share of it."""
+"""A plane whose depth differs from the height of the mount by this share of the height is no floor."""
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 
 
@@ -80,7 +80,7 @@ def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
 
 
 def _floor(cubes: Float64, R: Float64) -> Floor | None:
-    """The floor in (3, C) cubes of a sensor that R (3, 3) turns upright, up to the angles of a search."""
+    """Floor in (3, C) cubes; None without one. R (3, 3) turns the sensor upright, up to the angles of the search."""
     if cubes.shape[1] < MIN_CUBES:
         return None
     x, y, z = _turned(R, cubes[:, :: 1 + cubes.shape[1] // MOST_CUBES])
@@ -98,7 +98,7 @@ def _floor(cubes: Float64, R: Float64) -> Floor | None:
 
 
 def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
-    """A plane by least squares; the first guess lies at a depth, level after R (3, 3)."""
+    """Plane by least squares, from a first guess at a depth that is level after R (3, 3)."""
     x, y, z = _turned(R, cubes)
     way = np.abs(y) < WAY_M
     level, z = np.stack([np.ones(way.sum()), x[way], y[way]], axis=1), z[way]

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 CLOSE_S = 0.6
-"""Time limit for shutting a writer down [s]; half of it is reserved for draining its queue."""
+"""Time limit for shutting a writer down [s]. Half of it is reserved for draining its queue."""
 RETRY_S = 1.0
 """Pause after a failure [s]."""
 
@@ -61,7 +61,7 @@ class Background(Generic[T]):
         self._thread.start()
 
     def write(self, item: Any, /) -> None:
-        """Queue an item; never waits."""
+        """Queue an item without waiting."""
         encoded: T = item if self._encode is None else self._encode(item)
         self._put(lambda: self._writer.write(encoded))
 
@@ -72,7 +72,7 @@ class Background(Generic[T]):
             self._put(lambda: writer.ledger(record))
 
     def health(self) -> Health:
-        """Items written, dropped, failed and waiting; the last failure; the writer's own counts."""
+        """Items written, dropped, failed and waiting, the last failure, and the writer's own counts."""
         own: Health = getattr(self._writer, "health", dict)()
         return {
             **own,
@@ -84,7 +84,7 @@ class Background(Generic[T]):
         }
 
     def close(self) -> None:
-        """Drain the queue and close the writer within the time limit; the rest is dropped."""
+        """Drain the queue and close the writer within the time limit. The rest is dropped."""
         with self._changed:
             if self._end_s is None:
                 self._end_s = self._clock() + self._close_s / 2
@@ -128,7 +128,7 @@ class Background(Generic[T]):
             self._state = "ok"
 
     def _next(self) -> Callable[[], None] | None:
-        """Wait for the oldest job; None at the end."""
+        """Wait for the oldest job. None stands for the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._jobs or self._end_s is not None)
             late = self._end_s is not None and self._clock() > self._end_s

@@ -1,4 +1,4 @@
-"""Results, energy and CPU time as channels of Foxglove: its WebSocket server, and MCAP recordings."""
+"""Results, energy and CPU time as channels of Foxglove: a WebSocket server, and MCAP recordings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from modt.types import FrameResult
 logging.getLogger("foxglove").setLevel(logging.ERROR)  # its warnings of each unwritten message are counted instead
 
 BACKLOG = 16
-"""Messages that may wait for a client; a slow client misses the oldest."""
+"""Messages that may wait for a client. A slow client misses the oldest."""
 PORT = 8765
 NUMBER, TEXT = "std_msgs/Float64", "std_msgs/String"
 FIGURES = {
@@ -121,11 +121,11 @@ def open_foxglove(address: Address) -> FoxgloveServer:
 
 
 FLUSH_S = 1.0
-"""Time between two flushes [s]: a crash loses no more."""
+"""Time between two flushes [s]. A crash loses no more than this."""
 OPTIONS = MCAPWriteOptions(profile="ros2", compression=MCAPCompression.Lz4, compression_threads=0)
 """LZ4 costs less CPU time than writing uncompressed."""
 PARTS = 8
-"""Number of parts that share the size limit; the oldest is deleted for a new one."""
+"""Number of parts that share the size limit. The oldest is deleted for a new one."""
 
 
 class _Output(FileIO):
@@ -134,18 +134,16 @@ class _Output(FileIO):
     def __init__(self, path: Path) -> None:
         with writing(path):
             super().__init__(path, "xb")
-        self.path, self.size, self.frames = path, 0, 0
+        self.path, self.frames = path, 0
         self.error: OSError | None = None
 
     def write(self, data: Any) -> int:
         """Write, and return how much was written."""
         try:
-            written = super().write(data)
+            return super().write(data)
         except OSError as error:
             self.error = error
             raise
-        self.size += written
-        return written
 
 
 class McapFile:
@@ -156,7 +154,7 @@ class McapFile:
     Args:
         path: file of the first part.
         points: whether the points are recorded.
-        max_bytes: limit for all parts, including those of earlier runs; the oldest are deleted.
+        max_bytes: limit for all parts, including those of earlier runs. The oldest are deleted.
         clock: [s].
 
     Raises:
@@ -177,7 +175,7 @@ class McapFile:
         Raises:
             ModtError: the file cannot be written.
         """
-        if self._output.error is not None or self._output.size > self._max_bytes / PARTS:
+        if self._output.error is not None or self._output.tell() > self._max_bytes / PARTS:
             self.close()
             self._output, self._writer, self._flushed_s = self._part()
         self._channels.write(result)
@@ -191,7 +189,7 @@ class McapFile:
         self._output.frames += 1
 
     def ledger(self, record: dict[str, Any], /) -> None:
-        """Record a line of the ledger; a failure is raised with the next frame."""
+        """Record a line of the ledger. A failure is raised with the next frame."""
         self._channels.ledger(record)
 
     def close(self) -> None:
@@ -227,7 +225,7 @@ class McapFile:
 
 
 def open_mcap(address: Address) -> McapFile:
-    """A recording; `points=none` leaves the points out, `max_mb` limits its size.
+    """A recording. `points=none` leaves the points out, `max_mb` limits its size.
 
     Raises:
         MisuseError: no file name, or an invalid option.

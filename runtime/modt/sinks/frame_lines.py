@@ -13,26 +13,26 @@ from typing import Any
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sinks.background import Background
-from modt.sinks.output import Health, LineFile, writing
+from modt.sinks.output import Health, LineFile, Writer, writing
 from modt.sinks.tracks import frame_line, frame_parts
 from modt.types import FrameResult
 
 log = logging.getLogger(__name__)
 
 DEPTH = 100
-"""Number of lines that may wait for a stalled disk, 10 s at 10 Hz. No points wait: frames are encoded at once."""
+"""Number of lines that may wait for a stalled disk, 10 s at 10 Hz. Frames are encoded first, so no points wait."""
 LONGEST_LINE = 1 << 22
 """Longest incomplete line that is searched for at the end of a continued file [bytes]."""
 
 
-class Descriptor:
+class Descriptor(Writer[str]):
     """Writes text to a file descriptor and never closes it."""
 
     def __init__(self, number: int) -> None:
         self._number = number
 
     def write(self, text: str, /) -> None:
-        """Write the whole text; waits for the reader.
+        """Write the whole text, and wait for the reader.
 
         Raises:
             OSError: the reader has left.
@@ -40,9 +40,6 @@ class Descriptor:
         data = text.encode()
         while data:
             data = data[os.write(self._number, data) :]
-
-    def close(self) -> None:
-        """No effect."""
 
 
 def open_stdout(address: Address) -> Background[str]:
@@ -96,7 +93,7 @@ class Datagrams:
         self._state = "ok"
 
     def write(self, result: FrameResult, /) -> None:
-        """Send the line of a frame, or its parts; the rest of a frame is dropped where a part cannot be sent.
+        """Send the line of a frame, or its parts. If a part cannot be sent, the rest of the frame is dropped.
 
         Raises:
             ValueError: a number is not finite.
@@ -114,7 +111,7 @@ class Datagrams:
         self._socket.close()
 
     def health(self) -> Health:
-        """Frames sent, dropped at a full queue of the receiver, failed without a receiver; the last failure."""
+        """Frames sent, dropped at a full queue of the receiver, failed without a receiver, and the last failure."""
         return {"written": self._written, "dropped": self._dropped, "failed": self._failed, "state": self._state}
 
     def _miss(self, error: OSError) -> None:

@@ -1,11 +1,12 @@
-"""Vectorised JSON numbers: the text that repr and json write, by table look-up of whole columns.
+"""Vectorised JSON numbers: the text that json writes, looked up in tables for whole columns.
 
 A text is an array of uint32, each four ASCII characters, padded with NULs. Columns of texts side by side make rows;
-`decode` removes the NULs.
+`decode` removes the NULs. A column with a number that the tables lack is written one number at a time.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -31,7 +32,7 @@ def encode(text: str) -> Text:
 def encode_table(texts: Sequence[str]) -> Text:
     """(n, w) elements of n texts, padded to the longest."""
     rows = [encode(text) for text in texts]
-    out = np.zeros((len(rows), max(map(len, rows))), np.uint32)
+    out = np.zeros((len(rows), max(map(len, rows), default=0)), np.uint32)
     for row, padded in zip(rows, out, strict=True):
         padded[: len(row)] = row
     return out
@@ -63,8 +64,20 @@ EXPONENTIAL = encode_table([repr(k / 1e6) for k in range(100)])
 MINUS = encode("-")[0]
 
 
+def one_by_one(numbers: Int | Float64) -> Text:
+    """(..., w) text of any numbers.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    texts = [json.dumps(number, allow_nan=False) for number in numbers.ravel().tolist()]
+    return encode_table(texts).reshape(*numbers.shape, -1)
+
+
 def integers(numbers: Int) -> Text:
-    """(..., 2) text of integers from 0 to below LIMIT."""
+    """(..., w) text of integers from 0 on."""
+    if (numbers >= LIMIT).any():
+        return one_by_one(numbers)
     out = np.empty((*numbers.shape, 2), np.uint32)
     high, low = np.divmod(numbers, BASE)
     out[..., 0] = np.where(high > 0, INTEGER.take(high), 0)
@@ -73,7 +86,9 @@ def integers(numbers: Int) -> Text:
 
 
 def rounded_to_3(numbers: Float64) -> Text:
-    """(..., 4) text of np.round(numbers, 3), absolute values below LIMIT."""
+    """(..., w) text of np.round(numbers, 3); ValueError if one is not finite."""
+    if not (np.abs(numbers) < LIMIT - 1).all():
+        return one_by_one(np.round(numbers, 3))
     out = np.empty((*numbers.shape, 4), np.uint32)
     units, decimals = np.divmod(np.rint(np.abs(numbers) * 1000).astype(np.int64), 1000)
     out[..., 0] = np.where(np.signbit(numbers), MINUS, 0)
@@ -83,7 +98,9 @@ def rounded_to_3(numbers: Float64) -> Text:
 
 
 def probabilities(numbers: Float64) -> Text:
-    """(..., 3) text of np.round(numbers, 6), values from 0 to 1."""
+    """(..., w) text of np.round(numbers, 6); ValueError if one is not finite."""
+    if not (np.abs(numbers - 0.5) <= 0.5).all():
+        return one_by_one(np.round(numbers, 6))
     out = np.empty((*numbers.shape, 3), np.uint32)
     millionths = np.rint(numbers * 1e6).astype(np.int64)
     thousandths, tail = np.divmod(millionths, 1000)

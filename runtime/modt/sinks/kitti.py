@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
 from modt.placement import Mount
-from modt.sinks.output import LineFile, writing
+from modt.sinks.output import LineFile, Writer, writing
 from modt.types import NONE, Cut, Float64, FrameResult
 
 KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
@@ -63,7 +62,7 @@ class KittiResults(LineFile[FrameResult]):
 
 
 def _image_boxes(boxes: Float64, camera: Camera) -> Float64:
-    """(n, 4) left, top, right, bottom [pixel]; -1 for boxes behind the camera."""
+    """(n, 4) left, top, right, bottom [pixel], or -1 for boxes behind the camera."""
     z = boxes[:, 2, None] + np.array([-0.5, 0.5]) * boxes[:, 5, None]
     xyz = np.dstack([corners(boxes).repeat(2, axis=1), np.tile(z, 4)])
     P = camera.P_image_sensor
@@ -78,11 +77,9 @@ def _image_boxes(boxes: Float64, camera: Camera) -> Float64:
 
 
 MAX_INSTANCE = 0xFFFF
-SEMANTIC = np.array([(*spec.semantic_kitti, 0)[0] for spec in CLASSES.values()])
-"""SemanticKITTI's label of each class, 0 (unlabelled) for the background."""
 
 
-class PointLabels:
+class PointLabels(Writer[FrameResult]):
     """Writes NNNNNN.label, one u32 per point in the order of the input scan.
 
     Upper 16 bits: index of the proposal in the frame plus one, 0 for none. Lower 16 bits: class of its track.
@@ -93,26 +90,15 @@ class PointLabels:
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
 
-    def write(self, result: FrameResult) -> None:
+    def write(self, result: FrameResult, /) -> None:
         """Write one frame's file.
 
         Raises:
             ModtError: the file cannot be written.
         """
-        self.write_labels(result.frame.index, encode(result))
-
-    def write_labels(self, index: int, labels: NDArray[np.uint32]) -> None:
-        """Write the file of a frame from its labels (N,).
-
-        Raises:
-            ModtError: the file cannot be written.
-        """
-        path = self._folder / f"{index:06d}.label"
+        path = self._folder / f"{result.frame.index:06d}.label"
         with writing(path):
-            path.write_bytes(labels.tobytes())
-
-    def close(self) -> None:
-        """No effect: no file stays open."""
+            path.write_bytes(encode(result).tobytes())
 
 
 def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
@@ -120,6 +106,5 @@ def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
     rows = result.tracks.row_of_proposal(len(result.proposals))
     classes = result.tracks.object_class[rows]
     code = np.minimum(np.arange(len(rows)) + 1, MAX_INSTANCE) << 16 | np.where(rows == NONE, 0, classes)
-    out = np.zeros(len(result.frame.points), np.uint32)
-    out[result.proposals.members] = np.repeat(code, result.proposals.count).astype(np.uint32)
-    return out
+    of_points = result.proposals.label(len(result.frame.points))
+    return np.append(code, 0).astype(np.uint32)[of_points]  # the last one stands for NONE

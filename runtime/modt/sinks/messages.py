@@ -67,8 +67,8 @@ def topics(
 
     Args:
         prefix: begins the names.
-        frame_id: frame of the sensor; "": that of the input, else FRAME_ID.
-        world_frame_id: frame of the poses; "": WORLD_FRAME_ID, and no /tf.
+        frame_id: frame of the sensor; "" takes the frame of the input, or FRAME_ID if the input names none.
+        world_frame_id: frame of the poses; "" takes WORLD_FRAME_ID, without the topic /tf.
         background: whether detections hold the background too.
         points: whether the sweep is published.
     """
@@ -89,7 +89,7 @@ def topics(
 
 
 def seen(result: FrameResult, background: bool = False) -> Int:
-    """Rows of the tracks with a proposal; tracks of the background only if `background`."""
+    """Rows of the tracks with a proposal, those of the background only if `background`."""
     tracks = result.tracks
     return np.flatnonzero((tracks.proposal != NONE) & (background | (tracks.object_class != ObjectClass.BACKGROUND)))
 
@@ -115,7 +115,7 @@ def detections(result: FrameResult, frame_id: str, background: bool = False) -> 
 def _detection(
     header: tuple[str, ...], class_: int
 ) -> tuple[tuple[str, ...], list[tuple[int, tuple[float | bytes, ...]]]]:
-    """Fields of a detection of a class up to its id; class and name of each hypothesis in their order."""
+    """Fields of a detection of a class up to its id, and class and name of each hypothesis in their order."""
     order = [class_, *(k for k in range(len(CLASS_NAMES)) if k != class_)]
     names = [(k, text_fields(CLASS_NAMES[k])) for k in order]
     results = chain.from_iterable((*fields, "d", "7d", UNKNOWN_COVARIANCE) for _, (fields, _) in names)

@@ -16,17 +16,18 @@ WRITE_REMEDY = "free or unlock the disk, or give another --out; what was recorde
 T = TypeVar("T")
 T_contra = TypeVar("T_contra", contravariant=True)
 Health = dict[str, int | str]
-"""Counts of a writer: items `written`, and lost by reason; its `state` in words."""
+"""Number of items `written`, of those lost for each reason, and the `state` of the writer in words."""
 
 
 class Writer(Protocol[T_contra]):
     """Takes items one by one."""
 
     def write(self, item: T_contra, /) -> None:
-        """Write one item; the operating system has it on return."""
+        """Write one item. The operating system has it on return."""
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the files, where any stay open."""
+        return  # a default for all writers, which a body without a statement would not be
 
 
 class Sink(Writer[FrameResult], Protocol):
@@ -57,15 +58,6 @@ def writing(path: Path, remedy: str = WRITE_REMEDY) -> Iterator[None]:
         raise ModtError(path, f"cannot be written ({error.strerror or error})", remedy) from None
 
 
-def sync_folder(path: Path) -> None:
-    """Make the names in a folder survive a power cut; raises OSError."""
-    number = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)
-
-
 def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
     """Write a file atomically through .NAME.part, without following links. A lasting file survives a power cut whole.
 
@@ -90,7 +82,7 @@ def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
 
 
 class LineFile(Generic[T]):
-    """An unbuffered text file of whole lines; `encode` gives the lines of an item.
+    """An unbuffered text file of whole lines. `encode` gives the lines of an item.
 
     Mode "ab" continues a file, "wb" begins a new one.
     """
@@ -101,7 +93,7 @@ class LineFile(Generic[T]):
             self._file: BinaryIO = path.open(mode, buffering=0)
 
     def write(self, item: T, /) -> None:
-        """Append the lines of an item; a partial line on a full disk is removed.
+        """Append the lines of an item. A partial line on a full disk is removed.
 
         Raises:
             ModtError: the file cannot be written.
@@ -121,7 +113,7 @@ class LineFile(Generic[T]):
         self._written += 1
 
     def sync(self) -> None:
-        """Make all written lines survive a power cut; waits for the disk.
+        """Make all written lines survive a power cut, and wait for the disk.
 
         Raises:
             ModtError: the disk reports a failure.

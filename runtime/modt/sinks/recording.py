@@ -12,7 +12,7 @@ from modt.config import RecordingConfig
 from modt.errors import ModtError
 from modt.geometry import Camera
 from modt.sinks.kitti import KittiResults, PointLabels
-from modt.sinks.output import Health, LineFile, Writer
+from modt.sinks.output import Health, LineFile, Sink, Writer
 from modt.sinks.records import line
 from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
 from modt.sinks.tracks import frame_line
@@ -31,16 +31,16 @@ RESERVED_BYTES = 20_000
 RETRY_S = 1.0
 """Time from a failure to the next attempt to write [s]."""
 WHOLE_BYTES = 5e8
-"""Records of frames that are written whole before `gb_per_day` thins them: a run on a desk loses no frame."""
+"""Records of frames that are written whole before `gb_per_day` thins them, so that a run on a desk loses no frame."""
 DAY_S = 86_400.0
 JOBS = 128
 """Length of the queue of jobs."""
 CLOSE_S = 1.0
-"""Time limit for the last jobs of a service [s]; half of it is reserved for draining the queue."""
+"""Time limit for the last jobs of a service [s]. Half of it is reserved for draining the queue."""
 Job = Callable[[], None]
 
 
-class AtOnce:
+class AtOnce(Writer[Job]):
     """Runs jobs where they are handed over."""
 
     def write(self, job: Job, /) -> None:
@@ -51,12 +51,9 @@ class AtOnce:
         """No job is ever dropped."""
         return {"dropped": 0}
 
-    def close(self) -> None:
-        """No effect."""
 
-
-class Recording:
-    """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted; the loop continues.
+class Recording(Sink):
+    """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted.
 
     Once a second it checks that its files are in place, and begins another part if they were removed or moved.
 
@@ -72,7 +69,7 @@ class Recording:
         lost: number of those that could not be written, or may be missing since their file was removed or not synced.
         thinned: number left out to keep to `gb_per_day`.
         pauses, parts: number of times that writing failed, and of parts begun.
-        cause: why nothing can be written now; None while all is well.
+        cause: why nothing can be written now, or None.
     """
 
     def __init__(
@@ -96,7 +93,7 @@ class Recording:
         """Begin the first part."""
         self.writer.write(self._begin)
 
-    def write(self, result: FrameResult) -> None:
+    def write(self, result: FrameResult, /) -> None:
         """Hand over the line of a frame."""
         if TRACKS in KEPT[self.config.keep] and self._allows():
             text = frame_line(result)
@@ -124,9 +121,6 @@ class Recording:
             "parts": self.parts,
         }
         return {"keep": self.config.keep, **counts, "failing": self.cause}
-
-    def close(self) -> None:
-        """No effect: `finish` ends the files on their own thread."""
 
     def state(self, status: str) -> None:
         """Write the status beside the records or in memory, and make the lines so far survive a power cut."""
@@ -233,7 +227,7 @@ class Recording:
 
 
 class WholeRecording(Recording):
-    """The records of a replay: all of them, in one part, written at once. A failure ends the run.
+    """All records of a replay, in one part and written at once. A failure ends the run.
 
     Args:
         directory, describe: as in Recording.
@@ -263,14 +257,14 @@ class WholeRecording(Recording):
         if self._labels:
             self._more.append(PointLabels(path / "labels"))
 
-    def write(self, result: FrameResult) -> None:
+    def write(self, result: FrameResult, /) -> None:
         """Write a frame."""
         super().write(result)
         for writer in self._more:
             writer.write(result)
 
     def follow(self, config: RecordingConfig) -> None:
-        """Describe another profile; what is kept stays the same."""
+        """Describe another profile, and keep the same records."""
         super().follow(self.config)
 
     def finish(self) -> None:

@@ -18,7 +18,7 @@ class Ros2Sink:
         self.topics = topics
 
     def write(self, result: FrameResult, /) -> None:
-        """Publish a frame; never waits for a subscriber."""
+        """Publish a frame without waiting for a subscriber."""
         for topic, publication in self.topics:
             if publication.receivers:
                 self._unsent += not publication.write(topic.encode(result))

@@ -11,11 +11,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from modt.errors import MisuseError, ModtError
-from modt.sinks.output import replace_file, sync_folder, writing
+from modt.sinks.output import replace_file, writing
 
 RUN, TRACKS, LEDGER, SUMMARY, STATUS = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"
 MARK = "service: true"
-"""Line of run.yaml in the directories of a service: no other directory is ever deleted."""
+"""Line of run.yaml in the directories of a service. No other directory is ever deleted."""
 MEMORY = Path("/dev/shm")
 """Folder of the status while the disk of the records cannot be written."""
 _KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) for form in ("{}", ".{}.part")}
@@ -28,7 +28,7 @@ def status_paths(directory: Path) -> tuple[Path, Path]:
 
 
 class RunDirectory:
-    """The parts of a run. Each is complete in itself; an incomplete one, left by a failed start, is replaced.
+    """The parts of a run. Each is complete in itself. An incomplete one, left by a failed start, is replaced.
 
     Attributes:
         path: the directory.
@@ -95,7 +95,7 @@ class RunDirectory:
         return os.path.isfile(self.path / RUN)
 
     def in_memory(self, status: str | None) -> None:
-        """Keep the status in memory; None removes it. Failures are ignored. Another run's status is left alone."""
+        """Keep the status in memory. None removes it. Failures are ignored. Another run's status is left alone."""
         if self._shut_out:
             return
         path = status_paths(self.path)[1]
@@ -112,8 +112,12 @@ class RunDirectory:
             ModtError: the disk reports a failure.
         """
         with writing(self.path):
-            sync_folder(self.path)
-            sync_folder(self.path.parent)
+            for folder in (self.path, self.path.parent):
+                number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+                try:
+                    os.fsync(number)
+                finally:
+                    os.close(number)
 
     def kept(self) -> list[Path]:
         """Earlier parts, the oldest first."""

@@ -18,7 +18,7 @@ BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 UNKNOWN_NEAR = "unknown, near"
 """Value of `uncertain` for a track that may be a person too near to be seen whole."""
-BOOLEANS = ("false", "true")
+BOOLEANS = False, True
 UNCERTAIN = (None, *(f"{name}?" for name in CLASS_NAMES[1:]), UNKNOWN_NEAR)
 NUMBER_BYTES = 32
 """Room for the numbers in `part` and `parts` [bytes]."""
@@ -32,8 +32,7 @@ class _Latest:
 
     def of(self, result: FrameResult) -> str:
         if result is not self.result:
-            rows = _by_columns(result) if _in_tables(result) else ",".join(_rows(result))
-            self.line, self.result = f"{_head(result)},{_tracks(rows)}", result
+            self.line, self.result = f"{_head(result)},{_tracks(text.decode(_rows(result)))}", result
         return self.line
 
 
@@ -65,13 +64,13 @@ def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
     room = max_bytes - len(f'{head},"part":,"parts":,{_tracks("")}') - NUMBER_BYTES
     parts: list[list[str]] = [[]]
     left = room
-    for row in _rows(result):
-        left -= len(row) + 1
+    for row in map(text.decode, _rows(result)):
+        left -= len(row)
         if left < 0 and parts[-1]:
             parts.append([])
-            left = room - len(row) - 1
+            left = room - len(row)
         parts[-1].append(row)
-    return [f'{head},"part":{k},"parts":{len(parts)},{_tracks(",".join(rows))}' for k, rows in enumerate(parts)]
+    return [f'{head},"part":{k},"parts":{len(parts)},{_tracks("".join(rows))}' for k, rows in enumerate(parts)]
 
 
 def _head(result: FrameResult) -> str:
@@ -90,7 +89,8 @@ def _head(result: FrameResult) -> str:
 
 
 def _tracks(rows: str) -> str:
-    return f'"tracks":[{rows}]}}\n'
+    """End of a line, with the rows of its tracks."""
+    return f'"tracks":[{rows[1:]}]}}\n'
 
 
 def _doubts(result: FrameResult) -> Int:
@@ -98,99 +98,54 @@ def _doubts(result: FrameResult) -> Int:
     return np.asarray(np.where(unknown_near(result), len(CLASS_NAMES), result.tracks.object_class * doubtful(result)))
 
 
-def _rows(result: FrameResult) -> list[str]:
-    """JSON of each track, at three times the CPU time of `_by_columns`.
+def _rows(result: FrameResult) -> text.Text:
+    """(M, w) text of the JSON of each track, made column by column. Each row begins with a comma.
 
     Raises:
         ValueError: a number is not finite.
     """
-    tracks = result.tracks
-    boxes = [dict(zip(BOX_KEYS, box, strict=True)) for box in np.round(result.proposals.box, 3).tolist()]
-    columns = {
-        "id": tracks.id.tolist(),
-        "state": [result.state_names[state] for state in tracks.state],
-        "class": [CLASS_NAMES[class_] for class_ in tracks.object_class],
-        "posterior": np.round(tracks.posterior, 6).tolist(),
-        "witness": np.round(tracks.witness, 3).tolist(),
-        "viewed": tracks.viewed.tolist(),
-        "final": tracks.final.tolist(),
-        "uncertain": [UNCERTAIN[doubt] for doubt in _doubts(result)],
-        "proposal": [None if proposal == NONE else proposal for proposal in tracks.proposal.tolist()],
-        "points": tracks.points.tolist(),
-        "age": tracks.age.tolist(),
-        "missed": tracks.missed.tolist(),
-        "box": [None if proposal == NONE else boxes[proposal] for proposal in tracks.proposal],
-        "size": np.round(tracks.size_m, 3).tolist(),
-        "world": [dict(zip(WORLD_KEYS, x, strict=True)) for x in np.round(tracks.x, 3).tolist()],
-    }
-    return [line(dict(zip(columns, row, strict=True)))[:-1] for row in zip(*columns.values(), strict=True)]
-
-
-TEXT_OF_CLASS, TEXT_OF_DOUBT = (
-    text.encode_table([json.dumps(name) for name in names]) for names in (CLASS_NAMES, UNCERTAIN)
-)
-TEXT_OF_BOOLEAN = text.encode_table(BOOLEANS)
-NULL = text.encode("null")[0]
-
-
-def _in_tables(result: FrameResult) -> bool:
-    """Whether the tables of text hold every number; false for numbers that are not finite."""
-    tracks, boxes = result.tracks, result.proposals.box
-    lengths = all(
-        (np.abs(values) < text.LIMIT - 1).all() for values in (tracks.x, tracks.witness, tracks.size_m, boxes)
-    )
-    counts = all((values < text.LIMIT).all() for values in (tracks.id, tracks.points, tracks.age, tracks.missed))
-    return bool(len(boxes) and lengths and counts and (np.abs(tracks.posterior - 0.5) <= 0.5).all())
-
-
-def _by_columns(result: FrameResult) -> str:
-    """JSON of all tracks, joined by commas and made column by column."""
-    tracks = result.tracks
+    tracks, lost = result.tracks, result.tracks.proposal == NONE
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
     id_, proposal, points, age, missed = text.integers(np.stack(counts))
-    box = _objects(BOX_KEYS, text.rounded_to_3(result.proposals.box[tracks.proposal]))
+    boxes = np.vstack([result.proposals.box, np.zeros(len(BOX_KEYS))])  # the last row stands for NONE
+    box = _group(text.rounded_to_3(boxes[tracks.proposal]), BOX_KEYS)
     for value in (proposal, box):
-        value[tracks.proposal == NONE] = 0
-        value[tracks.proposal == NONE, 0] = NULL
+        value[lost] = 0
+        value[lost, 0] = NULL
     columns = {
         "id": id_,
-        "state": _states(result.state_names)[tracks.state],
-        "class": TEXT_OF_CLASS[tracks.object_class],
-        "posterior": _lists(text.probabilities(tracks.posterior)),
-        "witness": _lists(text.rounded_to_3(tracks.witness)),
-        "viewed": TEXT_OF_BOOLEAN[tracks.viewed.astype(np.int64)],
-        "final": TEXT_OF_BOOLEAN[tracks.final.astype(np.int64)],
-        "uncertain": TEXT_OF_DOUBT[_doubts(result)],
+        "state": _words(result.state_names)[tracks.state],
+        "class": _words(CLASS_NAMES)[tracks.object_class],
+        "posterior": _group(text.probabilities(tracks.posterior)),
+        "witness": _group(text.rounded_to_3(tracks.witness)),
+        "viewed": _words(BOOLEANS)[tracks.viewed.astype(np.int64)],
+        "final": _words(BOOLEANS)[tracks.final.astype(np.int64)],
+        "uncertain": _words(UNCERTAIN)[_doubts(result)],
         "proposal": proposal,
         "points": points,
         "age": age,
         "missed": missed,
         "box": box,
-        "size": _lists(text.rounded_to_3(tracks.size_m)),
-        "world": _objects(WORLD_KEYS, text.rounded_to_3(tracks.x)),
+        "size": _group(text.rounded_to_3(tracks.size_m)),
+        "world": _group(text.rounded_to_3(tracks.x), WORLD_KEYS),
     }
     keyed = [part for key, column in columns.items() for part in (f',"{key}":', column)]
     keyed[0] = ',{"id":'
-    return text.decode(text.join_columns(len(tracks), *keyed, "}"))[1:]
+    return text.join_columns(len(tracks), *keyed, "}")
 
 
 @lru_cache
-def _states(names: tuple[str, ...]) -> text.Text:
-    """(S, w) text of the names of the states."""
-    return text.encode_table([json.dumps(name) for name in names])
+def _words(words: tuple[str | bool | None, ...]) -> text.Text:
+    """(n, w) text of the JSON of words."""
+    return text.encode_table([json.dumps(word) for word in words])
 
 
-def _objects(keys: tuple[str, ...], values: text.Text) -> text.Text:
-    """(n, w) text of JSON objects with some keys and values (n, k, v)."""
-    return _enclosed([f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)], values, "}")
+NULL = text.encode("null")[0]
 
 
-def _lists(values: text.Text) -> text.Text:
-    """(n, w) text of JSON lists of values (n, k, v)."""
-    return _enclosed(["," if k else "[" for k in range(values.shape[1])], values, "]")
-
-
-def _enclosed(prefixes: list[str], values: text.Text, end: str) -> text.Text:
-    """(n, w) text of values (n, k, v), each after its prefix."""
-    parts = [part for k, prefix in enumerate(prefixes) for part in (prefix, values[:, k])]
+def _group(values: text.Text, keys: tuple[str, ...] = ()) -> text.Text:
+    """(n, w) text of JSON lists of values (n, k, v), or of objects with these keys."""
+    names = [f'"{key}":' for key in keys] or [""] * values.shape[1]
+    begin, end = "{}" if keys else "[]"
+    parts = [part for k, name in enumerate(names) for part in (("," if k else begin) + name, values[:, k])]
     return text.join_columns(len(values), *parts, end)

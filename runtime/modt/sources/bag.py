@@ -30,7 +30,10 @@ Poses = tuple[str, Float64]
 def find_poses(
     files: list[BagFile], topics: dict[str, BagTopic], sensor: str
 ) -> tuple[Poses | None, tuple[str, ...]]:
-    """Poses that apply to the frame of a sensor (None without poses or without a transform to it), and notes."""
+    """Topic of the poses with the mount of the sensor, and notes.
+
+    The topic is None without poses, or without a transform from their frame to the sensor's.
+    """
     names = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE and topic.count)
     if not names:
         return None, ("no nav_msgs/Odometry: no poses",)
@@ -49,15 +52,15 @@ def find_poses(
                 transforms.add(message.data)
     T_base_sensor = transforms.between(base, sensor)
     if T_base_sensor is None:
-        where = f"{odometry.TF_STATIC} does not lead from {base}, of which they are, to {sensor}"
+        where = f"{odometry.TF_STATIC} does not lead from {base}, their frame, to {sensor}"
         return None, (f"poses of {topic} are not used: {where}",)
     return (topic, T_base_sensor), ()
 
 
 PEEKED = 50
-"""Greatest number of messages that are read before the first frame, to find usable sweeps."""
+"""Greatest number of messages that are searched for the first usable sweeps."""
 COMPARED = 4
-"""Number of first sweeps whose stamps are compared, to find one that is right."""
+"""Number of first sweeps whose stamps are compared. The first stamp that fits a later one begins the stream."""
 
 
 class BagStream:
@@ -81,21 +84,21 @@ class BagStream:
         stamps, pose_stamps = StampCheck(self._began), None
         topics = {self._topic} if self._poses is None else {self._topic, self._poses[0]}
         for message in self._readable(topics):
-            if message.topic != self._topic:
+            is_sweep = message.topic == self._topic
+            index += is_sweep
+            if not is_sweep:
                 if pose_stamps is None:  # the clock of the poses is that of the sweeps
                     began_s = message.recorded_s - STEP_S / 2
                     pose_stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
                 self._keep(message, buffer, pose_stamps)
-            else:
-                index += 1
-            if held is not None and (message.topic == self._topic or buffer.newest_s >= held.stamp_s):
+            if held is not None and (is_sweep or buffer.newest_s >= held.stamp_s):
                 yield replace(held, T_world_sensor=buffer.at(held.stamp_s))
                 held = None
             if index >= self._last:
                 return
-            if message.topic == self._topic and index >= self._first:
+            if is_sweep and index >= self._first:
                 held = self._frame(index, message, stamps)
-            elif message.topic == self._topic:
+            elif is_sweep:
                 with suppress(MessageError):
                     stamps.doubt(CdrReader(message.data).stamp_s() or message.recorded_s, message.recorded_s)
         if held is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sqlite3
 import sys
@@ -9,11 +10,12 @@ import tempfile
 import weakref
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from heapq import heappop, heappush
-from itertools import count
+from itertools import chain, count, repeat
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 from urllib.parse import quote
@@ -29,11 +31,11 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 MAX_RECORD_BYTES = 2**28
 """Largest record of an MCAP file and largest unpacked message; a chunk has a few megabytes."""
 ALLOWANCE_BYTES, MOST_TIMES = 16 * 2**20, 64
-"""A file may unpack to ALLOWANCE_BYTES and MOST_TIMES its size together."""
+"""A file may unpack to ALLOWANCE_BYTES plus MOST_TIMES its size."""
 FOOTER_BYTES = 37
 """Size of the last record of a closed MCAP file and of what follows it."""
 STEPS = 10_000
-"""Instructions of a database between two checks of their number, which is limited like the bytes unpacked."""
+"""Instructions of a database between two checks of their number. Their limit is that of the unpacked bytes."""
 
 
 class BagMessage(NamedTuple):
@@ -175,62 +177,82 @@ class McapFile(BagFile):
     """An .mcap file; a truncated one is read up to its end."""
 
     def _topics(self) -> list[tuple[str, str, int]]:
-        with self._plain.open("rb") as file:
-            summary, cause = _summary(file), ""
-            if summary is not None:
-                counts = Counter(summary.statistics.channel_message_counts)
-                found = [(summary.schemas.get(channel.schema_id), channel) for channel in summary.channels.values()]
-            else:
-                counts, seen = Counter(), {}
-                try:
-                    for schema, channel, _ in self._records(file, None):
-                        seen[channel.id] = schema, channel
-                        counts[channel.id] += 1
-                except Exception as error:  # at the broken end of the file
-                    cause = f" ({error.cause})" if isinstance(error, ModtError) else ""
-                found = list(seen.values())
-        if not found:
-            raise ModtError(self.path, f"holds no message{cause}", REMEDY)
+        summary, counts = self._summary
+        found = [(summary.schemas.get(channel.schema_id), channel) for channel in summary.channels.values()]
         return [
-            (channel.topic, schema.name, counts[channel.id])
+            (channel.topic, schema.name, counts.get(channel.id, 0))
             for schema, channel in found
             if schema is not None and channel.message_encoding == "cdr"
         ]
 
     def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
-        with self._plain.open("rb") as file:
-            for _, channel, message in self._records(file, _summary(file), topics):
-                yield channel.topic, message.log_time, message.data
+        """Messages ordered by recorded time; without an index, chunks come in the order of the file."""
+        from mcap.records import Message
 
-    def _records(self, file: BinaryIO, summary: Any, topics: Collection[str] | None = None) -> Iterator[Any]:
-        """Schema, channel and message, ordered by recorded time with an index, else by their place in the file."""
-        from mcap.records import Channel, Chunk, Message, Schema
+        channels, index = self._summary[0].channels, list[Any]()
+        for chunk in self._summary[0].chunk_indexes:
+            held = {channels[number].topic for number in chunk.message_index_offsets}
+            if not held or held & {*topics}:
+                index.append(chunk)
+        index.sort(key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
+        waiting, order = list[tuple[int, int, Any]](), count()
+        with self._plain.open("rb") as file:
+            chunks = (next(_records(file, chunk.chunk_start_offset)) for chunk in index)
+            contents = self._parts(chunks if self._summary[0].chunk_indexes else _records(file, 0))
+            next_ns = chain((chunk.message_start_time for chunk in index[1:]), repeat(math.inf))
+            for parts, until_ns in zip(contents, next_ns, strict=False):
+                for part in parts:
+                    if isinstance(part, Message) and channels[part.channel_id].topic in topics:
+                        heappush(waiting, (part.log_time, next(order), part))
+                while waiting and waiting[0][0] < until_ns:
+                    _, _, message = heappop(waiting)
+                    yield channels[message.channel_id].topic, message.log_time, message.data
+
+    @cached_property
+    def _summary(self) -> tuple[Any, Mapping[int, int]]:
+        """Schemas, channels and index of chunks, and number of messages by channel.
+
+        A recording that was not closed has no index, and is read up to its end.
+        """
+        from mcap.records import Channel, ChunkIndex, Message, Schema, Statistics
+        from mcap.summary import Summary
+
+        start, cause = 0, ""
+        with self._plain.open("rb") as file:
+            with suppress(Exception):
+                start = next(_records(file, file.seek(-FOOTER_BYTES, os.SEEK_END))).summary_start
+            for at in dict.fromkeys((start, 0)):
+                summary, counts = Summary(), Counter[int]()
+                try:
+                    for record in chain.from_iterable(self._parts(_records(file, at))):
+                        if isinstance(record, Schema):
+                            summary.schemas[record.id] = record
+                        elif isinstance(record, Channel):
+                            summary.channels[record.id] = record
+                        elif isinstance(record, ChunkIndex):
+                            summary.chunk_indexes.append(record)
+                        elif isinstance(record, Statistics):
+                            counts = Counter(record.channel_message_counts)
+                        elif isinstance(record, Message):
+                            counts[record.channel_id] += 1
+                except Exception as error:  # at the broken end of the file
+                    cause = f" ({error.cause})" if isinstance(error, ModtError) else ""
+                if counts:
+                    return summary, counts
+        raise ModtError(self.path, f"holds no message{cause}", REMEDY)
+
+    def _parts(self, records: Iterable[Any]) -> Iterator[list[Any]]:
+        """Content of each chunk, and each record outside of one by itself."""
+        from mcap.records import Chunk
         from mcap.stream_reader import breakup_chunk
 
-        schemas, channels = ({}, {}) if summary is None else (summary.schemas, summary.channels)
-        known: dict[type, dict[int, Any]] = {Schema: schemas, Channel: channels}
-        left, waiting, order = self._most, list[Any](), count()
-        for begin_ns, record in _parts(file, summary, topics):
-            while waiting and waiting[0][0] < begin_ns:
-                yield heappop(waiting)[2]
-            parts = [record]
+        left = self._most
+        for record in records:
             if isinstance(record, Chunk):
                 self._less(min(left, MAX_RECORD_BYTES), record.uncompressed_size)
                 record.data = _unpacked(record.compression, record.data, record.uncompressed_size)
                 left, record.compression = self._less(left, len(record.data)), ""
-                parts = breakup_chunk(record)
-            for part in parts:
-                if type(part) in known:
-                    known[type(part)][part.id] = part
-                elif isinstance(part, Message) and (topics is None or channels[part.channel_id].topic in topics):
-                    channel = channels[part.channel_id]
-                    found = schemas.get(channel.schema_id), channel, part
-                    if isinstance(record, Chunk) and summary is not None:
-                        heappush(waiting, (part.log_time, next(order), found))
-                    else:
-                        yield found
-        while waiting:
-            yield heappop(waiting)[2]
+            yield breakup_chunk(record) if isinstance(record, Chunk) else [record]
 
 
 KINDS: dict[str, type[BagFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
@@ -253,44 +275,13 @@ def _kind(path: Path) -> str:
     return Path(path.name.removesuffix(ZSTD)).suffix
 
 
-def _from(file: BinaryIO, at: int) -> Iterator[Any]:
+def _records(file: BinaryIO, at: int) -> Iterator[Any]:
     """Records of an MCAP file from an offset on; chunks are not unpacked."""
     from mcap.stream_reader import StreamReader
 
     file.seek(at)
     records = StreamReader(file, skip_magic=at > 0, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES).records
     return iter(records)
-
-
-def _summary(file: BinaryIO) -> Any:
-    """Index and counts of an MCAP file; None where the recording was not closed."""
-    from mcap.records import Channel, ChunkIndex, Schema, Statistics
-    from mcap.summary import Summary
-
-    summary = Summary()
-    with suppress(Exception):
-        start = next(_from(file, file.seek(-FOOTER_BYTES, os.SEEK_END))).summary_start
-        for record in _from(file, start) if start else ():
-            if isinstance(record, Schema):
-                summary.schemas[record.id] = record
-            elif isinstance(record, Channel):
-                summary.channels[record.id] = record
-            elif isinstance(record, ChunkIndex):
-                summary.chunk_indexes.append(record)
-            elif isinstance(record, Statistics):
-                summary.statistics = record
-    return None if summary.statistics is None else summary
-
-
-def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iterator[tuple[int, Any]]:
-    """Start [ns] and content of each chunk with messages of these topics; without an index, 0 and each record."""
-    chunks = () if summary is None else summary.chunk_indexes
-    for index in sorted(chunks, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
-        held = {summary.channels[number].topic for number in index.message_index_offsets}
-        if topics is None or not held or held & set(topics):
-            yield index.message_start_time, next(_from(file, index.chunk_start_offset))
-    if not chunks:
-        yield from ((0, record) for record in _from(file, 0))
 
 
 def _unpacked(compression: str, data: bytes, most: int) -> bytes:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.sources import kitti_calibration, oxts
+from modt.sources import kitti_calibration
 from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
 from modt.sources.pose_source import read_poses, sensor_poses
 from modt.sources.scan_file import PERIOD_S, ScanReference, ScanStream
@@ -37,26 +37,17 @@ Poses = dict[int, Float64]
 """T_world_sensor by frame."""
 
 
-@dataclass(frozen=True, slots=True)
-class Notes:
-    """Missing files and their consequences; `of_poses` are irrelevant with another source of poses."""
-
-    of_stream: list[str] = field(default_factory=list)
-    of_poses: list[str] = field(default_factory=list)
-
-
 def raw_drive(drive: Path) -> ScanStream:
     """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder."""
-    notes = Notes()
+    notes, pose_notes = list[str](), list[str]()
     calib = drive.parent / "calib_cam_to_cam.txt"
-    camera = _optional(kitti_calibration.camera_of_raw, calib, notes.of_stream, NO_CAMERA)
-    poses = _poses_of_raw(drive, notes)
-    data = drive / "velodyne_points" / "data"
-    frames, _ = _scans(data)
-    stamps = _stamps(drive / "velodyne_points" / "timestamps.txt", frames, notes, time_ns)
-    turns = _raw_turns(drive / "velodyne_points", frames, notes)
+    camera = _optional(kitti_calibration.camera_of_raw, calib, notes, NO_CAMERA)
+    poses = _poses_of_raw(drive, pose_notes)
+    folder = drive / "velodyne_points"
+    scans = _scans(folder / "data")
+    stamps = _stamps(folder / "timestamps.txt", scans, notes, time_ns)
     info = StreamInfo(drive.name, "KITTI raw drive", camera=camera)
-    return _stream(info, data, notes, poses, stamps, turns)
+    return _stream(info, scans, notes, pose_notes, poses, stamps, _raw_turns(folder, scans, notes))
 
 
 def tracking_sequence(scans: Path) -> ScanStream:
@@ -65,19 +56,19 @@ def tracking_sequence(scans: Path) -> ScanStream:
     Its sweeps are those of raw drives without time stamps; each lasts one period.
     """
     root, number = scans.parent.parent, scans.name
-    notes = Notes()
+    notes, pose_notes = list[str](), list[str]()
     calib = root / "calib" / f"{number}.txt"
-    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, NO_CAMERA)
+    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes, NO_CAMERA)
     records = root / "oxts" / f"{number}.txt"
     poses: Poses = {}
     if absent := _absent(records):
-        notes.of_poses.append(f"{records} {absent}: {NO_POSES}")
+        pose_notes.append(f"{records} {absent}: {NO_POSES}")
     else:
-        T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, notes.of_poses, NO_POSES)
+        T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, pose_notes, NO_POSES)
         if T_imu_sensor is not None:
-            poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
-    info = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera)
-    return _stream(info, scans, notes, poses, turns=dict.fromkeys(_scans(scans)[0], PERIOD_S))
+            poses = dict(enumerate(kitti_calibration.oxts_poses(kitti_calibration.read_oxts(records)) @ T_imu_sensor))
+    info, files = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera), _scans(scans)
+    return _stream(info, files, notes, pose_notes, poses, turns=dict.fromkeys(files, PERIOD_S))
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
@@ -85,91 +76,93 @@ def odometry_sequence(sequence: Path) -> ScanStream:
 
     Its sweeps are published deskewed.
     """
-    notes = Notes()
+    notes, pose_notes = list[str](), list[str]()
     calib = sequence / "calib.txt"
     cost = f"{NO_CAMERA}; get Tr from data_odometry_calib.zip"
-    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, cost)
+    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes, cost)
     places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
     path = next((p for p in places if not _absent(p)), None)
     poses: Poses = {}
     if path is None or camera is None:
         cause = f"{places[0]} {_absent(places[0])}" if path is None else f"{path} needs the Tr of {calib}"
-        notes.of_poses.append(f"{cause}: {NO_POSES}")
+        pose_notes.append(f"{cause}: {NO_POSES}")
     else:
         poses = dict(enumerate(sensor_poses(read_poses(path), camera.T_camera_sensor)))
-    data = sequence / "velodyne"
-    stamps = _stamps(sequence / "times.txt", _scans(data)[0], notes, seconds_ns)
+    scans = _scans(sequence / "velodyne")
+    stamps = _stamps(sequence / "times.txt", scans, notes, seconds_ns)
     info = StreamInfo(f"odometry {sequence.name}", "KITTI odometry", camera=camera)
-    return _stream(info, data, notes, poses, stamps)
+    return _stream(info, scans, notes, pose_notes, poses, stamps)
 
 
 def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") -> ScanStream:
     """A folder of scans in the order of their names, stamped by their names or `period_s` apart."""
-    indices, files = _scans(folder, suffix)
-    times = times_ns([f.stem for f in files])
+    scans = _scans(folder, suffix)
+    times = times_ns([f.stem for f in scans.values()])
     apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
-    stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(indices)}
-    notes = Notes([f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"])
+    stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(scans)}
+    notes, pose_notes = [f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"]
     info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
-    return _stream(info, folder, notes, {}, stamps, suffix=suffix)
+    return _stream(info, scans, notes, pose_notes, {}, stamps)
 
 
-def _scans(data: Path, suffix: str = ".bin") -> tuple[list[int], list[Path]]:
-    """Indices and files of the scans of a folder in their order."""
+def _scans(data: Path, suffix: str = ".bin") -> dict[int, Path]:
+    """Files of the scans of a folder in their order, by index."""
     files = files_in(data, suffix)
     if not files:
         raise MisuseError(data, f"no {suffix} scans", "give a folder of scans")
     numbers = [int(f.stem) for f in files if re.fullmatch(f"[0-9]{{1,{MAX_NUMBER_DIGITS}}}", f.stem)]
     numbered = len(set(numbers)) == len(files) and times_ns([f.stem for f in files]) is None
-    return numbers if numbered else list(range(len(files))), files
+    return dict(zip(numbers if numbered else range(len(files)), files, strict=True))
 
 
 def _stream(
     info: StreamInfo,
-    data: Path,
-    notes: Notes,
+    files: Mapping[int, Path],
+    notes: list[str],
+    pose_notes: list[str],
     poses: Poses,
     stamps: Mapping[int, float] = MappingProxyType({}),
     turns: Mapping[int, float] = MappingProxyType({}),
-    suffix: str = ".bin",
 ) -> ScanStream:
-    """Stream of the scans in `data` with their poses, stamps and durations [s] by frame."""
-    indices, files = _scans(data, suffix)
+    """Stream of scan files with their poses, stamps and durations [s] by frame."""
+    indices = list(files)
     missing = indices[-1] - indices[0] + 1 - len(indices)
     if missing:
         first = next(a + 1 for a, b in pairwise(indices) if b > a + 1)
-        notes.of_stream.append(f"{missing} frames are missing (the first is {first})")
+        notes.append(f"{missing} frames are missing (the first is {first})")
     if poses:
         lost, known = [i for i in indices if i not in poses], sorted(poses)
         if lost:
             cost = "have the pose of the frame before"
-            notes.of_poses.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
+            pose_notes.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
         poses = {i: poses[known[max(bisect_right(known, i) - 1, 0)]] for i in indices}  # the first, before it
     scans = [
-        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0))
-        for i, f in zip(indices, files, strict=True)
+        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0)) for i, f in files.items()
     ]
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
-        notes.of_stream.append(f"time stamps decrease: frames {PERIOD_S} s apart instead")
+        notes.append(f"time stamps decrease: frames {PERIOD_S} s apart instead")
         scans = [replace(s, stamp_s=s.index * PERIOD_S) for s in scans]
-    of_stream, of_poses = tuple(notes.of_stream), tuple(notes.of_poses)
-    return ScanStream(replace(info, has_poses=bool(poses), notes=of_stream, pose_notes=of_poses), scans)
+    info = replace(info, has_poses=bool(poses), notes=tuple(notes), pose_notes=tuple(pose_notes))
+    return ScanStream(info, scans)
 
 
-def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
+def _poses_of_raw(drive: Path, notes: list[str]) -> Poses:
     files = files_in(drive / "oxts" / "data", ".txt")
     records = [r for r in files if re.fullmatch("[0-9]+", r.stem) and r.stat().st_size]
     if not records:
-        notes.of_poses.append(f"{drive / 'oxts' / 'data'} is missing: {NO_POSES}")
+        notes.append(f"{drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
-    T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_raw, drive.parent, notes.of_poses, NO_POSES)
+    T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_raw, drive.parent, notes, NO_POSES)
     if T_imu_sensor is None:
         return {}
-    T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1, : len(oxts.FIELDS)] for r in records]))
+    first = [kitti_calibration.read_oxts(r)[0, : len(kitti_calibration.OXTS_FIELDS)] for r in records]
+    T_world_imu = kitti_calibration.oxts_poses(np.array(first))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 
-def _stamps(path: Path, frames: Sequence[int], notes: Notes, read: Callable[[str], int | None]) -> dict[int, float]:
+def _stamps(
+    path: Path, frames: Iterable[int], notes: list[str], read: Callable[[str], int | None]
+) -> dict[int, float]:
     """Stamps of the frames since scan 0 [s]; missing ones are interpolated."""
     times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "theirs are interpolated", read)
     if not times:
@@ -177,15 +170,13 @@ def _stamps(path: Path, frames: Sequence[int], notes: Notes, read: Callable[[str
     known, began = sorted(times), min(times.values())
     stamps_s = np.array([(times[i] - began) / 1e9 for i in known])
     period_s = float(np.median(np.diff(stamps_s) / np.diff(known))) if len(known) > 1 else PERIOD_S
-
-    def stamp_s(i: int) -> float:
-        beyond = min(i - known[0], 0) + max(i - known[-1], 0)
-        return float(np.interp(i, known, stamps_s)) + beyond * period_s
-
-    return {i: stamp_s(i) - stamp_s(0) for i in frames}
+    scans = np.array([0, *frames])
+    beyond = np.minimum(scans - known[0], 0) + np.maximum(scans - known[-1], 0)
+    first_s, *others_s = (np.interp(scans, known, stamps_s) + beyond * period_s).tolist()
+    return {i: stamp_s - first_s for i, stamp_s in zip(frames, others_s, strict=True)}
 
 
-def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
+def _raw_turns(folder: Path, frames: Iterable[int], notes: list[str]) -> dict[int, float]:
     """Durations of the sweeps by frame [s]; empty where the time stamps are missing or wrong."""
     starts = _times_ns(folder / "timestamps_start.txt", frames, NO_SWEEP_TIMES, notes)
     ends = _times_ns(folder / "timestamps_end.txt", frames, NO_SWEEP_TIMES, notes) if starts else {}
@@ -195,16 +186,16 @@ def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, f
     if odd:
         impossible = f"a negative time or more than {MAX_SWEEP_PERIODS} periods"
         bad = f"{len(odd)} sweeps of {folder} last {impossible} (the first is {odd[0]})"
-        notes.of_stream.append(f"{bad}: {NO_SWEEP_TIMES}")
+        notes.append(f"{bad}: {NO_SWEEP_TIMES}")
         return {}
     return turns
 
 
 def _times_ns(
     path: Path,
-    frames: Sequence[int],
+    frames: Iterable[int],
     cost: str,
-    notes: Notes,
+    notes: list[str],
     cost_of_few: str = "",
     read: Callable[[str], int | None] = time_ns,
 ) -> dict[int, int]:
@@ -213,21 +204,21 @@ def _times_ns(
     A defect is noted with its cost; `cost_of_few` is the cost of single frames without a time.
     """
     if absent := _absent(path):
-        notes.of_stream.append(f"{path} {absent}: {cost}")
+        notes.append(f"{path} {absent}: {cost}")
         return {}
     lines = path.read_text(encoding="utf-8", errors="replace").rstrip().split("\n")
     times = {i: time for i, time in enumerate(map(read, lines)) if time is not None}
     if not times:
-        notes.of_stream.append(f"{path} is no list of time stamps: {cost}")
+        notes.append(f"{path} is no list of time stamps: {cost}")
         return {}
     n_scans = max(frames) + 1
     if len(lines) != n_scans:
         unlike = f"{path} has {len(lines)} lines, the last scan is number {n_scans - 1}"
-        notes.of_stream.append(f"{unlike}: line i is used for scan i, from 0; restore the missing lines")
+        notes.append(f"{unlike}: line i is used for scan i, from 0; restore the missing lines")
     without = [i for i in frames if i not in times]
     if without:
         few = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
-        notes.of_stream.append(f"{few}: {cost_of_few or cost}")
+        notes.append(f"{few}: {cost_of_few or cost}")
     return times
 
 

@@ -1,6 +1,6 @@
-"""KITTI calibration files: left colour camera and inertial unit, relative to the sensor.
+"""KITTI's calibration files and OXTS records: left colour camera, inertial unit and its poses.
 
-All readers raise a MissingError for a missing file or row, and a MisuseError for an invalid one.
+All readers of calibrations raise a MissingError for a missing file or row, and a MisuseError for an invalid one.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.geometry import Camera, inverse, se3
+from modt.geometry import Camera, inverse, rotation_zyx, se3
 from modt.sources.text_file import read_lines
 from modt.types import Float64
 
@@ -90,9 +90,8 @@ def camera_of_raw(path: Path) -> Camera:
 def camera_of_sequence(path: Path) -> Camera:
     """Left colour camera from a calibration file of the tracking, object or odometry layout."""
     table = read_table(path)
-    R_rect = np.eye(3)  # Tr of the odometry layout includes the rectification
-    if "R0_rect" in table or "R_rect" in table:
-        R_rect = matrix(table, path, (3, 3), "R0_rect", "R_rect")
+    unrectified = {"R_rect": np.eye(3)}  # Tr of the odometry layout includes the rectification
+    R_rect = matrix(unrectified | table, path, (3, 3), "R0_rect", "R_rect")
     T = homogeneous(matrix(table, path, (3, 4), "Tr_velo_to_cam", "Tr_velo_cam", "Tr"))
     return camera(matrix(table, path, (3, 4), "P2"), R_rect, T)
 
@@ -107,3 +106,49 @@ def T_imu_sensor_of_sequence(path: Path) -> Float64:
     """(4, 4) T_imu_sensor from a calibration file of the tracking or object layout."""
     table = read_table(path)
     return inverse(homogeneous(matrix(table, path, (3, 4), "Tr_imu_to_velo", "Tr_imu_velo")))
+
+
+EARTH_RADIUS_M = 6378137.0
+OXTS_FIELDS = ("lat", "lon", "alt", "roll", "pitch", "yaw")
+MOST_OF_OXTS = (85.0, 360.0, 1e5, 7.0, 7.0, 7.0)
+"""Greatest absolute value of each field; Mercator's projection excludes the poles."""
+OXTS_REMEDY = "restore it, or remove it to run without ego-motion"
+
+
+def oxts_poses(records: Float64) -> Float64:
+    """(n, 4, 4) T_world_imu of (n, 6 or more) OXTS records: lat, lon [deg], alt [m], roll, pitch, yaw [rad].
+
+    As in KITTI's development kit, Mercator coordinates are scaled at the first latitude, and the world frame is that
+    of the first record.
+    """
+    lat, lon, alt, roll, pitch, yaw = records[:, :6].T
+    scale = np.cos(np.deg2rad(lat[0]))
+    x = scale * EARTH_RADIUS_M * np.deg2rad(lon)
+    y = scale * EARTH_RADIUS_M * np.log(np.tan(np.deg2rad(90.0 + lat) / 2))
+    T_mercator_imu = np.stack(
+        [
+            se3(rotation_zyx(*angles), np.array(position))
+            for angles, position in zip(np.c_[roll, pitch, yaw], np.c_[x, y, alt], strict=True)
+        ]
+    )
+    return np.asarray(inverse(T_mercator_imu[0]) @ T_mercator_imu)
+
+
+def read_oxts(path: Path) -> Float64:
+    """(n, k) OXTS records of a file, one a line, OXTS_FIELDS first.
+
+    Raises:
+        MisuseError: the file is missing, holds no records, or holds values that no place on Earth has.
+    """
+    rows = [line.split() for line in read_lines(path, OXTS_REMEDY)]
+    try:
+        records = np.array(rows, dtype=np.float64).reshape(len(rows), -1)
+    except ValueError:
+        raise MisuseError(path, "is no table of numbers", OXTS_REMEDY) from None
+    if records.shape[1] < len(OXTS_FIELDS) or not np.isfinite(records[:, : len(OXTS_FIELDS)]).all():
+        raise MisuseError(path, f"OXTS record without {', '.join(OXTS_FIELDS)}", OXTS_REMEDY)
+    beyond = np.flatnonzero((np.abs(records[:, : len(OXTS_FIELDS)]) > MOST_OF_OXTS).any(axis=0))
+    if len(beyond):
+        field, most = OXTS_FIELDS[beyond[0]], MOST_OF_OXTS[beyond[0]]
+        raise MisuseError(path, f"OXTS record of {field} beyond {most:g}", OXTS_REMEDY)
+    return records

@@ -46,7 +46,7 @@ def read_datagram(raw: bytes) -> tuple[float, Float64]:
     if len(raw) > MAX_BYTES:
         raise MessageError("malformed", f"more than {MAX_BYTES} bytes")
     try:
-        message = json.loads(raw)
+        message = json.loads(raw, parse_int=float)  # a number beyond all floats is infinite
     except (ValueError, RecursionError):
         raise MessageError("malformed", "no JSON") from None
     if not isinstance(message, dict):
@@ -66,15 +66,11 @@ def read_datagram(raw: bytes) -> tuple[float, Float64]:
 
 
 def _number(value: object, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if not isinstance(value, float):
         raise MessageError("malformed", f"{key} is no number")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
+    if not math.isfinite(value):
         raise MessageError("non_finite", f"{key} is not finite")
-    return number
+    return value
 
 
 def _matrix(values: object) -> Float64:

@@ -14,12 +14,12 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse
 from modt.sources.stream import StreamInfo
-from modt.sources.text_file import read_lines
+from modt.sources.text_file import read_text
 from modt.types import Float64, Frame
 
 N_ELEMENTS = 12
 MAX_DISTANCE_M = 1e8
-"""Greatest coordinate of a pose, which holds for any frame of the Earth [m]."""
+"""Greatest coordinate of a pose [m]. Those of any frame fixed to the Earth are smaller."""
 MAX_SKEW = 0.01
 """Greatest element of R R' - I of a rotation; files hold at least six digits."""
 
@@ -60,8 +60,8 @@ class NoPoses(PoseSource):
 class PoseFile(PoseSource):
     """Poses of a file; line k, from 0, belongs to frame k.
 
-    The poses are the camera's (KITTI's rectified left one), without one the sensor's; `end` is the index of the last
-    frame plus one, None where unknown.
+    The poses are those of KITTI's rectified left camera, or of the sensor where `camera` is None; `end` is the index
+    of the last frame plus one, None where unknown.
 
     Raises:
         MisuseError: the file is missing, a line is no pose, or there are too few.
@@ -97,9 +97,7 @@ def read_poses(path: Path) -> Float64:
     Raises:
         MisuseError: the file is unreadable or empty, or a line is no pose; the error names the line.
     """
-    lines = read_lines(path, "give a file of poses")
-    while lines and not lines[-1].strip():
-        lines.pop()
+    lines = read_text(path, "give a file of poses").rstrip().splitlines()
     if not lines:
         raise MisuseError(path, "no poses", "give twelve numbers a line")
     return np.stack([_pose(line, f"{path}:{number}") for number, line in enumerate(lines, 1)])

@@ -35,7 +35,7 @@ POSITION_NOISE_M = 0.5
 CONFIRM_S = 0.2
 """Time for which doubted poses must be mutually consistent to be believed [s]."""
 _LEVER_M = 5.0
-"""Distance that stands for a turn of one radian [m]."""
+"""Displacement that counts as much as a turn of one radian [m]."""
 _UNKNOWN_INTERVAL_S = 0.5
 """Assumed interval between poses until two are known [s]."""
 
@@ -95,7 +95,7 @@ class PoseBuffer:
         return apart_m > POSITION_NOISE_M + self.config.max_speed_mps * dt_s
 
     def at(self, stamp_s: float) -> Float64 | None:
-        """(4, 4) pose at a time, interpolated or extrapolated from the latest poses; None where they are too old."""
+        """(4, 4) pose at a time, at constant velocity and turn rate; None where the latest poses are too old."""
         ends = self._ends(stamp_s)
         if ends is None:
             return None
@@ -104,13 +104,14 @@ class PoseBuffer:
             return b.copy()
         if max(abs(stamp_s - t1), min(stamp_s, t1) - t0) > MAX_AGE_S:
             return None
-        T = interpolate(a, b, (stamp_s - t0) / (t1 - t0))
+        share = (stamp_s - t0) / (t1 - t0)
+        T = se3(turn_between(a, b, share), a[:3, 3] + share * (b[:3, 3] - a[:3, 3]))
         return None if stamp_s > t1 and self.leaps(stamp_s, T) else T
 
     def _ends(self, stamp_s: float) -> list[tuple[float, Float64]] | None:
-        """Stamp and pose of the two poses to interpolate; twice the same one if it has this time.
+        """Stamps and poses to interpolate between; both are the same if a pose has this time, None without two.
 
-        After the latest pose they are the latest and one as long before it as the time is behind it.
+        After the latest pose they are the latest one and one that lies as far before it as the time lies after it.
         """
         stamps = np.array(self._stamps)
         after = int(np.searchsorted(stamps, stamp_s))
@@ -136,11 +137,6 @@ class PoseBuffer:
 def _turn_rad(a: Float64, b: Float64) -> float:
     """Angle between two (4, 4) poses."""
     return math.acos(min(max((float(np.sum(a[:3, :3] * b[:3, :3])) - 1) / 2, -1.0), 1.0))
-
-
-def interpolate(a: Float64, b: Float64, share: float) -> Float64:
-    """(4, 4) pose at a share of the motion from a to b, at constant velocity and turn rate."""
-    return se3(turn_between(a, b, share), a[:3, 3] + share * (b[:3, 3] - a[:3, 3]))
 
 
 _MIN_VOTES = 5

@@ -106,13 +106,13 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
         return None
     for drive in (path, path.parent, path.parent.parent):
         scans = drive / "velodyne_points"
-        if path in (drive, scans, scans / "data") and _is_raw(drive):
+        if path in (drive, scans, scans / "data") and scans.is_dir():
             return kitti.raw_drive(drive)
     if _is_tracking(path):
         return kitti.tracking_sequence(path)
     if path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path):
         path = path.parent
-    if _is_odometry(path):
+    if _has_scans(path / "velodyne"):
         return kitti.odometry_sequence(path)
     suffix = next((s for s in SUFFIXES if _has_scans(path, s)), None)
     return None if suffix is None else kitti.scan_folder(path, period_s, suffix)
@@ -125,16 +125,8 @@ def _is_bag(path: Path) -> bool:
     return joined and any(file.name.endswith(BAGS) for file in files)
 
 
-def _is_raw(path: Path) -> bool:
-    return (path / "velodyne_points").is_dir()
-
-
 def _is_tracking(path: Path) -> bool:
     return path.parent.name == "velodyne" and path.name.isdigit() and _has_scans(path)
-
-
-def _is_odometry(path: Path) -> bool:
-    return _has_scans(path / "velodyne")
 
 
 def _has_scans(path: Path, suffix: str = ".bin") -> bool:
@@ -143,9 +135,6 @@ def _has_scans(path: Path, suffix: str = ".bin") -> bool:
 
 def _nearby(path: Path) -> list[Path]:
     """Streams up to three levels below."""
-    if not path.is_dir():
-        return []
     below = [p for depth in ("*", "*/*", "*/*/*") for p in sorted(path.glob(depth)) if p.is_dir()]
-    return [
-        p for p in below if _is_raw(p) or _is_tracking(p) or (_is_odometry(p) and not p.name.startswith("velodyne"))
-    ]
+    odometry = {p for p in below if _has_scans(p / "velodyne") and not p.name.startswith("velodyne")}
+    return [p for p in below if (p / "velodyne_points").is_dir() or _is_tracking(p) or p in odometry]

@@ -46,7 +46,7 @@ MAX_STAMP_S = 1e11
 
 
 def unit_of(ratio: float) -> str:
-    """Name of the unit of a time that is `ratio` times another one in seconds; empty if it is no unit."""
+    """Unit of a time by its ratio to the same time in seconds; empty if the ratio fits no unit."""
     units = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
     return next((name for factor, name in units.items() if abs(ratio / factor - 1.0) < 0.02), "")
 

@@ -219,7 +219,8 @@ class Regrouping:
         proposals.box[changed], proposals.centroid[changed] = few.box, few.centroid
         observations = frame.observations.take(source)
         observed = observe(few, placement.T_world_sensor, kernels)
-        observations.put(changed, observed.moved(placement.deskew(observed.centroid)))
+        observed.move(placement.deskew(observed.centroid))
+        observations.put(changed, observed)
         return proposals, observations
 
     def _locate(self, tracks: TrackTable, rows: Int, kdop: Float64, matches: Matches) -> Float64:

@@ -24,19 +24,18 @@ PORT = 8766
 LOCAL = "127.0.0.1"
 
 
-class LivePage:
+class LivePage(LiveServer):
     """Publishes each frame with its cost to the open pages, once its line of the ledger arrives."""
 
     def __init__(self, host: str, port: int) -> None:
         head, tail = page("modt", "waits for a sweep", content([], None, STEP_CM), LIVE)
-        self._server = LiveServer(host, port, (head + tail).encode())
-        self.port = int(self._server.server_address[1])
+        super().__init__(host, port, (head + tail).encode())
         self._result: FrameResult | None = None
         self._energy: dict[str, Any] = {}
 
     def write(self, result: FrameResult, /) -> None:
         """Keep a frame until its line of the ledger arrives."""
-        self._result = result if self._server.watched else None
+        self._result = result if self.watched else None
 
     def ledger(self, record: dict[str, Any], /) -> None:
         """Take the line of a frame, or the energy of the frames of a window."""
@@ -48,11 +47,7 @@ class LivePage:
             result, self._result = self._result, None
             if result.frame.index == record["frame"]:
                 cpu_ms = {name: round(1e-6 * stage["cpu_ns"], 3) for name, stage in record["stages"].items()}
-                self._server.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}))
-
-    def close(self) -> None:
-        """Close the page."""
-        self._server.close()
+                self.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}))
 
 
 def open_view(address: Address) -> LivePage:
@@ -98,7 +93,7 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
 
 
 def live_cells(result: FrameResult) -> Cells:
-    """Cells of the sweep; points without a proposal count as ground."""
+    """Cells of the sweep. Points without a proposal count as ground."""
     x, y, z = (result.frame.points[:, k] for k in range(3))
     reach_m = (SIDE // 2 - 1) * STEP_CM / 100
     used = (np.abs(x) < reach_m) & (np.abs(y) < reach_m) & ((x != 0) | (y != 0))

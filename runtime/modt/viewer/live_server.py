@@ -1,4 +1,4 @@
-"""HTTP server of a page and its events. A slow client misses events; the run never waits."""
+"""HTTP server of a page and its events. A slow client misses events, and the run never waits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class LiveServer(ThreadingTCPServer):
 
     Attributes:
         page: HTML.
-        names: host names that a request may use; None for all. On the loopback they are limited, because a page of
+        port: port that is bound.
+        names: host names that a request may use, or None for all. On the loopback they are limited, because a page of
             another site could reach it by a name of its own.
 
     Raises:
@@ -40,6 +41,7 @@ class LiveServer(ThreadingTCPServer):
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         self.address_family = family
         super().__init__((str(address[0]), int(address[1])), _Handler)
+        self.port = int(self.server_address[1])
         local = ip_address(str(address[0])).is_loopback
         self.names = {"localhost", "127.0.0.1", "[::1]", host} if local else None
         self._free, self._changed = threading.Semaphore(MOST_CONNECTIONS), threading.Condition()
@@ -58,7 +60,7 @@ class LiveServer(ThreadingTCPServer):
             self._changed.notify_all()
 
     def enter(self) -> int | None:
-        """Count a page, and return the number of the last event before it; None where there are too many."""
+        """Count a page, and return the number of the last event before it, or None if there are too many."""
         with self._changed:
             if self._pages >= MOST_PAGES:
                 return None
@@ -66,12 +68,12 @@ class LiveServer(ThreadingTCPServer):
             return self._number
 
     def leave(self) -> None:
-        """Count a page no longer."""
+        """Release the place of a page."""
         with self._changed:
             self._pages -= 1
 
     def event_after(self, number: int) -> tuple[int, bytes] | None:
-        """Wait for an event after the one of a number, and return the newest with its number; None at the end.
+        """Wait for an event newer than a number, and return the newest with its own number, or None at the end.
 
         After ALIVE_S without an event it is a comment.
         """
@@ -90,7 +92,7 @@ class LiveServer(ThreadingTCPServer):
         self.server_close()
 
     def verify_request(self, request: object, client_address: object) -> bool:
-        """Whether there is room for another connection; it is closed where there is none."""
+        """Whether there is room for another connection, which is closed if there is none."""
         return self._free.acquire(blocking=False)
 
     def process_request_thread(self, request: _Request, client_address: object) -> None:
@@ -101,7 +103,7 @@ class LiveServer(ThreadingTCPServer):
             self._free.release()
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """Ignore the error: the client has gone."""
+        """Ignore the error, since the client has gone."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -109,7 +111,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = SEND_S
 
     def handle(self) -> None:
-        """Answer a request; a client whose request takes longer than SEND_S is disconnected."""
+        """Answer a request. A client whose request takes longer than SEND_S is disconnected."""
         self.late = threading.Timer(SEND_S, self._leave)
         self.late.start()
         try:
@@ -160,4 +162,4 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, format: str, *args: object) -> None:
-        """Log nothing: the log belongs to the run."""
+        """Log nothing, because the log belongs to the run."""

@@ -1,4 +1,4 @@
-"""Arrays as text for a page: columns of differences, byte by byte, deflated, in base64."""
+"""Arrays as text for a page: each number less the one before it, byte by byte, deflated, in base64."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from modt.types import Float32, Int
 
 LEVEL = 6
-"""Level of the compression; higher ones take longer and gain little."""
+"""Level of the compression. Higher ones take longer and gain little."""
 CELL_BYTES = 3
 NUMBER_BYTES = 4
 
@@ -27,26 +27,21 @@ def planes(numbers: Int, n_bytes: int) -> bytes:
     return each[:, :n_bytes].T.tobytes()
 
 
-def differences(numbers: Int) -> Int:
-    """(n,) the first number, then the difference of each number from the one before."""
-    return np.diff(numbers, prepend=0)
-
-
 def packed_cells(cells: Cells, level: int = LEVEL) -> str:
     """Cells of a sweep: differences of the cells in CELL_BYTES planes, then the levels."""
-    return packed(planes(differences(cells.cell), CELL_BYTES) + planes(cells.level, 1), level)
+    return packed(planes(np.diff(cells.cell, prepend=0), CELL_BYTES) + planes(cells.level, 1), level)
 
 
 def packed_table(table: Int, level: int = LEVEL) -> str:
     """(R, C) table, column by column: differences in NUMBER_BYTES planes."""
-    return packed(b"".join(planes(differences(column), NUMBER_BYTES) for column in table.T), level)
+    return packed(b"".join(planes(column, NUMBER_BYTES) for column in np.diff(table, axis=0, prepend=0).T), level)
 
 
 SIDE = 4096
-"""Cells of the grid along x and along y: three bytes count them all."""
+"""Cells of the grid along x and along y. Three bytes count them all."""
 LEVEL_M = 0.1
 LEVELS = 64
-"""Heights above ground are whole multiples of LEVEL_M below LEVELS; level 0 is ground."""
+"""Heights above ground are whole multiples of LEVEL_M below LEVELS. Level 0 is ground."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +50,6 @@ class Cells:
 
     cell: Int  # (n,) SIDE * row + column, ascending; column and row count from -x and -y, the sensor at SIDE / 2
     level: Int  # (n,) height above ground [LEVEL_M], 0 for ground
-
-    def __len__(self) -> int:
-        return len(self.cell)
 
     def thinned(self, most: int) -> Cells:
         """At most `most` cells. Cells of the ground are left out first."""

@@ -1,5 +1,6 @@
-"""`modt evaluate` from the outside."""
+"""`modt evaluate` from the outside: recorded runs, and the experiments of the paper."""
 
+import csv
 import json
 import shutil
 
@@ -10,8 +11,6 @@ from tests.desk.recorded import drive_and_run
 from tests.viewer.chromium import LOADED, WIDE
 
 pytestmark = pytest.mark.command
-
-COLUMNS = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
 
 
 @pytest.fixture(scope="module")
@@ -74,22 +73,54 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path, capsys):
     bare, cut, empty = copy("bare"), copy("cut"), copy("empty", [])
     shutil.rmtree(bare / "labels")
     (cut / "labels" / "000003.label").unlink()
-    odd = copy("odd", [lines[0], lines[1].replace('"proposals":', '"proposals_":', 1)])
     longer = copy("longer", [*lines, lines[-1].replace('"frame":4', '"frame":9')])
-    broken = tmp_path / "broken.csv"
-    broken.write_text(f"{COLUMNS}\n0,1,Tree,9,0,-1.7,1,1,2,0\n")
     for arguments, message in (
         ((bare, truth), "modt replay --labels"),
         ((cut, truth), "000003.label: cannot be read"),
-        ((odd, truth), "tracks.jsonl:2: no record of a frame"),
         ((empty, truth), "no frames are recorded"),
         ((longer, truth), "frame 9 is not in the truth"),
         ((run, drives["hdl-32e"][1]), "labels for a scan of"),
         ((run,), "are no pairs"),
         ((tmp_path, truth), "describes no run"),
-        ((run, truth, "--further", broken), "broken.csv:2: 'Tree' is no type of an object"),
-        ((run, truth, run, truth, "--further", broken), "--further: is for one drive"),
+        ((run, truth, "--further", "none.csv"), "none.csv: cannot be read"),
+        ((run, truth, run, truth, "--further", "none.csv"), "--further: is for one drive"),
         ((run, truth, "--json", "--unlabelled", "found"), "makes a list, and no evaluation"),
         ((run, truth, "--sector", "0"), "is no half sector"),
     ):
         assert message in refusal(capsys, "evaluate", *arguments)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Results of swept experiments and of one that is not, with another profile beside the first."""
+    out = tmp_path_factory.mktemp("results")
+    other = out / "other.yaml"
+    other.write_text("fusion:\n  start_frame: 1\n")
+    words = ["evaluate", "--experiment", "table4", "fig11", "fig12", "--simulated", "2", "--seconds", "0.2"]
+    assert here(*words, "--beside", other, "--out", out) == 0
+    return out
+
+
+def test_results_are_written_as_a_table_and_a_document(results):
+    with (results / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    swept = {row["at"] for row in rows if row["experiment"] == "fig12" and row["quantity"] == "beta"}
+    assert swept == {f"{metres}.0" for metres in range(10, 80, 10)}
+    assert {(row["kind"], row["paper"]) for row in rows} == {("simulated", "")}, "beside no figure of the paper"
+    assert [row["profile"] for row in rows].count("default") == len(rows) / 2
+    page = (results / "results.md").read_text()
+    assert all(f"## {title}" in page for title in ("Table IV", "Fig. 11", "Fig. 12"))
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--experiment", "table9", "--simulated", "1"], "table3"),
+        (["--experiment", "table4"], "no drives"),
+        (["RUN", "TRUTH", "--experiment", "table4"], "takes no runs"),
+        (["--experiment", "table3", "--simulated", "1"], "none of the drives"),
+        (["--experiment", "table4", "--simulated", "1", "--further", "table.csv"], "--further"),
+    ],
+)
+def test_misuse_of_experiments_is_one_line(words, named, capsys, tmp_path):
+    assert named in refusal(capsys, "evaluate", *words, "--out", tmp_path)

@@ -122,6 +122,7 @@ def test_pointing_at_a_track_tells_its_story(run, records, chromium):
     times = sum(track["id"] in record["classified"] for record in records)
     assert shown["story"].count("classified: ") == times > 0
     assert f"{track['state'].replace('_', ' ')}, {track['points']} points" in shown["story"]
+    assert "mJ of classification (estimated)" in shown["story"]
 
 
 def test_keys_step_and_hide(run, records, chromium):

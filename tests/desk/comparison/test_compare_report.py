@@ -34,7 +34,7 @@ class Board:
 
     facts = FACTS
 
-    def __init__(self, every):
+    def __init__(self, every=1):
         self.every, self.now_ns = every, 0
         self.ledger = Ledger(self.clock, self.clock)
 
@@ -48,14 +48,18 @@ class Board:
         self.now_ns += round(ms * 1e6)
         return value
 
+    def seen(self, index):
+        """Result of a frame, and the tracks that are classified."""
+        return result(index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}), [7, 8] * (index % self.every == 0)
+
     def step(self, frame, budget=UNLIMITED):
-        run, asked = self.ledger.run, frame.index % self.every == 0
-        found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR})
-        run("segmentation", self.work, 10.0 + frame.index % 3)
-        run("tracking", self.work, 2.0)
-        if asked:
-            run("classification", self.work, 3.0, np.tile(CAR, (2, 1)))
-        return replace(found, classified=np.array([7, 8] * asked, np.int64))
+        found, classified = self.seen(frame.index)
+        self.ledger.run("segmentation", self.work, 10.0 + frame.index % 3)
+        self.ledger.run("tracking", self.work, 2.0)
+        if classified:
+            count = len(classified)
+            self.ledger.run("classification", self.work, 1.0 + count, np.tile(CAR, (count, 1)))
+        return replace(found, classified=np.array(classified, np.int64))
 
 
 def mode_run(name, metered):
@@ -90,6 +94,14 @@ def estimated():
 @pytest.fixture(scope="module")
 def measured():
     return tree_of(metered=True)
+
+
+def test_meters_are_read_at_the_ends_of_turns():
+    made = [mode_run("conventional", metered=True) for _ in range(2)]
+    interleave(FRAMES[:6], made, turn=3)
+    for each in made:
+        assert [line["frames"][2] for line in each.energy_lines] == [3, 3]
+        assert all(line["energy_J"] > 0 for line in each.energy_lines)
 
 
 MEAN_MS = {"conventional": 10.975 + 2 + 3, "efficient": 10.975 + 2 + 3 / 20, "accurate": 10.975 + 2 + 3 / 5}

@@ -1,17 +1,9 @@
-from dataclasses import replace
-
-import numpy as np
 import pytest
 
-from modt.config import EnergyConfig
-from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Conditions, model_meter
-from modt.energy.windows import Clocks, Windows
-from modt.types import UNLIMITED, Budget, Frame
+from modt.types import UNLIMITED, Budget
 from modt_desk.comparison.comparison import COUNTS, ModeRun, interleave, total
+from tests.desk.comparison.test_compare_report import FRAMES, Board
 from tests.results import CAR, result
-
-FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(6)]
 
 SCRIPT = [
     result(0, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}),
@@ -21,31 +13,33 @@ SCRIPT = [
     result(4, [], {}),
     result(5, [5], {0: 9}, {9: CAR}),
 ]
+SCRIPTED = FRAMES[: len(SCRIPT)]
 CLASSIFIED = [[7, 8], [7], [8], [], [], [9]]
 
 
-class Scripted:
-    """A pipeline that classifies what the script says."""
+class Scripted(Board):
+    """A board that classifies by the script."""
 
-    def __init__(self, name, ledger, log):
-        self.name, self.ledger, self.log = name, ledger, log
+    def __init__(self, name, log):
+        super().__init__()
+        self.name, self.log = name, log
+
+    def seen(self, index):
+        return SCRIPT[index], CLASSIFIED[index]
 
     def step(self, frame, budget=UNLIMITED):
         self.log.append((self.name, (frame.index, budget.calls)))
-        classified = np.array(CLASSIFIED[frame.index], np.int64)
-        if len(classified):
-            self.ledger.run("classification", np.tile, CAR, (len(classified), 1))
-        return replace(SCRIPT[frame.index], classified=classified)
+        return super().step(frame, budget)
 
 
-def mode_run(name, log, budget=lambda index: UNLIMITED, windows=None):
-    ledger = Ledger()
-    return ModeRun(Scripted(name, ledger, log), ledger, budget, windows)
+def mode_run(name, log, budget=lambda index: UNLIMITED):
+    pipeline = Scripted(name, log)
+    return ModeRun(pipeline, pipeline.ledger, budget)
 
 
 def test_counts_of_first_further_and_reacquired_views_and_lives_of_tracks():
     one = mode_run("one", [])
-    interleave(FRAMES, [one], turn=1)
+    interleave(SCRIPTED, [one], turn=1)
     expected = {
         "proposals": [2, 1, 2, 1, 0, 1],
         "tracks": [2, 0, 0, 1, 0, 1],
@@ -66,23 +60,7 @@ def test_counts_of_first_further_and_reacquired_views_and_lives_of_tracks():
 )
 def test_every_run_has_every_frame_with_its_budget_and_the_first_rotates(turn, order):
     log = []
-    interleave(iter(FRAMES), [mode_run(name, log, lambda index: Budget(calls=index)) for name in "ab"], turn)
+    interleave(iter(SCRIPTED), [mode_run(name, log, lambda index: Budget(calls=index)) for name in "ab"], turn)
     assert "".join(name for name, _ in log) == order.replace(" ", "")
     for name in "ab":
         assert [(index, calls) for who, (index, calls) in log if who == name] == [(k, k) for k in range(6)]
-
-
-def test_meters_are_read_at_the_ends_of_turns():
-    now = [0]
-
-    def tick():
-        now[0] += 1_000_000
-        return now[0]
-
-    clocks = Clocks(tick, tick, tick)
-    metered = [Windows([model_meter(EnergyConfig(), tick, tick)], clocks, Conditions(), min_s=1e9) for _ in "ab"]
-    made = [mode_run(name, [], windows=windows) for name, windows in zip("ab", metered, strict=True)]
-    interleave(FRAMES, made, turn=3)
-    for each in made:
-        assert [line["frames"][2] for line in each.energy_lines] == [3, 3]
-        assert all(line["energy_J"] > 0 for line in each.energy_lines)

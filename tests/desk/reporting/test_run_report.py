@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt import profile
-from modt.app.deadlines import Timing
+from modt.app.deadlines import Deadlines
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
@@ -259,10 +259,10 @@ def test_missing_records_are_named(run, missing):
 
 
 def test_how_many_are_as_late_or_later(tmp_path):
-    timing = Timing()
+    late, punctual = Deadlines(0.1), Deadlines(0.1)
     for ms in (0.2, 0.2, 3.0, 40.0):
-        timing.add(0.0, 1e-3 * ms, 0.05, 0.1)
-    found, none = timing.late_or_later(), Timing().late_or_later()
+        late.lateness.add(round(1e6 * ms))
+    found, none = late.late_or_later(), punctual.late_or_later()
     assert found["ms"] == pytest.approx([0.2, 3.0, 40.0], rel=0.03)
     assert found["frames"] == [4, 2, 1]
     (tmp_path / SUMMARY).write_text(json.dumps({"lateness": found}))

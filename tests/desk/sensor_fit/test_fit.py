@@ -6,15 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from modt import assets, profile
-from modt.sensor_fit.beams import cell_m
+from modt import profile
 from modt.sources.recognise import open_stream
 from modt_desk.sensor_fit.findings import Recording, doubts, profile_text
 from modt_desk.sensor_fit.fit import fit
 from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording, with_mast, with_scale
-
-PROFILES = [path.stem for path in sorted(assets.folder("profiles").glob("*.yaml"))]
 
 
 @cache
@@ -81,14 +78,6 @@ def test_the_scale_of_the_reflectance_is_found_where_the_beams_are_known(name, c
     config, findings = fit(change(recording(name))) if change else fitted(name)
     assert config.sensor.reflectance == scale
     assert evidence in next(f.evidence for f in findings if f.key == "reflectance")
-
-
-@pytest.mark.parametrize("name", PROFILES)
-def test_cells_of_the_profiles_are_near_the_rule(name):
-    config = profile.load(name)
-    elevations = config.sensor.elevations_deg
-    spacing = np.median(-np.diff(elevations)) if elevations else config.sensor.elevation_step_deg
-    assert config.segmentation.cell_m == pytest.approx(cell_m(spacing, config.sensor.azimuth_step_deg), rel=0.27)
 
 
 @pytest.mark.parametrize("name", ["vlp-16", "pandar64"])

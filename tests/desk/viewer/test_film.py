@@ -1,4 +1,4 @@
-"""Films, and the places of the labels of a picture."""
+"""Films of a run."""
 
 import os
 
@@ -7,8 +7,6 @@ import pytest
 
 Image = pytest.importorskip("PIL.Image", reason="needs the extra [view]")
 pytest.importorskip("matplotlib", reason="needs the extra [view]")
-
-from matplotlib.transforms import Bbox  # noqa: E402
 
 from modt.errors import ModtError  # noqa: E402
 from modt_desk.viewer import picture  # noqa: E402
@@ -59,22 +57,3 @@ def test_the_message_of_ffmpeg_is_the_error(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     with pytest.raises(ModtError, match=r"cannot be written by ffmpeg \(no room\)"):
         film_of(tmp_path / "film.mp4")
-
-
-def labels_of(points, taken=()):
-    """Boxes of the texts that are written."""
-    axes = picture.new_figure(1280).add_axes((0, 0, 1, 1))
-    axes.set(xlim=(-45, 45), ylim=(-32, 32))
-    picture._write(axes, [(x, y, text, picture.INK) for x, y, text in points], list(taken))
-    boxes = [text.get_window_extent().transformed(axes.transData.inverted()) for text in axes.texts]
-    return {text.get_text(): box for text, box in zip(axes.texts, boxes, strict=True)}
-
-
-def test_labels_keep_off_what_is_taken_and_stay_in_the_picture():
-    block = Bbox([[-1.0, -1.0], [1.0, 1.0]])
-    written = labels_of([(0.5, 0.3, "#1"), (20.0, 0.3, "#2"), (44.9, 5.0, "#3"), (50.0, 5.0, "#4")], [block])
-    assert list(written) == ["#1", "#2", "#3"]
-    assert written["#1"].y0 >= 1.0 > written["#2"].y0
-    assert written["#3"].x1 <= 45.0 + 1e-9
-    feet = [box.y0 for box in labels_of([(3.0, 10.0, f"#{k}") for k in range(3)]).values()]
-    assert np.all(np.diff(feet) > 0), "labels of one place stand above one another"

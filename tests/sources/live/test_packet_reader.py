@@ -2,7 +2,6 @@
 
 import socket
 import time
-from contextlib import ExitStack
 from itertools import islice
 from types import SimpleNamespace
 
@@ -42,16 +41,15 @@ ECHO = SimpleNamespace(name="sensor", decode=lambda *packet: [packet[:2]], pause
 
 
 @pytest.fixture(name="listen")
-def listening(port):
+def listening(port, request):
     """A function that makes a reader of the port."""
-    with ExitStack() as stack:
 
-        def listen(*group, **options):
-            reader = PacketReader(bound_socket("sensor", port, *group), ECHO, **options)
-            stack.callback(reader.close)
-            return reader
+    def listen(*group, **options):
+        reader = PacketReader(bound_socket("sensor", port, *group), ECHO, **options)
+        request.addfinalizer(reader.close)
+        return reader
 
-        yield listen
+    return listen
 
 
 def test_a_multicast_group_is_joined_and_another_address_is_refused(port, listen):

@@ -16,8 +16,6 @@ from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.live.ros2 import MissingSweeps, PointCloudReader
 from tools.send.ros2 import Sender, looped, pace
 
-ADDRESS = f"ros2:///points?domain={NEAR}&reliability=reliable"
-
 
 def cloud(stamp_s=5.0, frame_id="lidar", n=10):
     return write_cloud(stamp_s, frame_id, np.full((n, 4), 0.5, np.float32))
@@ -81,15 +79,9 @@ def test_silence_and_a_clock_that_is_set_are_no_loss():
     assert sum(missing(0.1 * np.arange(500) + rng.uniform(-0.02, 0.02, 500))) == 0
 
 
-@pytest.fixture
-def live(loopback):
-    stream = open_sensor(ADDRESS)
-    stream.start()
-    yield stream
-    stream.close()
-
-
-def test_sweeps_that_are_sent_over_loopback_are_frames(live):
+def test_sweeps_that_are_sent_over_loopback_are_frames(loopback):
+    live = open_sensor(f"ros2:///points?domain={NEAR}&reliability=reliable")
+    live.start()
     sender = Sender(dds.participant(FAR))
     assert sender.wait_for_receiver(60.0)
     until(lambda: has_sender(live.reader._subscription))
@@ -99,6 +91,7 @@ def test_sweeps_that_are_sent_over_loopback_are_frames(live):
     np.testing.assert_array_equal(received.points, points)
     assert (received.stamp_s, received.frame_id) == (pytest.approx(1000.5), "lidar")
     assert (live.health()["lost_messages"], live.health()["dropped_sweeps"]) == (0, 0)
+    live.close()
 
 
 def test_a_sender_keeps_the_pace_of_the_stream():

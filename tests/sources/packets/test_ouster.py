@@ -1,7 +1,8 @@
 """Ouster's packets: the SDK's frames, everything else counted."""
 
 import threading
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from functools import partial
+from http.server import HTTPServer, SimpleHTTPRequestHandler
 
 import numpy as np
 import pytest
@@ -128,25 +129,13 @@ def test_invalid_metadata_are_refused(tmp_path, text):
         OusterDecoder("sensor", tmp_path / "nowhere.json")
 
 
-class Answers(BaseHTTPRequestHandler):
-    """A sensor's HTTP server, which knows no page without its text."""
-
-    text = ""
-
-    def do_GET(self):
-        self.send_response(200 if self.text and self.path == "/api/v1/sensor/metadata" else 404)
-        self.end_headers()
-        self.wfile.write(self.text.encode())
-
-    def log_message(self, *said):
-        pass
-
-
 @pytest.mark.parametrize(("kind", "cause"), [("sensor", ""), ("other", "HTTP Error 404"), ("off", "refused")])
-def test_a_sensor_is_asked_for_its_metadata(kind, cause, metadata, monkeypatch):
+def test_a_sensor_is_asked_for_its_metadata(kind, cause, metadata, tmp_path, monkeypatch):
     monkeypatch.setenv("http_proxy", "http://192.0.2.1:1")  # a sensor is never behind one
-    monkeypatch.setattr(Answers, "text", metadata.read_text() if kind == "sensor" else "")
-    with HTTPServer(("127.0.0.1", 0), Answers) as server:
+    if kind == "sensor":
+        (tmp_path / "api/v1/sensor").mkdir(parents=True)
+        (tmp_path / "api/v1/sensor/metadata").write_text(metadata.read_text())
+    with HTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=str(tmp_path))) as server:
         monkeypatch.setattr(ouster, "METADATA", ouster.METADATA.replace("{host}", f"{{host}}:{server.server_port}"))
         if kind == "off":
             server.server_close()

@@ -74,16 +74,9 @@ def test_a_sector_that_the_sensor_is_set_not_to_see_is_not_lost_and_its_sweep_en
     assert reception.lost == 0
 
 
-def stamp_us(payload):
-    return struct.unpack_from("<I", payload, 1200)[0]
-
-
-def at_time(payload, time_us):
-    return payload[:1200] + struct.pack("<I", round(time_us) % 3_600_000_000) + payload[1204:]
-
-
 def restamped(payload, by_s):
-    return at_time(payload, stamp_us(payload) + by_s * 1e6)
+    stamp_us = struct.unpack_from("<I", payload, 1200)[0] + by_s * 1e6
+    return payload[:1200] + struct.pack("<I", round(stamp_us) % 3_600_000_000) + payload[1204:]
 
 
 def azimuth_deg(payload):

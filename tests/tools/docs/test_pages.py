@@ -2,8 +2,6 @@
 
 import pytest
 
-from modt.tracking.states import ACCURATE, EFFICIENT
-from modt_desk.cli.completion import commands as all_commands
 from modt_desk.cli.profile_schema import keys, schema_text
 from tools.docs import commands, profile_keys, state_tables
 
@@ -16,21 +14,3 @@ def test_a_page_is_up_to_date(page):
 def test_the_schema_is_up_to_date_and_every_key_has_a_meaning():
     assert schema_text() == profile_keys.SCHEMA.read_text(encoding="utf-8")
     assert [key.path for key in keys() if not key.facts["meaning"]] == []
-
-
-def test_every_option_of_every_command_is_listed():
-    shared, *lists = commands.page().split("\n## ")
-    rows = [line for line in shared.splitlines() if line.startswith("| `")]
-    parsers = [command.parser for command in all_commands() if not command.names]
-    for parser, own in zip(parsers, lists, strict=True):
-        name = parser.prog.split()[-1]
-        known = own + "\n".join(line for line in rows if name in line.split("|")[-2])
-        for action in parser._actions:
-            assert action.dest == "help" or (action.option_strings or [str(action.metavar)])[0] in known
-
-
-@pytest.mark.parametrize("machine", [EFFICIENT, ACCURATE], ids=lambda machine: machine.title)
-def test_every_transition_of_a_machine_is_listed_once(machine):
-    listed = state_tables.table((*state_tables.TABLES[machine.title], *state_tables.TABLES["both"]))
-    for t in machine.transitions:
-        assert listed.count(f"| {t.label} | {t.source} | {t.target} |") == 1

@@ -65,7 +65,7 @@ def street(stream: tuple[int, float] = (3, 1.0), also: str = "", value: Any = No
         digest = hashlib.sha256()
         for frame in frames(*stream):
             result = pipeline.step(frame, mode.budget(config))
-            columns = [column for _, column in result.tracks.columns()]
+            columns = [*result.tracks.columns().values()]
             proposals = result.proposals
             columns += [proposals.members, proposals.box, proposals.cut, pipeline.decision.frequency]
             for column in columns:

@@ -1,14 +1,19 @@
-"""Augmentation of crops."""
+"""Augmentation of crops, and crops of people and things near a low sensor."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classification.crops import Crops, gather
 from modt.config import SensorConfig
+from modt.types import Cut
 from tests.classification.scenes import blobs
+from tests.tools.train.datasets import data_of
 from tools.train.augment import augment, subsample
 from tools.train.dataset import Sensors
+from tools.train.near_batches import MIN_CUT_POINTS, NearSource, cut_near
+from tools.train.near_scans import HEIGHT_M, near_scans
 
 
 @given(counts=st.lists(st.integers(6, 300), min_size=1, max_size=8), seed=st.integers(0, 200))
@@ -40,3 +45,50 @@ def test_no_augmented_crop_is_finer_than_its_sensor():
     mean = [augmented.count[step == k].mean() for k in (1, 2, 4)]
     assert mean[0] < 0.5 * len(wall)  # no more than one return for each 0.2 degrees
     np.testing.assert_allclose(mean[0] / mean[1:], [2, 4], rtol=0.25)
+
+
+def boards(n: int, height_m: float = 1.8) -> tuple[Crops, Sensors]:
+    """Upright boards 0.5 m wide, 10 m away from a sensor 1.73 m above the ground."""
+    y, z = np.meshgrid(np.linspace(-0.25, 0.25, 8), np.linspace(-1.4, height_m - 1.73, 60))
+    one = np.stack([np.full(y.size, 10.0), y.ravel(), z.ravel()], axis=1)
+    crops = Crops(np.tile(one, (n, 1)).astype(np.float32), np.arange(n + 1) * len(one))
+    ground, step = np.full(n, -1.73), np.full(n, 0.4)
+    return crops, Sensors(ground, step, step)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_crops_cut_near_lie_between_the_beams_and_keep_their_places_above_the_ground(seed):
+    crops, sensors = boards(20)
+    cut, near, rows, flags = cut_near(crops, sensors, np.random.default_rng(seed))
+    assert len(cut) == len(rows) == len(flags)
+    assert (cut.count >= MIN_CUT_POINTS).all()
+    assert (flags > 0).all()
+    mount_m = np.repeat(-near.ground_z_m, cut.count)
+    assert ((near.ground_z_m <= -HEIGHT_M[0]) & (near.ground_z_m >= -HEIGHT_M[1])).all()
+    above_m = cut.xyz[:, 2] + mount_m
+    assert (above_m > 0.32).all()
+    assert (above_m < 1.81).all()
+    top_m = np.maximum.reduceat(above_m, cut.offsets[:-1])
+    assert ((flags & Cut.TOP) > 0)[top_m < 1.79].all()
+
+
+def test_each_scan_is_seen_from_a_low_mount_of_its_own():
+    scans = list(near_scans(range(4), ["vlp-16", "mid-360"]))
+    heights = [scan.profile.sensor.height_m for scan in scans]
+    assert len(set(heights)) == 4
+    assert all(h is not None and HEIGHT_M[0] <= h <= HEIGHT_M[1] for h in heights)
+    for scan, height_m in zip(scans, heights, strict=True):
+        below = scan.points[np.hypot(*scan.points[:, :2].T) < 3.0, 2].min()
+        assert height_m is not None
+        assert below == pytest.approx(-height_m, abs=0.15) or scan.sensor == "mid-360"
+
+
+def test_a_batch_holds_simulated_crops_and_crops_of_the_streets_cut_near():
+    crops, sensors = boards(8)
+    label = np.arange(8) % 4
+    data = data_of(crops, label, sensors=sensors)
+    batch = NearSource(data, data).draw(np.random.default_rng(1))
+    from_streets = batch.sensors.ground_z_m > -1.5
+    assert 20 < from_streets.sum() < len(batch.crops)
+    assert ((batch.cut[from_streets] & ~Cut.SIDE) > 0).all()
+    assert not (batch.cut[~from_streets] & ~Cut.SIDE).any()  # of an HDL-64E it is not known where the beams end

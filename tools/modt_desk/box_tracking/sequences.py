@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from modt.classes import CLASSES
 from modt.errors import MisuseError
 from modt.geometry import corners, inverse, transform_boxes, wrap
-from modt.sources import kitti_calibration, oxts
+from modt.sources import kitti_calibration
 from modt.sources.pose_source import read_poses
 from modt.types import Bool, Float64, Int
 from modt_desk.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
@@ -208,7 +208,7 @@ def camera_poses(
         calib = path.parent.parent / "calib" / path.name
         T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
         T_sensor_camera = inverse(kitti_calibration.camera_of_sequence(calib).T_camera_sensor)
-        found = oxts.poses(oxts.read_records(path)) @ T_imu_sensor @ T_sensor_camera
+        found = kitti_calibration.oxts_poses(kitti_calibration.read_oxts(path)) @ T_imu_sensor @ T_sensor_camera
     if len(found) < sequence.n_frames:
         raise MisuseError(path, f"{len(found)} poses for {sequence.n_frames} frames", "give one a frame")
     return found

@@ -10,7 +10,7 @@ from importlib import import_module
 from modt import assets
 from modt.cli import main as modt
 from modt.cli import options
-from modt.cli import profile as modt_profile
+from modt_desk.cli import profile as modt_profile
 
 SHELLS = ("bash", "zsh", "fish")
 

@@ -24,9 +24,9 @@ def add_options(p: argparse.ArgumentParser) -> None:
     which = "experiments by name, or all (docs/evaluation.md)"
     g.add_argument("--experiment", nargs="+", metavar="NAME", help=which)
     g.add_argument("--kitti", type=Path, metavar="ROOT", help="folder below which labelled KITTI drives lie")
-    count = options.integer(0, 10_000, "drives")
+    count = options.bounded(int, 0, 10_000, "drives")
     g.add_argument("--simulated", type=count, default=0, metavar="N", help="number of simulated drives")
-    seconds = options.real(0.2, 3600, "seconds")
+    seconds = options.bounded(float, 0.2, 3600, "seconds")
     each = "duration of each simulated drive [s] (default: %(default)g)"
     g.add_argument("--seconds", type=seconds, default=6.0, metavar="S", help=each)
     options.add(g, "profile", help="profile on top of that of each drive's sensor; later ones win key by key")
@@ -34,7 +34,7 @@ def add_options(p: argparse.ArgumentParser) -> None:
     g.add_argument("--beside", action="append", default=[], metavar="NAME|FILE", help=beside)
     out = "directory of the results (default: %(default)s)"
     g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help=out)
-    jobs = options.integer(1, 1024, "processes")
+    jobs = options.bounded(int, 1, 1024, "processes")
     g.add_argument("--jobs", type=jobs, default=1, metavar="N", help="number of processes (default: %(default)s)")
     g.add_argument("--quiet", action="store_true", help="no progress bar")
 

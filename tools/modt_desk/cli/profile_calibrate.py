@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    seconds = options.real(0.01, 600, "seconds")
+    seconds = options.bounded(float, 0.01, 600, "seconds")
     p = commands.add_parser("calibrate", help="fit the energy of this board's units of work, and write its profile")
     options.add_stream_options(p, (0, 40))
     options.add(p, "meter")
@@ -25,7 +25,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument(
         "--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="profile (default: %(default)s)"
     )
-    count = options.integer(12, 100_000, "a count")
+    count = options.bounded(int, 12, 100_000, "a count")
     varied = "number of windows of varied load (default: %(default)s)"
     p.add_argument("--windows", type=count, default=60, metavar="N", help=varied)
     p.add_argument(
@@ -64,6 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import writing
     from modt_desk.comparison.window_fit_calibration import Workload
     from modt_desk.energy.board_fit import FitError
+    from modt_desk.energy.named_meter import choose_meter
 
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)
@@ -71,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
     loaded = choose(request.profile, scans[0], stream.info).config
-    meters = discover(loaded.energy).choose(arguments.meter).meters
+    meters = choose_meter(discover(loaded.energy), arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = PointNet(limits, loaded.sensor)
     segmenter = assembly.segmenter(loaded, FieldOfView(), assembly.chosen_kernels(loaded.segmentation.kernels))

@@ -15,19 +15,17 @@ from modt.errors import MisuseError
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    count = options.integer(1, 1000, "a count")
+    count = options.bounded(int, 1, 1000, "a count")
     p = commands.add_parser("compare", help="run all modes on the same stream, interleaved")
     options.add_stream_options(p)
     options.add(p, "fov", "meter", "json", "html")
     p.add_argument("--repeat", type=count, default=3, metavar="K", help="repetitions (default: %(default)s)")
-    turn = "consecutive frames of one mode (default: 1, with a meter all frames)"
-    p.add_argument("--turn", type=count, metavar="N", help=turn)
     against = "measure how far this file of modt-profile predict was off"
     p.add_argument("--against", type=Path, metavar="PREDICTION", help=against)
     options.add_examples(
         p,
         "modt-profile compare DRIVE --frames 0:50         what tracking saves there",
-        "modt-profile compare DRIVE --json > costs.json   for modt-profile predict and regimes",
+        "modt-profile compare DRIVE --json > costs.json   for modt-profile predict",
     )
     p.set_defaults(run=run)
 
@@ -44,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_desk.comparison.compare_view import compare_document, compare_plots
     from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
+    from modt_desk.energy.named_meter import choose_meter
     from modt_desk.reporting.document import document_page, save
     from modt_desk.reporting.quantity import to_json
 
@@ -53,9 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info).config
     board, info = loaded.energy, stream.info
-    meters = discover(board).choose(arguments.meter).meters
+    meters = choose_meter(discover(board), arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
-    comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
+    comparison = Comparison(request, loaded, pinned, meters if metered else ())
     repetitions = []
     for number in range(arguments.repeat):
         if sys.stderr.isatty():

@@ -29,7 +29,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add(p, "capture")
     p.add_argument("--name", metavar="NAME", help="name of the profile (default: that of the recording)")
     p.add_argument("--out", type=Path, metavar="FILE", help="profile to write (default: NAME.yaml)")
-    count = options.integer(1, MOST_FRAMES, "a count")
+    count = options.bounded(int, 1, MOST_FRAMES, "a count")
     spread = f"number of sweeps, spread evenly over its first {MOST_FRAMES} frames"
     p.add_argument("--sweeps", type=count, default=20, metavar="N", help=f"{spread} (default: %(default)s)")
     options.add_examples(

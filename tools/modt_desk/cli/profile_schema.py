@@ -106,9 +106,7 @@ def _value(key: Key) -> dict[str, Any]:
     kind: dict[str, Any] = {"type": "string"}
     if "low" in facts:
         kind = {"type": "integer" if key.whole else "number", "minimum": facts["low"], "maximum": facts["high"]}
-    if "length" in facts:
-        kind = {"type": "array", "items": kind, "minItems": facts["length"], "maxItems": facts["length"]}
-    elif "most" in facts:
+    if "most" in facts:
         kind = {"type": "array", "items": kind, "minItems": facts["least"], "maxItems": facts["most"]}
     if key.nullable:
         kind["type"] = [kind["type"], "null"]

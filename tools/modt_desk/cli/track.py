@@ -18,7 +18,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     file = "camera poses in KITTI odometry's format, or a folder"
     motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
     motion.add_argument("--oxts", type=Path, metavar="DIR", help="folder of OXTS records, with calib/ beside it")
-    seconds, confidence = options.real(0.001, 10, "seconds"), options.real(-1000, 1000, "a confidence")
+    seconds = options.bounded(float, 0.001, 10, "seconds")
+    confidence = options.bounded(float, -1000, 1000, "a confidence")
     least = "least mean confidence of a track, or online its confidence in a frame (default: by type, for PointRCNN)"
     p.add_argument("--period", type=seconds, default=0.1, metavar="S", help="frame period [s] (default: %(default)g)")
     p.add_argument("--sure", type=confidence, metavar="CONFIDENCE", help=least)

@@ -14,11 +14,15 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")
     which = p.add_mutually_exclusive_group()
     frame = "draw one frame, or begin there (default: a page at its first object, a film at its first frame)"
-    which.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
+    which.add_argument(
+        "--frame", type=options.bounded(int, 0, 10**9, "the number of a frame"), metavar="N", help=frame
+    )
     film = "make a film, RUN/view.mp4, or RUN/view.gif where ffmpeg is not installed"
     which.add_argument("--animate", action="store_true", help=film)
     track = "explain how the class of a track was decided (default: RUN/track-ID.html)"
-    which.add_argument("--track", type=options.integer(0, 10**9, "the number of a track"), metavar="ID", help=track)
+    which.add_argument(
+        "--track", type=options.bounded(int, 0, 10**9, "the number of a track"), metavar="ID", help=track
+    )
     out = (
         "FILE.html, a page that plays the run (default: RUN/view.html); of one frame FILE.svg (with --frame: "
         "RUN/view-N.svg) or FILE.png; a film, FILE.gif or FILE.mp4"

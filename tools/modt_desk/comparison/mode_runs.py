@@ -34,7 +34,6 @@ class Comparison:
     profile: ProfileConfig
     core: int | None
     meters: tuple[Meter, ...]  # to read; none where energy follows from CPU time
-    turn: int | None  # consecutive frames of one mode, None for the default
 
     @property
     def turn_frames(self) -> int:
@@ -43,7 +42,7 @@ class Comparison:
         A meter needs a second or more of one mode; CPU time is compared frame by frame, which spreads other load of
         the machine evenly.
         """
-        return self.turn or (10**9 if self.meters else 1)
+        return 10**9 if self.meters else 1
 
     def repetition(self) -> Repetition:
         """Every mode once through the stream, from its initial state; all repetitions do the same work."""

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from modt.classes import CLASS_NAMES
 from modt.errors import MisuseError, install
-from modt.sinks.kitti import KittiResults, PointLabels
+from modt.sinks.kitti import KittiResults
 from modt.sinks.output import LineFile, writing
 from modt.sinks.records import BROKEN
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
@@ -164,10 +164,13 @@ def _kitti(export: Export, target: Path) -> None:
 
 
 def _semantickitti(export: Export, target: Path) -> None:
-    labels = PointLabels(target)
+    with writing(target):
+        target.mkdir()
     for result in export.results():
         index = result.frame.index
-        labels.write_labels(index, semantic_labels(result.tracks, export.run.proposals(index)))
+        labels = semantic_labels(result.tracks, export.run.proposals(index)).tobytes()
+        with writing(target):
+            (target / f"{index:06d}.label").write_bytes(labels)
 
 
 def _csv(export: Export, target: Path) -> None:

@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.classes import CLASS_NAMES
+from modt.classes import CLASS_NAMES, CLASSES
 from modt.geometry import transform_boxes
-from modt.sinks.kitti import MAX_INSTANCE, SEMANTIC
+from modt.sinks.kitti import MAX_INSTANCE
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import NONE, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
 
 MOST_PROPOSALS = 100_000
 """Most proposals of a valid record; sweeps have some hundreds."""
+SEMANTIC = np.array([(*spec.semantic_kitti, 0)[0] for spec in CLASSES.values()])
+"""SemanticKITTI's label of each class, 0 (unlabelled) for the background."""
 NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
 
 

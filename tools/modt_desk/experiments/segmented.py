@@ -23,7 +23,7 @@ from modt.odometry.odometry import Odometry
 from modt.placement import Placement
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
-from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks
+from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks, copy_runs
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.overlap import PAD_M, ObjectPoints, Overlap, in_box_frame, inside
 from modt_desk.evaluation.rules import Rules
@@ -98,6 +98,13 @@ def within(proposals: Proposals, range_m: float) -> Bool:
     return np.asarray(np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m)
 
 
+def chosen(proposals: Proposals, which: Int) -> Proposals:
+    """A copy of the proposals of the numbers given, in their order."""
+    runs = np.stack([proposals.offsets[which], proposals.offsets[which + 1]])
+    copied = copy_runs(proposals.members, proposals.coordinates, runs)
+    return proposals.regrouped(*copied, proposals.count[which], which)
+
+
 @lru_cache(maxsize=2)
 def _ideal_tracks(drive: SegmentedDrive, tracking: TrackingConfig, period_s: float) -> tuple[Int, ...]:
     """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
@@ -150,7 +157,7 @@ class PlayedBack:
         """Proposals of the next frame."""
         self._now = next(self._frames)
         self._which = np.flatnonzero(within(self._now.proposals, self._range_m))
-        return self._now.proposals.take(self._which)
+        return chosen(self._now.proposals, self._which)
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) likelihoods of the network."""

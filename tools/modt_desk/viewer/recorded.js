@@ -1,4 +1,37 @@
-// ---- a recorded run, played at its own pace
+// ---- a recorded run, played at its own pace, and the truth beside it
+
+const speed = add(document.querySelector("footer"), "select", "", { ariaLabel: "speed" });
+for (const times of [0.25, 0.5, 1, 2, 4]) add(speed, "option", `${times} ×`, { value: times, selected: times === 1 });
+
+costOf = (rows) => {
+  const spent = rows.reduce((sum, row) => sum + (row.classified ? frames[row.at].call_mJ || 0 : 0), 0);
+  return `; ${spent.toFixed(1)} mJ of classification (estimated)`;
+};
+
+state.truth = Boolean(run.truth);
+if (run.truth) {
+  element("states").insertAdjacentHTML("afterend", '<h2>Truth (dotted, key G)</h2><div class="legend" id="truth"></div>');
+  legend("truth", Object.values(run.truth), true);
+  KEYS.g = toggle("truth");
+  factsOf = (frame) => {
+    const count = (outcome) => frame.truth.filter((object) => object.outcome === outcome).length;
+    const counts = () => `${count("found")}, ${count("missed")}, ${frame.false.length}`;
+    return frame.truth ? [["found, missed, false", counts()]] : [];
+  };
+  markOf = (row) => {
+    const wrong = state.truth && frames[row.at].false?.includes(row.id);
+    return wrong ? { text: "false: ", colour: run.truth.false.colour } : null;
+  };
+  drawMore = (frame) => state.truth && frame.truth?.forEach(drawTruth);
+}
+
+function drawTruth({ outcome, class: class_, ...box }) {
+  const corners = outline(box), { colour } = run.truth[outcome];
+  path(corners, true);
+  stroke(colour, outcome === "missed" ? 3 : 1.5, [2, 2]);
+  if (outcome === "missed" && state.labels)
+    write(`missed ${run.classes[class_].name}`, middleOf(corners), topOf(corners), colour);
+}
 
 const packedSweep = (at) => element(`points-${at}`).textContent;
 

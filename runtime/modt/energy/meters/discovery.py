@@ -1,4 +1,4 @@
-"""Search for the meters of a machine in sysfs and in the chip of a Raspberry Pi 5, and choice of one."""
+"""Search for the meters of a machine in sysfs and in the chip of a Raspberry Pi 5."""
 
 from __future__ import annotations
 
@@ -25,7 +25,6 @@ from modt.energy.meters.meter import (
     read_text,
     text_or_none,
 )
-from modt.errors import MisuseError
 
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
 _SAME_J = 1e-3
@@ -243,7 +242,7 @@ def _adc_text(command: str) -> str:
 
 
 def rail_power_W(text: str, known: set[str]) -> float:
-    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`; no `known` rail may be missing."""
+    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`. No `known` rail may be missing."""
     amperes: dict[str, float] = {}
     volts: dict[str, float] = {}
     for rail, quantity, value in _RAIL_VALUE.findall(text):
@@ -272,24 +271,8 @@ class Discovery:
 
     @property
     def best(self) -> Candidate:
-        """The first usable candidate; the model always is usable."""
+        """The first usable candidate. The model is always usable."""
         return next(c for c in self.candidates if c.usable)
-
-    def choose(self, name: str | None) -> Candidate:
-        """The best, or the first usable one whose name contains the text.
-
-        Raises:
-            MisuseError: none does, or it is not usable.
-        """
-        if name is None:
-            return self.best
-        named = [c for c in self.candidates if name.lower() in c.name.lower()]  # usable ones come first
-        if named and named[0].usable:
-            return named[0]
-        if named:
-            raise MisuseError(f"meter {named[0].name}", named[0].why_not, named[0].remedy)
-        names = ", ".join(c.name for c in self.candidates if c.usable)
-        raise MisuseError(f"meter {name}", "not on this machine", f"use one of: {names}")
 
 
 def discover(board: EnergyConfig, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:

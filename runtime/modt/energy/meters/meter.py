@@ -19,7 +19,7 @@ class Words(str, Enum):
 
 
 class Kind(Words):
-    """Reliability of a figure; every figure shown carries one."""
+    """Reliability of a figure. Every figure shown carries one."""
 
     MEASURED = "measured"  # counted by hardware or by this program
     INTEGRATED = "integrated"  # power samples integrated over time
@@ -28,12 +28,12 @@ class Kind(Words):
 
 
 def worst(kinds: Iterable[Kind]) -> Kind:
-    """The least reliable of some kinds: the kind of their sum."""
+    """The least reliable of some kinds, which is the kind of their sum."""
     return max(kinds, key=list(Kind).index)
 
 
 class Scope(Words):
-    """The consumers a meter covers, in order of preference: this program has a larger share of a narrower scope."""
+    """Consumers that a meter covers, in order of preference. This program has a larger share of a narrower scope."""
 
     CPU = "CPU packages"
     CPU_RAIL = "the rail of the CPU, with what shares it"
@@ -64,7 +64,7 @@ class Facts:
 
     @property
     def counts(self) -> bool:
-        """Whether a reading is an energy [J]; else it is a momentary power [W]."""
+        """Whether a reading is an energy [J], or else a momentary power [W]."""
         return self.kind is not Kind.INTEGRATED
 
     @property
@@ -88,7 +88,7 @@ def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:
 
 
 def read_text(path: Path) -> str:
-    """Content of a small file, stripped; raises MeterLostError with the reason."""
+    """Content of a small file, stripped. Raises MeterLostError with the reason."""
     try:
         return path.read_text(encoding="ascii", errors="replace").strip()
     except OSError as error:
@@ -96,7 +96,7 @@ def read_text(path: Path) -> str:
 
 
 def read_number(path: Path) -> float:
-    """An integer written by the kernel; raises MeterLostError with the reason."""
+    """An integer written by the kernel. Raises MeterLostError with the reason."""
     text = read_text(path)
     try:
         return float(int(text))
@@ -120,7 +120,7 @@ def number_or_none(path: Path) -> float | None:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Meters whose readings may be summed, since their scopes do not overlap; usable or not."""
+    """Meters whose readings may be summed, since their scopes do not overlap, usable or not."""
 
     name: str
     meters: tuple[Meter, ...]  # one per socket or rail; empty where none of this type exists
@@ -134,7 +134,7 @@ class Candidate:
 
     @property
     def facts(self) -> Facts | None:
-        """Facts of the first meter; those of one candidate are alike."""
+        """Facts of the first meter. The meters of a candidate are alike."""
         return self.meters[0].facts if self.meters else None
 
 
@@ -173,7 +173,7 @@ class Conditions:
     sys: Path = Path("/sys")
 
     def read(self) -> dict[str, str | float | None]:
-        """Governor, frequency [MHz] and temperature [degrees Celsius]; None where not available."""
+        """Governor, frequency [MHz] and temperature [degrees Celsius], or None where not available."""
         cpufreq = self.sys / "devices" / "system" / "cpu" / f"cpu{self.core}" / "cpufreq"
         frequency_kHz = number_or_none(cpufreq / "scaling_cur_freq")
         temperature_mC = number_or_none(self.sys / "class" / "thermal" / "thermal_zone0" / "temp")

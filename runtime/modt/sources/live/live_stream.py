@@ -231,20 +231,14 @@ class PlayedReader:
 
     def read(self, timeout_s: float) -> Sequence[Sweep]:
         """Next sweep, if it is due within the timeout."""
-        if self._closed.is_set():
+        self._next = self._next or next(self._frames, None)
+        if self._next is None or self._closed.is_set():
             raise StreamEndedError
-        if self._next is None:
-            self._next = next(self._frames, None)
-            if self._next is None:
-                raise StreamEndedError
         (stamp_s, frame), now_s = self._next, self._clock()
         if self._start_s is None:
             self._start_s = now_s - stamp_s
         due_s = self._start_s + stamp_s - now_s
-        if due_s > timeout_s:
-            self._wait(timeout_s)
-            return ()
-        if due_s > 0 and self._wait(due_s):
+        if due_s > 0 and (self._wait(min(due_s, timeout_s)) or due_s > timeout_s):
             return ()
         self._next = None
         self.reception.messages += 1

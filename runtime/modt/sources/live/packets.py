@@ -8,13 +8,12 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LATE_S, LiveStream
 from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for, refuse
-from modt.sources.stream import Reception, StreamInfo, Sweep
+from modt.sources.stream import Reception, Sweep
 
 log = logging.getLogger(__name__)
 
@@ -90,19 +89,17 @@ def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with suppress(OSError):  # without it, packets have the time at which they are read
         made.setsockopt(socket.SOL_SOCKET, TIMESTAMP, 1)
+    cause = f"port {port} cannot be bound"
+    remedy = "end what else reads this sensor, or give the port that it sends to"
     try:
         made.bind(("", port))
-    except OSError as error:
-        made.close()
-        remedy = "end what else reads this sensor, or give the port that it sends to"
-        raise MisuseError(name, f"port {port} cannot be bound ({error.strerror})", remedy) from None
-    try:
         if group:
+            cause = f"group {group} cannot be joined"
+            remedy = "give an address from 224.0.0.0 on, and a route to it (ip route add 224.0.0.0/4 dev INTERFACE)"
             made.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + bytes(4))
     except OSError as error:
         made.close()
-        remedy = "give an address from 224.0.0.0 on, and a route to it (ip route add 224.0.0.0/4 dev INTERFACE)"
-        raise MisuseError(name, f"group {group} cannot be joined ({error})", remedy) from None
+        raise MisuseError(name, f"{cause} ({error.strerror or error})", remedy) from None
     made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
     granted = made.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux reports twice the size
     if granted < BUFFER_BYTES:
@@ -137,6 +134,4 @@ def open_packets(address: Address, cores: frozenset[int] | None) -> LiveStream:
     decoder = decoder_for(address.scheme, name, address.options, address.host)
     source = address_of(name, address.host)
     reader = PacketReader(bound_socket(name, port, address.option("group")), decoder, source)
-    info = StreamInfo(name, f"{address.scheme} packets", period_s=decoder.period_s)
-    info = replace(info, profile=decoder.profile, elevations_deg=decoder.elevations_deg)
-    return LiveStream(info, reader, cores=cores)
+    return LiveStream(decoder.info(name, address.scheme), reader, cores=cores)

@@ -199,17 +199,16 @@ class PacketStream:
         reception: counts of the last pass.
     """
 
-    def __init__(
-        self, info: StreamInfo, capture: Capture, decoder: PacketDecoder, first: int = 0, last: int | None = None
-    ) -> None:
-        """Select the frames with first <= index < last; each pass decodes with a fresh copy of the decoder."""
+    def __init__(self, info: StreamInfo, capture: Capture, decoder: PacketDecoder, first: int = 0) -> None:
+        """Select the frames with first <= index < info.end; each pass decodes with a fresh copy of the decoder."""
         self.info, self.faults, self.reception = info, Faults(), Reception()
-        self.capture, self.decoder, self._first, self._last = capture, decoder, first, last
+        self.capture, self.decoder, self._first = capture, decoder, first
 
     def __iter__(self) -> Iterator[Frame]:
         self.reception = reception = Reception()
-        stamps, path, lost = StampCheck(), str(self.capture.path), 0
-        for index, (arrived_s, sweep) in enumerate(islice(self._sweeps(reception), self._last)):
+        stamps, path, lost, index = StampCheck(), str(self.capture.path), 0, -1
+        sweeps = islice(_decoded(self.capture, self.decoder.again(), reception), self.info.end)
+        for index, (arrived_s, sweep) in enumerate(sweeps):
             missing, lost = reception.lost - lost, reception.lost
             if index < self._first:
                 stamps.doubt(sweep.stamp_s, arrived_s)
@@ -217,26 +216,16 @@ class PacketStream:
             flaws = [f"{missing} packets are missing"] if missing else []
             if frame := stamps.frame(sweep, arrived_s, index, path, self.faults, flaws):
                 yield frame
+        if index + 1 != self.info.end:  # the file was read to its end
+            refused = [f"{count} packets refused: {reason}" for reason, count in reception.refused.items()]
+            for flaw in [*refused, *filter(None, [self.capture.flaw])]:
+                self.faults.report(index + 1, path, flaw, skipped=False)
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; the file is read up to the last one."""
-        ends = [end for end in (last, self._last) if end is not None]
-        first, end = max(first, self._first), min(ends, default=None)
-        nothing = end is not None and end <= first
-        info = replace(self.info, end=end, n_frames=0 if nothing else None)
-        return type(self)(info, self.capture, self.decoder, first, first if nothing else end)
-
-    def _sweeps(self, reception: Reception) -> Iterator[tuple[float, Sweep]]:
-        """Arrival [s] and sweep of each turn; refused packets and a broken end of the file are reported last."""
-        index = 0
-        for arrived_s, sweep in _decoded(self.capture, self.decoder.again(), reception):
-            yield arrived_s, sweep
-            index += 1
-        flaws = [f"{count} packets refused: {reason}" for reason, count in reception.refused.items()]
-        if self.capture.flaw is not None:
-            flaws.append(self.capture.flaw)
-        for flaw in flaws:
-            self.faults.report(index, self.capture.path, flaw, skipped=False)
+        first, end = max(first, self._first), min((k for k in (last, self.info.end) if k is not None), default=None)
+        info = replace(self.info, end=end, n_frames=0 if end is not None and end <= first else None)
+        return type(self)(info, self.capture, self.decoder, first)
 
 
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
@@ -270,14 +259,8 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         why, _, remedy = max(reception.refused, key=reception.refused.__getitem__, default="").partition("; ")
         cause = f"no whole sweep ({layout})" + (f", packets are refused: {why}" if why else "")
         raise MisuseError(path, cause, remedy or "record at least two turns of the sensor")
-    info = StreamInfo(
-        path.stem,
-        f"{layout} packets",
-        period_s=round(first.turn_s, 3) or decoder.period_s,
-        profile=decoder.profile,
-        elevations_deg=decoder.elevations_deg,
-    )
-    return PacketStream(info, capture, decoder)
+    info = decoder.info(path.stem, layout)
+    return PacketStream(replace(info, period_s=round(first.turn_s, 3) or info.period_s), capture, decoder)
 
 
 def _beside(path: Path, **suffixes: str) -> dict[str, str]:

@@ -107,7 +107,7 @@ class Model:
 
 
 def _head(major: int, channels: int, blocks: int) -> tuple[tuple[int, int], ...]:
-    """Bytes of the header of the newer packets, which states their content."""
+    """Header of the newer packets, which states number of channels and of blocks."""
     return (0, 0xEE), (1, 0xFF), (2, major), (6, channels), (7, blocks)
 
 
@@ -140,7 +140,7 @@ def read_angles(path: Path) -> Float64:
 
 
 PTC_PORT, GET_CALIBRATION, ANSWER_BYTES = 9347, b"\x47\x74\x05\x00" + bytes(4), 8
-"""A request over TCP is magic, command, 0 and length; the answer begins alike, with an error code for the 0."""
+"""A request over TCP holds magic bytes, a command, 0 and a length. In the answer an error code replaces the 0."""
 TIMEOUT_S = 3.0
 MAX_ANSWER_BYTES = 65_536
 

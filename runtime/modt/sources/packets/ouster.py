@@ -67,9 +67,7 @@ class OusterDecoder(PacketDecoder):
         packet.buf[:] = np.frombuffer(payload, np.uint8)
         packet.host_timestamp = round(received_s * 1e9)
         valid = packet.validate(self._info, self._format) == self._sdk.PacketValidationFailure.NONE
-        if (
-            not valid and self._format.prod_sn(packet.buf) != self._info.sn
-        ):  # the initialisation id changes at each start
+        if not valid and self._format.prod_sn(packet.buf) != self._info.sn:  # the number of a start may differ
             refuse(reception, self.name, "of another sensor than the metadata")
             return []
         if self._ended(self._format.frame_id(packet.buf)):

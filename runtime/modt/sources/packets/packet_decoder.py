@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError, install
-from modt.sources.stream import Reception, Sweep
+from modt.sources.stream import Reception, StreamInfo, Sweep
 from modt.types import Self
 
 MAX_DRIFT = 1e-4
@@ -44,9 +44,7 @@ class DeviceClock:
         if self._last_s is None:
             self._last_s, self._since_s, self.offset_s = device_s, device_s, received_s - device_s
             return device_s
-        elapsed_s = device_s - self._last_s
-        if self._wrap_s < math.inf:
-            elapsed_s = math.remainder(elapsed_s, self._wrap_s)
+        elapsed_s = math.remainder(device_s - self._last_s, self._wrap_s)
         self._last_s += elapsed_s
         offset_s = received_s - self._last_s
         if abs(offset_s - self.offset_s) > MAX_ERROR_S:
@@ -80,6 +78,11 @@ class PacketDecoder(ABC):
     profile: str | None = None
     elevations_deg: tuple[float, ...] | None = None
     period_s = 0.1
+
+    def info(self, name: str, maker: str) -> StreamInfo:
+        """Properties of a stream of the sensor's packets."""
+        layout, beams = f"{maker} packets", self.elevations_deg
+        return StreamInfo(name, layout, period_s=self.period_s, profile=self.profile, elevations_deg=beams)
 
     def again(self) -> Self:
         """Decoder of the same sensor that has seen no packet yet."""

@@ -68,11 +68,6 @@ class Model:
     reach: int = 100
     calibration: str | None = None
 
-    def paces(self, interval_us: float, *, dual: bool) -> bool:
-        """Whether an interval between packets fits this model."""
-        expected_us = self.interval_us / 2 if dual else self.interval_us
-        return abs(interval_us / expected_us - 1.0) < PACE_TOLERANCE
-
 
 _HDL_64E = Signature(UPPER_LOWER, None)
 _MODELS = (
@@ -139,8 +134,9 @@ def _by_pace(payloads: Sequence[bytes], stated: Model | None) -> Model | None:
     gaps_us = [b - a for a, b in pairwise(stamps_us) if b > a]
     if not gaps_us or stated is None or stated.signature == _HDL_64E:
         return stated
-    interval_us, dual = median(gaps_us), payloads[0][RETURN_AT] == DUAL
-    fitting = [m for m in _MODELS if m.signature.banks == stated.signature.banks and m.paces(interval_us, dual=dual)]
+    interval_us = median(gaps_us) * (2 if payloads[0][RETURN_AT] == DUAL else 1)
+    alike = [model for model in _MODELS if model.signature.banks == stated.signature.banks]
+    fitting = [model for model in alike if abs(interval_us / model.interval_us - 1.0) < PACE_TOLERANCE]
     return stated if stated in fitting or not fitting else fitting[0]
 
 

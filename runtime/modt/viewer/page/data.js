@@ -9,7 +9,7 @@ let first = 0, last = frames.length - 1;
 
 const state = {
   at: 0, playing: false, hovered: null, kept: null,
-  points: true, trails: true, background: true, labels: true, truth: true,
+  points: true, trails: true, background: true, labels: true,
   up: true, metre: 10, x: 0, y: 0, // pixels a metre, and where the sensor is on the canvas
 };
 

@@ -3,6 +3,8 @@
 const canvas = element("view"), context = canvas.getContext("2d", { alpha: false });
 const TRAIL = 30; // frames
 let sweep = null, pixels = null, palette = null, colours = {}, dot = 1, taken = [];
+// A page may replace these: { text, colour } that marks a track, and drawing between the boxes and their labels.
+let markOf = (row) => null, drawMore = (frame) => {};
 
 function theme() {
   const style = getComputedStyle(document.documentElement);
@@ -105,10 +107,10 @@ function write(text, x, y, colour, needed) {
   }
 }
 
-function drawTrack(row, wrong) {
+function drawTrack(row) {
   const chosen = row.id === (state.kept ?? state.hovered), object = row.class > 0;
   const box = outline(row), middle = screen(row.x, row.y), filled = run.classes[row.class].colour;
-  const edge = run.states[row.state].colour;
+  const edge = run.states[row.state].colour, mark = markOf(row);
   if (state.trails && (object || chosen)) {
     path(trail(row), false);
     stroke(filled, chosen ? 3 : 2);
@@ -118,8 +120,8 @@ function drawTrack(row, wrong) {
   context.fillStyle = filled;
   context.fill();
   context.globalAlpha = object || chosen ? 1 : row.seen ? 0.5 : 0.3;
-  const shown = chosen ? colours.ink : wrong ? run.truth.false.colour : edge;
-  stroke(shown, chosen || wrong ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
+  const shown = chosen ? colours.ink : mark?.colour ?? edge;
+  stroke(shown, chosen || mark ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
   if (object && row.world_speed_mps > 0.5) {
     const heading = row.world_heading - frames[state.at].pose[2], reach = row.world_speed_mps;
     path([middle, screen(row.x + reach * Math.cos(heading), row.y + reach * Math.sin(heading))], false);
@@ -131,14 +133,6 @@ function drawTrack(row, wrong) {
     stroke(colours.ink, 1.5);
   }
   context.globalAlpha = 1;
-}
-
-function drawTruth({ outcome, class: class_, ...box }) {
-  const corners = outline(box), { colour } = run.truth[outcome];
-  path(corners, true);
-  stroke(colour, outcome === "missed" ? 3 : 1.5, [2, 2]);
-  if (outcome === "missed" && state.labels)
-    write(`missed ${run.classes[class_].name}`, middleOf(corners), topOf(corners), colour);
 }
 
 const topOf = (box) => Math.min(...box.map((corner) => corner[1])) - 2 * dot;
@@ -167,18 +161,16 @@ function draw() {
   taken = [[state.x - 10 * dot, state.y - 8 * dot, state.x + 10 * dot, state.y + 8 * dot]]; // the sensor
   drawPoints();
   drawRings();
-  const frame = frames[state.at], wrong = new Set(state.truth ? frame.false : []);
-  const chosen = state.kept ?? state.hovered;
+  const frame = frames[state.at], chosen = state.kept ?? state.hovered;
   const shown = (rowsAt[state.at] || []).filter((row) => state.background || row.class || row.id === chosen);
   shown.sort((a, b) => a.class - b.class || a.seen - b.seen);
-  for (const row of shown) drawTrack(row, wrong.has(row.id));
+  shown.forEach(drawTrack);
   context.font = `${12 * dot}px system-ui,sans-serif`;
-  if (state.truth) (frame.truth || []).forEach(drawTruth);
+  drawMore(frame);
   for (const row of shown.reverse())
     if ((state.labels && row.class) || row.id === chosen) {
-      const box = outline(row), at = [middleOf(box), topOf(box)], needed = row.id === chosen;
-      if (wrong.has(row.id)) write(`false: ${label(row)}`, ...at, run.truth.false.colour, needed);
-      else write(label(row), ...at, colours.ink, needed);
+      const box = outline(row), { text, colour } = markOf(row) || { text: "", colour: colours.ink };
+      write(text + label(row), middleOf(box), topOf(box), colour, row.id === chosen);
     }
   canvas.dataset.frame = frame.frame;
 }

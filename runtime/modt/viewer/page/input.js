@@ -1,6 +1,6 @@
 // ---- time, pointer and keys
 
-const slider = element("slider"), speed = element("speed");
+const slider = element("slider");
 
 async function go(at) {
   state.at = Math.max(first, Math.min(last, at));
@@ -93,7 +93,6 @@ const KEYS = {
   "-": () => zoom(0.8),
   0: reset,
   r: toggle("up"), p: toggle("points"), t: toggle("trails"), b: toggle("background"), l: toggle("labels"),
-  g: toggle("truth"),
   Escape: () => (state.kept = state.hovered = null),
 };
 document.onkeydown = (event) => {

@@ -7,7 +7,6 @@ let waiting = 0, done = Promise.resolve(), lost = false;
 const packedSweep = (at) => packedSweeps[at];
 const play = () => go(last);
 state.at = last = -1;
-speed.hidden = true;
 element("play").textContent = "Newest";
 
 async function take({ frame, states, tracks, points }) {

@@ -9,6 +9,9 @@ const add = (parent, tag, text = "", more = {}) => {
 // Seconds from the begin of a recording, or the time of day of a stamp that counts from 1970.
 const time = (stamp) => stamp < 1e8 ? `${stamp.toFixed(2)} s` : new Date(1000 * stamp).toISOString().slice(11, 22);
 
+// A page may replace these: further names and values of a frame, and what the classification of a track cost.
+let factsOf = (frame) => [], costOf = (rows) => "";
+
 function showFrame() {
   const frame = frames[state.at], rows = rowsAt[state.at] || [], list = element("frame");
   const cpu = Object.values(frame.cpu_ms || {}).reduce((a, b) => a + b, 0);
@@ -21,11 +24,8 @@ function showFrame() {
     ["budget", run.budget],
     ["CPU time", cpu ? `${cpu.toFixed(1)} ms` : "not recorded"],
     ["energy", frame.energy_mJ === undefined ? "not recorded" : `${frame.energy_mJ.toFixed(0)} mJ, ${frame.kind}`],
+    ...factsOf(frame),
   ];
-  if (frame.truth) {
-    const count = (outcome) => frame.truth.filter((object) => object.outcome === outcome).length;
-    facts.push(["found, missed, false", `${count("found")}, ${count("missed")}, ${frame.false.length}`]);
-  }
   list.replaceChildren();
   for (const [name, value] of facts.filter(([, value]) => value !== null)) add(list, "dt", name), add(list, "dd", value);
   element("stages").replaceChildren();
@@ -66,12 +66,10 @@ function showStory() {
   box.replaceChildren();
   const row = rows.find((row) => row.at === state.at);
   add(box, "b", row ? label(row) : `#${id}, not in this frame`);
-  let spent = 0;
-  for (const row of rows) if (row.classified) spent += frames[row.at].call_mJ || 0;
   const pace = row && `${row.world_speed_mps.toFixed(1)} m/s, motion says ${motion(row)}`;
   const now = row ? `${stateOf(row)}, ${row.points} points, ${pace}; ` : "";
   const [begin, end] = [rows[0], rows[rows.length - 1]].map((row) => frames[row.at].frame);
-  add(box, "div", `${now}frames ${begin} to ${end}; ${spent.toFixed(1)} mJ of classification (estimated)`);
+  add(box, "div", `${now}frames ${begin} to ${end}${costOf(rows)}`);
   const list = add(box, "ol");
   for (const [at, text] of events(rows))
     add(add(list, "li"), "button", `${frames[at].frame}: ${text}`, { onclick: () => go(at) });
@@ -91,6 +89,4 @@ function legends() {
   legend("classes", run.classes, false);
   legend("states", run.states, true);
   legend("stage-legend", run.stages, false);
-  element("truth-title").hidden = !run.truth;
-  legend("truth", Object.entries(run.truth || {}).map(([name, { colour }]) => ({ name, colour })), true);
 }

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from modt.cli.command import dispatch
 
 COMMANDS = {
-    "meters": "modt.cli.profile_meters",
+    "meters": "modt_desk.cli.profile_meters",
     "calibrate": "modt_desk.cli.profile_calibrate",
     "report": "modt_desk.cli.profile_report",
     "compare": "modt_desk.cli.profile_compare",
