@@ -34,7 +34,7 @@ from modt.tracking.kdop_association import POSITION_SIGMA_M
 from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals
 
-MIN_COVERAGE = 0.6
+MIN_COVERAGE = 0.45
 """Least part of a proposal within the known extent of a track, or of the expected track within a proposal."""
 MIN_PART_COVERAGE = 0.7
 """Least part of a proposal within the known extent of the track that it is joined with."""
