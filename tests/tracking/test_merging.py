@@ -94,6 +94,12 @@ def test_a_part_that_comes_into_view_lies_beside_what_is_known_of_a_car(known, c
     assert groups == ([[0, 1]] if is_part else [[0], [1]])
 
 
+def test_a_car_takes_the_proposal_that_covers_half_of_it_from_a_fragment():
+    tracks = tracks_at([box(10, 3, 2.0, 1.8, 1.5), box(11.9, 3, 0.6, 1.8, 1.5)], CAR, BACKGROUND, hits=[10, 2])
+    seen = [box(11.5, 3, 3.0, 1.8, 1.5)]  # matched with the fragment
+    assert regrouped(tracks, frame_at_rest(tracks, seen, 1)).matches.rows.tolist() == [0]
+
+
 def test_a_car_takes_all_its_parts():
     parts = [box(7.0, 3, 2.0, 1.8, 1.5), box(9.4, 3, 2.0, 1.8, 1.5), box(12.5, 3, 3.0, 1.8, 1.5)]
     assert merged(tracks_at([box(10, 3, 9.0, 1.8, 1.5)], CAR), parts, [0])[0] == [[0, 1, 2]]
