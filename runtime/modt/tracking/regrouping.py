@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_SIZE_M, PART_PERSON
+from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_SIZE_M, PART_PERSON, USUAL_CAR_M
 from modt.classes import ObjectClass
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, widths
@@ -42,8 +42,6 @@ LONGER_M = 0.3
 """A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m]."""
 BESIDE_M = 0.6
 """Greatest gap between a car and a new proposal that is joined with it: more parts, and more neighbours [m]."""
-CAR_SIZE_M = 5.5, 2.2
-"""Length and width of what holds a car and a part beside it."""
 PAD_M = 0.2
 """Margin around the expected extent, and above the expected top, within which points are split off [m]."""
 LIKELY = 0.5
@@ -177,11 +175,11 @@ class Regrouping:
         rows, parts = cars[i], parts[j]
         hosts = own[rows]
         near = (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
-        near &= widths(np.maximum(tracks.known_kdops(rows), kdop.take(parts, axis=1))).max(axis=0) < CAR_SIZE_M[0]
+        near &= widths(np.maximum(tracks.known_kdops(rows), kdop.take(parts, axis=1))).max(axis=0) < USUAL_CAR_M[0]
         hosts, parts = hosts[near], parts[near]
         if not len(parts):
             return hosts, parts
-        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(CAR_SIZE_M, (len(parts), 1)))
+        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(USUAL_CAR_M, (len(parts), 1)))
         extent_m = widths(kdop.take(parts, axis=1)).max(axis=0)
         fit &= ~PART_PERSON.fits(extent_m, observations.bottom[parts], observations.top[parts])
         return hosts[fit], parts[fit]
