@@ -12,6 +12,8 @@ from modt.types import Bool, Cut, Float32, Float64, FrameResult
 MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
 """(4, 2) greatest length and width of each class."""
 MAX_CAR_M, MAX_PERSON_M = (CLASSES[c].max_length_m for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN))
+USUAL_CAR_M = 5.5, 2.2
+"""Length and width that most cars do not exceed; larger ones would hold a car and its neighbour as well."""
 IS_PERSON: Bool = np.array([spec.person for spec in CLASSES.values()])
 """(4,) whether the class is or carries a person, which is never part of a larger object."""
 

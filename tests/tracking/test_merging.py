@@ -72,6 +72,34 @@ def test_what_is_a_part(known, classes, seen, columns, is_part):
     assert groups == ([[0, 1]] if is_part else [[0], [1]])
 
 
+NEAR_END, NEXT = box(10.5, 3, 2.0, 1.8, 1.5), box(12.1, 3, 0.8, 1.8, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("known", "classes", "seen", "hits", "is_part"),
+    [
+        ([NEAR_END], [CAR], [NEAR_END, NEXT], [10], True),
+        ([NEAR_END], [BACKGROUND], [NEAR_END, NEXT], [10], False),
+        ([NEAR_END], [CAR], [NEAR_END, box(12.6, 3, 0.8, 1.8, 1.5)], [10], False),  # a gap of .7 m
+        ([NEAR_END], [CAR], [NEAR_END, box(13.6, 3, 3.8, 1.8, 1.5)], [10], False),  # 6 m together
+        ([WHOLE], [CAR], [NEAR_END, box(13.5, 3, 3.6, 1.8, 1.5)], [10], False),  # the car is known to be longer
+        ([NEAR_END], [CAR], [NEAR_END, box(12.1, 3, 0.6, 0.6, 1.5)], [10], False),  # may be a person
+        ([NEAR_END, NEXT], [CAR, BACKGROUND], [NEAR_END, NEXT], [10, 2], False),  # as many points as the car shows
+        ([NEAR_END, NEXT], [CAR, PEDESTRIAN], [NEAR_END, NEXT], [10, 2], False),
+        ([NEAR_END, NEXT], [CAR, BACKGROUND], [NEAR_END, NEXT], [10, 4], False),  # an established track
+    ],
+)
+def test_a_part_that_comes_into_view_lies_beside_what_is_known_of_a_car(known, classes, seen, hits, is_part):
+    groups, _ = merged(tracks_at(known, *classes, hits=hits), seen, range(len(known)))
+    assert groups == ([[0, 1]] if is_part else [[0], [1]])
+
+
+def test_a_car_takes_the_proposal_that_covers_half_of_it_from_a_fragment():
+    tracks = tracks_at([box(10, 3, 2.0, 1.8, 1.5), box(11.9, 3, 0.6, 1.8, 1.5)], CAR, BACKGROUND, hits=[10, 2])
+    seen = [box(11.5, 3, 3.0, 1.8, 1.5)]  # matched with the fragment
+    assert regrouped(tracks, frame_at_rest(tracks, seen, 1)).matches.rows.tolist() == [0]
+
+
 def test_a_car_takes_all_its_parts():
     parts = [box(7.0, 3, 2.0, 1.8, 1.5), box(9.4, 3, 2.0, 1.8, 1.5), box(12.5, 3, 3.0, 1.8, 1.5)]
     assert merged(tracks_at([box(10, 3, 9.0, 1.8, 1.5)], CAR), parts, [0])[0] == [[0, 1, 2]]

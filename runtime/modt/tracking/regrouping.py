@@ -4,7 +4,8 @@ Segmentation cuts a car at the pole before it, and joins a person to the wall th
 Pairs of a track and a proposal within its known extent are listed once, and serve three steps:
 
 - *Take*: a track takes the larger part of its object from a junior track, which gets the other part.
-- *Join*: parts of a car, or of background that may be one, are joined to the proposal of its track.
+- *Join*: parts of a car, or of background that may be one, are joined to the proposal of its track. So are new
+  proposals beside a car that fit into one car with it: a part that comes into view lies beside what is known.
 - *Split*: the track of an object that is expected within a longer proposal takes the points where it is expected, if
   it has no proposal of its own, one that is too long for its class, or one of few points.
 
@@ -21,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_SIZE_M, PART_PERSON
+from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_SIZE_M, PART_PERSON, USUAL_CAR_M
 from modt.classes import ObjectClass
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, widths
@@ -33,12 +34,14 @@ from modt.tracking.kdop_association import POSITION_SIGMA_M
 from modt.tracking.track_table import ESTABLISHED_HITS, TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals
 
-MIN_COVERAGE = 0.6
+MIN_COVERAGE = 0.45
 """Least part of a proposal within the known extent of a track, or of the expected track within a proposal."""
 MIN_PART_COVERAGE = 0.7
 """Least part of a proposal within the known extent of the track that it is joined with."""
 LONGER_M = 0.3
 """A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m]."""
+BESIDE_M = 0.6
+"""Greatest gap between a car and a new proposal that is joined with it: more parts, and more neighbours [m]."""
 PAD_M = 0.2
 """Margin around the expected extent, and above the expected top, within which points are split off [m]."""
 LIKELY = 0.5
@@ -108,7 +111,7 @@ class Regrouping:
         own[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
         pairs, before = self._pairs(tracks, frame, owner), own.copy()
         _take_larger(tracks, observations, pairs, own, owner)
-        into = _join(tracks, observations, pairs, own, owner)
+        into = _join(tracks, observations, pairs, own, owner, self._beside(tracks, observations, own, owner))
         joined = (into != np.arange(n)).nonzero()[0]
         pieces = _split(tracks, frame, placement, pairs, own)
         rows, hosts = pieces.rows, pieces.hosts
@@ -158,6 +161,28 @@ class Regrouping:
         around = self._kernels.coverage(tracks.predicted_kdops(), kdop, rows, part)
         free &= np.maximum(within, around) > MIN_COVERAGE
         return Pairs(rows, part, within, around, free)
+
+    def _beside(self, tracks: TrackTable, observations: Observations, own: Int, owner: Int) -> tuple[Int, Int]:
+        """Proposals of cars (K,) and others (K,) beside them that fit into one car with all that is known of it.
+
+        Such a part belongs to no track, or to a new one of fewer points than the car shows.
+        """
+        box, kdop, count = observations.box, observations.kdop, observations.count
+        cars = ((tracks.object_class == ObjectClass.CAR.value) & (own != NONE)).nonzero()[0]
+        known = np.append((tracks.hits >= ESTABLISHED_HITS) | IS_PERSON[tracks.object_class], False)
+        parts = (~known[owner]).nonzero()[0]
+        i, j = self._kernels.overlapping_pairs(kdop.take(own[cars], axis=1) + BESIDE_M, kdop.take(parts, axis=1))
+        rows, parts = cars[i], parts[j]
+        hosts = own[rows]
+        near = (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
+        near &= widths(np.maximum(tracks.known_kdops(rows), kdop.take(parts, axis=1))).max(axis=0) < USUAL_CAR_M[0]
+        hosts, parts = hosts[near], parts[near]
+        if not len(parts):
+            return hosts, parts
+        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(USUAL_CAR_M, (len(parts), 1)))
+        extent_m = widths(kdop.take(parts, axis=1)).max(axis=0)
+        fit &= ~PART_PERSON.fits(extent_m, observations.bottom[parts], observations.top[parts])
+        return hosts[fit], parts[fit]
 
     def _regrouped(
         self,
@@ -243,8 +268,13 @@ def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, o
             owner[left] = former
 
 
-def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int) -> Int:
-    """(P,) proposal into which each is joined, itself where it is not; the most senior track is served first."""
+def _join(
+    tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int, owner: Int, beside: tuple[Int, Int]
+) -> Int:
+    """(P,) proposal into which each is joined, itself where it is not; the most senior track is served first.
+
+    `beside` are further pairs of a proposal and its part, served last.
+    """
     into, car = np.arange(len(owner)), tracks.object_class == ObjectClass.CAR.value
     host = own[pairs.rows]
     joins = pairs.free & (pairs.within > MIN_PART_COVERAGE) & (host != NONE) & (host != pairs.proposals)
@@ -260,6 +290,7 @@ def _join(tracks: TrackTable, observations: Observations, pairs: Pairs, own: Int
     short = widths(known).max(axis=0, initial=0.0) < MAX_CAR_M
     joins = car[rows] | (short & ~person & ~of_car)
     joins &= (widths(np.maximum(part, observations.kdop.take(host, axis=1))) < widths(known) + LONGER_M).all(axis=0)
+    into[beside[1]] = beside[0]
     into[parts[joins][::-1]] = host[joins][::-1]  # the most senior is written last
     whole = into[(into != np.arange(len(into)))]
     into[whole] = whole  # a proposal that gains a part is no part itself
