@@ -61,14 +61,6 @@ def test_an_empty_envelope_overlaps_nothing():
     assert not len(overlapping_pairs(np.full((8, 15), -np.inf), kdop(*random_ends(15, 0, 30)))[0])
 
 
-def test_pairs_do_not_depend_on_the_origin_of_the_world():
-    origin = (np.array([-458_000, 5_430_000]) @ DIRECTIONS)[:, None]
-    a, b = kdop(*random_ends(90, 1, 9)) + 0.51, kdop(*random_ends(70, 2, 9))
-    near, far = overlapping_pairs(a, b), overlapping_pairs(a + origin, b + origin)
-    assert len(near[0])
-    np.testing.assert_array_equal(far, near)
-
-
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_coverage_is_the_lesser_of_both_squares(n, seed):
     (low, high), (low_position, high_position) = random_ends(n, seed, 9), random_ends(n, seed + 1, 30)
