@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,14 @@ def kitti_root() -> Path:
     if not root:
         pytest.skip("KITTI_ROOT is not set: no real data here")
     return Path(root)
+
+
+@pytest.fixture
+def port() -> int:
+    """Port for datagrams that is free."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])
 
 
 @pytest.fixture(scope="session")

@@ -156,10 +156,8 @@ def usage(core: int | None) -> dict[str, object]:
     used = {t.id: t.user_time + t.system_time for t in process.threads()}
     cores: set[int] = set()
     for thread in used:
-        try:
+        with suppress(ProcessLookupError):  # it has ended meanwhile
             cores |= os.sched_getaffinity(thread)
-        except ProcessLookupError:  # it has ended meanwhile
-            continue
     main_s = used.get(process.pid, 0.0)
     others_s = sum(used.values()) - main_s
     return {

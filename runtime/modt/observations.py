@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from modt.geometry import transform, transform_boxes
-from modt.geometry.kdop import DIRECTIONS, centres, kdops
+from modt.geometry.kdop import AXES, DIRECTIONS, centres
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.placement import Placement
 from modt.types import Bool, Float64, Int, Proposals
@@ -73,10 +73,12 @@ class Observations:
 def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Observations:
     """Transform the proposals of a frame to the world by T_world_sensor (4, 4)."""
     box = transform_boxes(T_world_sensor, proposals.box)
+    axes = np.ascontiguousarray(T_world_sensor[:2, :3].T @ AXES, np.float32)
+    ends = kernels.kdop_ends(proposals.coordinates, proposals.offsets, axes)
     return Observations(
         box=box,
         centroid=transform(T_world_sensor, proposals.centroid)[:, :2],
-        kdop=kdops(proposals, T_world_sensor, kernels.kdop_ends),
+        kdop=ends + (T_world_sensor[:2, 3] @ DIRECTIONS)[:, None],
         bottom=box[:, 2] - box[:, 5] / 2,
         top=box[:, 2] + box[:, 5] / 2,
         count=proposals.count,

@@ -40,15 +40,17 @@ def test_motion_tells_classes_apart(moved_m, observed_s, length_m, likely, unlik
     assert (found[unlikely] < 0.0).all()
 
 
+@pytest.mark.parametrize(
+    ("class_", "less", "more"),
+    [
+        (PEDESTRIAN, (2.5, 2.0, 0.24), (2.5, 2.0, 0.5)),  # a fragment that moves with its car
+        (CYCLIST, (6.0, 3.0, 2.5, 0.7), (6.0, 3.0, 1.8, 0.7)),  # was seen longer than a cyclist
+        (CYCLIST, (6.0, 3.0, 1.8, 1.5), (6.0, 3.0, 1.8, 0.7)),  # was seen wider
+    ],
+)
+def test_what_was_seen_too_small_or_too_large_for_a_class_is_hardly_one(class_, less, more) -> None:
+    assert ratios(*less)[class_] < 0 < ratios(*more)[class_]
+
+
 def test_a_young_track_weighs_little() -> None:
     assert np.abs(ratios(0.0, 0.1, 0.7)).max() < np.abs(ratios(0.0, 3.0, 0.7)).max()
-
-
-def test_a_fragment_that_moves_with_its_car_is_no_person() -> None:
-    assert ratios(2.5, 2.0, 0.24)[PEDESTRIAN] < 0 < ratios(2.5, 2.0, 0.5)[PEDESTRIAN]
-
-
-def test_what_was_seen_wider_or_longer_than_a_cyclist_is_none() -> None:
-    cyclist = ratios(6.0, 3.0, 1.8, 0.7)[CYCLIST]
-    assert cyclist - ratios(6.0, 3.0, 1.8, 1.5)[CYCLIST] == TOO_LARGE
-    assert ratios(6.0, 3.0, 2.5, 0.7)[CYCLIST] < -1

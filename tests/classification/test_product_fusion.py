@@ -50,21 +50,16 @@ def test_the_first_view_of_the_efficient_mode_is_final_whatever_it_is() -> None:
     assert subject.asks() == [False]
 
 
-@pytest.mark.parametrize(("points", "independent"), [(50, False), (59, False), (62, True), (38, True)])
-def test_independence_by_change_of_points(points: int, independent: bool) -> None:
-    subject = key_views()
+@pytest.mark.parametrize(
+    ("points", "class_", "independent"),
+    [(50, 1, False), (59, 1, False), (62, 1, True), (38, 1, True), (62, 0, False), (62, 2, True), (58, 2, False)],
+)
+def test_independence_by_the_change_of_points_that_the_most_probable_class_needs(points, class_, independent):
+    subject = key_views(point_change=(0.5, 0.2, 0.2, 0.9))
     subject.fuse(*CAR)
+    subject.tracks.posterior[0] = np.where(np.arange(4) == class_, 0.7, 0.1)
     subject.proposals = with_points(subject.proposals, points)
     assert subject.asks() == [independent]
-
-
-def test_point_change_is_that_of_the_most_probable_class() -> None:
-    subject = key_views(point_change=(0.5, 0.9, 0.1, 0.9))
-    subject.fuse(*CAR)
-    subject.proposals = with_points(subject.proposals, 60)
-    assert subject.asks() == [False]
-    subject.tracks.posterior[0] = [0.2, 0.2, 0.5, 0.1]
-    assert subject.asks() == [True]
 
 
 def test_a_view_before_the_start_frame_is_not_final_however_distinct_and_replaced_there() -> None:

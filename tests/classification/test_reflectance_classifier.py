@@ -68,25 +68,21 @@ def measured() -> Proposals:
     return dataclasses.replace(proposals, reflectance=REFLECTANCE)
 
 
-def prior_with_reflectance() -> BoxPrior:
-    """The prior with the reflectance of the sensor's scale."""
-    return BoxPrior(BoxScores(BOXES, from_metadata(METADATA, SENSOR), SENSOR), FREQUENCY)
+def prior_with_reflectance(scale: str = "hdl-64e") -> BoxPrior:
+    """The prior with the reflectance of a sensor's scale."""
+    sensor = SensorConfig(reflectance=scale)
+    return BoxPrior(BoxScores(BOXES, from_metadata(METADATA, sensor), sensor), FREQUENCY)
 
 
-def test_prior_is_box_probability_times_reflectance_likelihood() -> None:
+def test_prior_is_box_probability_times_reflectance_likelihood_by_the_classifier_of_the_sensors_scale() -> None:
     proposals = measured()
     boxes = proposal_features(proposals, SENSOR)
-    expected = softmax(logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE]), axis=1)
-    np.testing.assert_allclose(prior_with_reflectance().probability(proposals), expected)
-
-
-def test_a_sensor_has_the_classifier_of_its_scale() -> None:
-    features = RNG.normal(size=(3, N_FEATURES))
     for scale, layers, weight in (("hdl-64e", LAYERS, 0.5), ("pandar64", OTHER_LAYERS, 0.8)):
-        reflectance = from_metadata(METADATA, SensorConfig(reflectance=scale))
-        assert reflectance.weights == PoolWeights(reflectance=weight)
-        expected = logits(layers, np.c_[features, REFLECTANCE])
-        np.testing.assert_array_equal(reflectance.log_likelihood(features, REFLECTANCE), expected)
+        prior = prior_with_reflectance(scale)
+        expected = softmax(logits(BOX_LAYERS, boxes) + logits(layers, np.c_[boxes, REFLECTANCE]), axis=1)
+        np.testing.assert_allclose(prior.probability(proposals), expected)
+        classifier = from_metadata(METADATA, SensorConfig(reflectance=scale))
+        assert classifier.weights == PoolWeights(reflectance=weight)
 
 
 def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.LogCaptureFixture) -> None:

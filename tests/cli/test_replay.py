@@ -131,7 +131,7 @@ def test_misuse_is_one_line_and_status_2(tmp_path, monkeypatch, capsys, argument
     assert all(word in line for word in words), line
 
 
-def test_bad_scans_are_counted_and_the_rest_goes_on_while_there_is_one(tmp_path, capsys, caplog):
+def test_bad_scans_are_counted_and_the_rest_goes_on(tmp_path, capsys, caplog):
     folder = layouts.bare(tmp_path)
     (folder / "000001.bin").write_bytes(b"cut")
     assert here("replay", folder, "--out", tmp_path / "run") == 0
@@ -139,10 +139,6 @@ def test_bad_scans_are_counted_and_the_rest_goes_on_while_there_is_one(tmp_path,
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["faults"]["skipped"] == 1
     assert "truncated" in caplog.text
     assert "1 of them skipped" in capsys.readouterr().out
-    for path in folder.glob("*.bin"):
-        path.write_bytes(b"cut")
-    assert here("replay", folder, "--out", tmp_path / "none") == 1
-    assert "none of its 3 scans" in capsys.readouterr().err.splitlines()[-1]
 
 
 @pytest.mark.parametrize(("scale", "unlit"), [("hdl-64e", 2), ("none", 0)])

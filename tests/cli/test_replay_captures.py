@@ -15,7 +15,7 @@ from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
-from .commands import here, modt, refusal, session
+from .commands import modt, refusal, session
 
 pytestmark = pytest.mark.command
 
@@ -44,6 +44,7 @@ def test_a_capture_is_replayed(tmp_path, capture, options, frames):
         (["--capture", "colour=red"], "KEY one of model, calibration, metadata"),
         (["--capture", "model"], "write KEY=VALUE"),
         (["--capture", "model=vlp-17"], "use one of vlp-16"),
+        (["--capture", "calibration=nowhere.yaml"], "no calibration"),
         (["--capture", "metadata=nowhere.json"], "nowhere.json: cannot be read"),
     ],
 )
@@ -51,13 +52,6 @@ def test_invalid_options_are_misuse(capsys, capture, arguments, named):
     if "metadata" in arguments[1]:
         pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
     assert named in refusal(capsys, "replay", capture, *arguments)
-
-
-def test_topics_are_named_on_the_command_line(tmp_path, capsys):
-    recorded = [(f"/{k}", CLOUD, BEGAN_S, write_cloud(BEGAN_S, "lidar", np.ones((9, 4), np.float32))) for k in "ab"]
-    path = write_mcap(tmp_path / "drive", recorded)
-    assert "choose by --capture topic=NAME: /a, /b" in refusal(capsys, "replay", path, "--quiet")
-    assert here("replay", path, "--capture", "topic=/b", "--quiet", "--out", tmp_path / "run") == 0
 
 
 def test_a_recording_of_sweeps_and_poses_gives_the_tracks_of_what_was_recorded(tmp_path):

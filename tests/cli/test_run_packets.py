@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -21,14 +20,6 @@ pytestmark = [pytest.mark.command, pytest.mark.slow]
 
 MEASURED = {"xt-32": ("xt32-1673400677802009732", "PandarXT32"), "pandar64": ("64-1673403880599376836", "Pandar64")}
 """Recorded packets, and the angles of their sensor."""
-
-
-@pytest.fixture
-def port() -> int:
-    """A port that is free."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def send(port: int, *arguments: object) -> None:

@@ -16,14 +16,9 @@ def test_even_beams_are_alike_everywhere():
     assert EvenBeams(0.5).step_rad(tangent(-20.0, 0.0)) == pytest.approx(np.deg2rad(0.5))
 
 
-def test_the_spacing_is_that_of_the_wider_gap_at_the_nearest_beam():
-    step_deg = np.rad2deg(BeamTable(UNEVEN_DEG).step_rad(tangent(0.0, 0.2, 1.0, -1.1, -2.1, -5.0, -12.0)))
-    assert step_deg == pytest.approx([0.5, 0.5, 1.0, 1.0, 4.0, 6.0, 6.0], rel=1e-4)
-
-
-def test_outside_the_field_of_view_the_outermost_gap_holds():
-    step_deg = np.rad2deg(BeamTable(UNEVEN_DEG).step_rad(tangent(40.0, -80.0)))
-    assert step_deg == pytest.approx([1.0, 6.0], rel=1e-4)
+def test_the_spacing_is_that_of_the_wider_gap_at_the_nearest_beam_and_outside_the_view_the_outermost_one():
+    at_deg, gap_deg = np.array([(0, 0.5), (0.2, 0.5), (1, 1), (-1.1, 1), (-2.1, 4), (-5, 6), (40, 1), (-80, 6)]).T
+    assert np.rad2deg(BeamTable(UNEVEN_DEG).step_rad(tangent(*at_deg))) == pytest.approx(gap_deg, rel=1e-4)
 
 
 @given(st.lists(st.floats(-60, 60), min_size=2, max_size=64, unique_by=lambda v: round(v, 1)), st.floats(-70, 70))

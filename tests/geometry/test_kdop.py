@@ -13,13 +13,13 @@ from modt.geometry.kdop import (
     Shapes,
     certain_pairs,
     coverage,
-    kdops,
     measured,
     overlapping_pairs,
     pair_costs,
     shape_similarity,
     shift_between,
 )
+from modt.observations import observe
 from modt.types import Proposals
 from tests.tracking.tracking_scenes import box, frame_of
 
@@ -61,14 +61,6 @@ def test_an_empty_envelope_overlaps_nothing():
     assert not len(overlapping_pairs(np.full((8, 15), -np.inf), kdop(*random_ends(15, 0, 30)))[0])
 
 
-def test_pairs_do_not_depend_on_the_origin_of_the_world():
-    origin = (np.array([-458_000, 5_430_000]) @ DIRECTIONS)[:, None]
-    a, b = kdop(*random_ends(90, 1, 9)) + 0.51, kdop(*random_ends(70, 2, 9))
-    near, far = overlapping_pairs(a, b), overlapping_pairs(a + origin, b + origin)
-    assert len(near[0])
-    np.testing.assert_array_equal(far, near)
-
-
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_coverage_is_the_lesser_of_both_squares(n, seed):
     (low, high), (low_position, high_position) = random_ends(n, seed, 9), random_ends(n, seed + 1, 30)
@@ -88,12 +80,12 @@ def test_kdops_are_the_greatest_coordinates_of_the_points():
     c, s = np.cos(0.4), np.sin(0.4)
     T = np.array([[c, -s, 0, 5], [s, c, 0, -3], [0, 0, 1, 1.7], [0, 0, 0, 1.0]])
     frame, proposals = frame_of([box(10, 0, yaw=0.3), box(-4, 7)], 0, T)
-    found = kdops(proposals, T)
+    found = observe(proposals, T).kdop
     world = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
     for i in range(2):
         along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ DIRECTIONS
         np.testing.assert_allclose(found[:, i], along.max(axis=0), atol=1e-4)
-    assert kdops(Proposals.empty(), T).shape == (8, 0)
+    assert observe(Proposals.empty(), T).kdop.shape == (8, 0)
 
 
 def random_kdops(rng, n):

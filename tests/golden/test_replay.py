@@ -1,6 +1,5 @@
 """Behaviour against the golden replays."""
 
-import copy
 from functools import cache
 
 import numpy as np
@@ -35,29 +34,15 @@ def test_what_is_final_is_what_the_state_machine_says(scene, mode):
         assert result.state_names == machine.names
 
 
-@pytest.mark.parametrize(
-    ("change", "noticed"),
-    [
-        (lambda f: f.update(deferred=f["deferred"] + 1), ["deferred"]),
-        (lambda f: f["id"].reverse(), ["id"]),
-        (lambda f: f["points"].__setitem__(0, f["points"][0] + 1), ["points"]),
-        (lambda f: f.update(state="9" + f["state"][1:]), ["state"]),
-        (lambda f: f.update({"class": f["class"].swapcase()}), ["class"]),
-        (lambda f: next(iter(f["box"].values())).__setitem__(0, 10**6), ["box of"]),
-        (lambda f: next(iter(f["box"].values())).__setitem__(0, next(iter(f["box"].values()))[0] + 1), []),
-        (lambda f: next(iter(f["box"].values())).__setitem__(0, next(iter(f["box"].values()))[0] + 2), ["box of"]),
-        (lambda f: f["box"].pop(next(iter(f["box"]))), ["box"]),
-        (lambda f: f["box_sum"].__setitem__(6, f["box_sum"][6] + f["proposals"] + 1), ["box_sum"]),
-    ],
-)
-def test_a_changed_number_is_noticed(change, noticed):
+def test_a_changed_number_is_noticed_and_a_millimetre_of_a_box_tolerated():
     frame = next(f for f in replay.read(*replay.CASES[-1]) if f["box"])
-    changed = copy.deepcopy(frame)
-    change(changed)
-    found = replay.differences(changed, frame)
-    assert len(found) == len(noticed)
-    assert all(f.startswith(n) for f, n in zip(found, noticed, strict=True))
-
-
-def test_the_golden_files_stay_small():
-    assert sum(replay.path(*case).stat().st_size for case in replay.CASES) < 150_000
+    counts = {key: value for key, value in frame.items() if key not in ("box", "box_sum")}
+    for key, value in counts.items():
+        other = value + 1 if isinstance(value, int) else value[::-1] + value[:1]
+        assert replay.differences(frame | {key: other}, frame) == [key]
+    (id_, (x, *rest)), *_ = frame["box"].items()
+    for by, noticed in ((1, []), (2, [f"box of {id_}"]), (10**6, [f"box of {id_}"])):
+        assert replay.differences(frame | {"box": frame["box"] | {id_: [x + by, *rest]}}, frame) == noticed
+    assert replay.differences(frame | {"box": {}}, frame) == ["box"]
+    *most, yaw = frame["box_sum"]
+    assert replay.differences(frame | {"box_sum": [*most, yaw + frame["proposals"] + 1]}, frame) == ["box_sum"]

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.geometry import inverse, rotation_zyx, se3, yaw_of
-from modt.observations import observe
+from modt.geometry import inverse, rotation_zyx, se3, transform, yaw_of
 from modt.odometry.odometry import delays
 from modt.placement import Placement, PlanarMotion
 from modt.types import Proposals
@@ -50,14 +49,13 @@ def test_deskewed_points_lie_at_their_true_positions(speed, turn, turn_s, seed):
     rng = np.random.default_rng(seed)
     xyz = np.c_[rng.uniform(-40, 40, (20, 2)), rng.uniform(-1, 1, 20)]
     xyz = xyz[(np.hypot(xyz[:, 0], xyz[:, 1]) > 5) & (np.abs(np.arctan2(xyz[:, 1], xyz[:, 0])) < 2.7)]  # off the seam
-
-    def at(t):
-        return constant_turn_pose(t, speed, turn)
-
-    local, late = skewed_points(xyz, 0.0, turn_s, speed, turn)
-    motion = PlanarMotion.between(at(-PERIOD_S), at(0.0), PERIOD_S)
-    deskewed = local[:, :2] + motion.displacement(local[:, :2], late)
-    np.testing.assert_allclose(deskewed, xyz[:, :2], atol=2e-3)  # arcs by their chords, of two degrees
+    before, stamp = (constant_turn_pose(t, speed, turn) for t in (-PERIOD_S, 0.0))
+    T = se3(rotation_zyx(0, 0, 0.7), np.array([3.0, -2.0, 0.0]))
+    motion = PlanarMotion.between(before, stamp, PERIOD_S)
+    seen = transform(T, skewed_points(xyz, 0.0, turn_s, speed, turn)[0])[:, :2]
+    deskewed = seen + Placement(T, motion, turn_s).deskew(seen)
+    np.testing.assert_allclose(deskewed, transform(T, xyz)[:, :2], atol=2e-3)  # arcs by their chords, of two degrees
+    assert not Placement(T, motion).deskew(seen).any()
 
 
 def one(x, y, length, width):
@@ -72,22 +70,16 @@ def one(x, y, length, width):
     )
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "share"), [(10, 0, 0.0), (0, 10, -0.25), (0, -10, 0.25), (-7, 7, -0.375), (-7, -7, 0.375)]
-)
-def test_the_delay_is_zero_ahead_and_its_sign_follows_the_rotation(x, y, share):
-    assert delays(one(x, y, 1.0, 1.0), 0.1)[0] == pytest.approx(0.1 * share)
-    assert delays(one(x, y, 1.0, 1.0), -0.1)[0] == pytest.approx(-0.1 * share)
-
-
-@given(st.floats(2, 30), st.floats(-0.999, 0.999), st.floats(0.2, 4))
-def test_the_delay_across_the_seam_is_the_mean_over_the_bearings(distance, side, length):
+@pytest.mark.parametrize("towards", [0.0, 0.5 * np.pi, -0.75 * np.pi, np.pi])
+@given(st.floats(2, 30), st.floats(-0.999, 0.999), st.floats(0.2, 4), st.sampled_from([1.0, -0.1]))
+def test_the_delay_is_the_mean_over_the_bearings_also_across_the_seam(towards, distance, side, length, turn_s):
+    """It is zero ahead, and its sign follows the rotation."""
     wide = np.arctan2(length / 2, distance)
-    bearing = np.pi + side * wide  # the seam is within it
+    bearing = towards + side * wide
     parts = np.linspace(bearing - wide, bearing + wide, 20001)
     mean = np.angle(np.exp(1j * parts)).mean()
-    found = delays(one(distance * np.cos(bearing), distance * np.sin(bearing), length, 0.0), 1.0)[0]
-    assert found == pytest.approx(-mean / (2 * np.pi), abs=1e-3)
+    found = delays(one(distance * np.cos(bearing), distance * np.sin(bearing), length, 0.0), turn_s)[0]
+    assert found == pytest.approx(-turn_s * mean / (2 * np.pi), abs=1e-3)
 
 
 def drive(turn_s, known, posed=False, frames=25):
@@ -118,15 +110,3 @@ def test_stationary_objects_stay_in_place_though_their_sweeps_are_skewed():
     distance = np.hypot(*(t.kdop[:, [0, 2]] / 2 - t.kdop[:, [4, 6]] / 2 - street(n=60)[:, :2]).T)
     assert np.median(distance) < 0.05
     assert distance.max() < 0.3
-
-
-@given(st.floats(-15, 15), st.floats(-1, 1), st.sampled_from([0.1, -0.1]), st.floats(0, 2 * np.pi))
-def test_a_placement_deskews_positions_like_the_proposals_there(speed, yaw_rate, turn_s, bearing):
-    """Placement.deskew corrects positions without points, as the correction of a small proposal does."""
-    T = se3(rotation_zyx(0, 0, 0.7), np.array([3.0, -2.0, 0.0]))
-    motion = PlanarMotion(complex(speed, 0.1 * speed), yaw_rate)
-    proposals = one(9 * np.cos(bearing), 9 * np.sin(bearing), 0.0, 0.0)
-    step = motion.displacement(proposals.centroid[:, :2], delays(proposals, turn_s)) @ T[:2, :2].T
-    position = observe(proposals, T).centroid
-    np.testing.assert_allclose(Placement(T, motion, turn_s).deskew(position), step, atol=1e-9)
-    assert not Placement(T, motion).deskew(position).any()

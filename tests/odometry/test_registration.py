@@ -55,6 +55,7 @@ def test_the_path_is_found_among_stationary_objects_though_others_move(moving, f
 
 T_OTHER = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
 GIVEN = {  # pose of a frame as the odometry gives it, and its restarts
+    "first far from the origin": lambda i: (T_OTHER @ gentle_curve(0) if i == 0 else None, 0),
     "missing": lambda i: (None if 8 <= i < 14 else gentle_curve(i), 0),
     "begins late": lambda i: (None if i < 6 or i in (12, 13) else T_OTHER @ gentle_curve(i), 0),
     "restarts": lambda i: (
@@ -68,13 +69,8 @@ def test_no_track_is_moved_where_poses_are_missing_begin_late_or_restart(given):
     follower = drive(20, given_pose=lambda i: GIVEN[given](i)[0], restarts=lambda i: GIVEN[given](i)[1])
     assert len(follower.tracks) == N_OBJECTS
     assert follower.tracks.age.min() == 20
-    np.testing.assert_allclose(follower.T_world_sensor, gentle_curve(19), atol=0.15)
-
-
-def test_a_first_pose_far_from_the_origin_is_no_motion():
-    follower = drive(4, given_pose=lambda i: T_OTHER @ gentle_curve(0) if i == 0 else None)
-    assert len(follower.tracks) == N_OBJECTS
-    np.testing.assert_allclose(follower.T_world_sensor, T_OTHER @ gentle_curve(3), atol=0.15)
+    T_world_start = T_OTHER if given.startswith("first") else np.eye(4)
+    np.testing.assert_allclose(follower.T_world_sensor, T_world_start @ gentle_curve(19), atol=0.15)
 
 
 def test_without_landmarks_the_last_motion_continues():

@@ -28,7 +28,6 @@ def test_the_environment_states_the_domain_where_the_address_does_not(monkeypatc
         *((f"ros2:///points?domain={domain}", "from 0 to 232") for domain in ("-1", "233", "x", "²")),
         ("ros2://?domain=3", "names no topic"),
         ("ros2:///points?reliability=perfect", "reliability 'perfect' is unknown"),
-        ("ros2:///points?colour=red", "option 'colour' is unknown"),
     ],
 )
 def test_an_invalid_address_of_a_topic_is_refused(text, cause):

@@ -16,34 +16,29 @@ RNG = np.random.default_rng(0)
 WALLS = RNG.uniform(0.3, 2.6, 2000)
 
 
-def heights(ceiling_m, n):
-    """Histogram of the heights of returns on walls and a ceiling."""
-    ceiling = RNG.normal(ceiling_m, 0.02, n)
-    return histogram(np.concatenate([WALLS, ceiling[ceiling < 2.6]]).astype(np.float32), 2.6)
-
-
-@pytest.mark.parametrize("ceiling_m", [2.3, 2.4, 2.5, 2.62])
-def test_a_ceiling_is_cut_just_below(ceiling_m):
-    limit_m = below_ceiling_m(heights(ceiling_m, 4000))
-    assert ceiling_m - 0.35 < limit_m < ceiling_m - 0.14  # some of its returns lie 0.1 m below it
-
-
-@pytest.mark.parametrize(("ceiling_m", "n"), [(2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000)])
-def test_few_returns_doors_and_what_is_higher_are_no_ceiling(ceiling_m, n):
-    assert below_ceiling_m(heights(ceiling_m, n)) is None
+@pytest.mark.parametrize(
+    ("ceiling_m", "n", "cut_m"),
+    [
+        *((ceiling_m, 4000, (ceiling_m - 0.35, ceiling_m - 0.14)) for ceiling_m in (2.3, 2.4, 2.5, 2.62)),
+        *((ceiling_m, n, None) for ceiling_m, n in ((2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000))),
+    ],
+)
+def test_a_ceiling_is_cut_just_below_but_few_returns_doors_and_what_is_higher_are_none(ceiling_m, n, cut_m):
+    """Some returns of a ceiling lie 0.1 m below it."""
+    height = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.02, n)]).astype(np.float32)
+    limit_m = below_ceiling_m(histogram(height[height < 2.6], 2.6))
+    assert (limit_m is None) if cut_m is None else (cut_m[0] < limit_m < cut_m[1])
     assert below_ceiling_m(histogram(np.zeros(0, np.float32), 2.6)) is None
 
 
-@pytest.mark.parametrize("ceiling_m", [2.55, 2.65, 2.75, 2.85])
-def test_a_ceiling_about_the_greatest_height_used_is_cut_well_below(ceiling_m):
-    level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, 4000)]).astype(np.float32)
-    assert 2.3 < below_grazed_m(level[::SAMPLED], 0.0, 2.6) < 2.5
-
-
-@pytest.mark.parametrize(("ceiling_m", "n"), [(3.2, 4000), (2.65, 100), (2.65, 0)])
-def test_a_high_ceiling_or_few_returns_about_the_greatest_height_used_are_none(ceiling_m, n):
+@pytest.mark.parametrize(
+    ("ceiling_m", "n", "is_cut"),
+    [*((2.55 + 0.1 * k, 4000, True) for k in range(4)), (3.2, 4000, False), (2.65, 100, False), (2.65, 0, False)],
+)
+def test_a_ceiling_about_the_greatest_height_used_is_cut_well_below(ceiling_m, n, is_cut):
     level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, n)]).astype(np.float32)
-    assert below_grazed_m(level[::SAMPLED], 0.0, 2.6) is None
+    limit_m = below_grazed_m(level[::SAMPLED], 0.0, 2.6)
+    assert (2.3 < limit_m < 2.5) if is_cut else (limit_m is None)
 
 
 def stage_of(sensor, height_m):

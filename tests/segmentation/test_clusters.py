@@ -23,10 +23,6 @@ def cloud(seed, n, sigma):
     return points[np.hypot(points[:, 0], points[:, 1]) < 79.0]
 
 
-def clusterer(**config):
-    return Clusterer(SensorConfig(), SegmentationConfig(**config))
-
-
 def cells_of(grid, points, height):
     cells, _, sampled, cell = occupied_cells(grid, points, height)
     return cells, cell, np.float32(BEAM_RAD) * np.square(sampled.sqrt_range)
@@ -67,5 +63,7 @@ def test_the_grid_lies_between_two_euclidean_radii(seed, n, sigma):
 @pytest.mark.parametrize("n", [1, 2, 7])
 def test_points_of_no_height_are_no_cluster(n):
     points = np.tile(np.float32([[5.0, 1.0, -0.5]]), (n, 1))
-    clusters = clusterer().cluster(PointColumns.from_array(points), np.full(n, 1.0, np.float32))
+    clusters = Clusterer(SensorConfig(), SegmentationConfig()).cluster(
+        PointColumns.from_array(points), np.full(n, 1.0, np.float32)
+    )
     assert clusters.n == 0

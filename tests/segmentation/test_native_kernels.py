@@ -97,27 +97,20 @@ def street(seed, n):
 
 
 @pytest.mark.slow
-@given(seed=st.integers(0, 10_000), n=st.integers(0, 3000), front=st.booleans())
-@settings(max_examples=80, deadline=None)
-def test_random_sweeps(kernels, seed, n, front):
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 3000), front=st.booleans(), share=st.just(0.0) | st.floats(0, 1))
+@settings(max_examples=160, deadline=None)
+def test_random_sweeps_with_a_share_of_hostile_coordinates(kernels, seed, n, front, share):
     sensor = SensorConfig(reflectance="hdl-64e", height_m=(None, 1.73)[seed % 2])
-    both(kernels, street(seed, n), sensor, FRONT if front else None)
-
-
-@pytest.mark.slow
-@given(seed=st.integers(0, 10_000), share=st.floats(0, 1))
-@settings(max_examples=80, deadline=None)
-def test_hostile_sweeps(kernels, seed, share):
-    rng, points = np.random.default_rng(seed), street(seed, 500)
-    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), points.shape)]
+    rng, points = np.random.default_rng(seed), street(seed, n)
+    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), (n, 3))]
+    np.copyto(points[:, :3], values, where=rng.random((n, 3)) < share)
     with np.errstate(all="ignore"):
-        both(kernels, np.where(rng.random(points.shape) < share, values, points))
+        both(kernels, points, sensor, FRONT if front else None)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [0, 1, 2, 1_000_000])
-def test_any_number_of_points(kernels, n):
-    both(kernels, street(1, n))
+def test_a_million_points(kernels):
+    both(kernels, street(1, 1_000_000))
 
 
 def test_rows_of_any_width_and_order(kernels):
@@ -193,7 +186,20 @@ def some_pairs(rng, n):
 
 def some_covered(rng, n):
     a, b = random_kdops(rng, 1 + n % 13)
-    return a, b, *rng.integers(0, a.shape[1], (2, n))
+    return *in_some_order(rng, a, b), *rng.integers(0, a.shape[1], (2, n))
+
+
+def some_overlaps(rng, n):
+    """K-DOPs that all overlap are more pairs than there is room for at first."""
+    spread, scale = rng.choice([0, 1, 10, 60]), rng.choice([1e-3, 1.0, 100.0])
+    a, b = (rng.integers(-spread, spread + 1, (8, m)) * scale for m in (n, rng.integers(0, 61)))
+    a[:, :1], a[:, 1:2] = np.inf, np.nan  # overlaps all, overlaps nothing
+    return in_some_order(rng, a, b)
+
+
+def in_some_order(rng, a, b):
+    """Both as they are, or with columns that are contiguous instead of rows."""
+    return [rng.choice([np.asarray, np.asfortranarray])(kdop) for kdop in (a, b)]
 
 
 def some_displacements(rng, n):
@@ -220,6 +226,7 @@ PASSES = {
     "kdop_ends": some_kdops,
     "copy_runs": some_runs,
     "coverage": some_covered,
+    "overlapping_pairs": some_overlaps,
     "measured": some_displacements,
     "pair_costs": some_pairs,
     "assign": some_assignments,
@@ -233,31 +240,6 @@ PASSES = {
 def test_passes_on_random_input(kernels, name, arguments, seed, n):
     given = arguments(np.random.default_rng(seed), n)
     assert same(*(getattr(each, name)(*given) for each in (NUMPY, kernels)))
-
-
-def test_covered_parts_of_k_dops_in_columns(kernels):
-    a, b, rows, columns = some_covered(np.random.default_rng(0), 9)
-    in_columns = kernels.coverage(np.asfortranarray(a), np.asfortranarray(b), rows, columns)
-    np.testing.assert_array_equal(in_columns, kernels.coverage(a, b, rows, columns))
-
-
-@given(
-    seed=st.integers(0, 10_000),
-    n=st.integers(0, 40),
-    k=st.integers(0, 40),
-    spread=st.integers(0, 60),
-    scale=st.sampled_from([1e-3, 1.0, 100.0]),
-)
-@settings(max_examples=200, deadline=None)
-def test_overlapping_pairs(kernels, seed, n, k, spread, scale):
-    rng = np.random.default_rng(seed)
-    a, b = (rng.integers(-spread, spread + 1, (8, m)) * scale for m in (n, k))
-    a[:, :1], a[:, 1:2] = np.inf, np.nan  # overlaps all, overlaps nothing
-    one, other = (each.overlapping_pairs(a, b) for each in (NUMPY, kernels))
-    assert same(one, other)
-    assert same(one, kernels.overlapping_pairs(np.asfortranarray(a), np.asfortranarray(b)))
-    if spread == 0:
-        assert len(one[0]) == k * (n - (n > 1)), "all overlap: more pairs than there was room for at first"
 
 
 @given(seed=st.integers(0, 10_000), m=st.integers(0, 9), dt_s=st.sampled_from([0.0, 0.1, 3.0]))

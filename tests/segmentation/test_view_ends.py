@@ -35,17 +35,17 @@ def flags(*parts, sensor=SENSOR):
     return [Cut(flag) for flag in ViewEnds(sensor, 2.6).cut(points, offsets, box).tolist()]
 
 
-def test_a_person_near_a_low_sensor_is_cut_above_and_one_farther_away_is_whole():
-    assert flags(person(1.0), person(3.0), person(8.0)) == [Cut.TOP | Cut.BOTTOM, Cut.TOP, Cut(0)]
+EVEN, TABLE = SensorConfig(min_range_m=0.2), SensorConfig(min_range_m=0.2, elevations_deg=tuple(range(-15, 16, 2)))
+NEAR = Cut.TOP | Cut.BOTTOM
 
 
-def test_without_known_beams_nothing_is_cut_above_or_below():
-    assert flags(person(1.0), sensor=SensorConfig(min_range_m=0.2)) == [Cut(0)]
-
-
-def test_beams_end_at_the_outermost_of_a_table():
-    table = SensorConfig(min_range_m=0.2, elevations_deg=tuple(range(-15, 16, 2)))
-    assert flags(person(1.0), person(8.0), sensor=table) == [Cut.TOP | Cut.BOTTOM, Cut(0)]
+@pytest.mark.parametrize(
+    ("sensor", "cut"),
+    [(SENSOR, [NEAR, Cut.TOP, Cut(0)]), (EVEN, [Cut(0)] * 3), (TABLE, [NEAR, Cut.TOP, Cut(0)])],
+    ids=["span", "beams not known", "table"],
+)
+def test_a_person_near_a_low_sensor_is_cut_at_its_outermost_beams_and_one_farther_away_is_whole(sensor, cut):
+    assert flags(person(1.0), person(3.0), person(8.0), sensor=sensor) == cut
 
 
 @given(st.lists(st.integers(1, 6), min_size=1, max_size=5), st.integers(0, 2**32 - 1), st.floats(-180, 90))

@@ -8,7 +8,7 @@ from scipy import ndimage
 from scipy.signal import find_peaks
 
 from modt.geometry import rotation_zyx
-from modt.sensor_fit.beams import find_beams, gaussian, prominent_peaks, running_mean, running_median
+from modt.sensor_fit.beams import find_beams, gaussian, prominent_peaks, running_mean
 from modt.sources.scan_file import read_scan
 from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording
@@ -61,11 +61,8 @@ def test_beams_of_a_pandar64_on_the_road(kitti_root):
 ROWS = st.lists(st.integers(0, 5000), min_size=1, max_size=600).map(np.array)
 
 
-@given(ROWS, st.sampled_from([0.7, 1.0, 2.0]), st.integers(1, 260), st.sampled_from([1, 3, 7]))
-def test_filters_are_those_of_scipy(values, deviation, width, odd):
-    padded = np.pad(values, odd // 2, "symmetric")  # SciPy of Python 3.10 fails where the window is the longer one
-    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, odd), axis=1)
-    np.testing.assert_array_equal(running_median(values, odd), median)
+@given(ROWS, st.sampled_from([0.7, 1.0, 2.0]), st.integers(1, 260))
+def test_filters_are_those_of_scipy(values, deviation, width):
     values, near = values / 7, {"rtol": 1e-9, "atol": 1e-9}
     np.testing.assert_allclose(gaussian(values, deviation), ndimage.gaussian_filter1d(values, deviation), **near)
     np.testing.assert_allclose(running_mean(values, width), ndimage.uniform_filter1d(values, width), **near)

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
 from modt.app.assembly import MODES
 from modt.errors import ScanError
-from modt.sinks.records import line
-from modt.sinks.tracks import SCHEMA
 from modt.sources.scan_file import sanitised
 from modt.types import Budget, Float32, Frame
-from modt_desk.reporting.records import read_records
 from tests.sequences.promises import Run, config
 from tests.sequences.world import SENSORS, World, broken
 
@@ -121,15 +115,3 @@ class Sequences(RuleBasedStateMachine):
         if hasattr(self, "runs"):
             first, second = (run.text for run in self.runs)
             assert first == second
-            with tempfile.TemporaryDirectory() as folder:
-                cut_anywhere(Path(folder) / "tracks.jsonl", self.runs[0].frames)
-
-
-def cut_anywhere(path: Path, lines: list[str]) -> None:
-    """Lines of a file that ends at several bytes: the whole ones are read, in their order."""
-    written = "".join(lines).encode()
-    for cut in {0, len(written) // 3, max(len(written) - 1, 0), len(written)}:
-        path.write_bytes(written[:cut])
-        read = [line(record) for record in read_records(path, SCHEMA)]
-        assert read == lines[: len(read)]
-        assert len(read) >= written[:cut].count(b"\n")

@@ -94,7 +94,6 @@ class Run:
     budget: Budget
     back: int = 0
     text: str = ""
-    frames: list[str] = field(default_factory=list)
     proposals: list[int] = field(default_factory=list)
     _before: frozenset[int] = frozenset()
     _next_id: int = 0
@@ -116,8 +115,7 @@ class Run:
         self._posteriors(result)
         self._placed(result)
         self._parts_are_the_whole(book)
-        self.frames.append(frame_line(result))
-        self.text += self.frames[-1] + line(book)
+        self.text += frame_line(result) + line(book)
         return result
 
     def _proposals_are_of_the_frame(self, result: FrameResult) -> None:

@@ -203,10 +203,7 @@ def test_a_unix_socket_is_emptied_between_two_frames(tmp_path):
     odometry.close()
 
 
-def test_what_the_kernel_drops_is_counted():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+def test_what_the_kernel_drops_is_counted(port):
     odometry = open_poses(f"udp://127.0.0.1:{port}", CONFIG)
     with pytest.raises(MisuseError, match="cannot be bound"):
         open_poses(f"udp://127.0.0.1:{port}", CONFIG)

@@ -50,7 +50,7 @@ class Tally:
         label = proposals.label(len(scan.points))
         self.proposals, self.scans = self.proposals + len(proposals), self.scans + 1
         for kind, own in zip(scan.kinds, scan.objects, strict=True):
-            if len(own) < MIN_POINTS or not scan.fov.contains(scan.points[own]).mean() > 0.5:
+            if len(own) < MIN_POINTS or not (scan.fov.depth(scan.points[own]) > 0).mean() > 0.5:
                 continue
             shared = np.bincount(label[own] + 1, minlength=len(proposals) + 1)[1:]
             union = proposals.count + len(own) - shared

@@ -118,7 +118,7 @@ def reflectance_of(proposals: Proposals) -> Float64:
 
 def points_in_view(scan: Scan) -> Int:
     """(B,) points of each object in the annotated field of view."""
-    return np.array([scan.fov.contains(scan.points[own]).sum() for own in scan.objects], np.int64)
+    return np.array([(scan.fov.depth(scan.points[own]) > 0).sum() for own in scan.objects], np.int64)
 
 
 class CropWriter:

@@ -148,7 +148,7 @@ def scan_from_boxes(
 ) -> Scan:
     """A scan with the points of each object taken from its box."""
     objects = tuple(np.flatnonzero(points_in_box(points, box)) for box in boxes)
-    return Scan(name, drive, points, objects, tuple(kinds), boxes, fov, unlabelled | ~fov.contains(points))
+    return Scan(name, drive, points, objects, tuple(kinds), boxes, fov, unlabelled | (fov.depth(points) <= 0))
 
 
 def drives_of_frames(folder: Path) -> dict[str, str]:

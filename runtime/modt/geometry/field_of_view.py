@@ -64,11 +64,6 @@ class FieldOfView:
             np.minimum(nearest, points @ normal + points.dtype.type(offset), out=nearest)
         return nearest
 
-    def contains(self, points: NDArray[Real]) -> Bool:
-        """(n,) whether each of (n, 3 or more) points lies inside."""
-        inside: Bool = self.depth(points) > 0
-        return inside
-
 
 class BlindSectors:
     """Sectors around the sensor.

@@ -7,15 +7,12 @@ Many are an (8, n) array, a contiguous row a direction.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from modt.types import Bool, Float32, Float64, Int, Proposals, Self
-
-Ends = Callable[[Float32, Int, Float32], Float32]
+from modt.types import Bool, Float32, Float64, Int, Self
 
 _BEARINGS_RAD = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 AXES = np.stack([np.cos(_BEARINGS_RAD), np.sin(_BEARINGS_RAD)])
@@ -39,17 +36,6 @@ def kdop_ends(xyz: Float32, offsets: Int, axes: Float32) -> Float32:
     along += axes[2][:, None] * xyz[2]
     ahead, behind = (f.reduceat(along, offsets[:-1], axis=1) for f in (np.maximum, np.minimum))
     return np.concatenate([ahead, -behind])
-
-
-def kdops(proposals: Proposals, T_world_sensor: Float64, ends: Ends = kdop_ends) -> Float64:
-    """(8, P) k-DOPs of the proposals in the world [m]; `ends` is `kdop_ends`, or what does the same."""
-    if not len(proposals):
-        return np.zeros((8, 0))
-    axes = np.ascontiguousarray(T_world_sensor[:2, :3].T @ AXES, np.float32)
-    reach: Float64 = (
-        ends(proposals.coordinates, proposals.offsets, axes) + (T_world_sensor[:2, 3] @ DIRECTIONS)[:, None]
-    )
-    return reach
 
 
 def widths(kdop: Float64) -> Float64:

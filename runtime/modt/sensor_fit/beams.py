@@ -42,12 +42,6 @@ def running_mean(values: Float64, width: int) -> Float64:
     return np.asarray(np.concatenate([first, padded[width:] - padded[:-width]]).cumsum() / width)
 
 
-def running_median(values: Int, width: int) -> Int:
-    """Median of windows of an odd width."""
-    windows = sliding_window_view(np.pad(values, width // 2, "symmetric"), width)
-    return np.sort(windows, axis=1)[:, width // 2]
-
-
 def prominent_peaks(count: Float64) -> tuple[Int, Float64]:
     """(B,) bins of the local maxima, in the middle of a plateau, and (B,) prominence of each.
 
@@ -172,7 +166,8 @@ def _peaks(count: Float64) -> Int:
     peaks, mass = peaks[kept], mass[kept]
     while len(peaks) > 3:  # a gap far narrower than those around is within a blurred beam
         gap = np.diff(peaks)
-        usual = running_median(gap, GAPS_AROUND)
+        around = sliding_window_view(np.pad(gap, GAPS_AROUND // 2, "symmetric"), GAPS_AROUND)
+        usual = np.median(around, axis=1)
         narrowest = int(np.argmin(gap / usual))
         if gap[narrowest] >= MIN_GAP * usual[narrowest]:
             break

@@ -17,14 +17,6 @@ from tools.send.loops import endless
 
 
 @pytest.fixture
-def port():
-    """A port that is free."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        return probe.getsockname()[1]
-
-
-@pytest.fixture
 def to(port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.connect(("127.0.0.1", port))

@@ -68,15 +68,14 @@ def edited(timed, metadata, edit):
     return out
 
 
-def numbered(timed, metadata, first):
-    """The packets with other numbers of their frames, from the first on."""
-    return edited(timed, metadata, lambda layout, packet, k: layout.set_frame_id(packet, first + k // 64))
-
-
 @pytest.mark.parametrize("lies", [1, 64 * 3])
 def test_frame_numbers_that_leap_ahead_or_begin_anew_cost_one_frame(timed, metadata, lies):
-    ahead = numbered(timed, metadata, 500)[:lies]  # a forged packet, or the sensor before it is restarted
-    sweeps, reception = decoded(OusterDecoder("sensor", metadata), [*ahead, *numbered(timed, metadata, 0)])
+    """They are of a forged packet, or of the sensor before it is restarted."""
+    ahead, anew = (
+        edited(timed, metadata, lambda layout, packet, k, first=first: layout.set_frame_id(packet, first + k // 64))
+        for first in (500, 0)
+    )
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), [*ahead[:lies], *anew])
     assert reception.refused == {"late: its frame has ended": RESTARTED_BY}
     assert len(sweeps) == lies // 64 + 2
     assert all(s.complete for s in sweeps)

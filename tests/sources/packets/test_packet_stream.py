@@ -58,13 +58,6 @@ def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(
     assert stream.faults.first[-1].cause == "1 packets refused: its stamp leaps: the clock was set, or lies"
 
 
-def test_invalid_options_are_refused(path):
-    with pytest.raises(MisuseError, match="no calibration"):
-        open_stream(path, capture={"calibration": "nowhere.yaml"})
-    with pytest.raises(MisuseError, match="model does not apply"):
-        open_stream(path.parent, capture={"model": "vlp-16"})
-
-
 @pytest.mark.parametrize(
     ("timed", "cause"),
     [([], "no packets of a Velodyne"), ([(0.0, b"x")], "give metadata=FILE"), (packets()[:50], "no whole sweep")],

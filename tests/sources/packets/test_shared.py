@@ -1,6 +1,5 @@
 """Promises that the decoders of all makers share: faults of the network are counted and change no other sweep."""
 
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,12 +43,8 @@ class Maker:
     refused: dict[str, int]  # reasons for three payloads of other lengths, a broken and a foreign one
 
 
-def ouster_folder() -> Path:
-    return Path(os.environ.get("KITTI_ROOT", "")) / "ouster"
-
-
 def of_ouster() -> list[Timed]:
-    capture = Capture(ouster_folder() / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap")
+    capture = Capture(makers.OUSTER_METADATA.with_name(f"{makers.OUSTER}_lb_n3.pcap"))
     return [(d.stamp_s, d.payload) for d in capture if d.port == 7502]
 
 
@@ -79,7 +74,7 @@ MAKERS = {
         {"no packet of points of a Livox": 4},
     ),
     "ouster": Maker(
-        lambda: OusterDecoder("sensor", ouster_folder() / "OS-1-128_v2.3.0_1024x10.json"),
+        lambda: OusterDecoder("sensor", makers.OUSTER_METADATA),
         of_ouster,
         (70, 71, 90),
         lambda p: np.random.default_rng(0).bytes(len(p)),

@@ -61,7 +61,7 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
         times = np.bincount(of[which], minlength=len(overlap.own))
         return np.asarray((times > 0.5 * overlap.count) | (overlap.count == 0))
 
-    in_view, in_sector = most(frame.fov.contains(shown)), most(_in_sector(shown, rules))
+    in_view, in_sector = most(frame.fov.depth(shown) > 0), most(_in_sector(shown, rules))
     near = range_m <= rules.max_range_m
     wanted = np.isin(truth.role, LABELLED) & near
     of_class = (truth.object_class > 0) & _has_points(frame, overlap, rules)
