@@ -33,26 +33,15 @@ def components(grid, cells, beam_m):
     return connect(grid, cells, gap_m, np.ones(len(cells), np.bool_))
 
 
-@given(seed=st.integers(0, 10_000), n=st.integers(1, 250), sigma=st.floats(0.05, 3.0))
-@settings(max_examples=60)
-def test_components_equal_those_of_a_flood_fill(seed, n, sigma):
-    points = PointColumns.from_array(cloud(seed, n, sigma))
-    if not len(points):
-        return
-    grid = SqrtRangeGrid(STEP, 80.0)
-    cells, _, beam_m = cells_of(grid, points, points.z + 1.7)
-    slow = reference.flood_fill(cells, beam_m)
-    assert reference.same_partition(components(grid, cells, beam_m), slow)
-
-
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 400), sigma=st.floats(0.05, 3.0))
 @settings(max_examples=60)
-def test_the_grid_lies_between_two_euclidean_radii(seed, n, sigma):
+def test_components_are_those_of_a_flood_fill_and_lie_between_two_euclidean_radii(seed, n, sigma):
     """In the plane of the grid, points within one step share a cluster, and no cluster bridges two steps."""
-    points = PointColumns.from_array(cloud(seed, n, sigma))
+    points, grid = PointColumns.from_array(cloud(seed, n, sigma)), SqrtRangeGrid(STEP, 80.0)
     if not len(points):
         return
-    grid = SqrtRangeGrid(STEP, 80.0)
+    cells, _, beam_m = cells_of(grid, points, points.z + 1.7)
+    assert reference.same_partition(components(grid, cells, beam_m), reference.flood_fill(cells, beam_m))
     cells, cell, beam_m = cells_of(grid, points, np.zeros(len(points), np.float32))
     fast = components(grid, cells, beam_m)[cell]
     plane = np.stack([points.x, points.y], axis=1).astype(np.float64) / points.sqrt_range[:, None]

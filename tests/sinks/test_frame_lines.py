@@ -44,13 +44,11 @@ def many(n):
     return result(4, [1] * n, {k: k for k in range(n)}, lost=(n,), n_points=n)
 
 
-@pytest.fixture(params=["udp", "unix"])
-def receiver(request, tmp_path):
-    """A function that sends frames, and returns the datagrams that a receiver gets."""
-    family = socket.AF_INET if request.param == "udp" else socket.AF_UNIX
-    with socket.socket(family, socket.SOCK_DGRAM) as bound:
+@pytest.mark.parametrize("kind", ["udp", "unix"])
+def test_a_frame_is_a_datagram_and_a_longer_line_comes_in_parts(kind, tmp_path):
+    with socket.socket(socket.AF_INET if kind == "udp" else socket.AF_UNIX, socket.SOCK_DGRAM) as bound:
         bound.settimeout(60.0)
-        bound.bind(("127.0.0.1", 0) if request.param == "udp" else str(tmp_path / "lines.sock"))
+        bound.bind(("127.0.0.1", 0) if kind == "udp" else str(tmp_path / "lines.sock"))
         name = bound.getsockname()
         sink = open_sink(f"unix://{name}" if isinstance(name, str) else "udp://{}:{}".format(*name))
 
@@ -60,18 +58,13 @@ def receiver(request, tmp_path):
             first = bound.recv(1 << 17).decode()
             return [first, *(bound.recv(1 << 17) for _ in range(json.loads(first).get("parts", 1) - 1))]
 
-        yield received
+        parts = [json.loads(datagram) for datagram in received(many(300), 1)]
+        assert [part["part"] for part in parts] == list(range(len(parts)))
+        whole = {key: value for key, value in parts[0].items() if key not in ("part", "parts")}
+        whole["tracks"] = [track for part in parts for track in part["tracks"]]
+        assert whole == frame_record(many(300))
+        assert received(FRAME, 2) == [frame_line(FRAME)]
         sink.close()
-
-
-def test_a_frame_is_a_datagram_and_a_longer_line_comes_in_parts(receiver):
-    frame = many(300)
-    parts = [json.loads(datagram) for datagram in receiver(frame, 1)]
-    assert [part["part"] for part in parts] == list(range(len(parts)))
-    whole = {key: value for key, value in parts[0].items() if key not in ("part", "parts")}
-    whole["tracks"] = [track for part in parts for track in part["tracks"]]
-    assert whole == frame_record(frame)
-    assert receiver(FRAME, 2) == [frame_line(FRAME)]
 
 
 @pytest.mark.parametrize(("n", "max_bytes"), [(0, 10), (1, 10), (300, MAX_BYTES), (300, 2000), (300, 600)])

@@ -13,10 +13,11 @@ COMMANDS = dict(commands())
 
 def test_the_table_has_a_summary_of_each_command(capsys):
     main()
-    lines = capsys.readouterr().out.splitlines()
     assert "tools.train.build_models" in COMMANDS
     assert "tools.train.dataset" not in COMMANDS
-    assert [line.split(maxsplit=3)[2:] for line in lines] == [[*item] for item in COMMANDS.items()]
+    assert [line.split(maxsplit=3)[2:] for line in capsys.readouterr().out.splitlines()] == [
+        [*item] for item in COMMANDS.items()
+    ]
 
 
 @pytest.mark.parametrize("module", COMMANDS)

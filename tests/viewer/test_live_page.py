@@ -67,15 +67,11 @@ def read(live):
         yield lambda *path, **headers: readers.enter_context(closing(Reader(live, *path, **headers)))
 
 
-@pytest.fixture
-def patient(monkeypatch):
-    """A server at which any number of connections may wait, each for any time."""
+def test_connections_are_bounded(monkeypatch, request):
     monkeypatch.setattr(live_server.LiveServer, "request_queue_size", 2 * MOST_CONNECTIONS)
     monkeypatch.setattr(live_server, "SEND_S", WAIT_S)
     monkeypatch.setattr(live_server._Handler, "timeout", WAIT_S)
-
-
-def test_connections_are_bounded(patient, live, read):
+    live, read = map(request.getfixturevalue, ("live", "read"))  # only now: a server that waits as long as it takes
     with ExitStack() as idle:
         for _ in range(MOST_CONNECTIONS):
             idle.enter_context(socket.create_connection(("127.0.0.1", live.port), WAIT_S))

@@ -86,12 +86,7 @@ def consistencies_on_crossings():
     [
         ("pedestrian, moving", 25, 3.0, 0.15),
         ("pedestrian, standing", 5, 2.0, 0.1),
-        (
-            "background, standing",
-            40,
-            12.0,
-            0.1,
-        ),  # its visible part moves along what hides it, and no filter models that
+        ("background, standing", 40, 12.0, 0.1),  # no filter models the motion of a visible part along what hides it
     ],
 )
 def test_the_filter_is_nearly_consistent(kind, tracks, mean, beyond, consistencies):

@@ -10,8 +10,7 @@ def test_ratio_of_frequent_cells_is_that_of_the_counts():
     counts = np.full((4, CELLS, 4), 100_000)
     counts[:, 0, 2] *= 3
     ratio = log_likelihood_ratio(counts)
-    expected = WEIGHT * np.log(3 / (CELLS + 2) * CELLS)
-    np.testing.assert_allclose(ratio[:, 1, 0], expected, atol=1e-3)
+    np.testing.assert_allclose(ratio[:, 1, 0], WEIGHT * np.log(3 / (CELLS + 2) * CELLS), atol=1e-3)
     np.testing.assert_allclose(ratio[:, 0], 0.0, atol=1e-3)
 
 
