@@ -40,8 +40,7 @@ def test_tracks_are_renewed_in_every_column(kept, n):
         column[:] = np.arange(1, len(kept) + 1).reshape(-1, *[1] * (column.ndim - 1))
     rows = np.flatnonzero(kept)
     renewed = tracks.renewed(rows, n)
-    blank = Tracks.blank(n)
-    for name, column in renewed.columns().items():
-        np.testing.assert_array_equal(column, np.concatenate([getattr(tracks, name)[rows], getattr(blank, name)]))
+    for name, blank in Tracks.blank(n).columns().items():
+        np.testing.assert_array_equal(getattr(renewed, name), np.concatenate([getattr(tracks, name)[rows], blank]))
     assert (renewed.id[len(rows) :] == NONE).all()
     assert renewed.columns().keys() == {f.name for f in dataclasses.fields(Tracks)}
