@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -20,13 +21,12 @@ def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
     A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them and
     to min_points.
     """
-    most, least, batch = limits.max_points, limits.min_points, limits.batch
+    return partial(_padded, limits.max_points, limits.min_points, limits.batch)
 
-    def padded(count: Int) -> int:
-        size = sorted(max(min(n, most), least) for n in count.tolist())  # few: faster than arrays
-        return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
 
-    return padded
+def _padded(most: int, least: int, batch: int, count: Int) -> int:
+    size = sorted(max(min(n, most), least) for n in count.tolist())  # few: faster than arrays
+    return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
 
 
 UNCERTAINTY_WEIGHT, NEARNESS_WEIGHT, NOVELTY_WEIGHT = 0.4, 0.3, 0.3
