@@ -11,59 +11,56 @@ typedef struct {
     float *x, *y, *z, *sqrt_range; /* of one point of each cell */
 } Samples;
 
-enum { BLOCK = 128 }; /* points whose cells are fetched into the cache together */
-
 /* Place of a cell in a table of a grid whose side is a multiple of four: neighbours mostly share a cache line. */
 static ALWAYS_INLINE i32 place_of(i32 row, i32 column, i32 side)
 {
     return (row >> 2) * (4 * side) + (column >> 2) * 16 + (row & 3) * 4 + (column & 3);
 }
 
+/* SqrtRangeGrid.row_column, of a point; `scale` is over the square root of its range. */
+static ALWAYS_INLINE i32 line_of(float x, float scale, i32 centre) { return (i32)(x * scale + (float)centre); }
+
 /* occupied_cells: cells of n points in the order of their last points, of a grid of cells 1 / `scale` wide. `number` is
- * a table of side * side, NONE throughout before and after. Returns how many; they are the last of the n places of
- * `sample`, `sampled` and `cells`. */
+ * scratch of side * side. Returns how many; they are the first of the n places of `sample`, `sampled` and `cells`. */
 EXPORT i64 modt_occupied_cells(const Samples *points, const float *height, i64 n, float scale, i32 centre, i32 side,
                                i32 *number, i64 *sample, Samples *sampled, i64 *cell, Cells *cells)
 {
-    i32 first = (i32)n, row[BLOCK], column[BLOCK], place[BLOCK];
-    for (i64 end = n; end > 0; end -= BLOCK) { /* backwards: the last point of a cell comes first */
-        i64 start = end > BLOCK ? end - BLOCK : 0;
-        for (i64 i = start; i < end; i++) { /* SqrtRangeGrid.row_column */
-            float here = scale / points->sqrt_range[i];
-            row[i - start] = (i32)(points->x[i] * here + (float)centre);
-            column[i - start] = (i32)(points->y[i] * here + (float)centre);
-            place[i - start] = place_of(row[i - start], column[i - start], side);
-        }
-        for (i64 i = 0; i < end - start; i++) {
-            PROVEN(row[i] >= 0 && row[i] < side && column[i] >= 0 && column[i] < side);
-            __builtin_prefetch(&number[place[i]], 1);
-        }
-        for (i64 i = end - 1; i >= start; i--) {
-            i32 *here = &number[place[i - start]], c = *here;
-            if (c == NONE) {
-                c = *here = --first;
-                sample[c] = i;
-                sampled->x[c] = points->x[i];
-                sampled->y[c] = points->y[i];
-                sampled->z[c] = points->z[i];
-                sampled->sqrt_range[c] = points->sqrt_range[i];
-                cells->row[c] = row[i - start];
-                cells->column[c] = column[i - start];
-                cells->low[c] = cells->high[c] = height[i];
-                cells->entries[c] = 1;
-            } else {
-                cells->low[c] = least(height[i], cells->low[c]);
-                cells->high[c] = most(height[i], cells->high[c]);
-                cells->entries[c]++;
-            }
-            cell[i] = c;
-        }
+    i32 count = 0;
+    for (i64 i = 0; i < n; i++) {
+        float here = scale / points->sqrt_range[i];
+        cell[i] = place_of(line_of(points->x[i], here, centre), line_of(points->y[i], here, centre), side);
     }
-    for (i64 i = 0; i < n; i++)
-        cell[i] -= first;
-    for (i64 c = first; c < n; c++)
-        number[place_of(cells->row[c], cells->column[c], side)] = NONE;
-    return n - first;
+    for (i64 i = 0; i < n; i++) { /* each point writes its number: that of the last one stays */
+        PROVEN(cell[i] >= 0 && cell[i] < side * side);
+        __builtin_prefetch(&number[cell[i + AHEAD < n ? i + AHEAD : i]], 1);
+        number[cell[i]] = (i32)i;
+    }
+    for (i64 i = 0; i < n; i++) {
+        sample[count] = i; /* overwritten by the next, unless it is the last one */
+        count += number[cell[i]] == i;
+    }
+    for (i32 c = 0; c < count; c++) {
+        i64 i = sample[c];
+        sampled->x[c] = points->x[i];
+        sampled->y[c] = points->y[i];
+        sampled->z[c] = points->z[i];
+        sampled->sqrt_range[c] = points->sqrt_range[i];
+        cells->low[c] = cells->high[c] = height[i];
+        cells->entries[c] = 0;
+        number[cell[i]] = c;
+    }
+    for (i64 i = 0; i < n; i++) {
+        i64 c = cell[i] = number[cell[i]];
+        cells->low[c] = least(height[i], cells->low[c]);
+        cells->high[c] = most(height[i], cells->high[c]);
+        cells->entries[c]++;
+    }
+    for (i32 c = 0; c < count; c++) {
+        float here = scale / sampled->sqrt_range[c];
+        cells->row[c] = line_of(sampled->x[c], here, centre);
+        cells->column[c] = line_of(sampled->y[c], here, centre);
+    }
+    return count;
 }
 
 /* Rem's union: a parent is never greater than its child, so a root is the least of its component. */
@@ -141,8 +138,7 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *latest, i32 
         f4 max_gap_m = {left->max_gap_m, beyond->max_gap_m, above->max_gap_m, ahead->max_gap_m};
         f4 gap_m = most4(low, spread(own->low)) - least4(high, spread(own->high));
         i4 joined = (places == place - back) & (gap_m < max_gap_m), alone = {k, k, k, k};
-        i4 roots = {parent[k - 1], parent[over[0]], parent[over[1]], parent[over[2]]};
-        roots = (i4){parent[roots[0]], parent[roots[1]], parent[roots[2]], parent[roots[3]]};
+        i4 roots = {parent[k - 1], parent[over[0]], parent[over[1]], parent[over[2]]}; /* or not yet the roots */
         roots = (roots & joined) | (alone & ~joined);
         i32 one = roots[0] < roots[1] ? roots[0] : roots[1], other = roots[2] < roots[3] ? roots[2] : roots[3];
         parent[k] = one = one < other ? one : other;
@@ -166,33 +162,34 @@ static i64 connect(const Cells *cells, const float *max_gap_m, const uint8_t *us
     Span *span = (Span *)(next + 2 * side);
     Place *order = (Place *)(span + n_cells + 1);
     i32 *parent = (i32 *)(order + n_cells), *wide = parent + n_cells + 1, *last = wide + n_cells;
-    i32 used = sort_places(cells, use, n_cells, shift, side, next, (Place *)span, order), n = 0, count = 0, before = NONE;
+    i32 used = sort_places(cells, use, n_cells, shift, side, next, (Place *)span, order), n = 0, count = 0;
+    f4 none = spread(INFINITY), ends = none; /* least height, and the greatest negated */
+    span[0] = (Span){-3 * side, INFINITY, -INFINITY, 0.0f};
+    last[0] = NONE;
+    for (i64 i = 0; i < n_cells; i++)
+        wide[i] = 0; /* that of the cells not used */
     for (i32 k = 0; k < used; k++) {
-        i32 i = order[k].cell, place = order[k].row * side + order[k].column;
-        int begins = place != before;
-        n += begins;
-        Span *own = &span[n];
-        own->low = least(cells->low[i], begins ? INFINITY : own->low);
-        own->high = most(cells->high[i], begins ? -INFINITY : own->high);
-        own->place = before = place;
-        own->max_gap_m = max_gap_m[i];
+        i32 i = order[k].cell, place = order[k].row * side + order[k].column, begins = -(place != span[n].place);
+        i4 anew = {begins, begins, begins, begins};
+        n -= begins;
+        ends = least4((f4){cells->low[i], -cells->high[i]}, (f4)(((i4)none & anew) | ((i4)ends & ~anew)));
+        span[n] = (Span){place, ends[0], -ends[1], max_gap_m[i]};
         last[n] = i;
         wide[i] = n;
     }
-    span[0] = (Span){-3 * side, INFINITY, -INFINITY, 0.0f};
     find_components(span, n, side, next, parent);
-    i32 *number = (i32 *)order, *ends = last + n_cells + 1, m = 0; /* of each root's component; last cells */
-    for (i32 c = 1; c <= n; c++)
+    i32 *number = (i32 *)order, *ended = last + n_cells + 1, m = 0; /* of each root's component; wide cells */
+    for (i32 c = 0; c <= n; c++)
         number[c] = NONE;
     for (i64 i = 0; i < n_cells; i++) {
-        ends[m] = wide[i];
-        m += use[i] && last[wide[i]] == i;
+        ended[m] = wide[i];
+        m += last[wide[i]] == i;
     }
     for (i32 k = 0; k < m; k++)
-        if (number[parent[ends[k]]] == NONE)
-            number[parent[ends[k]]] = count++;
+        if (number[parent[ended[k]]] == NONE)
+            number[parent[ended[k]]] = count++;
     for (i64 i = 0; i < n_cells; i++)
-        component[i] = use[i] ? number[parent[wide[i]]] : NONE;
+        component[i] = number[parent[wide[i]]];
     return count;
 }
 
@@ -201,8 +198,6 @@ typedef struct {
     float *extent_m, *bottom_m, *top_m, *sqrt_range, *beam_m;
     uint8_t *is_part;
 } Sizes;
-
-typedef float u4 __attribute__((vector_size(16), aligned(4)));
 
 /* ClusterSizes.of_cells of n clusters. Scratch: `ends`, the least and the greatest x, y and height of each. */
 static void measure(const Cells *cells, const Samples *points, const float *beam_m, const i64 *cluster, i64 n_cells,

@@ -107,9 +107,11 @@ EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, co
     for (i64 i = 0; i < n_points; i++) {
         PROVEN(cell[i] >= 0 && cell[i] < n_cells && cluster[cell[i]] >= NONE && cluster[cell[i]] < n);
         i64 g = cluster[cell[i]];
-        if (g == NONE)
-            continue;
-        i64 at = next[g]++;
+        if (g != NONE)
+            members->index[next[g]++] = i;
+    }
+    for (i64 at = 0; at < total; at++) { /* reads may wait for memory together, writes may not: they go in order */
+        i64 i = members->index[at];
         members->index[at] = points->index[i];
         x[at] = points->x[i];
         y[at] = points->y[i];

@@ -25,7 +25,14 @@
 typedef int32_t i32;
 typedef int64_t i64;
 typedef float f4 __attribute__((vector_size(16)));
+typedef float u4 __attribute__((vector_size(16), aligned(4)));
 typedef i32 i4 __attribute__((vector_size(16)));
+
+#ifdef __clang__ /* numbers at four places of a, from 0 on, and of b, from 4 on */
+#define MIXED(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+#define MIXED(a, b, ...) __builtin_shuffle(a, b, (i4){__VA_ARGS__})
+#endif
 
 static inline float least(float a, float b) { return a < b ? a : b; }
 static inline float most(float a, float b) { return a > b ? a : b; }

@@ -30,7 +30,7 @@ class Kernels(GeometryKernels):
     def above_ground(
         self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
     ) -> tuple[Int, PointColumns, Float32, Int]:
-        """(K,) rows of (N, 3) or wider points within bounds, those points, their (K,) heights above ground [m].
+        """(K,) rows of (N, 4) or wider points within bounds, those points, their (K,) heights above ground [m].
 
         With them comes the histogram of the heights in which a ceiling shows.
         Bounds are the least and greatest height [m], and the least and greatest square root of range, exclusively.

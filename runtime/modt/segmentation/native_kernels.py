@@ -33,7 +33,7 @@ from modt.types import N_REFLECTANCE, Float32, Float64, Int
 
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, _L, Own, Own, FLOAT32, *[Own] * 3)),
+    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, Own, Own, FLOAT32, *[Own] * 3)),
     "modt_occupied_cells": (_L, (Own, FLOAT32, _L, _F, _I, _I, INT32, Own, Own, Own, Own)),
     "modt_cluster": (_L, (Own, Own, Own, FLOAT32, _L, _I, _I, Own, Own, Own)),
     "modt_view_bounds": (None, (Own, Own, FLOAT32, INT64, INT64, _L, INT64, _L, Own, Own)),
@@ -79,17 +79,8 @@ class _GroundBuffers:
         sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS
         self.constants = _Ground(grid.rings, *sectors, *scales, *slopes, *limits)
         self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
-        self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
-        self.points = np.empty((3, 0), np.float32)
-        self.rays = np.empty((4, SECTORS), np.float32)
-        self._scratch = pointers(*self.cells, self.points)
-
-    def scratch(self, n: int) -> array[int]:
-        """Scratch of ground.c, for n points."""
-        if n > self.points.shape[1]:
-            self.points = np.empty((3, n), np.float32)
-            self._scratch = pointers(*self.cells, self.points)
-        return self._scratch
+        self.cells, self.kind = np.empty((5, grid.size + 1), np.float32), np.empty(grid.size, np.uint8)
+        self.points, self.rays = np.empty((3, 0), np.float32), np.empty((4, SECTORS), np.float32)
 
 
 class NativeKernels(NativeGeometryKernels, Kernels):
@@ -105,7 +96,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
         self._last_cells: tuple[Cells | None, array[int]] = None, array("Q")
-        self._work = np.empty(1, np.int32)
+        self._work, self._number = np.empty((2, 1), np.int32)
         self._strips: dict[CarLimits, Any] = {}
         self._ground: dict[GroundEstimator, _GroundBuffers] = {}
 
@@ -114,13 +105,15 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     ) -> tuple[Int, PointColumns, Float32, Int]:
         """(K,) rows of the points within bounds, those points, their (K,) heights above ground [m] and histogram."""
         buffers = self._ground.get(ground) or self._ground.setdefault(ground, _GroundBuffers(ground))
-        points = np.ascontiguousarray(points, np.float32)
-        n, width = points.shape
+        points, n = np.ascontiguousarray(points[:, :4], np.float32), len(points)
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
-        scratch, out, count = buffers.scratch(n), pointers(kept), np.zeros(bins_up_to(float(bounds[1])), np.int64)
+        if n > buffers.points.shape[1]:
+            buffers.points = np.empty((3, n), np.float32)
+        scratch, out = pointers(buffers.cells[:4], buffers.kind, buffers.points), pointers(kept)
+        count = np.zeros(bins_up_to(float(bounds[1])), np.int64)
         k = self.library.modt_above_ground(
-            buffers.constants, ground.grid.range_m, buffers.flat_m, sensor_height_m, points, n, width, scratch,
-            buffers.rays, bounds, rows, out, count,
+            buffers.constants, ground.grid.range_m, buffers.flat_m, sensor_height_m, points, n, scratch, buffers.rays,
+            bounds, rows, out, count,
         )  # fmt: skip
         x, y, z, sqrt_range, height = kept[:, :k]
         return rows[:k], PointColumns(x, y, z, sqrt_range), height, count
@@ -130,16 +123,17 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     ) -> tuple[Cells, Int, PointColumns, Int]:
         """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
         k = len(points)
-        places, entries = np.empty((2, k), np.int32), np.empty(k, np.int64)
+        if len(self._number) < grid.side**2:
+            self._number = np.empty(grid.side**2, np.int32)
+        places, (entries, sample, cell) = np.empty((2, k), np.int32), np.empty((3, k), np.int64)
         heights, sampled = np.empty((2, k), np.float32), np.empty((4, k), np.float32)
-        sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
         given, out, columns = self._columns(points), pointers(places, heights, entries), pointers(sampled)
         n = self.library.modt_occupied_cells(
-            given, height, k, 1 / grid.step, grid.centre, grid.side, grid.number, sample, columns, cell, out,
+            given, height, k, 1 / grid.step, grid.centre, grid.side, self._number, sample, columns, cell, out,
         )  # fmt: skip
-        (row, column), (low, high) = places[:, k - n :], heights[:, k - n :]
-        cells = Cells(row, column, low, high, entries[k - n :])
-        return cells, sample[k - n :], PointColumns(*sampled[:, k - n :]), cell
+        (row, column), (low, high) = places[:, :n], heights[:, :n]
+        cells = Cells(row, column, low, high, entries[:n])
+        return cells, sample[:n], PointColumns(*sampled[:, :n]), cell
 
     def cluster(
         self, clusterer: CellClusterer, cells: Cells, points: PointColumns, beam_m: Float32
@@ -207,8 +201,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         """(G, 5) mean, standard deviation, maximum, share of bright and share of dark returns of each group."""
         points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
         statistics = np.empty((n, N_REFLECTANCE))
-        given = points, points.shape[1], index, offsets, n
-        self.library.modt_reflectance_statistics(*given, BRIGHT, DARK, statistics)
+        self.library.modt_reflectance_statistics(points, points.shape[1], index, offsets, n, BRIGHT, DARK, statistics)
         return statistics
 
     @staticmethod
