@@ -30,7 +30,9 @@ def logits(layers: Layers, features: Float64) -> Float64:
     *hidden, (weight, bias) = layers
     value: Weights = features.astype(weight.dtype)
     for hidden_weight, hidden_bias in hidden:
-        value = np.tanh(value @ hidden_weight + hidden_bias)
+        value = value @ hidden_weight
+        value += hidden_bias
+        np.tanh(value, out=value)
     output: Float64 = (value @ weight + bias).astype(np.float64)
     return output
 

@@ -30,14 +30,14 @@ class Crops:
         return self.offsets[1:] - self.offsets[:-1]
 
     def padded(self, rows: Int, least: int = 1) -> Float32:
-        """(len(rows), n, 3) crops of these rows, each padded with repetitions of its own points to the largest, or to
+        """(len(rows), n, 3) crops of these rows, each padded with repetitions of its last point to the largest, or to
         the least n.
 
         Repeated points leave the output unchanged: the network takes the maximum over points.
         """
-        count = self.count[rows, None]
-        batch: Float32 = self.xyz[self.offsets[rows, None] + np.arange(count.max(initial=least)) % count]
-        return batch
+        last = self.count[rows, None] - 1
+        places = np.minimum(np.arange(last.max(initial=least - 1) + 1), last)
+        return self.xyz.take(self.offsets[rows, None] + places, axis=0)
 
 
 def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
@@ -65,7 +65,7 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
             members = members[np.arange(max_points) * len(members) // max_points]
         kept.append(members)
         offsets.append(offsets[-1] + len(members))
-    return Crops(points[np.concatenate(kept), :3], np.array(offsets))
+    return Crops(points.take(np.concatenate(kept), axis=0)[:, :3], np.array(offsets))
 
 
 def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
@@ -82,13 +82,16 @@ def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
     """
     if not len(crops):
         return crops
-    x, y, z = crops.xyz.astype(np.float32).T
+    x, y, z = xyz = crops.xyz.T.astype(np.float32, order="C")
     starts, count = crops.offsets[:-1], crops.count
-    mean_x, mean_y = np.add.reduceat(x, starts) / count, np.add.reduceat(y, starts) / count
+    mean_x, mean_y = np.add.reduceat(xyz[:2], starts, axis=1) / count
     azimuth, bound = np.arctan2(mean_y, mean_x), _GROUND_OFFSET_M + _GROUND_SLOPE * np.hypot(mean_x, mean_y)
-    rise = np.clip(np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M, -bound, bound)
-    c, s, ground = np.stack([np.cos(azimuth), np.sin(azimuth), rise + ground_z_m]).repeat(count, axis=1)
-    level = np.stack([c * x + s * y, c * y - s * x])
+    rise = np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M
+    ground = np.minimum(np.maximum(rise, -bound), bound) + ground_z_m
+    c, s, ground = np.array((np.cos(azimuth), np.sin(azimuth), ground)).repeat(count, axis=1)
+    out = np.empty((3, len(c)))
+    level = out[:2]
+    out[0], out[1], out[2] = c * x + s * y, c * y - s * x, z - ground
     ends = np.minimum.reduceat(level, starts, axis=1) + np.maximum.reduceat(level, starts, axis=1)
     level -= (ends / 2).repeat(count, axis=1)
-    return Crops(np.stack([*level, z - ground], axis=1, dtype=np.float32), crops.offsets)
+    return Crops(out.T.astype(np.float32, order="C"), crops.offsets)

@@ -44,9 +44,10 @@ class LikeliestClass:
 
     def _report(self, tracks: Tracks, weighed: Float64) -> None:
         """Write the class of every track by the weights (4, M) of its classes."""
-        likeliest = weighed[1:].argmax(axis=0) + 1
-        reported = weighed[likeliest, np.arange(len(likeliest))] >= self._threshold[likeliest - 1]
-        tracks.object_class = np.where(reported, likeliest, 0)
+        objects = weighed[1:]
+        likeliest = objects.argmax(axis=0)
+        reported = objects.max(axis=0) >= self._threshold[likeliest]
+        tracks.object_class = np.where(reported, likeliest + 1, 0)
 
 
 class Decision(LikeliestClass):
@@ -72,8 +73,9 @@ class Decision(LikeliestClass):
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
         adapted = self.adapted(tracks.posterior.T.copy())
-        weighed, last = adapted.copy(), tracks.object_class
-        weighed[last, np.arange(len(last))] /= self._kept[last]
+        weighed, objects = adapted.copy(), tracks.object_class.nonzero()[0]
+        last = tracks.object_class[objects]
+        weighed[last, objects] /= self._kept[last]
         self._report(tracks, weighed)
         self._learn(adapted.take((tracks.proposal != NONE).nonzero()[0], axis=1))
 
