@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,7 @@ class Crops:
         """(R,) points of each crop."""
         return self.offsets[1:] - self.offsets[:-1]
 
-    def padded(self, rows: Int, least: int = 1) -> Float32:
+    def padded(self, rows: Int | slice, least: int = 1) -> Float32:
         """(len(rows), n, 3) crops of these rows, each padded with repetitions of its last point to the largest, or to
         the least n.
 
@@ -40,6 +41,18 @@ class Crops:
         return self.xyz.take(self.offsets[rows, None] + places, axis=0)
 
 
+def batches(count: list[int], most: int, first: int = 0) -> Iterator[slice]:
+    """Runs of crops that the network takes together, of (R,) ascending numbers of points, `most` crops each at most.
+
+    Args:
+        count: points of each crop.
+        most: crops of a batch.
+        first: place of the first crop.
+    """
+    for k in range(0, len(count), most):
+        yield slice(first + k, first + min(k + most, len(count)))
+
+
 def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
     """(R,) z of the ground beneath proposals [m, sensor frame]: as segmented, else by the height of the sensor."""
     if proposals.ground_z_m is not None:
@@ -48,24 +61,23 @@ def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -
     return np.full(len(proposals), -height_m)[which]
 
 
-def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -> Crops:
+def gather(proposals: Proposals, which: Int, max_points: int) -> Crops:
     """Points of the given proposals, sensor frame; larger ones evenly subsampled, deterministically.
 
     Args:
-        points: (N, 4) points of the frame.
         proposals: proposals of the frame.
         which: (R,) proposals to gather.
         max_points: per crop.
     """
     starts, ends = (proposals.offsets[rows].tolist() for rows in (which, which + 1))
-    kept, offsets = [proposals.members[:0]], [0]
+    kept, offsets = [proposals.coordinates[:, :0]], [0]
     for first, end in zip(starts, ends, strict=True):  # few: faster than all at once
-        members = proposals.members[first:end]
-        if len(members) > max_points:
-            members = members[np.arange(max_points) * len(members) // max_points]
-        kept.append(members)
-        offsets.append(offsets[-1] + len(members))
-    return Crops(points.take(np.concatenate(kept), axis=0)[:, :3], np.array(offsets))
+        own = proposals.coordinates[:, first:end]
+        if end - first > max_points:
+            own = own.take(np.arange(max_points) * (end - first) // max_points, axis=1)
+        kept.append(own)
+        offsets.append(offsets[-1] + own.shape[1])
+    return Crops(np.concatenate(kept, axis=1).T, np.array(offsets))
 
 
 def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
@@ -82,7 +94,7 @@ def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
     """
     if not len(crops):
         return crops
-    x, y, z = xyz = crops.xyz.T.astype(np.float32, order="C")
+    x, y, z = xyz = crops.xyz.T.astype(np.float32, order="C", copy=False)
     starts, count = crops.offsets[:-1], crops.count
     mean_x, mean_y = np.add.reduceat(xyz[:2], starts, axis=1) / count
     azimuth, bound = np.arctan2(mean_y, mean_x), _GROUND_OFFSET_M + _GROUND_SLOPE * np.hypot(mean_x, mean_y)
