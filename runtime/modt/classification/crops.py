@@ -10,6 +10,8 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.types import Float32, Float64, Int, Proposals
 
+MAX_PADDING = 100
+"""Points of padding that a batch takes on for its next crop; beyond them a further call of the network is cheaper."""
 # Definition of the canonical frame: fixed when a model is trained.
 _LOWEST_M = 0.3  # height of a standing object's lowest point: what is lower was removed with the ground
 _GROUND_OFFSET_M, _GROUND_SLOPE = 0.1, 0.005  # bound on the ground's height beneath a crop: constant, and per range
@@ -42,15 +44,20 @@ class Crops:
 
 
 def batches(count: list[int], most: int, first: int = 0) -> Iterator[slice]:
-    """Runs of crops that the network takes together, of (R,) ascending numbers of points, `most` crops each at most.
+    """Runs of crops, sorted by their number of points, that the network takes together.
 
     Args:
-        count: points of each crop.
+        count: points of each crop, ascending.
         most: crops of a batch.
         first: place of the first crop.
     """
-    for k in range(0, len(count), most):
-        yield slice(first + k, first + min(k + most, len(count)))
+    start, end = 0, len(count)
+    for k in range(1, end):
+        if k - start == most or (k - start) * (count[k] - count[k - 1]) > MAX_PADDING:
+            yield slice(first + start, first + k)
+            start = k
+    if end:
+        yield slice(first + start, first + end)
 
 
 def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:

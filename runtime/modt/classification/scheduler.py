@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from modt.classes import N_CLASSES
+from modt.classification.crops import batches
 from modt.config import ClassificationConfig
 from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tracks
 
@@ -18,15 +19,14 @@ from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tra
 def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
     """Points that the network processes, padding included, for proposals of (R,) points.
 
-    A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them and
-    to min_points.
+    A call takes a batch of proposals, of max_points each at most, padded to the largest of them and to min_points.
     """
     return partial(_padded, limits.max_points, limits.min_points, limits.batch)
 
 
 def _padded(most: int, least: int, batch: int, count: Int) -> int:
     size = sorted(max(min(n, most), least) for n in count.tolist())  # few: faster than arrays
-    return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
+    return sum((rows.stop - rows.start) * size[rows.stop - 1] for rows in batches(size, batch))
 
 
 UNCERTAINTY_WEIGHT, NEARNESS_WEIGHT, NOVELTY_WEIGHT = 0.4, 0.3, 0.3
