@@ -65,8 +65,8 @@ class Decision(LikeliestClass):
         super().__init__(config, frequency)
         self._assumed = frequency
         start = config.frequency
-        self._start = frequency if start is None else np.array([1.0 - sum(start), *start])
-        self.frequency = self._start.copy()
+        self.frequency = frequency.copy() if start is None else np.array([1.0 - sum(start), *start])
+        self._start_mass = START_PROPOSALS * self.frequency
         self._mass = np.zeros(N_CLASSES)
         self._kept = np.append(1.0, np.minimum(KEPT_FROM / self._threshold, 1.0))
 
@@ -91,7 +91,7 @@ class Decision(LikeliestClass):
         total = self._mass.sum()
         if total > MEMORY_PROPOSALS:
             self._mass *= MEMORY_PROPOSALS / total
-        mass, assumed = (START_PROPOSALS * self._start + self._mass).tolist(), self._assumed.tolist()
+        mass, assumed = (self._start_mass + self._mass).tolist(), self._assumed.tolist()
         n = sum(mass)  # lists are faster than arrays of four
         objects = [min(max(m / n, a), a * MAX_CHANGE) for m, a in zip(mass[1:], assumed[1:], strict=True)]
         frequency = [max(1.0 - sum(objects), MIN_BACKGROUND), *objects]

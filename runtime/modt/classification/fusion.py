@@ -53,6 +53,7 @@ MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 one view of a few points is weak evidence, and many of them are right."""
 NEAR_M = 3.0
 """Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
+_POWERS = np.arange(1000) ** GROWTH  # by the number of views; more of them hardly weigh more
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
@@ -186,7 +187,7 @@ class FusedTracks:
 
     def _posterior(self, tracks: Tracks, rows: Int, prior: Float64, boxes: Float64, witness: Float64) -> Float64:
         """Posterior (4, R) of the rows by their views, and by their boxes and motion, (4, R) each."""
-        weight = tracks.views[rows] ** GROWTH
+        weight = _POWERS.take(tracks.views[rows], mode="clip")
         known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
         known += BOX_WEIGHT * boxes + witness
         posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)

@@ -231,7 +231,8 @@ class PointNet:
         by_size = which[order]
         crops = gather(proposals, by_size, self.config.max_points)
         crops = canonical(crops, ground_z_m(proposals, by_size, self._sensor))
-        count, middle, out = crops.count.tolist(), len(which) - np.count_nonzero(near), np.empty((len(which), N_CLASSES))
+        count, middle = crops.count.tolist(), int(np.count_nonzero(~near))
+        out = np.empty((len(which), N_CLASSES))
         for session, first, end in ((self._session, 0, middle), (self._near, middle, len(which))):
             for rows in batches(count[first:end], self.config.batch, first):
                 out[order[rows]] = self.infer(crops.padded(rows, self.config.min_points), session)
