@@ -16,7 +16,7 @@ from modt.errors import MisuseError
 if TYPE_CHECKING:
     from modt.geometry.beams import Beams
 
-BATCH = 4
+BATCH = 8
 """Proposals of one network call: few enough for their features to stay in the cache."""
 NATIVE, NUMPY = "native", "numpy"
 KERNELS = ("auto", NATIVE, NUMPY)

@@ -115,7 +115,7 @@ def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds() -> N
 def test_features_of_crops_and_proposals_agree() -> None:
     frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
     proposals = Segmenter(SegmentationConfig(), SENSOR, FieldOfView()).segment(frame.points)
-    crops = gather(frame.points, proposals, np.arange(len(proposals)), 100_000)
+    crops = gather(proposals, np.arange(len(proposals)), 100_000)
     expected = proposal_features(proposals, SENSOR)
     assert len(crops) > 50
     sensors = Sensors.of(SENSOR, proposals.box, ground_z_m(proposals, slice(None), SENSOR))

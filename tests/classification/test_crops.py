@@ -28,7 +28,7 @@ def canonical_one(xyz: np.ndarray, ground_z_m: float) -> np.ndarray:
 def test_canonical_agrees_with_the_reference(counts: list[int], seed: int) -> None:
     points, proposals = blobs(counts, np.random.default_rng(seed))
     ground_z_m = np.linspace(-2.0, -1.0, len(counts))
-    crops = canonical(gather(points, proposals, np.arange(len(counts)), 1000), ground_z_m)
+    crops = canonical(gather(proposals, np.arange(len(counts)), 1000), ground_z_m)
     for i in range(len(counts)):
         members = proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]]
         expected = canonical_one(points[members, :3].astype(np.float64), ground_z_m[i])
@@ -38,7 +38,7 @@ def test_canonical_agrees_with_the_reference(counts: list[int], seed: int) -> No
 @given(own=st.integers(1, 500), most=st.integers(1, 100))
 def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
     points, proposals = blobs([own], np.random.default_rng(own))
-    crops = gather(points, proposals, np.array([0]), most)
+    crops = gather(proposals, np.array([0]), most)
     kept = [int(np.flatnonzero((points[proposals.members, :3] == p).all(axis=1))[0]) for p in crops.xyz]
     assert len(kept) == min(own, most)
     assert len(set(kept)) == len(kept)
@@ -49,7 +49,7 @@ def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
 @given(counts=COUNTS)
 def test_padding_repeats_own_points(counts: list[int]) -> None:
     points, proposals = blobs(counts, np.random.default_rng(1))
-    crops = gather(points, proposals, np.arange(len(counts)), 100)
+    crops = gather(proposals, np.arange(len(counts)), 100)
     batch = crops.padded(np.arange(len(counts)))
     assert batch.shape == (len(counts), max(counts), 3)
     for i, own in enumerate(batch):

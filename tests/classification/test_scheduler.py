@@ -177,7 +177,7 @@ def test_cost_model_survives_any_measurement(frames: list[tuple[int, float]]) ->
     assert (price >= 0).all()
 
 
-@pytest.mark.parametrize(("likelihood", "points"), [("network", 6 * 400), ("pooled", 4 * 290 + 2 * 400)])
+@pytest.mark.parametrize(("likelihood", "points"), [("network", 6 * 400), ("pooled", 3 * 20 + 290 + 2 * 400)])
 def test_points_are_counted_with_padding(likelihood: str, points: int) -> None:
     size = padded_size(ClassificationConfig(likelihood=likelihood, max_points=400))
     assert size(np.array([10, 700, 290, 10, 20, 400])) == points

@@ -18,6 +18,7 @@ from modt.classes import N_CLASSES
 from modt.classification.crops import ground_z_m
 from modt.classification.pool import PoolWeights
 from modt.config import SensorConfig
+from modt.geometry.beams import Beams
 from modt.types import Bool, Cut, Float64, Int, Proposals
 
 Weights = NDArray[np.floating[Any]]
@@ -30,7 +31,9 @@ def logits(layers: Layers, features: Float64) -> Float64:
     *hidden, (weight, bias) = layers
     value: Weights = features.astype(weight.dtype)
     for hidden_weight, hidden_bias in hidden:
-        value = np.tanh(value @ hidden_weight + hidden_bias)
+        value = value @ hidden_weight
+        value += hidden_bias
+        np.tanh(value, out=value)
     output: Float64 = (value @ weight + bias).astype(np.float64)
     return output
 
@@ -90,13 +93,6 @@ class MlpBoxClassifier:
 BoxClassifier = NoBoxClassifier | MlpBoxClassifier
 
 
-def beam_solid_angle_sr(sensor: SensorConfig, box: Float64) -> Float64:
-    """(P,) or () solid angle between neighbouring beams at (P, 7) boxes, sensor frame [sr]."""
-    tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
-    elevation_step_rad = sensor.beams.step_rad(tangent.astype(np.float32))
-    return np.asarray(np.deg2rad(sensor.azimuth_step_deg) * elevation_step_rad, np.float64)
-
-
 def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64) -> Float64:
     """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
 
@@ -113,8 +109,9 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
     area, distance, *_, foot, top = features
     np.maximum(np.hypot(x, y), 1.0, out=distance)
     np.multiply(np.minimum(np.maximum(count, 1), _MAX_COUNT), distance**2 * beam_sr, out=area)
-    features[2:5] = length + _LENGTH_OFFSET_M, width + _LENGTH_OFFSET_M, height
+    np.add((length, width), _LENGTH_OFFSET_M, out=features[2:4])
     np.log(features[:4], out=features[:4])
+    features[4] = height
     foot[:] = z - height / 2 - ground_z_m
     np.add(foot, height, out=top)
     return features.T
@@ -134,10 +131,19 @@ def bound_features(features: Float64, cut: Int) -> Float64:
     return np.column_stack([features, *((cut & side) > 0 for side in Cut)])
 
 
-def proposal_features(proposals: Proposals, sensor: SensorConfig) -> Float64:
-    """(P, 7) box features of the proposals."""
-    beam_sr = beam_solid_angle_sr(sensor, proposals.box)
-    return box_features(proposals.count, proposals.box, ground_z_m(proposals, slice(None), sensor), beam_sr)
+def proposal_features(proposals: Proposals, sensor: SensorConfig, beams: Beams | None = None) -> Float64:
+    """(P, 7) box features of the proposals.
+
+    Args:
+        proposals: proposals of a frame.
+        sensor: its angular steps, and its height where the proposals have none.
+        beams: of the sensor, if they are at hand.
+    """
+    box = proposals.box
+    tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
+    elevation_step_rad = (beams or sensor.beams).step_rad(tangent.astype(np.float32))
+    beam_sr = np.asarray(np.deg2rad(sensor.azimuth_step_deg) * elevation_step_rad, np.float64)
+    return box_features(proposals.count, box, ground_z_m(proposals, slice(None), sensor), beam_sr)
 
 
 def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None = None) -> BoxClassifier:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.types import Float32, Float64, Int, Proposals
 
+MAX_PADDING = 100
+"""Points of padding that a batch takes on for its next crop; beyond them a further call of the network is cheaper."""
 # Definition of the canonical frame: fixed when a model is trained.
 _LOWEST_M = 0.3  # height of a standing object's lowest point: what is lower was removed with the ground
 _GROUND_OFFSET_M, _GROUND_SLOPE = 0.1, 0.005  # bound on the ground's height beneath a crop: constant, and per range
@@ -29,15 +32,32 @@ class Crops:
         """(R,) points of each crop."""
         return self.offsets[1:] - self.offsets[:-1]
 
-    def padded(self, rows: Int, least: int = 1) -> Float32:
-        """(len(rows), n, 3) crops of these rows, each padded with repetitions of its own points to the largest, or to
+    def padded(self, rows: Int | slice, least: int = 1) -> Float32:
+        """(len(rows), n, 3) crops of these rows, each padded with repetitions of its last point to the largest, or to
         the least n.
 
         Repeated points leave the output unchanged: the network takes the maximum over points.
         """
-        count = self.count[rows, None]
-        batch: Float32 = self.xyz[self.offsets[rows, None] + np.arange(count.max(initial=least)) % count]
-        return batch
+        last = self.count[rows, None] - 1
+        places = np.minimum(np.arange(last.max(initial=least - 1) + 1), last)
+        return self.xyz.take(self.offsets[rows, None] + places, axis=0)
+
+
+def batches(count: list[int], most: int, first: int = 0) -> Iterator[slice]:
+    """Runs of crops, sorted by their number of points, that the network takes together.
+
+    Args:
+        count: points of each crop, ascending.
+        most: crops of a batch.
+        first: place of the first crop.
+    """
+    start, end = 0, len(count)
+    for k in range(1, end):
+        if k - start == most or (k - start) * (count[k] - count[k - 1]) > MAX_PADDING:
+            yield slice(first + start, first + k)
+            start = k
+    if end:
+        yield slice(first + start, first + end)
 
 
 def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
@@ -48,24 +68,23 @@ def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -
     return np.full(len(proposals), -height_m)[which]
 
 
-def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -> Crops:
+def gather(proposals: Proposals, which: Int, max_points: int) -> Crops:
     """Points of the given proposals, sensor frame; larger ones evenly subsampled, deterministically.
 
     Args:
-        points: (N, 4) points of the frame.
         proposals: proposals of the frame.
         which: (R,) proposals to gather.
         max_points: per crop.
     """
     starts, ends = (proposals.offsets[rows].tolist() for rows in (which, which + 1))
-    kept, offsets = [proposals.members[:0]], [0]
+    kept, offsets = [proposals.coordinates[:, :0]], [0]
     for first, end in zip(starts, ends, strict=True):  # few: faster than all at once
-        members = proposals.members[first:end]
-        if len(members) > max_points:
-            members = members[np.arange(max_points) * len(members) // max_points]
-        kept.append(members)
-        offsets.append(offsets[-1] + len(members))
-    return Crops(points[np.concatenate(kept), :3], np.array(offsets))
+        own = proposals.coordinates[:, first:end]
+        if end - first > max_points:
+            own = own.take(np.arange(max_points) * (end - first) // max_points, axis=1)
+        kept.append(own)
+        offsets.append(offsets[-1] + own.shape[1])
+    return Crops(np.concatenate(kept, axis=1).T, np.array(offsets))
 
 
 def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
@@ -82,13 +101,16 @@ def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
     """
     if not len(crops):
         return crops
-    x, y, z = crops.xyz.astype(np.float32).T
+    x, y, z = xyz = crops.xyz.T.astype(np.float32, order="C", copy=False)
     starts, count = crops.offsets[:-1], crops.count
-    mean_x, mean_y = np.add.reduceat(x, starts) / count, np.add.reduceat(y, starts) / count
+    mean_x, mean_y = np.add.reduceat(xyz[:2], starts, axis=1) / count
     azimuth, bound = np.arctan2(mean_y, mean_x), _GROUND_OFFSET_M + _GROUND_SLOPE * np.hypot(mean_x, mean_y)
-    rise = np.clip(np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M, -bound, bound)
-    c, s, ground = np.stack([np.cos(azimuth), np.sin(azimuth), rise + ground_z_m]).repeat(count, axis=1)
-    level = np.stack([c * x + s * y, c * y - s * x])
+    rise = np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M
+    ground = np.minimum(np.maximum(rise, -bound), bound) + ground_z_m
+    c, s, ground = np.array((np.cos(azimuth), np.sin(azimuth), ground)).repeat(count, axis=1)
+    out = np.empty((3, len(c)))
+    level = out[:2]
+    out[0], out[1], out[2] = c * x + s * y, c * y - s * x, z - ground
     ends = np.minimum.reduceat(level, starts, axis=1) + np.maximum.reduceat(level, starts, axis=1)
     level -= (ends / 2).repeat(count, axis=1)
-    return Crops(np.stack([*level, z - ground], axis=1, dtype=np.float32), crops.offsets)
+    return Crops(out.T.astype(np.float32, order="C"), crops.offsets)

@@ -44,9 +44,10 @@ class LikeliestClass:
 
     def _report(self, tracks: Tracks, weighed: Float64) -> None:
         """Write the class of every track by the weights (4, M) of its classes."""
-        likeliest = weighed[1:].argmax(axis=0) + 1
-        reported = weighed[likeliest, np.arange(len(likeliest))] >= self._threshold[likeliest - 1]
-        tracks.object_class = np.where(reported, likeliest, 0)
+        objects = weighed[1:]
+        likeliest = objects.argmax(axis=0)
+        reported = objects.max(axis=0) >= self._threshold[likeliest]
+        tracks.object_class = np.where(reported, likeliest + 1, 0)
 
 
 class Decision(LikeliestClass):
@@ -64,16 +65,17 @@ class Decision(LikeliestClass):
         super().__init__(config, frequency)
         self._assumed = frequency
         start = config.frequency
-        self._start = frequency if start is None else np.array([1.0 - sum(start), *start])
-        self.frequency = self._start.copy()
+        self.frequency = frequency.copy() if start is None else np.array([1.0 - sum(start), *start])
+        self._start_mass = START_PROPOSALS * self.frequency
         self._mass = np.zeros(N_CLASSES)
         self._kept = np.append(1.0, np.minimum(KEPT_FROM / self._threshold, 1.0))
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
         adapted = self.adapted(tracks.posterior.T.copy())
-        weighed, last = adapted.copy(), tracks.object_class
-        weighed[last, np.arange(len(last))] /= self._kept[last]
+        weighed, objects = adapted.copy(), tracks.object_class.nonzero()[0]
+        last = tracks.object_class[objects]
+        weighed[last, objects] /= self._kept[last]
         self._report(tracks, weighed)
         self._learn(adapted.take((tracks.proposal != NONE).nonzero()[0], axis=1))
 
@@ -89,7 +91,7 @@ class Decision(LikeliestClass):
         total = self._mass.sum()
         if total > MEMORY_PROPOSALS:
             self._mass *= MEMORY_PROPOSALS / total
-        mass, assumed = (START_PROPOSALS * self._start + self._mass).tolist(), self._assumed.tolist()
+        mass, assumed = (self._start_mass + self._mass).tolist(), self._assumed.tolist()
         n = sum(mass)  # lists are faster than arrays of four
         objects = [min(max(m / n, a), a * MAX_CHANGE) for m, a in zip(mass[1:], assumed[1:], strict=True)]
         frequency = [max(1.0 - sum(objects), MIN_BACKGROUND), *objects]

@@ -53,6 +53,7 @@ MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 one view of a few points is weak evidence, and many of them are right."""
 NEAR_M = 3.0
 """Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
+_POWERS = np.arange(1000) ** GROWTH  # by the number of views; more of them hardly weigh more
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
@@ -145,18 +146,24 @@ class FusedTracks:
         self.certain = Certainty(self._log_frequency, config.object_threshold, background_threshold)
 
     def observe(self, tracks: Tracks, proposals: Proposals) -> Seen:
-        """Add the box and the motion of every track with a proposal to what is known of it."""
+        """Add the box and the motion of every track with a proposal to what is known of it.
+
+        The class of a remembered place has probability 1.
+        """
         rows = (tracks.proposal != NONE).nonzero()[0]
         prior = self.prior.probability(proposals).T.take(tracks.proposal[rows], axis=1)
         evidence, known = _log(prior) - self._log_frequency[:, None], _by_class(tracks.box_evidence, rows)
         gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows]
         witness = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m.take(rows, axis=0)).T
-        tracks.prior[rows], tracks.witness[rows] = prior.T, witness.T
-        tracks.box_evidence[rows] = (known + gain * (evidence - known)).T
+        boxes = known + gain * (evidence - known)
+        tracks.prior[rows], tracks.witness[rows], tracks.box_evidence[rows] = prior.T, witness.T, boxes.T
         weighed = prior * np.exp(witness)
         probability = (weighed / weighed.sum(axis=0)).T
         may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
-        return Seen(rows, self._conclude(tracks, rows), may_be_object)
+        posterior = self._posterior(tracks, rows, prior, boxes, witness)
+        posterior.T[tracks.inherited[rows]] = _BACKGROUND
+        tracks.posterior[rows] = posterior.T
+        return Seen(rows, posterior, may_be_object)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows; (R,) which are certain now.
@@ -173,18 +180,18 @@ class FusedTracks:
         tracks.weight[rows] = total
         tracks.views[rows] += 1
         tracks.key_points[rows], tracks.key_age[rows] = count, tracks.age[rows]
-        return self.certain(self._conclude(tracks, rows))
-
-    def _conclude(self, tracks: Tracks, rows: Int) -> Float64:
-        """Posterior (4, R) of the rows, which is written; the class of a remembered place has probability 1."""
-        weight = tracks.views[rows] ** GROWTH
-        known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
-        known += BOX_WEIGHT * _by_class(tracks.box_evidence, rows) + _by_class(tracks.witness, rows)
-        posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
-        posterior += MISMATCH_PROBABILITY * _by_class(tracks.prior, rows)
-        inherited = tracks.inherited[rows].nonzero()[0]
-        posterior[:, inherited] = _BACKGROUND[:, None]
+        boxes, witness = _by_class(tracks.box_evidence, rows), _by_class(tracks.witness, rows)
+        posterior = self._posterior(tracks, rows, prior.T, boxes, witness)
         tracks.posterior[rows] = posterior.T
+        return self.certain(posterior)
+
+    def _posterior(self, tracks: Tracks, rows: Int, prior: Float64, boxes: Float64, witness: Float64) -> Float64:
+        """Posterior (4, R) of the rows by their views, and by their boxes and motion, (4, R) each."""
+        weight = _POWERS.take(tracks.views[rows], mode="clip")
+        known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
+        known += BOX_WEIGHT * boxes + witness
+        posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
+        posterior += MISMATCH_PROBABILITY * prior
         return posterior
 
 
@@ -257,7 +264,7 @@ def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:
 
 def _by_class(column: Float64, rows: Int) -> Float64:
     """(4, R) rows of a column (M, 4), a contiguous row a class: arithmetic along axes of four would be slow."""
-    return column.T.take(rows, axis=1)
+    return column.take(rows, axis=0).T.copy()
 
 
 def _log(probability: Float64) -> Float64:

@@ -22,7 +22,7 @@ from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 from modt import assets
 from modt.classes import N_CLASSES
 from modt.classification import box_classifier, reflectance_classifier
-from modt.classification.crops import canonical, gather, ground_z_m
+from modt.classification.crops import batches, canonical, gather, ground_z_m
 from modt.classification.pool import log_pool, softmax
 from modt.classification.prior import BoxScores
 from modt.config import ClassificationConfig, SensorConfig
@@ -222,19 +222,20 @@ class PointNet:
         """(R, 4) class probabilities of the given proposals, in their order.
 
         Args:
-            points: (N, 4) points of the frame.
+            points: (N, 4) points of the frame; the proposals hold the coordinates of theirs.
             proposals: proposals of the frame.
             which: (R,) proposals to classify.
         """
-        crops = gather(points, proposals, which, self.config.max_points)
-        crops = canonical(crops, ground_z_m(proposals, which, self._sensor))
-        out = np.empty((len(crops), N_CLASSES))
-        by_size = crops.count.argsort(kind="stable")
-        near = self.box_scores.bound(proposals)[which[by_size]] if self._near else np.zeros(len(crops), np.bool_)
-        for session, own in ((self._session, by_size[~near]), (self._near, by_size[near])):
-            for first in range(0, len(own), self.config.batch):
-                rows = own[first : first + self.config.batch]
-                out[rows] = self.infer(crops.padded(rows, self.config.min_points), session)
+        near = self.box_scores.bound(proposals)[which] if self._near else np.zeros(len(which), np.bool_)
+        order = np.lexsort((proposals.count[which], near))
+        by_size = which[order]
+        crops = gather(proposals, by_size, self.config.max_points)
+        crops = canonical(crops, ground_z_m(proposals, by_size, self._sensor))
+        count, middle = crops.count.tolist(), int(np.count_nonzero(~near))
+        out = np.empty((len(which), N_CLASSES))
+        for session, first, end in ((self._session, 0, middle), (self._near, middle, len(which))):
+            for rows in batches(count[first:end], self.config.batch, first):
+                out[order[rows]] = self.infer(crops.padded(rows, self.config.min_points), session)
         return self._pooled(out, proposals, which)
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:

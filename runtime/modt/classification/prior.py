@@ -28,7 +28,7 @@ class BoxScores:
 
     def __init__(self, boxes: BoxClassifier, reflectance: ReflectanceClassifier, sensor: SensorConfig) -> None:
         self.boxes, self.reflectance, self._sensor = boxes, reflectance, sensor
-        self._proposals = Proposals.empty()
+        self._beams, self._proposals = sensor.beams, Proposals.empty()
         self._scores = np.zeros((0, N_CLASSES)), np.zeros((0, N_CLASSES))
 
     @property
@@ -45,7 +45,7 @@ class BoxScores:
     def of(self, proposals: Proposals) -> tuple[Float64, Float64]:
         """(P, 4) log P(class | box) and (P, 4) log P(reflectance | class, box), up to constants."""
         if proposals is not self._proposals:
-            features = proposal_features(proposals, self._sensor)
+            features = proposal_features(proposals, self._sensor, self._beams)
             boxes = self.boxes.log_probability(features, proposals.cut)
             reflectance = self.reflectance.log_likelihood(features, proposals.reflectance)
             self._proposals, self._scores = proposals, (boxes, reflectance)

@@ -55,7 +55,7 @@ class MlpReflectanceClassifier:
         Zeros where a proposal has no reflectance (NaN) or the sweep has none (None).
         """
         if reflectance is not None:
-            likelihood = logits(self._layers, np.hstack([box_features, reflectance]))
+            likelihood = logits(self._layers, np.concatenate((box_features, reflectance), axis=1))
             likelihood[np.isnan(reflectance[:, 0])] = 0.0
             return likelihood
         if len(box_features) and not self._warned:

@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from modt.classes import N_CLASSES
+from modt.classification.crops import batches
 from modt.config import ClassificationConfig
 from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tracks
 
@@ -18,15 +19,14 @@ from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tra
 def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
     """Points that the network processes, padding included, for proposals of (R,) points.
 
-    A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them and
-    to min_points.
+    A call takes a batch of proposals, of max_points each at most, padded to the largest of them and to min_points.
     """
     return partial(_padded, limits.max_points, limits.min_points, limits.batch)
 
 
 def _padded(most: int, least: int, batch: int, count: Int) -> int:
     size = sorted(max(min(n, most), least) for n in count.tolist())  # few: faster than arrays
-    return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
+    return sum((rows.stop - rows.start) * size[rows.stop - 1] for rows in batches(size, batch))
 
 
 UNCERTAINTY_WEIGHT, NEARNESS_WEIGHT, NOVELTY_WEIGHT = 0.4, 0.3, 0.3
@@ -40,6 +40,7 @@ FORGETTING = 0.98
 """Weight per frame of the past in the fit of a call's cost: with less, it follows the machine faster."""
 START_MARGIN, MARGIN_STEP = 1.5, 0.05
 """The estimate of a call's cost over the fit, at the start, and by how much an underestimate raises its logarithm."""
+_MAX_ENTROPY = math.log(N_CLASSES)
 _POINTS = 100.0  # the unit of points, which conditions the fit
 _DIAGONAL = np.eye(3)
 _LEAST_MS = 1e-3  # what takes less was not measured
@@ -160,20 +161,22 @@ class Scheduler:
             asks: (M,) tracks that request a class, each with a proposal.
             budget: budget of the frame.
         """
-        asking = (asks & (tracks.proposal != NONE)).nonzero()[0]
+        observed = tracks.proposal != NONE
+        asking = (asks & observed).nonzero()[0]
         worth = self.worth(tracks, proposals, asking)
         ranked = asking[np.lexsort((tracks.id[asking], -worth))]
         granted = self._affordable(proposals.count[tracks.proposal[ranked]], budget)
-        tracks.waiting[~asks & (tracks.proposal != NONE)] = 0
-        tracks.waiting[ranked[granted]] = 0
-        tracks.waiting[ranked[~granted]] += 1
-        return Selection(ranked[granted], int(np.count_nonzero(~granted)))
+        deferred = ranked[~granted]
+        waiting = tracks.waiting[deferred] + 1
+        tracks.waiting[observed] = 0
+        tracks.waiting[deferred] = waiting
+        return Selection(ranked[granted], len(deferred))
 
     def worth(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Float64:
         """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
         proposal_rows = tracks.proposal[rows]
         posterior = np.maximum(tracks.posterior[rows], 1e-12)
-        uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / np.log(N_CLASSES)
+        uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / _MAX_ENTROPY
         count, last_points = proposals.count[proposal_rows], tracks.key_points[rows]
         novelty = np.minimum(np.abs(count - last_points) / np.maximum(last_points, 1), 1.0)
         nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / NEARNESS_RANGE_M)
@@ -215,7 +218,7 @@ class Scheduler:
                 else:
                     self.cost.starve()
                     granted[0] = self.cost.outdated and frame_ms > 0
-        if budget.calls is not None:
+        if budget.calls is not None and len(points) > budget.calls:
             granted &= np.cumsum(granted) <= budget.calls
         return granted
 

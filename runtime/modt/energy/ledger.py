@@ -7,6 +7,7 @@ frame: the spans of the stages, the overhead of the ledger, and the rest (waitin
 from __future__ import annotations
 
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
@@ -27,7 +28,7 @@ class Ledger:
 
     def __init__(self, wall_ns: Clock = time.perf_counter_ns, cpu_ns: Clock = time.thread_time_ns) -> None:
         self._wall_ns, self._cpu_ns = wall_ns, cpu_ns
-        self._stages: dict[str, dict[str, int]] = {}
+        self._stages = defaultdict[str, dict[str, int]](NO_WORK.copy)
         self._wall0, self._cpu0 = wall_ns(), cpu_ns()
         self.span_overhead_ns = self.frame_overhead_ns = 0
         self.span_overhead_ns, self.frame_overhead_ns = self._measure_overhead()
@@ -44,7 +45,7 @@ class Ledger:
             result = function(*args, **kwargs)
         finally:
             cpu1, wall1 = self._cpu_ns(), self._wall_ns()
-            row = self._stages.setdefault(stage, NO_WORK.copy())
+            row = self._stages[stage]
             row["calls"] += 1
             row["wall_ns"] += wall1 - wall0
             row["cpu_ns"] += cpu1 - cpu0
@@ -55,7 +56,7 @@ class Ledger:
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
         """Add work to the stage beyond the length of its result."""
-        row = self._stages.setdefault(stage, NO_WORK.copy())
+        row = self._stages[stage]
         row["items"] += items
         row["points"] += points
 
@@ -68,7 +69,7 @@ class Ledger:
         wall, cpu = self._wall_ns(), self._cpu_ns()
         frame_wall, frame_cpu = wall - self._wall0, cpu - self._cpu0
         self._wall0, self._cpu0 = wall, cpu
-        rows, self._stages = self._stages, {}
+        rows, self._stages = dict(self._stages), defaultdict(NO_WORK.copy)
         marks: list[str] = []
         for row in rows.values():
             if row["wall_ns"] < 0 or row["cpu_ns"] < 0:
@@ -101,7 +102,8 @@ class Ledger:
             for _ in range(spans):
                 self.run("", _nothing)
             t2 = self._cpu_ns()
-            self._stages = {stage: NO_WORK.copy() for stage in STAGES}
+            for stage in STAGES:
+                self._stages[stage] = NO_WORK.copy()
             t3 = self._cpu_ns()
             self.close_frame(0)
             t4 = self._cpu_ns()

@@ -20,7 +20,7 @@ from tools.train.near_scans import HEIGHT_M, near_scans
 def test_augmentation_keeps_every_crop_and_enough_points(counts, seed):
     rng = np.random.default_rng(seed)
     points, proposals = blobs(counts, rng)
-    crops = gather(points, proposals, np.arange(len(counts)), 1000)
+    crops = gather(proposals, np.arange(len(counts)), 1000)
     augmented, _ = augment(
         crops, Sensors.of(SensorConfig(), np.ones((len(crops), 7)), np.full(len(crops), -1.73)), rng
     )
