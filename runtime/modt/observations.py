@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -46,14 +46,12 @@ class Observations:
 
     def move(self, step: Float64) -> None:
         """Displace all in place by steps (P, 2) [m, world]."""
-        self.box[:, :2] += step
-        self.centroid[:] += step
-        self.kdop[:] += DIRECTIONS.T @ step.T
+        for own, along in ((self.box[:, :2], step), (self.centroid, step), (self.kdop, DIRECTIONS.T @ step.T)):
+            np.add(own, along, out=own)
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""
-        return replace(
-            self,
+        return Observations(
             box=self.box.take(rows, axis=0),
             centroid=self.centroid.take(rows, axis=0),
             kdop=self.kdop.take(rows, axis=1),
@@ -61,6 +59,7 @@ class Observations:
             top=self.top[rows],
             count=self.count[rows],
             range_m=self.range_m[rows],
+            sensor_xy=self.sensor_xy,
         )
 
     def put(self, rows: Int, few: Observations) -> None:

@@ -13,6 +13,7 @@ from modt.types import NONE, Float64, Int
 
 UNMEASURED_M2 = 100.0
 """Variance along either axis of a position that was not measured."""
+_UNMEASURED_M2 = UNMEASURED_M2 * np.eye(2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +47,14 @@ class Matches:
             (self.rows, rows),
             (self.proposals, proposals[taken]),
             (self.position, tracks.x.take(rows, axis=0)[:, :2]),
-            (self.covariance, (UNMEASURED_M2 * np.eye(2))[None].repeat(n, axis=0)),
+            (self.covariance, _UNMEASURED_M2[None].repeat(n, axis=0)),
             (self.end_variance, tracks.end_variance.take(rows, axis=0)),
         )
         return Matches(*(np.concatenate([known.take(same, axis=0), new]) for known, new in columns))
+
+    def renumbered(self, number: Int) -> Matches:
+        """The same matches, of proposals that have new numbers (P,)."""
+        return Matches(self.rows, number[self.proposals], self.position, self.covariance, self.end_variance)
 
 
 class Association(Protocol):
