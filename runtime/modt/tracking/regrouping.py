@@ -120,12 +120,12 @@ class Regrouping:
         joined = (into != np.arange(n)).nonzero()[0]
         pieces = _split(tracks, frame, placement, pairs, own)
         rows, hosts = pieces.rows, pieces.hosts
-        intact = np.ones(len(tracks) + 1, np.bool_)  # the last is that of NONE
-        intact[owner[hosts]] = False
+        robbed = np.zeros(len(tracks) + 1, np.bool_)  # the last is that of NONE
+        robbed[owner[hosts]] = True
         lost = owner[joined]
         own[lost[lost != NONE]] = NONE
         own[rows] = n + np.arange(len(rows))
-        changed = ((own != before) | ~intact[:-1]).nonzero()[0]
+        changed = ((own != before) | robbed[:-1]).nonzero()[0]
         if not len(changed) + len(joined):
             return frame
         matches = matches.reassigned(tracks, changed, own[changed])
@@ -257,20 +257,18 @@ def _take_larger(tracks: TrackTable, observations: Observations, pairs: Pairs, o
     box = tracks.box.take(rows, axis=0)
     box[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
     fits = _fit_together(box, observations.box.take(parts, axis=0), MAX_SIZE_M[tracks.object_class[rows]])
-    rows, parts = rows[fits], parts[fits]
-    held: dict[int, int] = {}  # new proposal of each track that changes
-    holder: dict[int, int] = {}  # new track of each proposal that changes
-    columns = [numbers.tolist() for numbers in (rows, parts, own[rows], owner[parts])]
-    for row, part, left, first in zip(*columns, strict=True):
-        former = holder.get(part, first)
-        if row in held or former in held:
+    changed: set[int] = set()
+    for row, part in zip(rows[fits].tolist(), parts[fits].tolist(), strict=True):
+        former, left = int(owner[part]), int(own[row])
+        if row in changed or former in changed:
             continue
-        held[row], holder[part] = part, row
+        own[row], owner[part] = part, row
+        changed.add(row)
         if former != NONE:
-            held[former] = left
+            own[former] = left
+            changed.add(former)
         if left != NONE:
-            holder[left] = former
-    own[list(held)], owner[list(holder)] = list(held.values()), list(holder.values())
+            owner[left] = former
 
 
 def _join(
@@ -348,13 +346,15 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
 
 def _fit_together(a: Float64, b: Float64, size: Float64) -> Bool:
     """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer."""
-    of_a = (a[:, 3] > b[:, 3])[:, None]
-    longer, other = np.where(of_a, a, b).T, np.where(of_a, b, a).T
-    angle = np.array((longer[6], longer[6] - other[6]))  # of the longer, and between the two
-    (c, turned_c), (s, turned_s) = np.cos(angle), np.sin(angle)
-    away, half, other_half = other[:2] - longer[:2], longer[3:5] / 2, other[3:5] / 2
-    offset = c * away + np.array((s, -s)) * away[::-1]  # of the other, along the heading and across
-    reach = np.abs(turned_c) * other_half + np.abs(turned_s) * other_half[::-1]
-    span = np.maximum(half, offset + reach) - np.minimum(-half, offset - reach)
-    fit: Bool = (np.maximum(*span) < size[:, 0]) & (np.minimum(*span) < size[:, 1])
+    a, b = a.T.copy(), b.T.copy()  # a contiguous row a column: several times faster for a few boxes
+    of_a = a[3] > b[3]
+    longer, other = np.where(of_a, a, b), np.where(of_a, b, a)
+    yaw, (x, y), half, (length, width) = longer[6], other[:2] - longer[:2], longer[3:5] / 2, other[3:5] / 2
+    c, s = np.cos(yaw), np.sin(yaw)
+    offset = np.array((x * c + y * s, y * c - x * s))
+    turn = yaw - other[6]
+    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    reach = np.array((length * c + width * s, length * s + width * c))  # of the other, along the heading and across
+    one, two = np.maximum(half, offset + reach) - np.minimum(-half, offset - reach)
+    fit: Bool = (np.maximum(one, two) < size[:, 0]) & (np.minimum(one, two) < size[:, 1])
     return fit
