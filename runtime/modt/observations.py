@@ -72,14 +72,15 @@ class Observations:
 def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Observations:
     """Transform the proposals of a frame to the world by T_world_sensor (4, 4)."""
     box = transform_boxes(T_world_sensor, proposals.box)
+    half_m = box[:, 5] / 2
     axes = np.ascontiguousarray(T_world_sensor[:2, :3].T @ AXES, np.float32)
     ends = kernels.kdop_ends(proposals.coordinates, proposals.offsets, axes)
     return Observations(
         box=box,
         centroid=transform(T_world_sensor, proposals.centroid)[:, :2],
         kdop=ends + (T_world_sensor[:2, 3] @ DIRECTIONS)[:, None],
-        bottom=box[:, 2] - box[:, 5] / 2,
-        top=box[:, 2] + box[:, 5] / 2,
+        bottom=box[:, 2] - half_m,
+        top=box[:, 2] + half_m,
         count=proposals.count,
         range_m=np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]),
         sensor_xy=T_world_sensor[:2, 3],

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from enum import IntFlag
 from functools import cache
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -246,23 +245,18 @@ class Tracks:
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Every column by its name."""
-        return dict(zip(self.__match_args__, self._columns()(self), strict=True))
-
-    @classmethod
-    @cache
-    def _columns(cls) -> attrgetter[tuple[NDArray[Any], ...]]:
-        return attrgetter(*cls.__match_args__)
+        return {name: getattr(self, name) for name in self.__match_args__}
 
     def copy(self) -> Self:
         """The same rows, independent of these."""
-        return type(self)(*[column.copy() for column in self._columns()(self)])
+        return type(self)(*[getattr(self, name).copy() for name in self.__match_args__])
 
     def renewed(self, kept: Int, n: int) -> Self:
         """The rows kept, by index, then n blank ones."""
         if not len(self):
             return self.blank(n)
         rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
-        columns = [column.take(rows, axis=0) for column in self._columns()(self)]
+        columns = [getattr(self, name).take(rows, axis=0) for name in self.__match_args__]
         for column, blank in zip(columns, self._blank_row(), strict=True):
             column[len(kept) :] = blank
         return type(self)(*columns)

@@ -27,10 +27,8 @@ def delays(proposals: Proposals, turn_s: float) -> Float64:
     (x, y), (length, width) = proposals.centroid[:, :2].T, proposals.box[:, 3:5].T
     bearing = np.arctan2(y, x)
     half_angle = np.arctan2(np.hypot(length, width) / 2, np.hypot(x, y))
-    beyond_seam = np.abs(bearing) + half_angle - np.pi
-    if beyond_seam.max(initial=0.0) > 0.0:
-        beyond_seam = np.maximum(beyond_seam, 0.0)
-        bearing -= np.copysign(np.pi * beyond_seam / np.maximum(half_angle, 1e-9), bearing)
+    beyond_seam = np.maximum(np.abs(bearing) + half_angle - np.pi, 0.0)
+    bearing -= np.copysign(np.pi * beyond_seam / np.maximum(half_angle, 1e-9), bearing)
     return np.asarray(bearing * (-turn_s / (2 * np.pi)))
 
 

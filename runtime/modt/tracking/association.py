@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,8 +15,7 @@ UNMEASURED_M2 = 100.0
 _UNMEASURED_M2 = UNMEASURED_M2 * np.eye(2)
 
 
-@dataclass(frozen=True, slots=True)
-class Matches:
+class Matches(NamedTuple):
     """Pairs of a track and a proposal; no row and no proposal occurs twice.
 
     Attributes:
@@ -51,10 +49,6 @@ class Matches:
             (self.end_variance, tracks.end_variance.take(rows, axis=0)),
         )
         return Matches(*(np.concatenate([known.take(same, axis=0), new]) for known, new in columns))
-
-    def renumbered(self, number: Int) -> Matches:
-        """The same matches, of proposals that have new numbers (P,)."""
-        return Matches(self.rows, number[self.proposals], self.position, self.covariance, self.end_variance)
 
 
 class Association(Protocol):

@@ -149,7 +149,7 @@ class Regrouping:
         if len(rows):
             observations.kdop[:, new] = self._locate(tracks, rows, observations.kdop[:, new], matches)
         observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
-        return Associated(proposals, observations, matches.renumbered(number))
+        return Associated(proposals, observations, matches._replace(proposals=number[matches.proposals]))
 
     def _pairs(self, tracks: TrackTable, frame: Associated, owner: Int) -> Pairs:
         """Pairs of tracks observed twice and proposals that overlap their known extents."""
@@ -188,7 +188,7 @@ class Regrouping:
         hosts, parts = hosts[near], parts[near]
         if not len(parts):
             return hosts, parts
-        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.tile(USUAL_CAR_M, (len(parts), 1)))
+        fit = _fit_together(box.take(hosts, axis=0), box.take(parts, axis=0), np.array([USUAL_CAR_M]))
         fit &= ~PART_PERSON.fits(pairs.extent_m[parts], observations.bottom[parts], observations.top[parts])
         return hosts[fit], parts[fit]
 
@@ -345,7 +345,7 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
 
 
 def _fit_together(a: Float64, b: Float64, size: Float64) -> Bool:
-    """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer."""
+    """(k,) whether boxes a and b (k, 7) fit into one of size (k, 2) or (1, 2), along the heading of the longer."""
     a, b = a.T.copy(), b.T.copy()  # a contiguous row a column: several times faster for a few boxes
     of_a = a[3] > b[3]
     longer, other = np.where(of_a, a, b), np.where(of_a, b, a)

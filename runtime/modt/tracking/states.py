@@ -141,14 +141,13 @@ class StateMachine:
         if after.min(initial=0) == NONE:
             bad = (after == NONE).nonzero()[0][0]
             event = Event(np.broadcast_to(events, after.shape)[bad])
-            state = self.names[np.broadcast_to(states, after.shape)[bad]]
-            raise UndefinedTransitionError(f"{self.title}: {event.name} in state {state}")
+            raise UndefinedTransitionError(f"{self.title}: {event.name} in state {self.names[states[bad]]}")
         return after
 
     def joined(self, states: Int) -> Int:
         """(M,) states of proposals that were matched with tracks in these states (a1, then what they join)."""
-        matched = self.transition(np.full(1, self.proposal), Event.ASSOCIATED)
-        return self.transition(matched, self.joining[states])
+        matched = self.transition(np.array([self.proposal]), Event.ASSOCIATED)
+        return self.transition(matched.repeat(len(states)), self.joining[states])
 
 
 _E = Event
