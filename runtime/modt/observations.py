@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -46,14 +46,12 @@ class Observations:
 
     def move(self, step: Float64) -> None:
         """Displace all in place by steps (P, 2) [m, world]."""
-        self.box[:, :2] += step
-        self.centroid[:] += step
-        self.kdop[:] += DIRECTIONS.T @ step.T
+        for own, along in ((self.box[:, :2], step), (self.centroid, step), (self.kdop, DIRECTIONS.T @ step.T)):
+            np.add(own, along, out=own)
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""
-        return replace(
-            self,
+        return Observations(
             box=self.box.take(rows, axis=0),
             centroid=self.centroid.take(rows, axis=0),
             kdop=self.kdop.take(rows, axis=1),
@@ -61,6 +59,7 @@ class Observations:
             top=self.top[rows],
             count=self.count[rows],
             range_m=self.range_m[rows],
+            sensor_xy=self.sensor_xy,
         )
 
     def put(self, rows: Int, few: Observations) -> None:
@@ -73,14 +72,15 @@ class Observations:
 def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Observations:
     """Transform the proposals of a frame to the world by T_world_sensor (4, 4)."""
     box = transform_boxes(T_world_sensor, proposals.box)
+    half_m = box[:, 5] / 2
     axes = np.ascontiguousarray(T_world_sensor[:2, :3].T @ AXES, np.float32)
     ends = kernels.kdop_ends(proposals.coordinates, proposals.offsets, axes)
     return Observations(
         box=box,
         centroid=transform(T_world_sensor, proposals.centroid)[:, :2],
         kdop=ends + (T_world_sensor[:2, 3] @ DIRECTIONS)[:, None],
-        bottom=box[:, 2] - box[:, 5] / 2,
-        top=box[:, 2] + box[:, 5] / 2,
+        bottom=box[:, 2] - half_m,
+        top=box[:, 2] + half_m,
         count=proposals.count,
         range_m=np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]),
         sensor_xy=T_world_sensor[:2, 3],

@@ -249,14 +249,14 @@ class Tracks:
 
     def copy(self) -> Self:
         """The same rows, independent of these."""
-        return type(self)(*[column.copy() for column in self.columns().values()])
+        return type(self)(*[getattr(self, name).copy() for name in self.__match_args__])
 
     def renewed(self, kept: Int, n: int) -> Self:
         """The rows kept, by index, then n blank ones."""
         if not len(self):
             return self.blank(n)
         rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
-        columns = [column.take(rows, axis=0) for column in self.columns().values()]
+        columns = [getattr(self, name).take(rows, axis=0) for name in self.__match_args__]
         for column, blank in zip(columns, self._blank_row(), strict=True):
             column[len(kept) :] = blank
         return type(self)(*columns)

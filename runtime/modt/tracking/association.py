@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,10 +12,10 @@ from modt.types import NONE, Float64, Int
 
 UNMEASURED_M2 = 100.0
 """Variance along either axis of a position that was not measured."""
+_UNMEASURED_M2 = UNMEASURED_M2 * np.eye(2)
 
 
-@dataclass(frozen=True, slots=True)
-class Matches:
+class Matches(NamedTuple):
     """Pairs of a track and a proposal; no row and no proposal occurs twice.
 
     Attributes:
@@ -46,7 +45,7 @@ class Matches:
             (self.rows, rows),
             (self.proposals, proposals[taken]),
             (self.position, tracks.x.take(rows, axis=0)[:, :2]),
-            (self.covariance, (UNMEASURED_M2 * np.eye(2))[None].repeat(n, axis=0)),
+            (self.covariance, _UNMEASURED_M2[None].repeat(n, axis=0)),
             (self.end_variance, tracks.end_variance.take(rows, axis=0)),
         )
         return Matches(*(np.concatenate([known.take(same, axis=0), new]) for known, new in columns))

@@ -39,7 +39,7 @@ class KdopAssociation:
         """Pairs of least cost; then, among the rest, those that overlap although they changed their shape."""
         expected = tracks.predicted_kdops()
         variance = POSITION_SIGMA_M**2
-        xx, xy, yy = covariance = np.stack([tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]])
+        xx, xy, yy = covariance = np.array((tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]))
         rows, columns = self._kernels.overlapping_pairs(expected + _reach(xx, xy, yy), observations.kdop)
         cost, coverage = self._kernels.pair_costs(
             Shapes.of(expected, tracks.bottom, tracks.top, tracks.points),
@@ -51,8 +51,9 @@ class KdopAssociation:
         )
         first = (cost < MAX_COST).nonzero()[0]
         first = first[self._kernels.assign(rows[first], columns[first], cost[first], MAX_COST)]
-        free = _free(rows, rows[first], len(tracks)) & _free(columns, columns[first], len(observations))
-        second = (free & (coverage > MIN_OVERLAP)).nonzero()[0]
+        second = (coverage > MIN_OVERLAP).nonzero()[0]
+        second = second[_free(rows[second], rows[first], len(tracks))]
+        second = second[_free(columns[second], columns[first], len(observations))]
         second = second[self._kernels.assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
         kept = np.concatenate([first, second])
         rows, columns = rows[kept], columns[kept]
@@ -83,6 +84,6 @@ def _reach(xx: Float64, xy: Float64, yy: Float64) -> Float64:
 
 def _free(index: Int, taken: Int, n: int) -> Bool:
     """(K,) which of the indices, each below n, were not taken."""
-    free = np.ones(n, np.bool_)
-    free[taken] = False
-    return free[index]
+    occupied = np.zeros(n, np.bool_)
+    occupied[taken] = True
+    return ~occupied[index]

@@ -97,7 +97,7 @@ class NativeObserve:
 
     def __init__(self, library: ctypes.CDLL) -> None:
         declare(library, {"modt_observe": (None, (Own, Own, INT64, INT64, ctypes.c_int64, FLOAT64, FLOAT64, Own))})
-        self._library = library
+        self._library, self._limits = library, (*MAX_LENGTH_M.tolist(), *CONFIRMED_GROWTH.tolist())
 
     def __call__(
         self, t: TrackTable, rows: Int, proposals: Int, observations: Observations, position: Float64, dt_s: float
@@ -108,6 +108,6 @@ class NativeObserve:
         columns = structure(*floats, t.bottom, t.top, t.proposal, t.points, t.hits, t.object_class, t.final)
         seen = structure(o.kdop, o.box, o.bottom, o.top, o.count, len(o))
         decays = (ENVELOPE_DECAY, MEAN_KDOP_DECAY, AGREE_M, SHRINKAGE, GROWTH, 1.0 - math.exp(-dt_s / LAG_S), dt_s)
-        numbers = array("d", (*decays, *MAX_LENGTH_M, *CONFIRMED_GROWTH))
+        numbers = array("d", (*decays, *self._limits))
         along = position @ DIRECTIONS
         self._library.modt_observe(columns, seen, rows, proposals, len(rows), position, along, numbers)

@@ -185,8 +185,9 @@ class Tracker:
         t = self._tracks
         events = np.full(len(t), Event.UNASSOCIATED.value)
         events[rows] = Event.ASSOCIATED.value
-        self._advance(np.arange(len(t)), events)
+        t.state[:] = self.machine.transition(t.state, events)
         t.state[rows] = self.machine.joined(t.state[rows])
+        t.final[:] = self.machine.final[t.state]
         t.age += 1
         t.hits[rows] += 1
         t.missed += 1
@@ -205,7 +206,7 @@ class Tracker:
         t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
         t.hidden[rows] = False
         people = IS_PERSON[t.object_class[rows]].nonzero()[0]
-        people = people[frame.proposals.cut[own[people]] & Cut.TOP > 0]
+        people = people[frame.proposals.cut[own[people]] & Cut.TOP.value > 0]
         if not len(people):
             return
         rows, own, known = rows[people], own[people], known[people]
@@ -241,8 +242,8 @@ class Tracker:
     def _withdraw(self, near: Bool) -> None:
         """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
         t = self._tracks
-        rows = (t.inherited & (t.proposal != NONE) & ~near).nonzero()[0]
-        self._advance(rows, Event.WITHDRAWN)
+        rows = (t.inherited & ~near).nonzero()[0]
+        self._advance(rows[t.proposal[rows] != NONE], Event.WITHDRAWN)
 
     def _expire(self, at_rest: Bool) -> Int:
         """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
@@ -254,21 +255,21 @@ class Tracker:
 
     def _renew(self, kept: Int, at_rest: Bool, matches: Matches, observations: Observations) -> None:
         """The rows kept, and a track for every proposal without one: a2, or a1 and a5 (a6) at a remembered place."""
-        unclaimed = np.ones(len(observations), np.bool_)
-        unclaimed[matches.proposals] = False
-        proposals = unclaimed.nonzero()[0]
+        claimed = np.zeros(len(observations), np.bool_)
+        claimed[matches.proposals] = True
+        proposals = (~claimed).nonzero()[0]
         known = self.background_map.recall(self._tracks, kept[at_rest[kept]], observations, proposals)
         t = self._tracks = self._tracks.renewed(kept, len(proposals))
-        new = np.arange(len(kept), len(t))
-        t.id[new] = self.next_id + np.arange(len(new))
-        self.next_id += len(new)
+        rows, new = np.arange(len(kept), len(t)), slice(len(kept), len(t))
+        t.id[new] = np.arange(self.next_id, self.next_id + len(rows))
+        self.next_id += len(rows)
         t.state[new] = self.machine.proposal
-        self._advance(new, np.where(known, Event.ASSOCIATED.value, Event.UNASSOCIATED.value))
-        self._advance(new[known], Event.JOINS_FINAL)
+        self._advance(rows, np.where(known, Event.ASSOCIATED.value, Event.UNASSOCIATED.value))
+        self._advance(rows[known], Event.JOINS_FINAL)
         position = self.association.initial_position(observations).take(proposals, axis=0)
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
         t.lagged_kdop[new] = observations.kdop.T.take(proposals, axis=0)
         t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]
-        self._observe(t, new, proposals, observations, position, 0.0)
+        self._observe(t, rows, proposals, observations, position, 0.0)
