@@ -105,6 +105,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     ) -> tuple[Int, PointColumns, Float32, Int]:
         """(K,) rows of the points within bounds, those points, their (K,) heights above ground [m] and histogram."""
         buffers = self._ground.get(ground) or self._ground.setdefault(ground, _GroundBuffers(ground))
+        if points.shape[1] < 4:
+            raise ValueError(f"rows of x, y, z and reflectance are needed, not of shape {points.shape}")
         points, n = np.ascontiguousarray(points[:, :4], np.float32), len(points)
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
         if n > buffers.points.shape[1]:
