@@ -160,13 +160,14 @@ class Scheduler:
             asks: (M,) tracks that request a class, each with a proposal.
             budget: budget of the frame.
         """
-        asking = asks.nonzero()[0]
+        observed = tracks.proposal != NONE
+        asking = (asks & observed).nonzero()[0]
         worth = self.worth(tracks, proposals, asking)
         ranked = asking[np.lexsort((tracks.id[asking], -worth))]
         granted = self._affordable(proposals.count[tracks.proposal[ranked]], budget)
         deferred = ranked[~granted]
         waiting = tracks.waiting[deferred] + 1
-        tracks.waiting[tracks.proposal != NONE] = 0
+        tracks.waiting[observed] = 0
         tracks.waiting[deferred] = waiting
         return Selection(ranked[granted], len(deferred))
 
