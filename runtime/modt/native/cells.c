@@ -138,7 +138,7 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *latest, i32 
         f4 max_gap_m = {left->max_gap_m, beyond->max_gap_m, above->max_gap_m, ahead->max_gap_m};
         f4 gap_m = most4(low, spread(own->low)) - least4(high, spread(own->high));
         i4 joined = (places == place - back) & (gap_m < max_gap_m), alone = {k, k, k, k};
-        i4 roots = {parent[k - 1], parent[over[0]], parent[over[1]], parent[over[2]]}; /* or not yet the roots */
+        i4 roots = {parent[parent[k - 1]], parent[parent[over[0]]], parent[parent[over[1]]], parent[parent[over[2]]]};
         roots = (roots & joined) | (alone & ~joined);
         i32 one = roots[0] < roots[1] ? roots[0] : roots[1], other = roots[2] < roots[3] ? roots[2] : roots[3];
         parent[k] = one = one < other ? one : other;
