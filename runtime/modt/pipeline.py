@@ -10,6 +10,7 @@ import numpy as np
 
 from modt.classification.decision import LikeliestClass
 from modt.classification.scheduler import Scheduler
+from modt.energy.ledger import STAGES as LEDGER_STAGES
 from modt.energy.ledger import Ledger
 from modt.observations import Located, StaticTracks
 from modt.placement import LEVEL, Mount
@@ -27,15 +28,8 @@ from modt.types import (
     Tracks,
 )
 
-SOURCE, SINK = "source", "sink"
-SEGMENTATION, ODOMETRY, TRACKING, SCHEDULING, CLASSIFICATION, FUSION = STAGES = (
-    "segmentation",
-    "odometry",
-    "tracking",
-    "scheduling",
-    "classification",
-    "fusion",
-)
+SOURCE, *_, SINK = LEDGER_STAGES
+SEGMENTATION, ODOMETRY, TRACKING, SCHEDULING, CLASSIFICATION, FUSION = STAGES = LEDGER_STAGES[1:-1]
 """Names of the stages in the ledger."""
 _NOTHING: Bool = np.zeros(0, np.bool_)
 

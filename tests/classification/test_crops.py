@@ -48,7 +48,7 @@ def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
 
 @given(counts=COUNTS)
 def test_padding_repeats_own_points(counts: list[int]) -> None:
-    points, proposals = blobs(counts, np.random.default_rng(1))
+    _, proposals = blobs(counts, np.random.default_rng(1))
     crops = gather(proposals, np.arange(len(counts)), 100)
     batch = crops.padded(np.arange(len(counts)))
     assert batch.shape == (len(counts), max(counts), 3)

@@ -25,7 +25,7 @@ def test_spans_are_timed_and_counted_also_when_the_stage_fails(machine):
     ledger = machine.ledger
     assert ledger.run("tracking", machine.work, 50, 40, [1, 2, 3]) == [1, 2, 3]
     ledger.run("tracking", machine.work, 5, 4)
-    ledger.count("tracking", points=7, items=1)
+    ledger.count("tracking", points=7)
     machine.work(100, 10)
 
     def fail():
@@ -36,7 +36,7 @@ def test_spans_are_timed_and_counted_also_when_the_stage_fails(machine):
         ledger.run("source", fail)
     line = ledger.close_frame(12)
     assert (line["schema"], line["frame"]) == (SCHEMA, 12)
-    assert line["stages"]["tracking"] == {"calls": 2, "items": 4, "points": 7, "wall_ns": 55, "cpu_ns": 44}
+    assert line["stages"]["tracking"] == {"calls": 2, "items": 3, "points": 7, "wall_ns": 55, "cpu_ns": 44}
     assert line["stages"]["source"]["cpu_ns"] == 20
     assert (line["wall_ns"], line["cpu_ns"], line["idle_ns"], line["marks"]) == (185, 74, 100, [])
 

@@ -138,7 +138,8 @@ class CropWriter:
         kept = np.flatnonzero(whole) if variant == PASTED else np.arange(len(proposals))
         crops = gather(proposals, kept, MAX_POINTS)
         n = len(kept)
-        row: dict[str, Any] = {"xyz": np.ascontiguousarray(crops.xyz), "count": crops.count, "label": labels.kind[kept].astype(np.int8)}
+        row: dict[str, Any] = {"xyz": np.ascontiguousarray(crops.xyz), "count": crops.count}
+        row |= {"label": labels.kind[kept].astype(np.int8)}
         row |= {"partial": labels.partial[kept], "unknown": labels.unknown[kept], "tall": labels.tall[kept]}
         row |= {"variant": np.full(n, variant, np.int8), "reflectance": reflectance_of(proposals)[kept]}
         row |= {"owner": labels.owner[kept].astype(np.int8)}

@@ -32,8 +32,7 @@ def logits(layers: Layers, features: Float64) -> Float64:
     value: Weights = features.astype(weight.dtype)
     for hidden_weight, hidden_bias in hidden:
         value = value @ hidden_weight
-        value += hidden_bias
-        np.tanh(value, out=value)
+        np.tanh(np.add(value, hidden_bias, out=value), out=value)
     output: Float64 = (value @ weight + bias).astype(np.float64)
     return output
 
@@ -132,13 +131,7 @@ def bound_features(features: Float64, cut: Int) -> Float64:
 
 
 def proposal_features(proposals: Proposals, sensor: SensorConfig, beams: Beams | None = None) -> Float64:
-    """(P, 7) box features of the proposals.
-
-    Args:
-        proposals: proposals of a frame.
-        sensor: its angular steps, and its height where the proposals have none.
-        beams: of the sensor, if they are at hand.
-    """
+    """(P, 7) box features of the proposals. Whoever has the beams of the sensor at hand spares looking them up."""
     box = proposals.box
     tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
     elevation_step_rad = (beams or sensor.beams).step_rad(tangent.astype(np.float32))

@@ -32,7 +32,7 @@ class Crops:
         """(R,) points of each crop."""
         return self.offsets[1:] - self.offsets[:-1]
 
-    def padded(self, rows: Int | slice, least: int = 1) -> Float32:
+    def padded(self, rows: Int, least: int = 1) -> Float32:
         """(len(rows), n, 3) crops of these rows, each padded with repetitions of its last point to the largest, or to
         the least n.
 
@@ -43,21 +43,15 @@ class Crops:
         return self.xyz.take(self.offsets[rows, None] + places, axis=0)
 
 
-def batches(count: list[int], most: int, first: int = 0) -> Iterator[slice]:
-    """Runs of crops, sorted by their number of points, that the network takes together.
-
-    Args:
-        count: points of each crop, ascending.
-        most: crops of a batch.
-        first: place of the first crop.
-    """
-    start, end = 0, len(count)
-    for k in range(1, end):
-        if k - start == most or (k - start) * (count[k] - count[k - 1]) > MAX_PADDING:
-            yield slice(first + start, first + k)
-            start = k
-    if end:
-        yield slice(first + start, first + end)
+def batches(count: list[int], most: int) -> Iterator[slice]:
+    """Batches of crops in ascending order of their numbers of points; `most` crops share one at most."""
+    first = 0
+    for k in range(1, len(count)):
+        if k - first == most or (k - first) * (count[k] - count[k - 1]) > MAX_PADDING:
+            yield slice(first, k)
+            first = k
+    if count:
+        yield slice(first, len(count))
 
 
 def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
@@ -77,14 +71,13 @@ def gather(proposals: Proposals, which: Int, max_points: int) -> Crops:
         max_points: per crop.
     """
     starts, ends = (proposals.offsets[rows].tolist() for rows in (which, which + 1))
-    kept, offsets = [proposals.coordinates[:, :0]], [0]
+    kept = [proposals.coordinates[:, :0]]
     for first, end in zip(starts, ends, strict=True):  # few: faster than all at once
         own = proposals.coordinates[:, first:end]
         if end - first > max_points:
             own = own.take(np.arange(max_points) * (end - first) // max_points, axis=1)
         kept.append(own)
-        offsets.append(offsets[-1] + own.shape[1])
-    return Crops(np.concatenate(kept, axis=1).T, np.array(offsets))
+    return Crops(np.concatenate(kept, axis=1).T, np.array([own.shape[1] for own in kept]).cumsum())
 
 
 def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
@@ -105,12 +98,10 @@ def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
     starts, count = crops.offsets[:-1], crops.count
     mean_x, mean_y = np.add.reduceat(xyz[:2], starts, axis=1) / count
     azimuth, bound = np.arctan2(mean_y, mean_x), _GROUND_OFFSET_M + _GROUND_SLOPE * np.hypot(mean_x, mean_y)
-    rise = np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M
-    ground = np.minimum(np.maximum(rise, -bound), bound) + ground_z_m
-    c, s, ground = np.array((np.cos(azimuth), np.sin(azimuth), ground)).repeat(count, axis=1)
-    out = np.empty((3, len(c)))
+    rise = (np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M).clip(-bound, bound)
+    c, s, ground = np.array((np.cos(azimuth), np.sin(azimuth), rise + ground_z_m)).repeat(count, axis=1)
+    out = np.array((c * x + s * y, c * y - s * x, z - ground))
     level = out[:2]
-    out[0], out[1], out[2] = c * x + s * y, c * y - s * x, z - ground
     ends = np.minimum.reduceat(level, starts, axis=1) + np.maximum.reduceat(level, starts, axis=1)
     level -= (ends / 2).repeat(count, axis=1)
     return Crops(out.T.astype(np.float32, order="C"), crops.offsets)

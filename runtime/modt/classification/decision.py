@@ -44,9 +44,8 @@ class LikeliestClass:
 
     def _report(self, tracks: Tracks, weighed: Float64) -> None:
         """Write the class of every track by the weights (4, M) of its classes."""
-        objects = weighed[1:]
-        likeliest = objects.argmax(axis=0)
-        reported = objects.max(axis=0) >= self._threshold[likeliest]
+        likeliest = weighed[1:].argmax(axis=0)
+        reported = weighed[1:].max(axis=0) >= self._threshold[likeliest]
         tracks.object_class = np.where(reported, likeliest + 1, 0)
 
 

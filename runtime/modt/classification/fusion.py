@@ -15,8 +15,6 @@ multiplied: n of them weigh n^GROWTH. Both means forget the past; a view counts 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_PERSON_M
@@ -106,14 +104,6 @@ class Certainty:
         return objects | background
 
 
-class Seen(NamedTuple):
-    """The R tracks with a proposal."""
-
-    rows: Int
-    posterior: Float64  # (4, R)
-    may_be_object: Bool  # probable enough for a classification, by box and motion
-
-
 class EveryFrame:
     """Tracking by detection: every proposal is classified, its likelihood is the posterior (Fig. 2a)."""
 
@@ -145,10 +135,10 @@ class FusedTracks:
         self.config, self.prior, self._log_frequency = config, prior, log_frequency_of(prior)
         self.certain = Certainty(self._log_frequency, config.object_threshold, background_threshold)
 
-    def observe(self, tracks: Tracks, proposals: Proposals) -> Seen:
+    def observe(self, tracks: Tracks, proposals: Proposals) -> tuple[Int, Float64, Bool]:
         """Add the box and the motion of every track with a proposal to what is known of it.
 
-        The class of a remembered place has probability 1.
+        Returns these R rows, their posteriors (4, R), and whether each may be an object by box and motion.
         """
         rows = (tracks.proposal != NONE).nonzero()[0]
         prior = self.prior.probability(proposals).T.take(tracks.proposal[rows], axis=1)
@@ -161,9 +151,9 @@ class FusedTracks:
         probability = (weighed / weighed.sum(axis=0)).T
         may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
         posterior = self._posterior(tracks, rows, prior, boxes, witness)
-        posterior.T[tracks.inherited[rows]] = _BACKGROUND
+        posterior.T[tracks.inherited[rows]] = _BACKGROUND  # remembered places
         tracks.posterior[rows] = posterior.T
-        return Seen(rows, posterior, may_be_object)
+        return rows, posterior, may_be_object
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows; (R,) which are certain now.

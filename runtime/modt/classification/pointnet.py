@@ -226,16 +226,15 @@ class PointNet:
             proposals: proposals of the frame.
             which: (R,) proposals to classify.
         """
-        near = self.box_scores.bound(proposals)[which] if self._near else np.zeros(len(which), np.bool_)
-        order = np.lexsort((proposals.count[which], near))
-        by_size = which[order]
-        crops = gather(proposals, by_size, self.config.max_points)
-        crops = canonical(crops, ground_z_m(proposals, by_size, self._sensor))
-        count, middle = crops.count.tolist(), int(np.count_nonzero(~near))
-        out = np.empty((len(which), N_CLASSES))
-        for session, first, end in ((self._session, 0, middle), (self._near, middle, len(which))):
-            for rows in batches(count[first:end], self.config.batch, first):
-                out[order[rows]] = self.infer(crops.padded(rows, self.config.min_points), session)
+        crops = gather(proposals, which, self.config.max_points)
+        crops = canonical(crops, ground_z_m(proposals, which, self._sensor))
+        count, out = crops.count, np.empty((len(crops), N_CLASSES))
+        by_size = count.argsort(kind="stable")
+        near = self.box_scores.bound(proposals)[which[by_size]] if self._near else np.zeros(len(crops), np.bool_)
+        for session, own in ((self._session, by_size[~near]), (self._near, by_size[near])):
+            for batch in batches(count[own].tolist(), self.config.batch):
+                rows = own[batch]
+                out[rows] = self.infer(crops.padded(rows, self.config.min_points), session)
         return self._pooled(out, proposals, which)
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:

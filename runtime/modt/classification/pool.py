@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from modt.classes import N_CLASSES
 from modt.types import Float64
 
 _MIN_PROBABILITY = 1e-12  # keeps logarithms finite
@@ -53,7 +52,7 @@ def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Flo
         log_frequency: (4,) log of the frequencies of the classes.
         weight: exponent of the box.
     """
-    log_ratio = np.zeros((len(log_box), N_CLASSES))
+    log_ratio = np.zeros(log_box.shape)
     if weight:  # P(box | object) / P(box | background)
         log_ratio[:, 1:] = weight * (_log_odds(log_box) - _assumed_log_odds(log_frequency.tobytes()))[:, None]
     return log_frequency + log_ratio

@@ -40,7 +40,6 @@ FORGETTING = 0.98
 """Weight per frame of the past in the fit of a call's cost: with less, it follows the machine faster."""
 START_MARGIN, MARGIN_STEP = 1.5, 0.05
 """The estimate of a call's cost over the fit, at the start, and by how much an underestimate raises its logarithm."""
-_MAX_ENTROPY = math.log(N_CLASSES)
 _POINTS = 100.0  # the unit of points, which conditions the fit
 _DIAGONAL = np.eye(3)
 _LEAST_MS = 1e-3  # what takes less was not measured
@@ -176,7 +175,7 @@ class Scheduler:
         """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
         proposal_rows = tracks.proposal[rows]
         posterior = np.maximum(tracks.posterior[rows], 1e-12)
-        uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / _MAX_ENTROPY
+        uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / math.log(N_CLASSES)
         count, last_points = proposals.count[proposal_rows], tracks.key_points[rows]
         novelty = np.minimum(np.abs(count - last_points) / np.maximum(last_points, 1), 1.0)
         nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / NEARNESS_RANGE_M)

@@ -54,11 +54,9 @@ class Ledger:
             row["items"] += length()
         return result, cpu1 - cpu0
 
-    def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
-        """Add work to the stage beyond the length of its result."""
-        row = self._stages[stage]
-        row["items"] += items
-        row["points"] += points
+    def count(self, stage: str, *, points: int) -> None:
+        """Add points to the work of the stage."""
+        self._stages[stage]["points"] += points
 
     def close_frame(self, index: int) -> Line:
         """Line of the frame: its stages, and the parts of the time since the last line.
@@ -102,8 +100,7 @@ class Ledger:
             for _ in range(spans):
                 self.run("", _nothing)
             t2 = self._cpu_ns()
-            for stage in STAGES:
-                self._stages[stage] = NO_WORK.copy()
+            self._stages.update({stage: NO_WORK.copy() for stage in STAGES})
             t3 = self._cpu_ns()
             self.close_frame(0)
             t4 = self._cpu_ns()

@@ -19,7 +19,7 @@ from tools.train.near_scans import HEIGHT_M, near_scans
 @given(counts=st.lists(st.integers(6, 300), min_size=1, max_size=8), seed=st.integers(0, 200))
 def test_augmentation_keeps_every_crop_and_enough_points(counts, seed):
     rng = np.random.default_rng(seed)
-    points, proposals = blobs(counts, rng)
+    _, proposals = blobs(counts, rng)
     crops = gather(proposals, np.arange(len(counts)), 1000)
     augmented, _ = augment(
         crops, Sensors.of(SensorConfig(), np.ones((len(crops), 7)), np.full(len(crops), -1.73)), rng
