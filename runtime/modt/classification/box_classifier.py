@@ -33,8 +33,7 @@ def logits(layers: Layers, features: Float64) -> Float64:
     for hidden_weight, hidden_bias in hidden:
         value = value @ hidden_weight
         np.tanh(np.add(value, hidden_bias, out=value), out=value)
-    output: Float64 = (value @ weight + bias).astype(np.float64)
-    return output
+    return (value @ weight + bias).astype(np.float64)
 
 
 def from_lists(lists: Any, n_features: int) -> Layers:

@@ -248,8 +248,7 @@ def _person_waits(tracks: Tracks, rows: Int, posterior: Float64) -> Bool:
 
 def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:
     """(M,) tracks whose last proposal shows clearly more of them than their last view."""
-    more: Bool = tracks.points > ratio * tracks.key_points + MORE_POINTS_BY
-    return more
+    return tracks.points > ratio * tracks.key_points + MORE_POINTS_BY
 
 
 def _by_class(column: Float64, rows: Int) -> Float64:
@@ -259,5 +258,4 @@ def _by_class(column: Float64, rows: Int) -> Float64:
 
 def _log(probability: Float64) -> Float64:
     """Logarithm, of MIN_PROBABILITY at least."""
-    logarithm: Float64 = np.log(np.maximum(probability, MIN_PROBABILITY))
-    return logarithm
+    return np.log(np.maximum(probability, MIN_PROBABILITY))

@@ -61,9 +61,8 @@ class BoxScores:
 class Prior(Protocol):
     """P(class) of proposals that are not classified yet."""
 
-    @property
-    def frequency(self) -> Float64:
-        """(4,) frequency of the classes among proposals."""
+    frequency: Float64
+    """(4,) frequency of the classes among proposals."""
 
     @property
     def pool_weight(self) -> float:
@@ -115,8 +114,7 @@ class BoxPrior:
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) rows of priors (M, 4) that give the objects together at least this probability."""
-        reaches: Bool = 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
-        return reaches
+        return 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
 
 
 def make_prior(scores: BoxScores, frequency: Float64) -> Prior:
