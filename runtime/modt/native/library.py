@@ -69,10 +69,7 @@ def address(numbers: Any) -> int:
 
 def structure(*fields: NDArray[Any] | int) -> array[int]:
     """A C structure of pointers to contiguous arrays, and of 64-bit numbers."""
-    try:
-        return array("Q", [field if type(field) is int else ctypes.addressof(_start(field)) for field in fields])
-    except (TypeError, ValueError):
-        return array("Q", [field if isinstance(field, int) else address(field) for field in fields])
+    return array("Q", [field if isinstance(field, int) else address(field) for field in fields])
 
 
 def pointers(*arrays: NDArray[Any]) -> array[int]:
