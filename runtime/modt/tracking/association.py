@@ -12,7 +12,6 @@ from modt.types import NONE, Float64, Int
 
 UNMEASURED_M2 = 100.0
 """Variance along either axis of a position that was not measured."""
-_UNMEASURED_M2 = UNMEASURED_M2 * np.eye(2)
 
 
 class Matches(NamedTuple):
@@ -45,7 +44,7 @@ class Matches(NamedTuple):
             (self.rows, rows),
             (self.proposals, proposals[taken]),
             (self.position, tracks.x.take(rows, axis=0)[:, :2]),
-            (self.covariance, _UNMEASURED_M2[None].repeat(n, axis=0)),
+            (self.covariance, (UNMEASURED_M2 * np.eye(2))[None].repeat(n, axis=0)),
             (self.end_variance, tracks.end_variance.take(rows, axis=0)),
         )
         return Matches(*(np.concatenate([known.take(same, axis=0), new]) for known, new in columns))
