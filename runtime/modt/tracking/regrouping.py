@@ -304,8 +304,7 @@ def _split(tracks: TrackTable, frame: Associated, placement: Placement, pairs: P
     A proposal is odd that is too long for the class of the track, or of few points.
     """
     proposals, observations, n = frame.proposals, frame.observations, len(frame.proposals)
-    may = (tracks.missed == 0) & (tracks.hits >= ESTABLISHED_HITS)
-    may &= tracks.object_class != ObjectClass.BACKGROUND.value
+    may = (tracks.missed == 0) & (tracks.object_class != ObjectClass.BACKGROUND.value)
     lost = may & (own == NONE)
     held = (may & ~lost).nonzero()[0]
     class_, kept = tracks.object_class[held], own[held]
