@@ -8,7 +8,7 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from modt import profile
@@ -41,6 +41,7 @@ from tests.tracking.tracking_scenes import frame_of, tracks_at
 SANITIZED = "MODT_SANITIZED" in os.environ
 """Set by `python -m tools.sanitize`."""
 FRONT = FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))
+SEEDS = st.integers(0, 10_000)
 HOSTILE = [np.nan, np.inf, -np.inf, 1e-45, -1e-40, 3e38, -3e38, FAR_M, 999.0, 0.0, -0.0]
 
 
@@ -97,7 +98,7 @@ def street(seed, n):
 
 
 @pytest.mark.slow
-@given(seed=st.integers(0, 10_000), n=st.integers(0, 3000), front=st.booleans(), share=st.just(0.0) | st.floats(0, 1))
+@given(seed=SEEDS, n=st.integers(0, 3000), front=st.booleans(), share=st.just(0.0) | st.floats(0, 1))
 @settings(max_examples=160, deadline=None)
 def test_random_sweeps_with_a_share_of_hostile_coordinates(kernels, seed, n, front, share):
     sensor = SensorConfig(reflectance="hdl-64e", height_m=(None, 1.73)[seed % 2])
@@ -118,14 +119,15 @@ def test_rows_of_any_width_and_order(kernels):
     wide = np.concatenate([points, points], axis=1)
     assert same(*(stage.segment(p) for stage, p in zip(stages(kernels, SensorConfig()), (points, wide), strict=True)))
     assert same(*(s.segment(p) for s, p in zip(stages(kernels, SensorConfig()), (points, wide[:, :4]), strict=True)))
+    with pytest.raises(ValueError, match="x, y, z and reflectance"):
+        both(kernels, np.ascontiguousarray(points[:, :3]))
 
 
-@given(seed=st.integers(0, 10_000), n=st.integers(1, 400), sigma=st.floats(0.05, 3.0))
+@given(seed=SEEDS, n=st.integers(1, 400), sigma=st.floats(0.05, 3.0))
 @settings(max_examples=60, deadline=None)
 def test_cells_and_components(kernels, seed, n, sigma):
     points = PointColumns.from_array(cloud(seed, n, sigma))
-    if not len(points):
-        return
+    assume(len(points))
     grid, height = SqrtRangeGrid(0.03, 80.0), points.z + 1.7
     expected, found = (k.occupied_cells(grid, points, height) for k in (NUMPY, kernels))
     assert same(expected, found)
@@ -147,9 +149,7 @@ def test_cells_and_components(kernels, seed, n, sigma):
     assert same(*(k.view_bounds(clusters, number, number.max() + 1) for k in (NUMPY, kernels)))
 
 
-@given(
-    seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 60), min_size=1, max_size=8), extra=st.integers(0, 9)
-)
+@given(seed=SEEDS, sizes=st.lists(st.integers(1, 60), min_size=1, max_size=8), extra=st.integers(0, 9))
 @settings(max_examples=60, deadline=None)
 def test_groups(kernels, seed, sizes, extra):
     rng = np.random.default_rng(seed)
@@ -235,14 +235,14 @@ PASSES = {
 
 
 @pytest.mark.parametrize(("name", "arguments"), PASSES.items())
-@given(seed=st.integers(0, 10_000), n=st.integers(0, 60))
+@given(seed=SEEDS, n=st.integers(0, 60))
 @settings(max_examples=300, deadline=None)
 def test_passes_on_random_input(kernels, name, arguments, seed, n):
     given = arguments(np.random.default_rng(seed), n)
     assert same(*(getattr(each, name)(*given) for each in (NUMPY, kernels)))
 
 
-@given(seed=st.integers(0, 10_000), m=st.integers(0, 9), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
+@given(seed=SEEDS, m=st.integers(0, 9), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
 @settings(max_examples=100, deadline=None)
 def test_filter(kernels, seed, m, dt_s):
     rng = np.random.default_rng(seed)
@@ -262,7 +262,7 @@ def test_filter(kernels, seed, m, dt_s):
         np.testing.assert_array_equal(one, other)
 
 
-@given(seed=st.integers(0, 10_000), n=st.integers(0, 6), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
+@given(seed=SEEDS, n=st.integers(0, 6), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
 @settings(max_examples=60, deadline=None)
 def test_observed_tracks(kernels, seed, n, dt_s):
     rng = np.random.default_rng(seed)

@@ -120,12 +120,12 @@ class Regrouping:
         joined = (into != np.arange(n)).nonzero()[0]
         pieces = _split(tracks, frame, placement, pairs, own)
         rows, hosts = pieces.rows, pieces.hosts
-        robbed = np.zeros(len(tracks) + 1, np.bool_)  # the last is that of NONE
-        robbed[owner[hosts]] = True
+        divided = np.zeros(len(tracks) + 1, np.bool_)  # the last is that of NONE
+        divided[owner[hosts]] = True
         lost = owner[joined]
         own[lost[lost != NONE]] = NONE
         own[rows] = n + np.arange(len(rows))
-        changed = ((own != before) | robbed[:-1]).nonzero()[0]
+        changed = ((own != before) | divided[:-1]).nonzero()[0]
         if not len(changed) + len(joined):
             return frame
         matches = matches.reassigned(tracks, changed, own[changed])
