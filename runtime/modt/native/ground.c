@@ -2,7 +2,7 @@
 #include "kernels.h"
 
 typedef struct {
-    i32 rings, sectors, sector_bits, flank_sectors;
+    i32 rings, sectors, sector_bits, flank_sectors, bonnet_ring;
     float far_m, ring_scale, sector_scale;
     float min_sqrt_range, max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
     float upper_m, bin_m;
@@ -235,6 +235,8 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
         place_points(g, points + i, m, s->z + i, s->sqrt_range + i, s->cell + i);
         find_ends(g, height_m, bounds, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
     }
+    for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* as _stands */
+        s->ends[k][1] = least(s->ends[k][1], s->ends[k + g->sectors][1]);
     trace(g, height_m, range_m, flat_m, s, ray);
     interpolate(g, range_m, s, ray);
     for (i64 first = 0; first < cells; first += g->sectors) {

@@ -30,6 +30,8 @@ SLOPE_GAIN = 0.2
 """Weight of the newest slope in the running slope of a ray."""
 FLAT_M, FLAT_SLOPE = 0.1, 0.2
 """Greatest height range of the returns of a flat cell, and its growth with the width of the cell."""
+BONNET_RANGE_M = 11.0
+"""From this range on, cells are as deep as a bonnet, 1 m: above a flank, the next return may lie in the next cell."""
 FLANK_SECTORS, FLANK_M = 3, 0.25
 """A surface this far above the median of the rays so many sectors beside it is the side of a vehicle."""
 
@@ -78,9 +80,10 @@ class GroundEstimator:
     """Height of each point above the ground below it.
 
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` over a
-    short way, on and beside a ramp over a longer one, and not at all where something stands in the cell, since it may
-    be a flank. It may lie lower by `max_slope_deg` all the way, since nothing else does. Cells without ground are
-    interpolated along the ray; beyond its last one, the ground is level, but a ramp goes on for MAX_GAP_M.
+    short way, on and beside a ramp over a longer one. It may not rise at all where something stands in the cell or,
+    far away, right behind it, since it may be a flank. It may lie lower by `max_slope_deg` all the way, since nothing
+    else does. Cells without ground are interpolated along the ray; beyond its last one, the ground is level, but a
+    ramp goes on for MAX_GAP_M.
 
     Args:
         sensor: range.
@@ -91,6 +94,7 @@ class GroundEstimator:
         self.grid = PolarGrid(sensor.max_range_m)
         flat_m = FLAT_M + FLAT_SLOPE * self.grid.ring_width_m
         self.flat_m: Float32 = flat_m[:, None].astype(np.float32)
+        self.bonnet_ring = int(np.searchsorted(self.grid.range_m, BONNET_RANGE_M))
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
         steepest_rad = np.deg2rad(max_slope_deg)
         self.max_slope, self.ramp_slope = np.tan([steepest_rad, RAMP_SHARE * steepest_rad]).tolist()
@@ -118,10 +122,10 @@ class GroundEstimator:
         return label_min(z, cell, self.grid.size).reshape(-1, SECTORS)
 
     def _stands(self, points: PointColumns, cell: Int, lowest: Float32) -> Bool:
-        """(rings, SECTORS) cells in which something stands: returns far above the lowest."""
-        flat = lowest + self.flat_m
-        stands = np.zeros(flat.shape, np.bool_)
-        stands.ravel()[cell[points.z > flat.ravel().take(cell)]] = True
+        """(rings, SECTORS) cells in which, or right behind which, something stands: returns far above the lowest."""
+        highest, far = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS), self.bonnet_ring
+        highest[far:-1] = np.maximum(highest[far:-1], highest[far + 1 :])
+        stands: Bool = highest > lowest + self.flat_m
         return stands
 
     def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> tuple[Bool, Bool, Float32]:

@@ -49,7 +49,7 @@ class _Ground(ctypes.Structure):
     """Ground of ground.c."""
 
     _fields_ = (
-        *((name, _I) for name in ("rings", "sectors", "sector_bits", "flank_sectors")),
+        *((name, _I) for name in ("rings", "sectors", "sector_bits", "flank_sectors", "bonnet_ring")),
         *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope")),
         *(
             (name, _F)
@@ -76,7 +76,7 @@ class _GroundBuffers:
         scales = FAR_M, 1 / RING_STEP, SECTORS / 4
         slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
         limits = NEAR_M, SLOPE_GAIN, NOISE_M, MAX_GAP_M, FLANK_M, ABOVE_M, BIN_M
-        sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS
+        sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS, ground.bonnet_ring
         self.constants = _Ground(grid.rings, *sectors, *scales, *slopes, *limits)
         self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
         self.cells, self.kind = np.empty((5, grid.size + 1), np.float32), np.empty(grid.size, np.uint8)
