@@ -49,6 +49,8 @@ LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
 MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 """Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
 one view of a few points is weak evidence, and many of them are right."""
+MANY_POINTS = 20
+"""Points of a proposal from which a view says more of a person who stands still than the motion does."""
 NEAR_M = 3.0
 """Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
 _POWERS = np.arange(1000) ** GROWTH  # by the number of views; more of them hardly weigh more
@@ -138,7 +140,8 @@ class FusedTracks:
     def observe(self, tracks: Tracks, proposals: Proposals) -> tuple[Int, Float64, Bool]:
         """Add the box and the motion of every track with a proposal to what is known of it.
 
-        Returns these R rows, their posteriors (4, R), and whether each may be an object by box and motion.
+        Returns these R rows, their posteriors (4, R), and whether each may be an object by box and motion, or by its
+        box alone where it has many points.
         """
         rows = (tracks.proposal != NONE).nonzero()[0]
         prior = self.prior.probability(proposals).T.take(tracks.proposal[rows], axis=1)
@@ -149,7 +152,8 @@ class FusedTracks:
         tracks.prior[rows], tracks.witness[rows], tracks.box_evidence[rows] = prior.T, witness.T, boxes.T
         weighed = prior * np.exp(witness)
         probability = (weighed / weighed.sum(axis=0)).T
-        may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
+        limit, many = self.config.min_object_probability, proposals.count[tracks.proposal[rows]] >= MANY_POINTS
+        may_be_object = self.prior.may_be_object(probability, limit) | many & self.prior.may_be_object(prior.T, limit)
         posterior = self._posterior(tracks, rows, prior, boxes, witness)
         posterior.T[tracks.inherited[rows]] = _BACKGROUND  # remembered places
         tracks.posterior[rows] = posterior.T
