@@ -182,7 +182,7 @@ class FusionConfig(StageConfig):
     )
     object_threshold: float = number(0.9, 0.25, 1.0, "", "Posterior from which the class of an object is confirmed.")
     min_object_probability: float = number(
-        0.1, 0.0, 1.0, "", "Tracks less likely objects are not classified: by box and motion, from 20 points by box."
+        0.1, 0.0, 1.0, "", "Tracks less likely an object by box and motion are not classified."
     )
     start_frame: int = number(
         4, 1, 1000, "frames", "Age of a track from which its views are combined, with rule product."

@@ -50,7 +50,7 @@ MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
 """Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
 one view of a few points is weak evidence, and many of them are right."""
 MANY_POINTS = 20
-"""Points of a proposal from which a view says more of a person who stands still than the motion does."""
+"""Points of a proposal from which mode accurate classifies what may be an object by its box, whatever its motion."""
 NEAR_M = 3.0
 """Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
 _POWERS = np.arange(1000) ** GROWTH  # by the number of views; more of them hardly weigh more
@@ -140,8 +140,7 @@ class FusedTracks:
     def observe(self, tracks: Tracks, proposals: Proposals) -> tuple[Int, Float64, Bool]:
         """Add the box and the motion of every track with a proposal to what is known of it.
 
-        Returns these R rows, their posteriors (4, R), and whether each may be an object by box and motion, or by its
-        box alone where it has many points.
+        Returns these R rows, their posteriors (4, R), and whether each may be an object by box and motion.
         """
         rows = (tracks.proposal != NONE).nonzero()[0]
         prior = self.prior.probability(proposals).T.take(tracks.proposal[rows], axis=1)
@@ -152,8 +151,7 @@ class FusedTracks:
         tracks.prior[rows], tracks.witness[rows], tracks.box_evidence[rows] = prior.T, witness.T, boxes.T
         weighed = prior * np.exp(witness)
         probability = (weighed / weighed.sum(axis=0)).T
-        limit, many = self.config.min_object_probability, proposals.count[tracks.proposal[rows]] >= MANY_POINTS
-        may_be_object = self.prior.may_be_object(probability, limit) | many & self.prior.may_be_object(prior.T, limit)
+        may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
         posterior = self._posterior(tracks, rows, prior, boxes, witness)
         posterior.T[tracks.inherited[rows]] = _BACKGROUND  # remembered places
         tracks.posterior[rows] = posterior.T
@@ -225,7 +223,9 @@ class FurtherViews(FusedTracks):
         """(M,) tracks at their first view or one that may change their class."""
         rows, posterior, may_be_object = self.observe(tracks, proposals)
         background, age, key_age = posterior[ObjectClass.BACKGROUND], tracks.age[rows], tracks.key_age[rows]
-        first = may_be_object | _near(proposals)[tracks.proposal[rows]]
+        own, limit = tracks.proposal[rows], self.config.min_object_probability
+        may_be_object |= (proposals.count[own] >= MANY_POINTS) & self.prior.may_be_object(tracks.prior[rows], limit)
+        first = may_be_object | _near(proposals)[own]
         review = (background < 0.5) & (age >= REVIEW_GROWTH * key_age + REVIEW_FRAMES)
         review |= first & _shows_more(tracks, FAR_MORE_POINTS)[rows]
         growth = np.where(background > LIKELY_BACKGROUND, BACKGROUND_GROWTH, UNSURE_GROWTH)
