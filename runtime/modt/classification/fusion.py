@@ -213,10 +213,11 @@ class FirstViews(FusedTracks):
 class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is certain, and where something changes (Table II).
 
-    A track, a remembered place too, is classified as soon as its box may be an object's, or a person's near by: the
-    box prior takes tall people who stand for background. An uncertain one is classified again where it shows clearly
-    more points, and at growing intervals, as is a certain object. Certain background is only where it shows far more
-    points and may be an object by its box. A person is not while the view cuts off more than half.
+    A track, a remembered place too, is classified as soon as it may be an object by box and motion, by a box of
+    MANY_POINTS alone, or a person near by: the box prior takes tall people who stand for background. An uncertain one
+    is classified again where it shows clearly more points, and at growing intervals, as is a certain object. Certain
+    background is only where it shows far more points and may be an object. A person is not while the view cuts off
+    more than half.
     """
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
