@@ -17,7 +17,7 @@ replay: $(VENV)/.run
 # The tests run in two halves at a time. Those that exchange ROS 2 messages stand in one of them.
 HALVES := $(MAKE) --no-print-directory --jobs=2 --output-sync=target
 PYTEST := $(BIN)/python -m pytest -p no:cacheprovider
-ONE    := tests/app tests/classification tests/desk tests/extending tests/fuzz tests/segmentation tests/sensor_fit
+ONE    := tests/app tests/classification tests/modt_commands tests/modt_evaluation tests/modt_profiling tests/modt_simulation tests/modt_viewer tests/extending tests/fuzz tests/segmentation tests/sensor_fit
 QUICK  := -m "not slow and not command and not install and not kitti"
 
 test: check

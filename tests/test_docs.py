@@ -9,10 +9,10 @@ import pytest
 
 from modt.classes import CLASS_NAMES
 from modt.reporting.summary import Summary
-from modt_desk.evaluation.class_score import ClassScore
-from modt_desk.evaluation.evaluation import Evaluation, RangeScore, SegmentationScore
-from modt_desk.evaluation.track_score import TrackScore
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_evaluation.class_score import ClassScore
+from modt_evaluation.evaluation import Evaluation, RangeScore, SegmentationScore
+from modt_evaluation.track_score import TrackScore
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests import results
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,7 +45,7 @@ def links(page: Path) -> set[Path]:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_names_of_code_exist(page):
-    names = re.findall(r"`((?:modt|modt_desk|tools)\.[a-z_]\w*(?:\.\w+)*)(?:\(.*?\))?`", page.read_text())
+    names = re.findall(r"`((?:modt|modt_[a-z]+|tools)\.[a-z_]\w*(?:\.\w+)*)(?:\(.*?\))?`", page.read_text())
     commands = re.findall(r"python -m (tools\.[\w.]+)", page.read_text())
     missing = [n for n in (*names, *commands) if not n.endswith((".service", ".env")) and not resolves(n)]
     assert [n for n in missing if not re.fullmatch(r"modt\.\w+/\d+", n)] == []

@@ -19,7 +19,7 @@ def test_lists_of_cores_of_the_kernel(text, cores):
     assert host.core_list(text) == cores
 
 
-@pytest.mark.parametrize("module", ["modt.cli.main", "modt_desk.cli.profile"])
+@pytest.mark.parametrize("module", ["modt.cli.main", "modt_commands.profile"])
 def test_commands_load_what_sizes_thread_pools_only_once_they_are_pinned(module):
     code = f"import {module}, sys; print({{'numpy', 'scipy', 'onnxruntime'}} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -13,7 +13,7 @@ from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, se3
 from modt.profile import load
 from modt.types import NONE
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
 

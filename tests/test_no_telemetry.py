@@ -31,8 +31,8 @@ COMMANDS = {
     "replay": ("-m", "modt", "replay", *FRAMES, "--out", "{out}/replay"),
     "run": ("-m", "modt", "run", "--out", "{out}/run"),
     "check": ("-m", "modt", "check", "--out", "{out}/run"),
-    "meters": ("-m", "modt_desk.cli.profile", "meters"),
-    "report": ("-m", "modt_desk.cli.profile", "report", "{out}/recorded", "--html", "{out}/report.html"),
+    "meters": ("-m", "modt_commands.profile", "meters"),
+    "report": ("-m", "modt_commands.profile", "report", "{out}/recorded", "--html", "{out}/report.html"),
     "library": ("-c", LIBRARY),
 }
 

@@ -11,7 +11,7 @@ from modt.geometry import FieldOfView
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, TRACKING
 from modt.profile import load
 from modt.types import Budget
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 
 FRAMES = list(SyntheticStream("street", "vlp-16", 0.4, seed=3))
 BOOKED = {SEGMENTATION: 1, ODOMETRY: 1, TRACKING: 2, FUSION: 3, SCHEDULING: 1, CLASSIFICATION: 1}

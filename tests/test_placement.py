@@ -9,7 +9,7 @@ from modt.placement import LEVEL, Mount
 from modt.profile import load, parse
 from modt.sinks.messages import box_poses, in_sensor_frame
 from modt.types import NONE, Frame
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
 
 TILTED = Mount.of(10.0, -5.0)
 R = rotation_zyx(*np.deg2rad([10.0, -5.0, 0.0]))

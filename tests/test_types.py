@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.types import NONE, Tracks
-from modt_desk.experiments.segmented import chosen
+from modt_evaluation.experiments.segmented import chosen
 from tests.results import proposals
 
 

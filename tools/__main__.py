@@ -12,6 +12,8 @@ ROOT = Path(__file__).parent
 def commands() -> Iterator[tuple[str, str]]:
     """Module and first docstring line of each module with a `main`. None is imported."""
     for path in sorted([*ROOT.glob("[!_]*.py"), *ROOT.glob("*/*.py")]):
+        if path.parent.name.startswith("modt_"):
+            continue  # packages by themselves
         tree = ast.parse(path.read_text(encoding="utf-8"))
         if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):
             module = ".".join(path.relative_to(ROOT.parent).with_suffix("").parts)

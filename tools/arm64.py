@@ -33,8 +33,9 @@ LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
 LEFT_OUT = {"cyclonedds", "ruff", "mypy"}
 """Packages of the extra [test] that have no wheel for this platform, or no use there."""
 TESTS = (
-    *("golden", "segmentation", "odometry", "tracking", "desk/box_tracking", "geometry", "classification", "energy"),
-    *("native", "sources", "sinks", "ros2", "app", "profile", "crash", "test_library.py", "test_pipeline.py"),
+    *("golden", "segmentation", "odometry", "tracking", "geometry", "classification", "energy", "native"),
+    *("modt_evaluation/box_tracking", "sources", "sinks", "ros2", "app", "profile", "crash"),
+    *("test_library.py", "test_pipeline.py"),
 )
 NOT_EMULATED = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
 """Test that fails because the emulator does not pass on the kernel's count of dropped datagrams."""

@@ -1,4 +1,4 @@
-"""Files of the package: models/, profiles/ and systemd/, and the models of modt_desk if it is installed.
+"""Files of the package: models/, profiles/ and systemd/, and the models of modt_evaluation if it is installed.
 
 They lie beside runtime/ in a checkout and an editable install, and inside the package in a wheel.
 """
@@ -11,7 +11,7 @@ from modt.errors import MisuseError
 
 _PACKAGE = Path(__file__).resolve().parent
 _ROOTS = (_PACKAGE / "data", _PACKAGE.parents[1])
-_DESK = (_PACKAGE.parent / "modt_desk", _PACKAGE.parents[1] / "tools" / "modt_desk")
+_EVALUATION = (_PACKAGE.parent / "modt_evaluation", _PACKAGE.parents[1] / "tools" / "modt_evaluation")
 
 
 def folder(kind: str) -> Path:
@@ -36,8 +36,8 @@ def find(kind: str, name: str, suffix: str, beside: Path = Path()) -> Path:
 
 
 def shipped(kind: str, suffix: str) -> list[Path]:
-    """Files of a kind by name, with those of the desk."""
-    folders = (folder(kind), *(root / kind for root in _DESK))
+    """Files of a kind by name, with those of the evaluation."""
+    folders = (folder(kind), *(root / kind for root in _EVALUATION))
     return sorted((path for place in folders for path in place.glob(f"*{suffix}")), key=lambda path: path.name)
 
 

@@ -14,7 +14,7 @@ from modt.app.stages import RANGE_SHARE, SWEEPS, SensorWatch, Stages
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED, Frame
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 
 INFO = SyntheticStream("street", "vlp-16", 2.0, 0).info
 

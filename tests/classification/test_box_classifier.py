@@ -32,7 +32,7 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Cut, Float64
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.classification.scenes import blobs
 from tools.train.dataset import Sensors, crop_features
 from tools.train.export_pointnet import classifier_entry, to_lists

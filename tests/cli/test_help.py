@@ -9,8 +9,8 @@ import pytest
 from modt import assets
 from modt.cli import main
 from modt.schemes import SENSORS
-from modt_desk.cli import profile
-from modt_desk.cli.completion import SHELLS, commands
+from modt_commands import profile
+from modt_commands.completion import SHELLS, commands
 
 
 def help_of(program, *arguments, capsys):
@@ -24,7 +24,7 @@ def help_of(program, *arguments, capsys):
 @pytest.mark.parametrize(
     ("program", "words", "names"),
     [
-        (main.main, [], main.COMMANDS),
+        (main.main, [], main.commands()),
         (profile.main, [], profile.COMMANDS),
         (main.main, ["profile"], ("fit", "show", "schema")),
     ],
@@ -91,4 +91,4 @@ def test_every_shell_is_told_every_command(capsys):
     for shell in SHELLS:
         main.main(["completion", shell])
         script = capsys.readouterr().out
-        assert all(name in script for name in (*main.COMMANDS, *profile.COMMANDS))
+        assert all(name in script for name in (*main.commands(), *profile.COMMANDS))

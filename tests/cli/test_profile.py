@@ -5,7 +5,7 @@ import json
 import pytest
 
 from modt import profile as profiles
-from modt_desk.cli import profile
+from modt_commands import profile
 
 from .commands import here, modt, refusal
 
@@ -27,7 +27,7 @@ def compared(tmp_path_factory):
     """Folder in which the modes were compared: other.json and page.html."""
     folder = tmp_path_factory.mktemp("compared")
     options = ("--frames", "0:8", "--repeat", 1, "--json", "--html", "page.html")
-    done = modt("compare", *options, cwd=folder, module="modt_desk.cli.profile")
+    done = modt("compare", *options, cwd=folder, module="modt_commands.profile")
     assert done.returncode == 0, done.stderr
     (folder / "other.json").write_text(done.stdout)
     return folder

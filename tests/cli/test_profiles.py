@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from modt import profile
-from modt_desk.cli.profile_schema import schema_text
+from modt_commands.profile_schema import schema_text
 
 from .commands import here, refusal
 

@@ -13,9 +13,9 @@ import yaml
 from modt import profile
 from modt.classes import CLASS_NAMES
 from modt.sinks.tracks import SCHEMA
-from modt_desk.cli.profile import main as modt_profile
-from modt_desk.reporting.records import read_records
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_commands.profile import main as modt_profile
+from modt_profiling.reporting.records import read_records
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
 from .commands import begin, here, modt, refusal

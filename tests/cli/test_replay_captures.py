@@ -9,8 +9,8 @@ from modt.app.supervisor import Supervisor
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sinks.tracks import SCHEMA
-from modt_desk.reporting.records import read_records
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_profiling.reporting.records import read_records
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture

@@ -9,7 +9,7 @@ import yaml
 
 from modt.app.supervisor import Supervisor
 from modt.geometry import inverse, rotation_zyx, se3
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
 from .commands import refusal, session

@@ -13,10 +13,10 @@ import yaml
 
 from modt import profile
 from modt.sinks.tracks import SCHEMA
-from modt_desk.cli.profile import main as modt_profile
-from modt_desk.reporting.records import read_records
-from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.desk import recorded
+from modt_commands.profile import main as modt_profile
+from modt_profiling.reporting.records import read_records
+from modt_simulation.synthetic_stream import SyntheticStream
+from tests import recorded
 
 from .commands import begin, environment, here, modt, refusal
 

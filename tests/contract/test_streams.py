@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modt.sources.recognise import open_stream
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets
 from tests.sources.point_clouds import pcd

@@ -46,7 +46,7 @@ from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Frame
-from modt_desk.reporting.records import read_records
+from modt_profiling.reporting.records import read_records
 from tests.crash.failing_calls import Faults
 from tests.results import CAR, result
 from tests.sequences.makers import MAKERS

@@ -8,7 +8,7 @@ from modt.energy.meters import meter as meter_module
 from modt.energy.meters.discovery import discover, find_batteries, find_hwmon, find_pmic, find_powercap
 from modt.energy.meters.meter import Kind, MeterLostError, Scope, model_meter
 from modt.errors import MisuseError
-from modt_desk.energy.named_meter import choose_meter
+from modt_profiling.energy.named_meter import choose_meter
 
 from .meter_files import write_files, write_zone
 

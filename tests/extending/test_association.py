@@ -12,7 +12,7 @@ from modt.tracking.association import Matches
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
 from modt.types import NONE
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 
 GATE_M, SIGMA_M = 2.0, 0.3
 

@@ -22,8 +22,8 @@ def a_package_with_trucks(tmp_path):
     """A copy of the package whose table of classes has one row more."""
     source = tmp_path / "source"
     root, unneeded = Path(__file__).parents[2], shutil.ignore_patterns("__pycache__")
-    for package in ("runtime/modt", "tools/modt_desk"):
-        shutil.copytree(root / package, source / package, ignore=unneeded)
+    for package in (root / "runtime" / "modt", *(root / "tools").glob("modt_*")):
+        shutil.copytree(package, source / package.relative_to(root), ignore=unneeded)
     (source / "models").mkdir()
     shutil.copytree(root / "profiles", source / "profiles")
     for profile in (source / "profiles").glob("*.yaml"):  # one value more where one is stated by class
@@ -82,6 +82,6 @@ def test_every_mode_and_sink_knows_the_class(source, profile):
         assert " Truck " in results.read_text()
         labels = np.fromfile(sorted((out / "labels").iterdir())[-1], np.uint32)
         assert 4 in labels & 0xFFFF
-    assert "frames" in run(source, "modt_desk.cli.profile", "report", str(out))
+    assert "frames" in run(source, "modt_commands.profile", "report", str(out))
     judged = json.loads(run(source, "modt", "evaluate", str(out), str(drive), "--json"))
     assert "truck" in json.dumps(judged)

@@ -7,7 +7,7 @@ from modt.config import EnergyConfig
 from modt.energy.meters import discovery
 from modt.energy.meters.meter import Candidate, Conditions, Facts, Kind, Scope, file_meter, probe
 from modt.energy.windows import Clocks, Windows
-from modt_desk.energy.named_meter import choose_meter
+from modt_profiling.energy.named_meter import choose_meter
 
 FACTS = Facts(
     name="coulomb counter",

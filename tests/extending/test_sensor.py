@@ -5,8 +5,8 @@ import pytest
 
 import modt
 from modt import profile
-from modt_desk.simulation import sensors
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation import sensors
+from modt_simulation.synthetic_stream import SyntheticStream
 
 PROFILE = """
 sensor:

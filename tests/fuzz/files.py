@@ -10,11 +10,11 @@ from modt.sources import kitti_calibration
 from modt.sources.pose_source import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import read_scan
-from modt_desk.box_tracking import detections as boxes
-from modt_desk.evaluation.kitti_labels import read_labels
-from modt_desk.evaluation.truth_files import open_truth
-from tests.desk.evaluation.test_truth_files import CUBOID, ITEM, LABEL, POSE
+from modt_evaluation.box_tracking import detections as boxes
+from modt_evaluation.kitti_labels import read_labels
+from modt_evaluation.truth_files import open_truth
 from tests.fuzz.target import Feed, of_file, target, targets_of_files
+from tests.modt_evaluation.test_truth_files import CUBOID, ITEM, LABEL, POSE
 from tests.sources import layouts, point_clouds
 
 PLY = ("binary_little_endian", "binary_big_endian", "ascii")

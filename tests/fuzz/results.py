@@ -5,13 +5,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from modt_desk.evaluation.export import FORMS, Export
-from modt_desk.evaluation.run_record import RunRecord
-from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.track_page import rows_of, track_page
-from tests.desk.reporting.test_run_report import ledger_line, window, write_run
+from modt_evaluation.export import FORMS, Export
+from modt_evaluation.run_record import RunRecord
+from modt_viewer.recorded_run import RecordedRun
+from modt_viewer.track_page import rows_of, track_page
 from tests.fuzz.runs import DESCRIPTION, described, frame_record
 from tests.fuzz.target import Feed, of_file, target
+from tests.modt_profiling.reporting.test_run_report import ledger_line, window, write_run
 
 
 def json_lines(records: Iterable[dict[str, Any]]) -> bytes:

@@ -17,13 +17,13 @@ from modt.cli import status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.sinks.run_directory import STATUS
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt_desk.cli import profile_report
-from modt_desk.evaluation.run_record import RunRecord
-from modt_desk.evaluation.truth_files import open_truth
+from modt_commands import profile_report
+from modt_evaluation.run_record import RunRecord
+from modt_evaluation.truth_files import open_truth
 from tests.cli.test_top import status as status_record
-from tests.desk.evaluation.test_truth_files import tracklets
-from tests.desk.reporting.test_run_report import track, write_run
 from tests.fuzz.target import Feed, of_file, target, targets_of_files
+from tests.modt_evaluation.test_truth_files import tracklets
+from tests.modt_profiling.reporting.test_run_report import track, write_run
 from tests.sources import layouts
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(

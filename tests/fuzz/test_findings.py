@@ -16,11 +16,11 @@ from modt.sources.packets.hesai import read_angles
 from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_source import read_poses
-from modt_desk.reporting.records import read_records
-from tests.desk.reporting.test_run_report import ledger_line
+from modt_profiling.reporting.records import read_records
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import SENSOR_BOMB, network
 from tests.fuzz.targets import TARGETS
+from tests.modt_profiling.reporting.test_run_report import ledger_line
 from tests.sources.layouts import CAMERA
 
 R, T = f"R: {CAMERA['R']}", "T: 0 0 0"

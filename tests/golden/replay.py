@@ -21,7 +21,7 @@ from modt.classes import CLASSES
 from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.types import NONE, FrameResult
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 
 FOLDER = Path(__file__).parent
 SCENES = {"street-vlp-16": ("street", "vlp-16", "vlp-16"), "street-hdl-64e": ("street", "hdl-64e", "hdl-64e")}

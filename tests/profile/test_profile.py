@@ -8,7 +8,7 @@ from modt import assets, profile
 from modt.config import EnergyConfig, ProfileConfig, SchedulerConfig
 from modt.errors import MisuseError
 from modt.segmentation.clusters import CellClusterer
-from modt_desk.cli import profile_group
+from modt_commands import profile_group
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m, histogram
 from modt.segmentation.segmenter import Segmenter
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 
 RNG = np.random.default_rng(0)
 WALLS = RNG.uniform(0.3, 2.6, 2000)

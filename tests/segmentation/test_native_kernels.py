@@ -32,7 +32,7 @@ from modt.tracking.track_table import NativeObserve
 from modt.tracking.track_table import observe as observe_tracks
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, UNRECORDED
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_clusters import cloud

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from modt.sensor_fit.reflectance import SCALES
-from modt_desk.sensor_fit.findings import Recording
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_profiling.sensor_fit.findings import Recording
+from modt_simulation.synthetic_stream import SyntheticStream
 
 
 @cache

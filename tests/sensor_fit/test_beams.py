@@ -10,7 +10,7 @@ from scipy.signal import find_peaks
 from modt.geometry import rotation_zyx
 from modt.sensor_fit.beams import find_beams, gaussian, prominent_peaks, running_mean
 from modt.sources.scan_file import read_scan
-from modt_desk.simulation.sensors import sensor
+from modt_simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording
 
 SENSORS = ("vlp-16", "vlp-32c", "hdl-64e", "os1-64", "pandar64", "solid-state")

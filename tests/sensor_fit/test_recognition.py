@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from modt import profile
 from modt.sensor_fit.recognition import recognise
 from modt.sources.scan_file import read_scan
-from modt_desk.simulation.sensors import SENSORS
+from modt_simulation.sensors import SENSORS
 from tests.sensor_fit.recordings import recording, with_scale
 
 

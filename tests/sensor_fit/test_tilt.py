@@ -9,9 +9,9 @@ from modt import profile
 from modt.app.chosen_profile import choose
 from modt.sensor_fit.recognition import recognise
 from modt.sensor_fit.tilt import MIN_TILT_DEG, find_floor
-from modt_desk.sensor_fit.findings import Recording
-from modt_desk.sensor_fit.fit import fit
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_profiling.sensor_fit.findings import Recording
+from modt_profiling.sensor_fit.fit import fit
+from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sensor_fit.recordings import recording
 
 MOUNTS = [(0.0, 0.0), (0.0, 15.0), (-15.0, 0.0), (8.0, -10.0), (180.0, 0.0), (170.0, 10.0)]

@@ -8,7 +8,7 @@ from modt.config import RecordingConfig
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sinks.tracks import SCHEMA
-from modt_desk.reporting.records import read_records
+from modt_profiling.reporting.records import read_records
 from tests.results import CAR, result
 
 OURS = f"schema: modt.run/1\n{MARK}\n"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from modt.errors import MisuseError, ModtError
 from modt.sinks.output import LineFile
 from modt.sinks.records import line
-from modt_desk.reporting.records import read_records
+from modt_profiling.reporting.records import read_records
 from tests.sinks.recordings import files_of_at_most
 
 

@@ -12,7 +12,7 @@ from modt.geometry import rotation_zyx, se3
 from modt.sinks.records import line
 from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
 from modt.types import NONE, Cut
-from modt_desk.evaluation.recorded_result import recorded_pose
+from modt_evaluation.recorded_result import recorded_pose
 from tests.results import PEDESTRIAN, frame_record, result
 
 

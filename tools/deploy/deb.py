@@ -23,7 +23,7 @@ sys.path.insert(0, "/{place}/lib")
 from {module} import main
 raise SystemExit(main())
 """
-PROGRAMS = {"modt": "modt.cli.main", "modt-profile": "modt_desk.cli.profile"}
+PROGRAMS = {"modt": "modt.cli.main", "modt-profile": "modt_commands.profile"}
 CONTROL = """Package: modt
 Version: {version}
 Architecture: {architecture}

@@ -17,8 +17,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from modt_desk.cli.service import PREFIX, Service
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_commands.service import PREFIX, Service
+from modt_simulation.synthetic_stream import SyntheticStream
 from tools.deploy.proof_steps import END
 from tools.options import parser
 

@@ -6,7 +6,7 @@ import argparse
 from collections import Counter
 from itertools import chain
 
-from modt_desk.cli.completion import commands
+from modt_commands.completion import commands
 from tools.docs.sections import DOCS, replace_section, write
 
 DOCUMENT = DOCS / "commands.md"

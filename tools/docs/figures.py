@@ -18,12 +18,12 @@ import numpy as np
 from modt import host
 from modt.app import assembly
 from modt.classes import CLASS_NAMES
-from modt_desk.evaluation.evaluation import ALL, Evaluation, collect, evaluation
-from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.experiments.catalogue import chosen
-from modt_desk.experiments.drives import Drive, KittiDrive, completed, kitti_drives, simulated_drives
-from modt_desk.experiments.markdown import commit, sources
-from modt_desk.experiments.study import Study
+from modt_evaluation.evaluation import ALL, Evaluation, collect, evaluation
+from modt_evaluation.experiments.catalogue import chosen
+from modt_evaluation.experiments.drives import Drive, KittiDrive, completed, kitti_drives, simulated_drives
+from modt_evaluation.experiments.markdown import commit, sources
+from modt_evaluation.experiments.study import Study
+from modt_evaluation.frame import JudgedFrame
 from tools.docs.paper_page import NAMES, section
 from tools.docs.sections import replace_section
 from tools.options import parser

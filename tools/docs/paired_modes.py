@@ -13,9 +13,9 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES
 from modt.types import Float64
-from modt_desk.evaluation.class_score import class_scores
-from modt_desk.evaluation.evaluation import DriveRows
-from modt_desk.experiments.markdown import commit
+from modt_evaluation.class_score import class_scores
+from modt_evaluation.evaluation import DriveRows
+from modt_evaluation.experiments.markdown import commit
 from tools.docs.sections import DOCS, replace_section, write
 from tools.study import drives
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from modt_desk.experiments import paper
-from modt_desk.experiments.catalogue import DETECTION, EXPERIMENTS, TRACKING
-from modt_desk.experiments.drives import KITTI
-from modt_desk.experiments.markdown import number
-from modt_desk.experiments.study import DEFAULT, Row
+from modt_evaluation.experiments import paper
+from modt_evaluation.experiments.catalogue import DETECTION, EXPERIMENTS, TRACKING
+from modt_evaluation.experiments.drives import KITTI
+from modt_evaluation.experiments.markdown import number
+from modt_evaluation.experiments.study import DEFAULT, Row
 
 NAMES = ("table3", "table4", "table5", "table6")
 """Experiments that the page shows."""

@@ -6,8 +6,8 @@ from dataclasses import fields
 
 from modt import assets
 from modt.config import ProfileConfig
-from modt_desk.cli.profile_group import value_text
-from modt_desk.cli.profile_schema import FILE, keys, schema_text
+from modt_commands.profile_group import value_text
+from modt_commands.profile_schema import FILE, keys, schema_text
 from tools.docs.sections import DOCS, replace_section, write
 
 DOCUMENT = DOCS / "profile-keys.md"

@@ -26,7 +26,7 @@ from modt.cli.options import bounded, frames
 from modt.errors import ModtError
 from modt.sources.packets.capture import open_capture
 from modt.sources.recognise import CAPTURES, open_stream
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 from tools.send.faults import PacketFaults, Timed
 from tools.send.ideal_packets import LAYOUTS, MODELS, ideal_calibration, packets_of

@@ -25,8 +25,8 @@ from modt import host, profile
 from modt.app import assembly
 from modt.cli.options import frames as number_range
 from modt.geometry import FieldOfView
-from modt_desk.simulation.sensors import SENSORS
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.sensors import SENSORS
+from modt_simulation.synthetic_stream import SyntheticStream
 from tools.docs.sections import replace_section
 from tools.options import parser
 

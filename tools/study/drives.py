@@ -12,14 +12,14 @@ from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
 from modt.sources.recognise import open_stream
 from modt.types import Frame
-from modt_desk.evaluation.evaluation import DriveRows, collect
-from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.evaluation.further_objects import with_further
-from modt_desk.evaluation.rules import CUBOID_RULES, Rules
-from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
-from modt_desk.evaluation.truth_files import open_truth
-from modt_desk.experiments.drives import SIMULATED_TYPES
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_evaluation.evaluation import DriveRows, collect
+from modt_evaluation.experiments.drives import SIMULATED_TYPES
+from modt_evaluation.frame import JudgedFrame
+from modt_evaluation.further_objects import with_further
+from modt_evaluation.rules import CUBOID_RULES, Rules
+from modt_evaluation.truth import KITTI_TYPES, FrameTruth
+from modt_evaluation.truth_files import open_truth
+from modt_simulation.synthetic_stream import SyntheticStream
 
 
 @dataclass(frozen=True, slots=True)

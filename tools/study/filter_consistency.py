@@ -26,8 +26,8 @@ from modt.cli.options import frames as number_range
 from modt.geometry import FieldOfView, wrap
 from modt.profile import load
 from modt.types import NONE, Float64, Int, Proposals
-from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt_desk.simulation.world import MOVING_MPS
+from modt_simulation.synthetic_stream import SyntheticStream
+from modt_simulation.world import MOVING_MPS
 from tools.options import parser
 
 MIN_HITS = 6

@@ -25,14 +25,14 @@ from modt.geometry import FieldOfView, inverse, transform_boxes
 from modt.placement import Mount
 from modt.profile import load
 from modt.sensor_fit.recognition import recognise
-from modt_desk.evaluation.evaluation import DriveRows, collect
-from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.evaluation.rows import Outcome
-from modt_desk.evaluation.rules import CUBOID_RULES
-from modt_desk.evaluation.truth import FrameTruth, Role
-from modt_desk.experiments.drives import SIMULATED_TYPES
-from modt_desk.simulation.sensors import SENSORS
-from modt_desk.simulation.synthetic_stream import SCENES, SyntheticStream
+from modt_evaluation.evaluation import DriveRows, collect
+from modt_evaluation.experiments.drives import SIMULATED_TYPES
+from modt_evaluation.frame import JudgedFrame
+from modt_evaluation.rows import Outcome
+from modt_evaluation.rules import CUBOID_RULES
+from modt_evaluation.truth import FrameTruth, Role
+from modt_simulation.sensors import SENSORS
+from modt_simulation.synthetic_stream import SCENES, SyntheticStream
 from tools.options import parser
 
 BANDS_M = ((0.5, 3.0), (3.0, 8.0), (8.0, 20.0), (20.0, 60.0))

@@ -18,7 +18,7 @@ from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.cli.options import frames as number_range
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Int
-from modt_desk.simulation.sensors import SENSORS
+from modt_simulation.sensors import SENSORS
 from tools.options import parser
 from tools.train.build_crops import kitti
 from tools.train.labelled_scans import THINNED, Scan, argoverse_scans, pandaset_scans, thinned

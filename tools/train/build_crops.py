@@ -25,7 +25,7 @@ from modt.classification.crops import gather, ground_z_m
 from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
-from modt_desk.simulation.sensors import SENSORS
+from modt_simulation.sensors import SENSORS
 from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, VARIANT_NAMES, Sensors
 from tools.train.labelled_scans import (
     THINNED,

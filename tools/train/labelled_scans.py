@@ -16,9 +16,9 @@ from modt.errors import MisuseError
 from modt.geometry import Camera, FieldOfView
 from modt.sources.kitti_calibration import camera_of_sequence
 from modt.types import Bool, Float32, Float64, Int
-from modt_desk.evaluation import overlap
-from modt_desk.evaluation.kitti_labels import DONT_CARE, read_labels
-from modt_desk.evaluation.truth import PANDASET_TYPES, Regions, Role
+from modt_evaluation import overlap
+from modt_evaluation.kitti_labels import DONT_CARE, read_labels
+from modt_evaluation.truth import PANDASET_TYPES, Regions, Role
 
 KITTI_CLASS = {kind: c for c, spec in CLASSES.items() for kind in spec.kitti}
 SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.semantic_kitti} | dict.fromkeys(

@@ -13,9 +13,9 @@ from modt.app import assembly
 from modt.classes import N_CLASSES
 from modt.classification.motion_witness import LENGTH_M, MOVED_M, YOUNG_S, cells
 from modt.types import Float64, Int
-from modt_desk.evaluation.evaluation import collect
-from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.simulation.sensors import SENSORS
+from modt_evaluation.evaluation import collect
+from modt_evaluation.frame import JudgedFrame
+from modt_simulation.sensors import SENSORS
 from tools.options import parser
 from tools.study.drives import Drive, simulated
 

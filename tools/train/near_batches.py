@@ -14,7 +14,7 @@ from modt.classification.crops import Crops
 from modt.config import SegmentationConfig
 from modt.segmentation.view_ends import ViewEnds
 from modt.types import Cut, Float64, Int
-from modt_desk.simulation.sensors import SENSORS
+from modt_simulation.sensors import SENSORS
 from tools.train.augment import subsample
 from tools.train.dataset import SYNTHETIC, Dataset, Pools, Sensors, draw_batch
 from tools.train.near_scans import HEIGHT_M, MIN_RANGE_M, RANGE_M

@@ -11,16 +11,16 @@ from numpy.random import Generator
 
 from modt import profile
 from modt.config import ProfileConfig
-from modt_desk.simulation import kinds, scenery
-from modt_desk.simulation.builder import SceneBuilder
-from modt_desk.simulation.materials import Material
-from modt_desk.simulation.motion import Path
-from modt_desk.simulation.scenery import chair, pallets, shelf, table
-from modt_desk.simulation.sensors import SENSORS
-from modt_desk.simulation.simulator import Simulator
-from modt_desk.simulation.solids import Solids, box, cylinder
-from modt_desk.simulation.world import World
-from modt_desk.simulation.yard import enclose, floor
+from modt_simulation import kinds, scenery
+from modt_simulation.builder import SceneBuilder
+from modt_simulation.materials import Material
+from modt_simulation.motion import Path
+from modt_simulation.scenery import chair, pallets, shelf, table
+from modt_simulation.sensors import SENSORS
+from modt_simulation.simulator import Simulator
+from modt_simulation.solids import Solids, box, cylinder
+from modt_simulation.world import World
+from modt_simulation.yard import enclose, floor
 from tools.train.labelled_scans import Scan
 from tools.train.synthetic_scans import labelled_scan
 

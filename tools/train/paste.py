@@ -17,7 +17,7 @@ from modt.classes import ObjectClass
 from modt.config import SensorConfig
 from modt.geometry import FieldOfView
 from modt.types import Bool, Float32, Float64, Int
-from modt_desk.evaluation.overlap import PAD_M
+from modt_evaluation.overlap import PAD_M
 from tools.train.labelled_scans import Scan
 
 MIN_POINTS, CLEARANCE_M, OCCLUSION_MARGIN_M = 8, 0.4, 0.4

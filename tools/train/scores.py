@@ -13,7 +13,7 @@ from scipy.special import log_softmax, softmax
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.types import NONE, Bool, Float64, Int
-from modt_desk.evaluation.class_score import (
+from modt_evaluation.class_score import (
     average_precision,
     precision_recall,
     top_calibration_error,

@@ -11,14 +11,14 @@ import numpy as np
 from modt import profile
 from modt.geometry import FieldOfView
 from modt.types import Frame
-from modt_desk.evaluation.kitti_labels import read_labels
-from modt_desk.simulation import kinds, road, roadside
-from modt_desk.simulation.builder import SceneBuilder
-from modt_desk.simulation.motion import Path as Trajectory
-from modt_desk.simulation.sensors import sensor as model_of
-from modt_desk.simulation.simulator import Simulator, Truth
-from modt_desk.simulation.street import furnish, residential
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from modt_evaluation.kitti_labels import read_labels
+from modt_simulation import kinds, road, roadside
+from modt_simulation.builder import SceneBuilder
+from modt_simulation.motion import Path as Trajectory
+from modt_simulation.sensors import sensor as model_of
+from modt_simulation.simulator import Simulator, Truth
+from modt_simulation.street import furnish, residential
+from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
 from tools.train.labelled_scans import AT_SENSOR, TEST_DRIVE, Scan, drives_of_frames
 
 PEOPLE = ("Pedestrian", "Cyclist", "Person_sitting")

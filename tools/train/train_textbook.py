@@ -21,7 +21,7 @@ import torch
 from scipy.special import softmax
 
 from modt.classes import CLASS_NAMES
-from modt_desk.evaluation.class_score import average_precision
+from modt_evaluation.class_score import average_precision
 from tools.options import make_torch_deterministic, parser
 from tools.train.build_models import KITTI_LICENCE
 from tools.train.dataset import BATCH_SIZE, SEED, SHIPPED, Dataset, folds, load, sampling_pools

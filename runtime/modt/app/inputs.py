@@ -6,7 +6,7 @@ import argparse
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from importlib import import_module
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
@@ -23,8 +23,6 @@ from modt.sources.stream import Stream, StreamInfo
 if TYPE_CHECKING:
     from modt.sources.live.live_stream import LiveStream
 
-STREET = "modt_desk.simulation.synthetic_stream"
-"""Module of the synthetic street, loaded only where no recording is given."""
 RECORDED, NONE = "recording", "none"
 """Values of --odometry that are no addresses."""
 log = logging.getLogger(__name__)
@@ -59,7 +57,8 @@ def stream(request: Request) -> Stream:
         MisuseError: the path is no stream.
     """
     if request.path is None:
-        whole: Stream = import_module(STREET).embedded_street()
+        (embedded,) = entry_points(group="modt.streams", name="embedded")
+        whole: Stream = embedded.load()()
     else:
         from modt.sources.recognise import open_stream
 

@@ -6,31 +6,28 @@ NumPy and ONNX Runtime size their thread pools when imported: commands import th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.metadata import entry_points
 
 from modt.cli.command import dispatch
 
-COMMANDS = {
+OWN = {
     "replay": "modt.cli.replay",
     "run": "modt.cli.run",
     "status": "modt.cli.status",
     "top": "modt.cli.status",
     "check": "modt.cli.check",
-    "view": "modt_desk.cli.view",
-    "evaluate": "modt_desk.cli.evaluate",
-    "export": "modt_desk.cli.export",
-    "simulate": "modt_desk.cli.simulate",
-    "track": "modt_desk.cli.track",
-    "profile": "modt_desk.cli.profile_group",
-    "profiles": "modt_desk.cli.profile_group",
-    "completion": "modt_desk.cli.completion",
-    "service": "modt_desk.cli.service",
 }
-"""Module of each command. Nothing else in this package names modules of the desk."""
+"""Module of each command of the robot. Installed tools add theirs by entry points."""
+
+
+def commands() -> dict[str, str]:
+    """Module of every command by its name."""
+    return OWN | {entry.name: entry.value for entry in entry_points(group="modt.commands")}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted."""
-    return dispatch("modt", "Detect, track and classify objects in a LiDAR stream.", COMMANDS, argv)
+    return dispatch("modt", "Detect, track and classify objects in a LiDAR stream.", commands(), argv)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.stream import Reception, Sweep
 from modt.types import Float32, Frame
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from tools.send.faults import Timed
 from tools.send.ideal_packets import packets_of
 

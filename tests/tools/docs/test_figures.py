@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modt_desk.evaluation.evaluation import DriveRows
-from modt_desk.experiments.drives import kitti_drives
-from modt_desk.experiments.study import DEFAULT, Row
-from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.desk.recorded import written
+from modt_evaluation.evaluation import DriveRows
+from modt_evaluation.experiments.drives import kitti_drives
+from modt_evaluation.experiments.study import DEFAULT, Row
+from modt_simulation.synthetic_stream import SyntheticStream
+from tests.recorded import written
 from tools.docs import figures, paired_modes
 from tools.docs.paired_modes import BASELINE, MODES, difference, interval
 from tools.docs.paper_page import section

@@ -2,7 +2,7 @@
 
 import pytest
 
-from modt_desk.cli.profile_schema import keys, schema_text
+from modt_commands.profile_schema import keys, schema_text
 from tools.docs import commands, profile_keys, state_tables
 
 

@@ -24,10 +24,10 @@ from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
 from modt.types import Frame
-from modt_desk.cli.profile_schema import Key, keys
-from modt_desk.reporting.run_report import run_tree
-from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.desk.reporting.test_run_report import write_run
+from modt_commands.profile_schema import Key, keys
+from modt_profiling.reporting.run_report import run_tree
+from modt_simulation.synthetic_stream import SyntheticStream
+from tests.modt_profiling.reporting.test_run_report import write_run
 
 pytestmark = pytest.mark.slow
 

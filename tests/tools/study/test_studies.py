@@ -9,8 +9,8 @@ from modt.classes import ObjectClass
 from modt.geometry import rotation_zyx, se3
 from modt.placement import Mount
 from modt.sources.recognise import open_stream
-from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tests.desk.recorded import written
+from modt_simulation.synthetic_stream import SyntheticStream
+from tests.recorded import written
 from tools.study import ego_drift, mounts
 from tools.study.boards import BOARDS, Work, rating_of, table
 from tools.study.filter_consistency import BodyTrack, body_tracks, study

@@ -9,7 +9,7 @@ from scipy.special import softmax
 
 from modt.classification.crops import Crops
 from modt.types import NONE, Int
-from modt_desk.evaluation.class_score import top_calibration_error
+from modt_evaluation.class_score import top_calibration_error
 from tests.tools.train.datasets import data_of, truth_of
 from tools.train.dataset import CLUSTERED, SHIPPED, SYNTHETIC, Dataset, folds
 from tools.train.held_out import Calibration, Validation, fit_calibration, fit_pool, out_of_fold

@@ -6,7 +6,7 @@ import pytest
 from modt.classes import ObjectClass
 from modt.config import SensorConfig
 from modt.errors import MisuseError
-from modt_desk.simulation.synthetic_stream import K
+from modt_simulation.synthetic_stream import K
 from tests.tools.train.datasets import scan_of, write_folder
 from tools.train.labelled_scans import AT_SENSOR, argoverse_scans, beams, folder_scans, pandaset_scans, thinned
 from tools.train.synthetic_scans import label_scene, simulated_scans

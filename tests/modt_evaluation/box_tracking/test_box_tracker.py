@@ -1,0 +1,157 @@
+"""The box tracker, its filter against the full Kalman filter, and whole tracks."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from shapely.geometry import Polygon
+
+from modt.geometry import corners
+from modt_evaluation.box_tracking import box_tracker
+from modt_evaluation.box_tracking.box_tracker import BoxClass, BoxTracker
+from modt_evaluation.box_tracking.sequences import TrackedBoxes, birds_eye_intersection, bridged, iou_3d, of_one_class
+
+CONFIG = BoxClass(report_above=-100.0, keep_above=0.0)
+CONFIDENT = BoxClass(report_above=5.0, keep_above=0.0)
+
+
+def car(x, y, yaw=0.0):
+    return [x, y, -1.0, 4.0, 1.8, 1.5, yaw]
+
+
+def step(tracker, i, listed, score=5.0):
+    boxes = np.array(listed, np.float64).reshape(-1, 7)
+    scores = np.broadcast_to(np.asarray(score, np.float64), len(boxes))
+    return tracker.step(i * 0.1, boxes, scores, np.hypot(boxes[:, 0], boxes[:, 1]))
+
+
+def follow(frames, config=CONFIG, score=5.0):
+    tracker = BoxTracker(config)
+    for i, listed in enumerate(frames):
+        reported = step(tracker, i, listed, score)
+    return reported
+
+
+@pytest.mark.parametrize(("missed", "ids"), [(5, [0]), (30, [0]), (31, [1])])
+def test_a_track_outlives_missed_detections_unreported_until_it_is_deleted(missed, ids):
+    seen = [[car(10, 0)]] * 9 + [[]] * missed
+    assert list(follow(seen).id) == []
+    assert list(follow([*seen, [car(10, 0)]]).id) == ids
+
+
+@pytest.mark.parametrize("missed", [0, 9, 29])
+def test_the_gate_does_not_widen_while_a_track_is_missed(missed):
+    seen = [[car(10, 0)]] * 9 + [[]] * missed
+    assert list(follow([*seen, [car(10, 2.5)]]).id) == [0]
+    assert list(follow([*seen, [car(10, 5.5)]]).id) == [1]
+
+
+def test_a_rotating_sensor_keeps_its_tracks():
+    """A parked car seen by a robot that turns at 1 rad/s: its heading in the sensor frame changes in every frame."""
+    bearing = np.pi / 4 - 0.1 * np.arange(12)
+    r = follow([[car(30 * np.cos(b), 30 * np.sin(b), b)] for b in bearing])
+    assert list(r.id) == [0]
+    np.testing.assert_allclose(r.box[0, :2], [30 * np.cos(bearing[-1]), 30 * np.sin(bearing[-1])], atol=0.2)
+
+
+def test_the_yaw_does_not_flip_by_pi():
+    r = follow([[car(10 + i, 0, np.pi * (i % 2))] for i in range(9)])
+    assert abs(np.cos(r.box[0, 6])) > 0.99
+    assert np.cos(r.box[0, 6]) > 0
+
+
+def test_a_low_score_continues_a_track_but_starts_none():
+    assert len(follow([[car(10, 0)]] * 3, score=-1.0).id) == 0
+    tracker = BoxTracker(CONFIG)
+    for i, score in enumerate([3.0, -1.0, -1.0]):
+        reported = step(tracker, i, [car(10, 0)], score)
+    assert list(reported.id) == [0]
+    assert list(reported.source) == [0]
+
+
+def test_a_track_is_reported_by_its_score_or_its_age():
+    for frames, score, reported in ((1, 4.5, 0), (1, 5.0, 1), (2, 4.5, 0), (3, 4.5, 1)):
+        assert len(follow([[car(10, 0)]] * frames, CONFIDENT, score=score).id) == reported
+    tracker = BoxTracker(CONFIDENT)
+    ids = [list(step(tracker, i, [car(10, 0)], s).id) for i, s in enumerate([6.0, 1.0, 9.0])]
+    assert ids == [[0], [], [0]], "it keeps its id while it is not reported"
+
+
+@given(st.lists(st.lists(st.tuples(st.floats(-30, 30), st.floats(-30, 30)), max_size=5), max_size=8))
+def test_each_detection_has_exactly_one_track(scene):
+    tracker = BoxTracker(CONFIG)
+    for i, places in enumerate(scene):
+        r = step(tracker, i, [car(x, y) for x, y in places])
+        assert sorted(r.source) == list(range(len(places)))
+        assert len(set(r.id)) == len(r.id)
+        assert np.isfinite(r.box).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_prediction_and_update_equal_the_full_kalman_filter(seed):
+    rng = np.random.default_rng(seed)
+    x, z, variance = rng.uniform(-50, 50, (1, 4)), rng.uniform(-50, 50, (1, 2)), rng.uniform(0.01, 4, 1)
+    dt_s, acceleration, A = rng.uniform(0, 2), rng.uniform(0.1, 20), rng.uniform(-2, 2, (2, 2))
+    P = A @ A.T + 0.01 * np.eye(2)
+    packed, full = np.array([[P[0, 0], P[0, 1], P[1, 1]]]), np.kron(P, np.eye(2))  # of x, y, vx, vy
+    moved, grown = box_tracker.predict(x, packed, acceleration, dt_s)
+    after, squeezed = box_tracker.update(x, packed, z, variance)
+    F, H = np.kron([[1, dt_s], [0, 1]], np.eye(2)), np.eye(2, 4)
+    push = acceleration * np.kron([[dt_s**2 / 2], [dt_s]], np.eye(2))
+    K = full @ H.T @ np.linalg.inv(H @ full @ H.T + variance * np.eye(2))
+    np.testing.assert_allclose(moved[0], F @ x[0], atol=1e-9)
+    np.testing.assert_allclose(after[0], x[0] + K @ (z[0] - H @ x[0]), atol=1e-7)
+    for found, expected in ((grown, F @ full @ F.T + push @ push.T), (squeezed, (np.eye(4) - K @ H) @ full)):
+        np.testing.assert_allclose(found[0], expected[[0, 0, 2], [0, 2, 2]], atol=1e-9)
+
+
+def tracked(rows):
+    """Boxes of rows of frame, id, x, yaw and confidence."""
+    frame, ids, x, yaw, confidence = (np.array(column) for column in zip(*rows, strict=True))
+    box = np.tile([0, 0, -1, 4.0, 1.8, 1.5, 0], (len(rows), 1))
+    box[:, 0], box[:, 6] = x, yaw
+    return TrackedBoxes(frame, ids, np.repeat(x[:, None], 4, axis=1), box, confidence.astype(float))
+
+
+def test_gaps_up_to_the_greatest_are_filled_on_the_line_between_their_ends():
+    found = tracked([(0, 1, 0.0, 3.0, 4), (3, 1, 6.0, -3.0, 7), (8, 1, 9.0, -3.0, 7), (4, 2, 1.0, 0.0, 5)])
+    filled = bridged(found, 3)
+    assert list(zip(filled.frame, filled.id, strict=True)) == [(0, 1), (1, 1), (2, 1), (3, 1), (4, 2), (8, 1)]
+    np.testing.assert_allclose(filled.box[:4, 0], [0, 2, 4, 6])
+    np.testing.assert_allclose(filled.image_box[:4, 2], [0, 2, 4, 6])
+    np.testing.assert_allclose(filled.confidence[:4], [4, 5, 6, 7])
+    assert (np.cos(filled.box[:4, 6]) < -0.98).all()  # across pi, not through 0
+    assert len(bridged(found, 4).frame) == len(filled.frame) + 4
+    assert len(bridged(found, 0).frame) == len(found.frame)
+
+
+def test_of_two_classes_on_one_object_the_more_confident_one_stays_unless_it_only_crosses():
+    rows = [(i, number, x, 0, sure) for number, x, sure in ((1, 10, 4), (2, 10.5, 6), (4, 30, 3)) for i in range(4)]
+    found = tracked(rows)
+    assert set(of_one_class(found, found.id % 3).id) == {2, 4}
+    assert set(of_one_class(found, np.zeros(len(rows))).id) == {1, 2, 4}
+    crossing = tracked([(i, 1, 10 + 3 * i, 0, 4) for i in range(6)] + [(i, 2, 10, 0, 6) for i in range(6)])
+    assert set(of_one_class(crossing, crossing.id).id) == {1, 2}
+
+
+BOXES = arrays(np.float64, (4, 7), elements=st.floats(0, 1)).map(
+    lambda u: np.concatenate([6 * u[:, :3] - 3, 0.05 + 5 * u[:, 3:6], 8 * u[:, 6:] - 4], axis=1)
+)
+
+
+@given(BOXES, BOXES)
+def test_intersection_area_matches_polygon_clipping(a, b):
+    slow = [Polygon(p).intersection(Polygon(q)).area for p, q in zip(corners(a), corners(b), strict=True)]
+    np.testing.assert_allclose(birds_eye_intersection(a, b), slow, atol=1e-6)
+    np.testing.assert_allclose(iou_3d(a, a), 1.0, atol=1e-6)
+
+
+def test_iou_is_accurate_far_from_the_origin_and_zero_apart():
+    a = np.array([[1e5, 1e5, 0, 4, 2, 1.5, 0.3]])
+    b = a + np.array([1.0, 0.5, 0.5, 0, 0, 0, 0])
+    far = np.array([1e5, 1e5, 0, 0, 0, 0, 0])
+    near = iou_3d(a - far, b - far)
+    np.testing.assert_allclose(iou_3d(a, b), near, atol=1e-6)
+    assert iou_3d(a, a + np.array([9.0, 0, 0, 0, 0, 0, 0]))[0] == 0
+    assert iou_3d(a, a + np.array([0, 0, 2.0, 0, 0, 0, 0]))[0] == 0

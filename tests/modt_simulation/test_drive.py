@@ -1,0 +1,75 @@
+"""A synthetic drive on disk, read back like a recorded one."""
+
+import numpy as np
+import pytest
+
+from modt.cli.main import main
+from modt.geometry import inverse
+from modt.sources.recognise import open_stream
+from modt_evaluation.truth_files import open_truth
+from modt_simulation.kitti_raw import DATE
+from modt_simulation.synthetic_stream import SyntheticStream
+from tests.recorded import written
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """A street on disk: its writer, its stream, its sweeps."""
+    stream = SyntheticStream("street", "vlp-16", 1.5, seed=4)
+    return written(tmp_path_factory.mktemp("drive"), stream), stream, list(stream.sweeps())
+
+
+@pytest.mark.parametrize("layout", ["drive", "sequence"])
+def test_points_times_poses_and_camera_are_read_back(drive, layout):
+    writer, stream, sweeps = drive
+    read = open_stream(getattr(writer, layout))
+    frames = list(read)
+    assert [f.index for f in frames] == [f.index for f, _ in sweeps]
+    first_read, first = frames[0], sweeps[0][0]
+    for mine, (frame, _) in zip(frames, sweeps, strict=True):
+        np.testing.assert_array_equal(mine.points, frame.points)
+        assert mine.stamp_s == pytest.approx(frame.stamp_s, abs=1e-6)
+        np.testing.assert_allclose(
+            inverse(first_read.T_world_sensor) @ mine.T_world_sensor,
+            inverse(first.T_world_sensor) @ frame.T_world_sensor,
+            atol=1e-4,
+        )
+    np.testing.assert_allclose(read.info.camera.P_image_sensor, stream.info.camera.P_image_sensor, atol=1e-9)
+    assert read.info.notes == read.info.pose_notes == ()
+
+
+@pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
+def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, turn_s):
+    stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
+    assert [frame.turn_s for frame in stream] == [turn_s] * 3
+    writer = written(tmp_path, stream)
+    read = open_stream(writer.drive)
+    np.testing.assert_allclose([f.turn_s for f in read], turn_s, atol=1e-9)
+    starts, stamps = ((writer.drive / "velodyne_points" / f"timestamps{k}.txt").read_text() for k in ("_start", ""))
+    assert (starts == stamps) is not distort
+
+
+def test_tracklets_hold_the_boxes_in_view_of_the_camera(drive):
+    writer, _, ((_, truth), *_) = drive
+    labelled = open_truth(writer.drive).frames[0]
+    assert len(labelled.id) > 3
+    off = np.linalg.norm(labelled.box[:, None, :6] - truth.boxes[:, :6], axis=2)
+    assert off.min(axis=1).max() < 1e-5
+    assert labelled.box[:, 0].min() > 0
+    assert set(labelled.type_) <= {"Car", "Van", "Truck", "Pedestrian", "Cyclist"}
+
+
+def test_labels_hold_class_and_instance(drive):
+    writer, _, sweeps = drive
+    for frame, truth in sweeps[:3]:
+        packed = np.fromfile(writer.sequence / "labels" / f"{frame.index:06d}.label", np.uint32)
+        np.testing.assert_array_equal(packed & 0xFFFF, truth.semantic)
+        number = (packed >> 16).astype(int)
+        for row, body in enumerate(truth.bodies):
+            np.testing.assert_array_equal(number == row + 1, truth.instance == body)
+
+
+def test_an_existing_drive_is_not_overwritten(tmp_path, capsys):
+    (tmp_path / DATE).mkdir()
+    assert main(["simulate", "--out", str(tmp_path)]) == 2
+    assert "already" in capsys.readouterr().err

@@ -1,0 +1,113 @@
+"""The synthetic stream: reproducible, with consistent ground truth."""
+
+import numpy as np
+import pytest
+
+from modt.errors import MisuseError
+from modt.geometry import inverse, rotation_zyx, transform, transform_boxes
+from modt.types import NONE
+from modt_simulation.sensors import SENSORS
+from modt_simulation.simulator import N_SLICES, slice_delay_s
+from modt_simulation.synthetic_stream import SCENES, SyntheticStream
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_same_seed_gives_the_same_bytes_in_any_order(scene):
+    a, b = (SyntheticStream(scene, "vlp-16", 0.4, seed=5) for _ in range(2))
+    frames = [f.points.tobytes() for f in a]
+    assert len(frames) == 4
+    assert frames[2] == next(iter(b.between(2, 3))).points.tobytes()
+    assert frames[2] != frames[1]
+    assert SyntheticStream(scene, "vlp-16", 0.4, seed=6).simulator.sweep(0)[0].points.tobytes() != frames[0]
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_every_sensor_gives_valid_frames(sensor):
+    frame = next(iter(SyntheticStream("street", sensor, 0.2)))
+    assert frame.points.dtype == np.float32
+    assert len(frame.points) > 5000
+    assert np.isfinite(frame.points).all()
+    assert 0 <= frame.points[:, 3].min() <= frame.points[:, 3].max() <= 1
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_points_of_a_body_lie_in_its_box(scene):
+    stream = SyntheticStream(scene, "os1-64", 0.8, seed=1)
+    inside = total = 0
+    for frame, truth in stream.sweeps():
+        for body, box in zip(truth.bodies, truth.boxes, strict=True):
+            p = frame.points[truth.instance == body, :3] - box[:3]
+            c, s = np.cos(box[6]), np.sin(box[6])
+            u = np.stack([c * p[:, 0] + s * p[:, 1], c * p[:, 1] - s * p[:, 0], p[:, 2]], axis=1)
+            inside += int((np.abs(u) < box[3:6] / 2 + 0.2).all(axis=1).sum())
+            total += len(p)
+    assert total > 1000
+    assert inside > 0.98 * total
+
+
+def test_bodies_at_rest_stay_where_they_are_in_the_world():
+    street = SyntheticStream(seconds=4.0, seed=3)
+    (first, a), (last, b) = (street.simulator.sweep(i) for i in (0, 39))
+    world_a = transform_boxes(first.T_world_sensor, a.boxes)
+    world_b = transform_boxes(last.T_world_sensor, b.boxes)
+    still = np.array([street.simulator.world.bodies[body].path.at_rest for body in a.bodies])
+    np.testing.assert_allclose(world_a[still, :3], world_b[still, :3], atol=1e-6)
+    assert np.linalg.norm(world_a[~still, :2] - world_b[~still, :2], axis=1).max() > 5
+
+
+def test_distorted_scans_are_restored_by_the_motion_during_the_sweep():
+    plain, distorted = (SyntheticStream(seconds=1.0, seed=2, distort=d) for d in (False, True))
+    (a, truth), (b, _) = plain.simulator.sweep(5), distorted.simulator.sweep(5)
+    world, sensor = plain.simulator.world, plain.simulator.sensor
+    transformed = np.linalg.norm(a.points[:, :3] - b.points[:, :3], axis=1)
+    still = truth.instance == NONE
+    assert transformed[still].max() > 0.2
+    bearing = np.arctan2(a.points[:, 1], a.points[:, 0]) % (2 * np.pi)
+    column = (bearing / (2 * np.pi) * sensor.shape[1]).astype(np.int64)
+    part = column * N_SLICES // sensor.shape[1]
+    for k in range(N_SLICES):
+        rows = still & (part == k)
+        late_s = slice_delay_s(k, sensor.period_s)
+        T = inverse(world.ego_pose(a.stamp_s)) @ world.ego_pose(a.stamp_s + late_s)
+        mended = transform(T, b.points[rows, :3].astype(np.float64))
+        np.testing.assert_allclose(mended, a.points[rows, :3], atol=1e-4)  # what float32 leaves of 80 m
+
+
+@pytest.mark.parametrize("mount_deg", [(0.0, 15.0), (15.0, 0.0), (180.0, 0.0)])
+def test_a_turned_sensor_sees_the_floor_where_the_mount_says(mount_deg):
+    level, turned = (
+        SyntheticStream("yard", "vlp-16", 0.1, 3, height_m=0.5, mount_deg=m).simulator
+        for m in ((0.0, 0.0), mount_deg)
+    )
+    height = []
+    for simulator in (level, turned):
+        frame, truth = simulator.sweep(0)
+        on_floor = (truth.instance == NONE) & (np.hypot(*frame.points[:, :2].T) < 10)
+        assert on_floor.sum() > 1000
+        height.append(transform(frame.T_world_sensor, frame.points[on_floor, :3].astype(np.float64))[:, 2])
+    assert np.abs(np.concatenate(height)).max() < 0.15
+    T = inverse(level.world.ego_pose(0.0)) @ turned.world.ego_pose(0.0)
+    np.testing.assert_allclose(T[:3, :3], rotation_zyx(*np.deg2rad([*mount_deg, 0.0])), atol=0.01)
+
+
+@pytest.mark.parametrize("scene", ["hall", "corridor", "lobby", "lift"])
+def test_rooms_have_a_ceiling_above_the_sensor(scene):
+    frame, _ = SyntheticStream(scene, "os1-64", 0.1, 2, height_m=0.5).simulator.sweep(0)
+    z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
+    top = np.quantile(z, 0.98)
+    assert 2.2 < top < 3.6
+    assert (np.abs(z - top) < 0.1).mean() > 0.03
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("moon", "vlp-16", 1.0, 0),
+        ("street", "eye", 1.0, 0),
+        ("street", "vlp-16", 0.0, 0),
+        ("street", "vlp-16", 1.0, -1),
+    ],
+)
+def test_invalid_arguments_are_refused(arguments):
+    with pytest.raises(MisuseError):
+        SyntheticStream(*arguments)

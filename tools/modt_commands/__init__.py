@@ -1,0 +1,1 @@
+"""Commands on recordings, profiles and energy: argument parsing alone."""

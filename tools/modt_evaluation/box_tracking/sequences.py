@@ -1,0 +1,214 @@
+"""Tracks of the detections of whole sequences, as KITTI's tracking results.
+
+After the last frame whole tracks are judged: by their confidence, by rival classes on one object, and short gaps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from modt.classes import CLASSES
+from modt.errors import MisuseError
+from modt.geometry import corners, inverse, transform_boxes, wrap
+from modt.sources import kitti_calibration
+from modt.sources.pose_source import read_poses
+from modt.types import Bool, Float64, Int
+from modt_evaluation.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
+from modt_evaluation.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, Detections, box_lines, boxes_to_kitti
+
+TINY = 1e-9
+
+
+def birds_eye_intersection(a: Float64, b: Float64) -> Float64:
+    """(n,) bird's-eye area that boxes a (n, 7) share with boxes b (n, 7), row by row [m2]."""
+    origin = a[:, None, :2]  # near the boxes: far from it, cross products cancel
+    return np.array([_shared_m2(p, q) for p, q in zip(corners(a) - origin, corners(b) - origin, strict=True)])
+
+
+def _shared_m2(polygon: Float64, other: Float64) -> float:
+    """Area that two convex, counter-clockwise polygons share: each edge of the other one clips the first."""
+    for begin, end in zip(other, np.roll(other, -1, axis=0), strict=True):
+        (dx, dy), (x, y) = end - begin, (polygon - begin).T
+        side = dx * y - dy * x
+        change = side - np.roll(side, -1)
+        inside = side >= 0
+        leaves = inside != np.roll(inside, -1)
+        share = np.divide(side, change, out=np.zeros(len(side)), where=leaves)[:, None]
+        crossing = polygon + share * (np.roll(polygon, -1, axis=0) - polygon)
+        polygon = np.stack([polygon, crossing], axis=1)[np.stack([inside, leaves], axis=1)]
+    (x, y), (after_x, after_y) = polygon.T, np.roll(polygon, -1, axis=0).T
+    return float(x @ after_y - after_x @ y) / 2
+
+
+def iou_3d(a: Float64, b: Float64) -> Float64:
+    """(n,) intersection over union of the boxes' volumes, row by row."""
+    top = np.minimum(a[:, 2] + a[:, 5] / 2, b[:, 2] + b[:, 5] / 2)
+    foot = np.maximum(a[:, 2] - a[:, 5] / 2, b[:, 2] - b[:, 5] / 2)
+    shared = birds_eye_intersection(a, b) * np.maximum(top - foot, 0.0)
+    union = np.prod(a[:, 3:6], axis=1) + np.prod(b[:, 3:6], axis=1) - shared
+    return np.asarray(shared / np.maximum(union, TINY))
+
+
+MIN_IOU = 0.25
+"""Overlap of boxes of two classes from which both are of one object."""
+REACH_M = 3.0
+"""Distance of centres up to which the overlap is tested."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedBoxes:
+    """The n boxes of tracks, in the world frame."""
+
+    frame: Int  # (n,) index of the frame
+    id: Int  # (n,) identity of the track
+    image_box: Float64  # (n, 4) left, top, right, bottom [pixel]
+    box: Float64  # (n, 7)
+    confidence: Float64  # (n,) confidence in the track, at that frame
+
+    def take(self, rows: Bool | Int) -> TrackedBoxes:
+        """The boxes at some rows."""
+        return TrackedBoxes(
+            self.frame[rows], self.id[rows], self.image_box[rows], self.box[rows], self.confidence[rows]
+        )
+
+    @classmethod
+    def none(cls) -> TrackedBoxes:
+        """No boxes."""
+        return cls(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 7)), np.zeros(0))
+
+    @classmethod
+    def join(cls, parts: Iterable[TrackedBoxes]) -> TrackedBoxes:
+        """The boxes of all parts."""
+        whole = list(parts)
+        return cls(*(np.concatenate([getattr(part, f.name) for part in whole]) for f in fields(cls)))
+
+
+def confident(found: TrackedBoxes, least: float) -> TrackedBoxes:
+    """Keep the tracks whose mean confidence reaches `least`."""
+    return found.take(_mean(found.id, found.confidence) >= least)
+
+
+def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
+    """Remove tracks whose boxes mostly lie on a more confident track of another class; classes are (n,)."""
+    mean = _mean(found.id, found.confidence)
+    place = np.column_stack([found.box[:, :2], 2 * REACH_M * found.frame])
+    a, b = cKDTree(place).query_pairs(REACH_M, output_type="ndarray").T
+    rivals = (object_class[a] != object_class[b]) & (iou_3d(found.box[a], found.box[b]) > MIN_IOU)
+    a, b = a[rivals], b[rivals]
+    beaten = np.zeros(len(mean))
+    beaten[np.where(mean[a] < mean[b], a, b)] = 1.0
+    return found.take(_mean(found.id, beaten) <= 0.5)
+
+
+def _mean(ids: Int, values: Float64) -> Float64:
+    """(n,) mean of the values (n,) of each one's track."""
+    _, track = np.unique(ids, return_inverse=True)
+    return np.asarray((np.bincount(track, values) / np.bincount(track))[track])
+
+
+def bridged(found: TrackedBoxes, max_gap: int) -> TrackedBoxes:
+    """The boxes, ordered by frame, with those interpolated where a track is missing for max_gap frames at most."""
+    found = found.take(np.lexsort((found.frame, found.id)))
+    gap = np.diff(found.frame) - 1
+    before = np.flatnonzero((np.diff(found.id) == 0) & (gap > 0) & (gap <= max_gap))
+    missing = gap[before]
+    step = 1 + np.arange(missing.sum()) - np.repeat(np.cumsum(missing) - missing, missing)
+    row = np.repeat(before, missing)
+    share = (step / (1 + gap[row]))[:, None]
+    change = found.box[row + 1] - found.box[row]
+    change[:, 6] = wrap(change[:, 6])
+    filled = TrackedBoxes(
+        frame=found.frame[row] + step,
+        id=found.id[row],
+        image_box=found.image_box[row] + share * (found.image_box[row + 1] - found.image_box[row]),
+        box=found.box[row] + share * change,
+        confidence=found.confidence[row] + share[:, 0] * (found.confidence[row + 1] - found.confidence[row]),
+    )
+    both = TrackedBoxes.join([found, filled])
+    return both.take(np.lexsort((both.id, both.frame)))
+
+
+def follow(
+    detections: Detections,
+    poses: Float64 | None,
+    period_s: float,
+    least_confidence: float | None = None,
+    *,
+    online: bool = False,
+) -> tuple[str, int]:
+    """KITTI tracking results of a sequence, and the number of its tracks.
+
+    Tracks are judged whole: by their mean confidence, and by whether a more confident one of another class follows
+    the same object. Their short gaps are filled. Online, each frame is written as the tracker reports it. The
+    (n, 4, 4) poses are T_world_camera, None without ego-motion. Where no minimum confidence is given, it is that of
+    the type.
+    """
+    T = None if poses is None else T_LEVEL_CAMERA @ poses @ inverse(T_LEVEL_CAMERA)
+    classes = []
+    for number, object_class in enumerate(DETECTED):
+        config = BOX_CLASSES[object_class]
+        least = config.keep_above if least_confidence is None else least_confidence
+        tracker = BoxTracker(replace(config, report_above=least if online else min(least, config.report_above)))
+        found = _reports(tracker, detections.take(detections.object_class == object_class), T, period_s)
+        found = replace(found, id=found.id * len(DETECTED) + number)
+        classes.append(found if online else bridged(confident(found, least), config.max_gap))
+    found = TrackedBoxes.join(classes)
+    if not online:
+        found = of_one_class(found, found.id % len(DETECTED))
+    found = found.take(np.argsort(found.frame, kind="stable"))
+    box = found.box
+    if T is not None:
+        ends = np.searchsorted(found.frame, np.arange(len(T) + 1))
+        box = np.concatenate([transform_boxes(inverse(T[i]), box[ends[i] : ends[i + 1]]) for i in range(len(T))])
+    names = [CLASSES[DETECTED[k]].kitti[0] for k in found.id % len(DETECTED)]
+    lines = box_lines(found.frame, names, found.id, found.image_box, boxes_to_kitti(box), found.confidence)
+    return "".join(lines), len(np.unique(found.id))
+
+
+def _reports(
+    tracker: BoxTracker, detections: Detections, T_world_level: Float64 | None, period_s: float
+) -> TrackedBoxes:
+    """Reports of all frames, in the world frame."""
+    reports = [TrackedBoxes.none()]
+    for frame, rows in detections.frames():
+        seen = detections.box[rows]
+        boxes = seen if T_world_level is None else transform_boxes(T_world_level[frame], seen)
+        found = tracker.step(frame * period_s, boxes, detections.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
+        if len(found.id):
+            image_box = detections.image_box[rows][found.source]
+            frames = np.full(len(found.id), frame)
+            reports.append(TrackedBoxes(frames, found.id, image_box, found.box, found.confidence))
+    return TrackedBoxes.join(reports)
+
+
+def camera_poses(
+    poses: Path | None, oxts_folder: Path | None, sequence: Detections, sequences: int
+) -> Float64 | None:
+    """(n, 4, 4) T_world_camera of every frame of the sequence, from files of poses or of OXTS records.
+
+    Raises:
+        MisuseError: there is no file for the sequence, or it is too short.
+    """
+    given = poses or oxts_folder
+    if given is None:
+        return None
+    if not given.is_dir() and sequences > 1:
+        raise MisuseError(given, f"one file for {sequences} sequences", "give a folder with a file for each")
+    path = given / f"{sequence.name}.txt" if given.is_dir() else given
+    if not path.is_file():
+        raise MisuseError(path, "is missing", "add it, or run without ego-motion")
+    if poses is not None:
+        found = read_poses(path)
+    else:
+        calib = path.parent.parent / "calib" / path.name
+        T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
+        T_sensor_camera = inverse(kitti_calibration.camera_of_sequence(calib).T_camera_sensor)
+        found = kitti_calibration.oxts_poses(kitti_calibration.read_oxts(path)) @ T_imu_sensor @ T_sensor_camera
+    if len(found) < sequence.n_frames:
+        raise MisuseError(path, f"{len(found)} poses for {sequence.n_frames} frames", "give one a frame")
+    return found

@@ -1,0 +1,145 @@
+"""The judgement of runs: every figure, from the judged rows of each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES
+from modt.types import NONE
+from modt_evaluation.class_score import ClassScore, class_scores, top_calibration_error
+from modt_evaluation.frame import JudgedFrame
+from modt_evaluation.matching import judge
+from modt_evaluation.rows import Association, Outcome, Rows, kinds, ratio
+from modt_evaluation.rules import Rules
+from modt_evaluation.track_score import TrackScore, track_metrics, track_scores
+from modt_evaluation.truth import LABELLED, Role
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentationScore:
+    """Counts of one kind of object, one for each object and frame. `Outcome` explains merged to missed."""
+
+    objects: int  # judged
+    recall: float | None  # share of them that is detected
+    merged: int
+    split: int
+    partial: int
+    missed: int
+    cut: int  # objects mostly out of view, judged or not
+
+
+def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
+    """The score of each class and of each labelled type."""
+    scores = {}
+    for name, which in kinds(objects).items():
+        judged = objects["outcome"][which & objects["to_segment"]]
+        found, merged, split, partial, missed = np.bincount(judged, minlength=len(Outcome)).tolist()
+        cut = int((which & ~objects["in_view"] & np.isin(objects["role"], LABELLED)).sum())
+        if len(judged) or cut:
+            recall = ratio(found, len(judged))
+            scores[name] = SegmentationScore(len(judged), recall, merged, split, partial, missed, cut)
+    return scores
+
+
+SCHEMA = "modt.evaluation/1"
+ALL = "all"
+RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0), "40-60": (40.0, 60.0)}
+"""Bands of range by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveRows:
+    """Judged rows of one drive: its tables of objects and proposals, and its associations by class and frame."""
+
+    rules: Rules
+    frames: int
+    n_proposals: int
+    classified: int
+    objects: Rows
+    proposals: Rows
+    associations: tuple[tuple[Association, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RangeScore:
+    """Scores of what lies within a band of range, by class (segmentation: by labelled type, too)."""
+
+    segmentation: dict[str, SegmentationScore]
+    classification: dict[str, ClassScore]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Scores of some drives; tracks and metrics are empty and None where labels have no identities."""
+
+    drives: int
+    sectors_deg: tuple[float, ...]  # half angles of the judged sectors, without repeats, ascending
+    complete: bool  # whether the labels of all drives are taken for complete
+    further_objects: int  # objects added beside the labels
+    further_labels: int  # labels of these objects, one a frame
+    frames: int
+    proposals: int
+    beta: float | None  # proposals classified over all
+    ranges: dict[str, RangeScore]  # scores by band of range
+    tracks: dict[str, TrackScore]  # scores of all objects, by class and by labelled type
+    metrics: dict[str, dict[str, float]] | None  # metrics of all classes and of each; None without trackeval
+    calibration_error: float | None  # expected, of the most probable class, over all judged proposals
+    calibration_error_of_objects: float | None  # the same over the proposals that stand for an object
+
+
+def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> DriveRows:
+    """Judge the frames of a drive. Pooled drives need different numbers.
+
+    Raises:
+        ValueError: there are no frames.
+    """
+    judged, n_proposals, classified = [], 0, 0
+    for frame in frames:
+        judged.append(judge(frame, rules, drive))
+        n_proposals, classified = n_proposals + frame.n_proposals, classified + frame.classified
+    if not judged:
+        raise ValueError("no frames")
+    objects, proposals, associations = zip(*judged, strict=True)
+    tables = np.concatenate(objects), np.concatenate(proposals)
+    return DriveRows(rules, len(judged), n_proposals, classified, *tables, tuple(zip(*associations, strict=True)))
+
+
+def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
+    """Every figure over all drives together."""
+    objects = np.concatenate([drive.objects for drive in drives])
+    proposals = np.concatenate([drive.proposals for drive in drives])
+    n_proposals, judged = sum(drive.n_proposals for drive in drives), proposals[proposals["to_classify"]]
+    further = objects[objects["role"] == Role.FURTHER]
+    on_objects = judged[judged["label"] > 0]
+    return Evaluation(
+        drives=len(drives),
+        sectors_deg=tuple(sorted({drive.rules.sector_deg for drive in drives})),
+        complete=all(drive.rules.complete for drive in drives),
+        further_objects=len(set(further[["drive", "id"]].tolist())),
+        further_labels=len(further),
+        frames=sum(drive.frames for drive in drives),
+        proposals=n_proposals,
+        beta=ratio(sum(drive.classified for drive in drives), n_proposals),
+        ranges={name: _in_range(objects, proposals, *band) for name, band in RANGES_M.items()},
+        tracks=track_scores(objects, proposals),
+        metrics=_metrics(drives) if (objects["id"] != NONE).any() else None,
+        calibration_error=top_calibration_error(judged["posterior"], judged["label"]),
+        calibration_error_of_objects=top_calibration_error(on_objects["posterior"], on_objects["label"]),
+    )
+
+
+def _in_range(objects: Rows, proposals: Rows, low_m: float, high_m: float) -> RangeScore:
+    seen, found = (rows[(rows["range_m"] >= low_m) & (rows["range_m"] < high_m)] for rows in (objects, proposals))
+    return RangeScore(segmentation(seen), class_scores(seen, found))
+
+
+def _metrics(drives: Sequence[DriveRows]) -> dict[str, dict[str, float]] | None:
+    if find_spec("trackeval") is None:
+        return None
+    by_class = {name: [drive.associations[k] for drive in drives] for k, name in enumerate(CLASS_NAMES[1:])}
+    groups = {ALL: [frames for drive in drives for frames in drive.associations], **by_class}
+    return {name: found for name, sequences in groups.items() if (found := track_metrics(sequences))}

@@ -1,0 +1,203 @@
+"""Exports of a recorded run in the formats of others; tracks as a CSV table have a row a track and frame."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+from modt.classes import CLASS_NAMES
+from modt.errors import MisuseError, install
+from modt.sinks.kitti import KittiResults
+from modt.sinks.output import LineFile, writing
+from modt.sinks.records import BROKEN
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
+from modt.types import FrameResult
+from modt_evaluation.recorded_result import recorded_result, semantic_labels
+from modt_evaluation.run_record import RunRecord, broken
+
+T = TypeVar("T")
+Frames = tuple[int, int | None]
+Capture = Sequence[tuple[str, str]]
+PLAIN = ("id", "state", "class", "viewed", "final", "proposal", "points", "age", "missed")
+"""Columns that have their name from tracks.jsonl."""
+UNITS = {"yaw": "rad", "heading": "rad", "speed_mps": ""}  # other columns: m
+NO_BOX = dict.fromkeys(BOX_KEYS)
+
+
+def _column(key: str) -> str:
+    unit = UNITS.get(key, "m")
+    return f"{key}_{unit}" if unit else key
+
+
+COLUMNS = (
+    "frame",
+    "stamp_s",
+    *PLAIN,
+    *(f"p_{name}" for name in CLASS_NAMES),
+    *(f"box_{_column(key)}" for key in BOX_KEYS),
+    *(f"world_{_column(key)}" for key in WORLD_KEYS),
+)
+
+
+def track_rows(record: dict[str, Any]) -> str:
+    """The rows of a line of tracks.jsonl. Null becomes an empty cell, booleans 0 and 1.
+
+    Raises:
+        KeyError, TypeError: the record is incomplete.
+    """
+    when = (record["frame"], record["stamp_s"])
+    return _text([(*when, *_cells(track)) for track in record["tracks"]])
+
+
+def _cells(track: dict[str, Any]) -> list[Any]:
+    plain = [int(track[key]) if isinstance(track[key], bool) else track[key] for key in PLAIN]
+    box, world = track["box"] or NO_BOX, track["world"]
+    return [*plain, *track["posterior"], *(box[key] for key in BOX_KEYS), *(world[key] for key in WORLD_KEYS)]
+
+
+def _text(rows: list[Any]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+HEADER = _text([COLUMNS])
+"""The first line of a table."""
+
+
+@contextmanager
+def whole(target: Path) -> Iterator[Path]:
+    """A path to write to, which is renamed to the target at the end. A failure leaves nothing behind.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    with writing(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder = TemporaryDirectory(prefix=".export-", dir=target.parent)
+    with folder as name:
+        partial = Path(name) / target.name
+        yield partial
+        with writing(target):
+            partial.rename(target)
+
+
+class Export:
+    """The run, the frames and the points that are exported.
+
+    Attributes:
+        n_frames: number of frames exported so far.
+    """
+
+    def __init__(
+        self, run: RunRecord, frames: Frames = (0, None), capture: Capture = (), *, points: bool = True
+    ) -> None:
+        self.run, self.points, self.n_frames = run, points, 0
+        self.frames, self.capture = frames, capture
+
+    def results(self) -> Iterator[FrameResult]:
+        """The results without points."""
+        return self.each(recorded_result)
+
+    def each(self, made_of: Callable[[dict[str, Any]], T]) -> Iterator[T]:
+        """Apply a function to the record of each frame.
+
+        Raises:
+            MisuseError: there are none, or one is incomplete.
+        """
+        first, last = self.frames
+        for place, record in self.run.records():
+            try:
+                wanted = first <= record["frame"] < (math.inf if last is None else last)
+                made = made_of(record) if wanted else None
+            except BROKEN as error:
+                raise broken(place, error) from None
+            if made is not None:
+                self.n_frames += 1
+                yield made
+        if not self.n_frames:
+            raise MisuseError(self.run.path, "holds none of these frames", "give other --frames")
+
+
+def _mcap(export: Export, target: Path) -> None:
+    """Write an MCAP file as the sink mcap:///FILE does."""
+    try:
+        from modt.sinks.foxglove_sinks import McapFile
+    except ModuleNotFoundError as error:
+        raise MisuseError("--mcap", f"needs {error.name}", install("foxglove")) from None
+    results = _with_points(export) if export.points else export.results()
+    lines = export.run.ledger_lines()
+    with closing(McapFile(target, points=export.points)) as file:
+        for result in results:
+            file.write(result)
+            for line in lines.get(result.frame.index, ()):
+                file.ledger(line)
+
+
+def _with_points(export: Export) -> Iterator[FrameResult]:
+    source = export.run.source(export.capture, export.frames)
+    if source is None:
+        raise MisuseError(export.run.path, "was live, its points are not recorded", "give --no-points")
+    sweeps = iter(source)
+    for result in export.results():
+        index = result.frame.index
+        sweep = next((sweep for sweep in sweeps if sweep.index == index), None)
+        if sweep is None:
+            remedy = "restore what the run read, or give --no-points"
+            raise MisuseError(source.info.name, f"frame {index} cannot be read any more", remedy)
+        yield replace(result, frame=replace(result.frame, points=sweep.points))
+
+
+def _kitti(export: Export, target: Path) -> None:
+    """Write a KITTI result file as a replay does."""
+    source = export.run.source(export.capture, export.frames)
+    with closing(KittiResults(target, source.info.camera if source else None)) as file:
+        for result in export.results():
+            file.write(result)
+
+
+def _semantickitti(export: Export, target: Path) -> None:
+    with writing(target):
+        target.mkdir()
+    for result in export.results():
+        index = result.frame.index
+        labels = semantic_labels(result.tracks, export.run.proposals(index)).tobytes()
+        with writing(target):
+            (target / f"{index:06d}.label").write_bytes(labels)
+
+
+def _csv(export: Export, target: Path) -> None:
+    with closing(LineFile[str](target)) as file:
+        file.write(HEADER)
+        for rows in export.each(track_rows):
+            file.write(rows)
+
+
+def _parquet(export: Export, target: Path) -> None:
+    """Write the table of --csv, read again by Arrow."""
+    try:
+        from pyarrow import csv as arrow
+        from pyarrow import parquet
+    except ModuleNotFoundError as error:
+        raise MisuseError("--parquet", f"needs {error.name}", install("parquet")) from None
+    text = target.with_suffix(".csv")
+    _csv(export, text)
+    table = arrow.read_csv(text)
+    with writing(target):
+        parquet.write_table(table, target)
+
+
+FORMS: dict[str, Callable[[Export, Path], None]] = {
+    "mcap": _mcap,
+    "kitti": _kitti,
+    "semantickitti": _semantickitti,
+    "csv": _csv,
+    "parquet": _parquet,
+}

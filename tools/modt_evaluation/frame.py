@@ -1,0 +1,47 @@
+"""Results and truth of one frame, side by side for the judgement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from modt.geometry import FieldOfView
+from modt.types import NONE, Float32, Float64, FrameResult, Int, Self
+from modt_evaluation.truth import FrameTruth
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFrame:
+    """Results and truth of a frame of N points and M visible tracks."""
+
+    index: int
+    points: Float32  # (N, 4) sensor frame
+    proposal: Int  # (N,) of each point, NONE where it belongs to none
+    n_proposals: int
+    classified: int  # proposals classified in the frame
+    track: Int  # (M,) identities
+    of_track: Int  # (M,) proposals
+    reported: Int  # (M,) classes
+    posterior: Float64  # (M, 4)
+    truth: FrameTruth
+    fov: FieldOfView = field(default_factory=FieldOfView)
+
+    @classmethod
+    def of_result(cls, result: FrameResult, truth: FrameTruth, fov: FieldOfView | None = None) -> Self:
+        """From a result of the pipeline in memory."""
+        tracks, proposals = result.tracks, result.proposals
+        seen = np.flatnonzero(tracks.proposal != NONE)
+        return cls(
+            index=result.frame.index,
+            points=result.frame.points,
+            proposal=proposals.label(len(result.frame.points)),
+            n_proposals=len(proposals),
+            classified=len(result.classified),
+            track=tracks.id[seen],
+            of_track=tracks.proposal[seen],
+            reported=tracks.object_class[seen],
+            posterior=tracks.posterior[seen],
+            truth=truth,
+            fov=FieldOfView() if fov is None else fov,
+        )

@@ -1,0 +1,96 @@
+"""An evaluation as a table that a person can read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from modt.classes import CLASS_NAMES
+from modt.errors import install
+from modt_evaluation.evaluation import ALL, Evaluation
+from modt_profiling.reporting.quantity import aligned
+
+CLASS_TABLES = (
+    ("average precision [%] by range [m]", "average_precision", "objects"),
+    ("precision of the reported classes [%]", "precision", "called"),
+    ("objects reported with their class [%]", "objects_called", "objects"),
+    ("recall with the right class [%]", "recall", "segmentable"),
+)
+"""Title of a table, its figure, and the count that the figure is a share of."""
+FAILURES = ("merged", "split", "partial", "missed", "cut")
+TRACKS = ["objects", "length", "ideal", "ratio", "as seen", "its ideal", "labelled", "breaks", "taken", "mixed"]
+METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")
+EVENTS = ("id_switches", "fragmentations")
+LEGEND = "  Rows car, pedestrian, cyclist: classes (vans as cars, unless --classes paper); others: types of labels."
+
+COMPLETE = "labels are taken for complete"
+INCOMPLETE = "labels of KITTI, unlike simulated ones, leave out road users"
+
+
+def report(sensors: Mapping[str, Evaluation]) -> str:
+    """The evaluation of each sensor, one after the other."""
+    return "\n\n".join("\n".join(_lines(name, found)) for name, found in sensors.items())
+
+
+def _lines(name: str, e: Evaluation) -> Iterator[str]:
+    drives = "1 drive" if e.drives == 1 else f"{e.drives} drives"
+    size = f"{drives}, {e.frames} frames, {e.proposals} proposals"
+    yield f"{name}: {size}, beta {_percent(e.beta)} %, judged {_sector(e)}"
+    yield f"  Truth: {_completeness(e)}."
+    bands, whole = e.ranges.values(), e.ranges[ALL]
+    rows = []
+    for kind, s in whole.segmentation.items():
+        found = [band.segmentation.get(kind) for band in bands]
+        recall = [_percent(score.recall if score else None) for score in found]
+        rows.append([kind, *recall, s.objects, *(getattr(s, failure) for failure in FAILURES)])
+    if not whole.segmentation.keys() <= set(CLASS_NAMES):
+        yield LEGEND
+    yield from _table("segmentation: recall [%] by range [m], and counts", [*e.ranges, "objects", *FAILURES], rows)
+    for title, key, count in CLASS_TABLES:
+        shares = {c: [_percent(getattr(band.classification[c], key)) for band in bands] for c in whole.classification}
+        rows = [[c, *shares[c], getattr(score, count)] for c, score in whole.classification.items()]
+        yield from _table(title, [*e.ranges, count], rows)
+    errors = {"proposals": e.calibration_error, "objects": e.calibration_error_of_objects}
+    errors |= {c: score.calibration_error for c, score in whole.classification.items()}
+    yield from _table("calibration error [%]", [*errors], [["", *map(_percent, errors.values())]])
+    rows = []
+    for kind, t in e.tracks.items():
+        figures = (t.life.life, t.life.ideal, t.life_as_seen.life, t.life_as_seen.ideal, t.labelled.ideal)
+        length, ideal, *others = (_number(value) for value in figures)
+        counts = (t.discontinuities, t.taken_over, t.mis_associations)
+        rows.append([kind, t.life.objects, length, ideal, _number(t.life.ratio, 2), *others, *counts])
+    if rows:
+        yield from _table("tracks: mean length [frames], and counts", TRACKS, [row for row in rows if row[1]])
+        measured = (e.metrics or {}).items()
+        rows = [[k, *(_percent(m[n]) for n in METRICS), *(_number(m[n], 0) for n in EVENTS)] for k, m in measured]
+        if rows:
+            yield from _table("metrics [%], and counts", [*METRICS, *EVENTS], rows)
+        elif e.metrics is None:
+            yield f"\n  {', '.join(METRICS)}, {' and '.join(EVENTS)} need trackeval: {install('evaluate')}"
+
+
+def _sector(e: Evaluation) -> str:
+    """The sectors in which proposals are judged, in words."""
+    sectors = ("all round" if half >= 180 else f"within {half:g} degrees of straight ahead" for half in e.sectors_deg)
+    return " or ".join(sectors)
+
+
+def _completeness(e: Evaluation) -> str:
+    """Completeness of the labels, in words."""
+    labels = COMPLETE if e.complete else INCOMPLETE
+    if e.further_objects:
+        what = f"{e.further_objects} objects" if e.complete else f"{e.further_objects} of them"
+        return f"{labels}; --further adds {what}, in {e.further_labels} labels"
+    return labels if e.complete else f"{labels}, and tracks on those count as false; --further FILE adds them"
+
+
+def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
+    """The title and lines of aligned columns, the first to the left."""
+    yield from ("", f"  {title}", *aligned([[str(cell) for cell in row] for row in (("", *head), *rows)]))
+
+
+def _number(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _percent(value: float | None) -> str:
+    return _number(None if value is None else 100 * value)

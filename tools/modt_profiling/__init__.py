@@ -1,0 +1,1 @@
+"""Profiles of sensors and boards, and the energy of runs: fits, predictions, comparisons and reports."""

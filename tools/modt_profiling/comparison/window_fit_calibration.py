@@ -1,0 +1,97 @@
+"""Calibration of a board: a fit over windows of varied load, and bursts of one stage as a cross-check."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import cycle
+
+import numpy as np
+
+from modt.energy.ledger import Ledger, Line
+from modt.energy.windows import Windows
+from modt.types import Float32, Float64, Frame, Int, Proposals
+from modt_profiling.energy.board_fit import CLASS, IDLE, SEG, Fit, fit, unit_energy_J, usable_windows
+
+_BURSTS = 5
+"""Bursts of each stage; the median counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Result of a calibration."""
+
+    fit: Fit
+    seg_burst_J: float | None  # energy of one segmentation, from bursts of segmentation
+    class_burst_J: float | None  # energy of one classification of mean size, from bursts
+    class_fit_J: float  # energy of one classification of mean size by the fit
+    busy_W: float  # idle power plus energy above idling over CPU time
+
+
+@dataclass(frozen=True, slots=True)
+class Workload:
+    """The work that a calibration varies."""
+
+    frames: Sequence[Frame]
+    segment: Callable[[Float32], Proposals]
+    classify: Callable[[Float32, Proposals, Int], Float64]
+    size: Callable[[Int], int]  # points that the network processes for proposals of (R,) points
+    ledger: Ledger
+    windows: Windows  # closed explicitly
+
+    def calibrate(self, windows: int, window_s: float, burst_s: float, random: np.random.Generator) -> Calibration:
+        """Run the windows of varied load, fit them, and run the bursts.
+
+        Raises:
+            FitError: the windows do not determine the coefficients.
+        """
+        frames = cycle(self.frames)
+        found = fit([self._varied(frames, window_s, random) for _ in range(windows)], random)
+        idle_W = found["idle_W"].value
+        work = cycle([(f, p, np.arange(len(p))) for f in self.frames for p in [self.segment(f.points)]])
+        segmented = [self._window(burst_s, lambda: self._segment(next(frames))) for _ in range(_BURSTS)]
+        classified = [self._window(burst_s, lambda: self._classify(*next(work))) for _ in range(_BURSTS)]
+        rows = [line["stages"].get("classification", {}) for line in usable_windows(classified)]
+        points, items = (sum(row.get(key, 0) for row in rows) for key in ("points", "items"))
+        busy = [line for line in usable_windows([*segmented, *classified]) if line["process_ns"]]
+        above_W = [1e9 * (line["energy_J"] - idle_W * IDLE.count(line)) / line["process_ns"] for line in busy]
+        return Calibration(
+            fit=found,
+            seg_burst_J=unit_energy_J(segmented, idle_W, SEG),
+            class_burst_J=unit_energy_J(classified, idle_W, CLASS),
+            class_fit_J=found["class_J"].value + found["point_J"].value * points / max(items, 1),
+            busy_W=idle_W + (float(np.median(above_W)) if above_W else 0.0),
+        )
+
+    def _varied(self, frames: Iterator[Frame], seconds: float, random: np.random.Generator) -> Line:
+        """A window of random load: share of waiting, classifications a frame, largest or smallest proposals first."""
+        load, waiting = int(random.integers(0, 60)), float(random.uniform(0.0, 0.9))
+        order = -1 if random.random() < 0.5 else 1
+
+        def task() -> None:
+            began_s = time.monotonic()
+            frame = next(frames)
+            proposals = self._segment(frame)
+            self._classify(frame, proposals, np.argsort(proposals.count, kind="stable")[::order][:load])
+            time.sleep((time.monotonic() - began_s) * waiting / (1.0 - waiting))
+
+        return self._window(seconds, task)
+
+    def _window(self, seconds: float, task: Callable[[], object]) -> Line:
+        """A window of one repeated task."""
+        self.ledger.close_frame(0)
+        self.windows.close()
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            task()
+            self.windows.add(self.ledger.close_frame(0))
+        return self.windows.close()
+
+    def _segment(self, frame: Frame) -> Proposals:
+        return self.ledger.run("segmentation", self.segment, frame.points)
+
+    def _classify(self, frame: Frame, proposals: Proposals, which: Int) -> None:
+        if len(which):
+            self.ledger.run("classification", self.classify, frame.points, proposals, which)
+            self.ledger.count("classification", points=self.size(proposals.count[which]))

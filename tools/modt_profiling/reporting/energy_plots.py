@@ -1,0 +1,107 @@
+"""Plots, tables, sentences and terms of gamma that the reports of a run and of a comparison share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modt.energy.meters.meter import Kind
+from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
+from modt.types import Float64
+from modt_profiling.energy.savings import EnergyModel, Reconciliation
+from modt_profiling.reporting import svg
+from modt_profiling.reporting.document import Plot, Table
+from modt_profiling.reporting.quantity import Quantity, estimate
+
+SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
+TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]
+SCHEDULE = [STAGES.index(SCHEDULING), STAGES.index(FUSION)]
+
+
+def reconciliation_tree(found: Reconciliation, gamma: float | None) -> dict[str, Any]:
+    """The paper's figures, the reconciled gamma, and the terms from N_go to the gamma of the runs."""
+    return {
+        "a": estimate(found.paper.a),
+        "gamma_short": estimate(found.paper.n_go),
+        "gamma_equation_3": estimate(found.paper.gamma),
+        "gamma_reconciled": estimate(found.model.gamma),
+        "terms": [
+            {"name": term.name, "change": estimate(term.change), "gamma": estimate(term.gamma)}
+            for term in found.explain(1.0 if gamma is None else gamma)
+        ],
+    }
+
+
+_MAX_N_GO = 1000.0
+"""Upper end of the N_go axis of the curve of Equation 3 [frames]."""
+
+
+def stage_energy_mJ(series: dict[str, Any]) -> dict[str, Float64]:
+    """(frames,) energy attributed to each stage [mJ]: its power above idling times its CPU time."""
+    return {stage: watts * np.array(series["cpu_ms"][stage], float) for stage, watts in series["stage_W"].items()}
+
+
+def basis(gross_J: Quantity) -> str:
+    """Origin of the energy that the plots show."""
+    if gross_J.kind is Kind.ESTIMATED:
+        return "estimated from CPU time, without idling"
+    return f"{gross_J.kind}, its split over stages and frames estimated; without idling and what is unattributed"
+
+
+def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64, note: str, top_mJ: float = 0.0) -> Plot:
+    """Stacked energy of the stages over (points,) frames; charts to be compared have one `top_mJ`."""
+    return (title, svg.areas(frames, energy_mJ, "frame", "mJ a frame", top_mJ), note)
+
+
+def cumulative_energy(energy_mJ: dict[str, Float64], each: Float64, note: str, dashed: str = "") -> Plot:
+    """Energy a frame summed over points of so many frames each, a line a run; the one named is dashed."""
+    traces = [
+        svg.Trace(name, np.cumsum(each), 1e-3 * np.cumsum(each * mJ), dashed=name == dashed)
+        for name, mJ in energy_mJ.items()
+    ]
+    return ("Cumulative energy, E1 against E2", svg.lines(traces, "frame", "J"), note)
+
+
+def length_histogram(title: str, lengths: dict[str, list[int]]) -> Plot:
+    """Histogram of track lengths [frames], by the occurrences of each length."""
+    length = np.array(lengths["values"], float)
+    edges = np.linspace(0.5, max(length.max(initial=1.0), 1.0) + 0.5, 31)
+    heights = np.histogram(length, edges, weights=np.array(lengths["counts"], float))[0]
+    return (title, svg.bars(edges, heights, "frames seen", "tracks"), "counted")
+
+
+def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quantity]], note: str) -> Plot:
+    """Equation 3 over N_go at a and n, the short form, and (N_go, gamma) of each run."""
+    traces = []
+    if a.value is not None and n.value is not None:
+        length = np.geomspace(1.0, _MAX_N_GO, 100)
+        curve = np.array([EnergyModel(1.0, a.value, n.value, n_go).gamma for n_go in length.tolist()])
+        short = length[length <= 10 * curve[-1]]
+        traces = [
+            svg.Trace("Equation 3 at this a and n", length, curve),
+            svg.Trace("gamma = N_go", short, short, dashed=True),
+        ]
+        traces += [
+            svg.Trace(name, np.array([x.value], float), np.array([y.value], float), dots=True)
+            for name, (x, y) in runs.items()
+        ]
+    note = f"dashed: gamma = N_go; line: Equation 3; {note}"
+    return ("Gamma against N_go", svg.lines(traces, "N_go [frames]", "gamma", log=True), note)
+
+
+def gamma_terms(title: str, saving: dict[str, Any]) -> Table:
+    """Table of the terms from gamma = N_go to the ratio of the runs, without those that change nothing."""
+    short = ["the short form, gamma = N_go", "", saving["gamma_short"]]
+    changes = [(term, f"{term['change'].value:+.3f}") for term in saving["terms"]]
+    rows = [[term["name"], f"~{change}", term["gamma"]] for term, change in changes if float(change)]
+    return Table([title, "change", "gamma"], [short, *rows])
+
+
+def conditions_text(conditions: dict[str, Any]) -> str:
+    """Governor, frequency and core, where available."""
+    governor, frequency = conditions.get("governor"), conditions.get("frequency_MHz")
+    return (
+        f"governor {governor or 'unavailable'}, "
+        f"frequency {'unavailable' if frequency is None else f'{frequency:.0f} MHz'}, core {conditions.get('core')}"
+    )

@@ -1,0 +1,112 @@
+"""Roads and the terrain around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from modt.types import Float32, Float64
+from modt_simulation.materials import Material
+from modt_simulation.terrain import Terrain
+
+CELL_M, MARGIN_M = 0.25, 80.0
+KERB_M, CAMBER, ROUGHNESS_M = 0.12, 0.02, 0.012
+
+
+@dataclass(frozen=True)
+class Road:
+    """A sinusoidal road; the x axis of its frame runs along it, positive offsets are to the left."""
+
+    start_m: float  # start along x
+    end_m: float  # end along x
+    half_m: float  # half the width of the carriageway
+    pavement_m: float  # width of each pavement
+    front_m: float  # distance of the house fronts from the centre line
+    bend_m: float = 0.0  # amplitude of the centre line
+    wave_m: float = 200.0  # wavelength of the centre line
+    turn_rad: float = 0.0  # direction of x in the world
+    gaps: tuple[tuple[float, float], ...] = ()  # stretches (from, to) along x occupied by other roads
+
+    def free(self, x: float) -> bool:
+        """Whether no other road occupies x [m]."""
+        return not any(a <= x <= b for a, b in self.gaps)
+
+    def middle(self, x: Float64) -> Float64:
+        """Offset of the centre line at x [m]."""
+        return np.asarray(self.bend_m * np.sin(2 * np.pi * x / self.wave_m))
+
+    def heading(self, x: Float64) -> Float64:
+        """Direction of the centre line at x, from the x axis [rad]."""
+        return np.asarray(np.arctan(self.bend_m * 2 * np.pi / self.wave_m * np.cos(2 * np.pi * x / self.wave_m)))
+
+    def place(self, x: float, left_m: float, turn: float = 0.0) -> tuple[float, float, float]:
+        """World x, y and heading of a place left of the centre line, turned from its direction."""
+        along = np.array([x])
+        spot = self._left_of_centre(along, left_m)
+        return float(spot[0, 0]), float(spot[0, 1]), float(self.heading(along)[0]) + turn + self.turn_rad
+
+    def lane(self, left_m: float, backwards: bool = False) -> Float64:
+        """(n, 2) line along the road, left of the centre line, world."""
+        line = self._left_of_centre(np.arange(self.start_m, self.end_m, 4.0), left_m)
+        return line[::-1] if backwards else line
+
+    def distance_to_centre(self, x: Float32, y: Float32) -> Float32:
+        """Distance of world points from the centre line [m]."""
+        c, s = np.float32(np.cos(self.turn_rad)), np.float32(np.sin(self.turn_rad))
+        along, across = c * x + s * y, c * y - s * x
+        if not self.bend_m:
+            return np.abs(across)
+        table = np.arange(self.start_m - 200, self.end_m + 200, 1.0)
+        swing = np.interp(along, table, self.middle(table)).astype(np.float32)
+        slant = np.interp(along, table, np.cos(self.heading(table))).astype(np.float32)
+        return np.asarray(np.abs((across - swing) * slant))
+
+    def _left_of_centre(self, x: Float64, left_m: float) -> Float64:
+        """(n, 2) world points at x (n,), left of the centre line."""
+        yaw, c, s = self.heading(x), np.cos(self.turn_rad), np.sin(self.turn_rad)
+        xy = np.stack([x - left_m * np.sin(yaw), self.middle(x) + left_m * np.cos(yaw)], axis=1)
+        return np.asarray(xy @ np.array([[c, s], [-s, c]]))
+
+
+def terrain_along(rng: np.random.Generator, road: Road) -> Terrain:
+    """Terrain along one road, MARGIN_M to both sides."""
+    return terrain(rng, [road], (road.start_m, -MARGIN_M), (road.end_m, MARGIN_M))
+
+
+def terrain(
+    rng: np.random.Generator, roads: list[Road], low: tuple[float, float], high: tuple[float, float]
+) -> Terrain:
+    """Cambered carriageways, kerbs, pavements and rough ground behind, between two corners [m, world]."""
+    x = np.arange(low[0], high[0], CELL_M, dtype=np.float32)
+    y = np.arange(low[1], high[1], CELL_M, dtype=np.float32)
+    side = [np.broadcast_to(r.distance_to_centre(x[:, None], y[None]), (len(x), len(y))) for r in roads]
+    carriage = np.logical_or.reduce([s < r.half_m for s, r in zip(side, roads, strict=True)])
+    walk = np.logical_or.reduce([s < r.half_m + r.pavement_m for s, r in zip(side, roads, strict=True)])
+    nearest = np.minimum.reduce([s - r.half_m for s, r in zip(side, roads, strict=True)])
+    half = roads[0].half_m
+    behind = np.maximum(nearest - roads[0].pavement_m, 0)
+    rough = _roughness(rng, len(x), len(y)) * np.minimum(behind, 1.0)
+    bank = np.float32(rng.uniform(-0.02, 0.05)) * np.minimum(behind, 15.0)
+    road_height = np.where(len(roads) > 1, np.float32(0), -np.float32(CAMBER) * (nearest + half)).astype(np.float32)
+    edge = KERB_M - (CAMBER * half if len(roads) == 1 else 0.0)
+    height = np.where(carriage, road_height, np.float32(edge) + bank + rough).astype(np.float32)
+    grade = rng.uniform(-0.02, 0.02, 2) * (1.0, 0.5)
+    height += np.float32(grade[0]) * x[:, None] + np.float32(grade[1]) * y
+    for _ in range(2):
+        k, phase = 2 * np.pi / rng.uniform(90.0, 250.0), rng.uniform(0, 2 * np.pi)
+        lift, bearing = rng.uniform(0.0, 0.5), rng.uniform(-0.5, 0.5)
+        along = np.float32(k * np.cos(bearing)) * x[:, None] + np.float32(k * np.sin(bearing)) * y
+        height += np.float32(lift) * np.sin(along + np.float32(phase))
+    height += rng.standard_normal(height.shape, np.float32) * np.float32(ROUGHNESS_M)
+    surface = np.where(carriage, Material.ASPHALT, np.where(walk, Material.PAVING, Material.GRASS))
+    return Terrain(np.array(low, np.float64), CELL_M, height, surface.astype(np.uint8))
+
+
+def _roughness(rng: np.random.Generator, rows: int, columns: int) -> Float32:
+    """(X, Y) unevenness of open ground [m], smooth over metres plus tussocks of one cell."""
+    coarse = rng.standard_normal((rows // 8 + 2, columns // 8 + 2), np.float32)
+    swell = ndimage.zoom(coarse, 8, order=1)[:rows, :columns]
+    fine = rng.standard_normal((rows, columns), np.float32)
+    return np.asarray(np.float32(0.06) * swell + np.float32(0.025) * np.abs(fine) * (1 + np.maximum(swell, 0)))

@@ -1,0 +1,98 @@
+"""The simulator as a source of frames."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.geometry import Camera
+from modt.sources.stream import Faults, StreamInfo
+from modt.types import Frame, Self
+from modt_simulation.indoors import corridor, hall, lift, lobby, warehouse
+from modt_simulation.sensors import sensor as sensor_model
+from modt_simulation.simulator import Simulator, Truth
+from modt_simulation.street import crossing, street
+from modt_simulation.yard import crowd, dock, ramp, yard
+
+T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
+K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0, 0.0]])
+CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
+"""Intrinsics and mount of KITTI's left colour camera: level, 0.27 m ahead of the sensor, 0.08 m below it."""
+
+SCENES = {
+    scene.__name__: scene
+    for scene in (street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse)
+}
+"""Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""
+
+
+class SyntheticStream:
+    """A drive through a synthetic scene; the same arguments give the same bytes.
+
+    `seed` is that of the scene, its traffic and the noise; `distort` leaves the motion during a sweep in the scans.
+    The sensor is mounted as usual, or at `height_m`; `mount_deg`, its roll and pitch, adds to what is left of them
+    after it was levelled.
+
+    Raises:
+        MisuseError: an unknown scene or sensor, or an invalid duration or seed.
+    """
+
+    def __init__(
+        self,
+        scene: str = "street",
+        sensor: str = "hdl-64e",
+        seconds: float = 10.0,
+        seed: int = 0,
+        *,
+        distort: bool = False,
+        height_m: float | None = None,
+        mount_deg: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        if scene not in SCENES:
+            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
+        if not 0 < seconds <= 3600:
+            raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
+        if seed < 0:
+            raise MisuseError(seed, "no seed", "give an integer of at least 0")
+        model = sensor_model(sensor)
+        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, height_m or model.height_m)
+        roll, pitch = np.deg2rad(mount_deg) + world.mount_rad
+        world = replace(world, mount_rad=(float(roll), float(pitch)))
+        self.simulator = Simulator(world, model, seed, distort=distort)
+        self._indices = range(max(1, round(seconds / model.period_s)))
+        self.faults = Faults()
+        self.info = StreamInfo(
+            name=f"{scene}, {sensor}, seed {seed}",
+            layout="synthetic",
+            sequence=0,
+            n_frames=len(self._indices),
+            period_s=model.period_s,
+            camera=CAMERA,
+            has_poses=True,
+            end=self._indices.stop,
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames."""
+        return (frame for frame, _ in self.sweeps())
+
+    def sweeps(self) -> Iterator[tuple[Frame, Truth]]:
+        """The frames with their ground truth."""
+        return (self.simulator.sweep(i) for i in self._indices)
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last; others are not rendered."""
+        part, indices = copy.copy(self), self._indices
+        part.faults = Faults()
+        part._indices = range(max(first, indices.start), indices.stop if last is None else min(last, indices.stop))
+        part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
+        return part
+
+
+def embedded_street() -> SyntheticStream:
+    """The stream of `modt replay` without a path: ten seconds of the street, seen by an HDL-64E."""
+    return SyntheticStream("street", "hdl-64e", 10.0, seed=0)
