@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import platform
+import struct
 from array import array
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from modt.native import build
 
@@ -80,6 +83,176 @@ def pointers(*arrays: NDArray[Any]) -> array[int]:
         step = numbers.strides[0] or 1  # of an empty one
         addresses += range(first, first + rows * step, step)
     return array("Q", addresses)
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A member of a C structure.
+
+    Attributes:
+        kind: "number"; "array", a pointer to one; or "rows", a pointer to each row of one.
+        dtype: type of the number, or of the elements of the array.
+        shape: size of each axis of the array. A name stands for a size that is known when a structure is filled; it
+            is the same size wherever the name occurs in a layout.
+    """
+
+    kind: str
+    dtype: np.dtype[Any]
+    shape: tuple[int | str, ...] = ()
+
+    @property
+    def format(self) -> str:
+        """Format of the member in the module `struct`."""
+        if self.kind == "rows":
+            return f"{self.shape[0]}P"
+        return "P" if self.kind == "array" else self.dtype.char
+
+    def fault(self, value: Any) -> str | None:
+        """What keeps a value from being the member, whatever the sizes; None if nothing does."""
+        if self.kind == "number":
+            try:
+                struct.pack(self.format, value)
+            except struct.error as error:
+                return f"is {value!r}: {error}"
+        elif not isinstance(value, np.ndarray) or value.dtype != self.dtype:
+            return f"is of {getattr(value, 'dtype', type(value).__name__)}"
+        elif value.ndim != len(self.shape):
+            return f"has {value.ndim} axes"
+        elif not value.flags.c_contiguous:
+            return "is not contiguous"
+        return None
+
+    def __str__(self) -> str:
+        return f"{self.dtype} ({', '.join(map(str, self.shape))})" if self.shape else str(self.dtype)
+
+
+def Number(dtype: DTypeLike) -> Member:
+    """A number, as in `i64 n`. If a size of the layout has its name, it is that size."""
+    return Member("number", np.dtype(dtype))
+
+
+def Array(dtype: DTypeLike, *shape: int | str) -> Member:
+    """A pointer to a contiguous array, as in `double *a`, or in `double (*a)[7]` if a row has seven elements."""
+    return Member("array", np.dtype(dtype), shape)
+
+
+def Rows(dtype: DTypeLike, *shape: int | str) -> Member:
+    """A pointer to each row of a contiguous array, as in `float *a[3]`; the number of rows is a constant."""
+    return Member("rows", np.dtype(dtype), shape)
+
+
+class Filled(bytearray):
+    """A filled structure. It keeps alive the arrays that it points to."""
+
+    __slots__ = ("arrays", "layout")
+
+    layout: Layout
+    arrays: list[NDArray[Any]]
+
+
+class Layout:
+    """A structure of the C sources. It fills such structures, and is the type of an argument that points to one.
+
+    The C declaration
+
+        typedef struct {
+            const double *kdop, *top; /* (8, n), (n,) */
+            i64 n;
+        } Shapes;
+
+    is `Layout("Shapes", kdop=Array(np.float64, 8, "n"), top=Array(np.float64, "n"), n=Number(np.int64))`.
+
+    Args:
+        name: name of the structure in C.
+        members: the members in the order of the C declaration.
+    """
+
+    def __init__(self, name: str, **members: Member) -> None:
+        self.name = name
+        self.members = members
+        self._arrays = [name for name, member in members.items() if member.kind != "number"]
+        self._kinds = [(name, member.kind) for name, member in members.items()]
+        self._dtypes = [members[name].dtype for name in self._arrays]
+        # Each size is taken from one place: the number of its name, or the first axis that has it.
+        self._places: dict[str, tuple[str, int | None]] = {}
+        for array_name in self._arrays:
+            for axis, size in enumerate(members[array_name].shape):
+                if isinstance(size, str):
+                    self._places.setdefault(size, (size, None) if size in members else (array_name, axis))
+        self._shapes = lru_cache(maxsize=256)(self._shapes_of)
+        alignment = "0q"
+        self._pack = struct.Struct("".join(member.format for member in members.values()) + alignment).pack
+
+    def __call__(self, **values: Any) -> Filled:
+        """Fill a structure with a number or a contiguous array for each member.
+
+        Raises:
+            TypeError: a member is missing, unknown, of another type, or not contiguous.
+            ValueError: an array has another shape, or members disagree about a size.
+        """
+        # Lists are compared whole, since this runs several times a frame. _refusal finds what differs.
+        try:
+            arrays = [values[name] for name in self._arrays]
+            sizes = tuple(
+                [values[name] if axis is None else values[name].shape[axis] for name, axis in self._places.values()]
+            )
+            if (
+                [numbers.shape for numbers in arrays] == self._shapes(sizes)
+                and [numbers.dtype for numbers in arrays] == self._dtypes
+                and len(values) == len(self.members)
+            ):
+                return self._filled(values, arrays)
+        except (AttributeError, IndexError, KeyError, TypeError, struct.error):
+            pass
+        raise self._refusal(values)
+
+    def of(self, source: object, **others: Any) -> Filled:
+        """Fill a structure with others, and with the attributes of an object that have the names of the rest."""
+        return self(**{name: getattr(source, name) for name in self.members if name not in others}, **others)
+
+    def from_param(self, filled: Filled) -> Any:
+        """The structure as ctypes passes it."""
+        if filled.layout is not self:
+            raise TypeError(f"a structure {self.name} is needed, not {filled.layout.name}")
+        return _start(filled)
+
+    def _shapes_of(self, sizes: tuple[int, ...]) -> list[tuple[int, ...]]:
+        """Shapes of the arrays, given the sizes in the order of their places."""
+        known = dict(zip(self._places, sizes, strict=True))
+        shapes = (self.members[name].shape for name in self._arrays)
+        return [tuple(known[size] if isinstance(size, str) else size for size in shape) for shape in shapes]
+
+    def _filled(self, values: dict[str, Any], arrays: list[NDArray[Any]]) -> Filled:
+        """Structure of values that fit."""
+        fields: list[Any] = []
+        for name, kind in self._kinds:
+            if kind == "array":
+                fields.append(address(values[name]))
+            elif kind == "rows":
+                fields.extend(pointers(values[name]))
+            else:
+                fields.append(values[name])
+        filled = Filled(self._pack(*fields))
+        filled.layout = self
+        filled.arrays = arrays
+        return filled
+
+    def _refusal(self, values: dict[str, Any]) -> TypeError | ValueError:
+        """Error that names the member which does not fit."""
+        for name in sorted(values.keys() ^ self.members.keys()):
+            return TypeError(f"{self.name}.{name} is {'missing' if name in self.members else 'unknown'}")
+        for name, member in self.members.items():
+            if fault := member.fault(values[name]):
+                return TypeError(f"{self.name}.{name}, {member}, {fault}")
+        sizes = {
+            size: values[name] if axis is None else values[name].shape[axis]
+            for size, (name, axis) in self._places.items()
+        }
+        for name, shape in zip(self._arrays, self._shapes_of(tuple(sizes.values())), strict=True):
+            if values[name].shape != shape:
+                subject = f"{self.name}.{name}, {self.members[name]},"
+                return ValueError(f"{subject} has the shape {values[name].shape}, where {sizes}")
+        return TypeError(f"{self.name} cannot be filled")
 
 
 X86_64_V3_FLAGS = frozenset(["avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"])
