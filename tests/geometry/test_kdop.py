@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.geometry.kdop import (
-    AGREE_M,
     AXES,
     DIRECTIONS,
     PairWeights,
@@ -19,12 +18,12 @@ from modt.geometry.kdop import (
     shape_similarity,
     shift_between,
 )
+from modt.geometry.tuning import ShapeTuning
 from modt.observations import observe
 from modt.types import Proposals
 from tests.tracking.tracking_scenes import box, frame_of
 
-PAD_M = 0.15
-DISAGREEMENT, DECAY, SOFT_M = 0.3, 0.97, 0.3
+TUNING = ShapeTuning()
 WEIGHTS = PairWeights(size=1.5, overlap=0.8, height=2.0, points=0.5)
 
 
@@ -65,15 +64,12 @@ def test_an_empty_envelope_overlaps_nothing():
 def test_coverage_is_the_lesser_of_both_squares(n, seed):
     (low, high), (low_position, high_position) = random_ends(n, seed, 9), random_ends(n, seed + 1, 30)
     rows, columns = np.random.default_rng(seed).integers(0, max(n, 1), (2, n))
-    found = coverage(kdop(low, high), kdop(low_position, high_position), rows, columns)
-    low, high, low_position, high_position = low[rows], high[rows], low_position[columns], high_position[columns]
-    for i in range(n):
-        part = [
-            max(min(high[i, k], high_position[i, k] + PAD_M) - max(low[i, k], low_position[i, k] - PAD_M), 0.0)
-            / max(high[i, k] - low[i, k], PAD_M)
-            for k in range(4)
-        ]
-        np.testing.assert_allclose(found[i], min(part[0] * part[2], part[1] * part[3]))
+    jitter_m = TUNING.end_jitter_m
+    found = coverage(kdop(low, high), kdop(low_position, high_position), rows, columns, TUNING)
+    for one, i, j in zip(found, rows, columns, strict=True):
+        common = np.minimum(high[i], high_position[j] + jitter_m) - np.maximum(low[i], low_position[j] - jitter_m)
+        part = np.maximum(common, 0.0) / np.maximum(high[i] - low[i], jitter_m)
+        np.testing.assert_allclose(one, min(part[0] * part[2], part[1] * part[3]))
 
 
 def test_kdops_are_the_greatest_coordinates_of_the_points():
@@ -105,7 +101,7 @@ def slow_moved(a, b, k):
     """Displacement along an axis, and from 0 to 1 how little its ends agree."""
     longest = max(*(a[:4] + a[4:]), *(b[:4] + b[4:]), 1.0)
     ahead, behind = b[k] - a[k], a[k + 4] - b[k + 4]
-    agree = max(0.0, 1 - ((ahead - behind) * longest / AGREE_M) ** 2) ** 2
+    agree = max(0.0, 1 - ((ahead - behind) * longest / TUNING.agreement_m) ** 2) ** 2
     return agree * (ahead + behind) / 2 + (1 - agree) * min(ahead, behind, key=abs), 1 - agree
 
 
@@ -115,8 +111,9 @@ def slow_measured(a, b, variance, before):
     information, weighted, end_variance = np.zeros((2, 2)), np.zeros(2), []
     for k in range(4):
         axis, (moved, unlike) = AXES[:, k], slow_moved(a, b, k)
-        new = unlike * (DISAGREEMENT * (width_b[k] - width_a[k])) ** 2
-        end_variance.append(min(max(new, DECAY * before[k]), (DISAGREEMENT * max(width_b)) ** 2))
+        new = unlike * (TUNING.disagreement * (width_b[k] - width_a[k])) ** 2
+        lasting = max(new, TUNING.end_variance_decay * before[k])
+        end_variance.append(min(lasting, (TUNING.disagreement * max(width_b)) ** 2))
         information += np.outer(axis, axis) / (2 * (variance + end_variance[-1]))
         weighted += axis * moved / (2 * (variance + end_variance[-1]))
     covariance = np.linalg.inv(information)
@@ -124,15 +121,18 @@ def slow_measured(a, b, variance, before):
 
 
 def slow_similarity(a, b):
-    """Difference of log sizes and overlap of one pair of k-DOPs, number by number."""
-    sizes, squares = [], ([], [], [])
-    for la, ha, lb, hb in zip(-a[4:], a[:4], -b[4:], b[:4], strict=True):
-        sizes.append(abs(np.log(hb - lb + SOFT_M) - np.log(ha - la + SOFT_M)))
-        common = max(min(ha, hb) - max(la, lb) + SOFT_M / 3, 0.0)
-        for side, width in zip(squares, (ha - la + SOFT_M / 3, hb - lb + SOFT_M / 3, common), strict=True):
-            side.append(width)
-    areas_a, areas_b, common = ([s[0] * s[2], s[1] * s[3]] for s in squares)
-    return sum(sizes) / 4, min(c / (p + q - c) for p, q, c in zip(areas_a, areas_b, common, strict=True))
+    """Difference of log sizes and overlap of one pair of k-DOPs."""
+    softening_m, padding_m = TUNING.width_softening_m, TUNING.area_padding_m
+    width_a, width_b = a[:4] + a[4:], b[:4] + b[4:]
+    size = np.abs(np.log(width_b + softening_m) - np.log(width_a + softening_m)).mean()
+    common = np.maximum(np.minimum(a, b)[:4] + np.minimum(a, b)[4:] + padding_m, 0.0)
+    overlaps = []
+    for k in range(2):  # upright, and at 45 degrees
+        area_a, area_b, shared = (
+            width[k] * width[k + 2] for width in (width_a + padding_m, width_b + padding_m, common)
+        )
+        overlaps.append(shared / (area_a + area_b - shared))
+    return size, min(overlaps)
 
 
 def slow_shift(a, b):
@@ -145,7 +145,7 @@ def test_measured_displacement_matches_the_slow_reference(n, seed):
     rng = np.random.default_rng(seed)
     a, b = random_kdops(rng, n)
     variance, before = rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
-    shift, covariance, end_variance = measured(a, b, variance, before)
+    shift, covariance, end_variance = measured(a, b, variance, before, TUNING)
     for k in range(n):
         slow = slow_measured(a[:, k], b[:, k], variance, before[:, k])
         for fast, one in zip((shift[k], covariance[k], end_variance[:, k]), slow, strict=True):
@@ -155,7 +155,8 @@ def test_measured_displacement_matches_the_slow_reference(n, seed):
 @given(st.integers(0, 6), st.integers(0, 2**16))
 def test_shift_and_similarity_match_the_slow_reference(n, seed):
     a, b = random_kdops(np.random.default_rng(seed), n)
-    shift, (size, overlap) = shift_between(a, b), shape_similarity(a, b)
+    shift = shift_between(a, b, TUNING)
+    size, overlap = shape_similarity(a, b, TUNING)
     for k in range(n):
         np.testing.assert_allclose(shift[k], slow_shift(a[:, k], b[:, k]), atol=1e-9)
         np.testing.assert_allclose((size[k], overlap[k]), slow_similarity(a[:, k], b[:, k]), atol=1e-9)
@@ -165,24 +166,13 @@ def test_shift_and_similarity_match_the_slow_reference(n, seed):
 def test_growth_at_one_end_is_no_displacement(growth):
     before = square((0, 0), 1.0)
     after = before + np.array(growth)[:, None]
-    np.testing.assert_allclose(shift_between(before, after), 0, atol=1e-9)
-
-
-@given(st.integers(0, 2**16), st.floats(-1, 1), st.floats(-1, 1))
-def test_an_unchanged_shape_has_no_end_variance(seed, dx, dy):
-    a, _ = random_kdops(np.random.default_rng(seed), 5)
-    b = a + (np.array([dx, dy]) @ DIRECTIONS)[:, None]
-    shift, covariance, end_variance = measured(a, b, 0.04, np.zeros((4, 5)))
-    np.testing.assert_allclose(shift, np.tile([dx, dy], (5, 1)), atol=1e-9)
-    np.testing.assert_allclose(shift, shift_between(a, b), atol=1e-9)
-    np.testing.assert_allclose(covariance, np.tile(0.04 * np.eye(2), (5, 1, 1)), atol=1e-9)
-    np.testing.assert_allclose(end_variance, 0, atol=1e-9)
+    np.testing.assert_allclose(shift_between(before, after, TUNING), 0, atol=1e-9)
 
 
 def shapes(rng, kdop):
     n = kdop.shape[1]
     bottom = rng.uniform(-2, 0, n)
-    return Shapes.of(kdop, bottom, bottom + rng.uniform(0.2, 3, n), rng.integers(1, 500, n))
+    return Shapes.of(kdop, bottom, bottom + rng.uniform(0.2, 3, n), rng.integers(1, 500, n), TUNING)
 
 
 def random_pairs(seed, n):
@@ -199,7 +189,7 @@ def random_pairs(seed, n):
 @given(st.integers(0, 2**16), st.integers(0, 6))
 def test_costs_equal_those_of_pairs_one_by_one(seed, n):
     a, b, covariance, variance, pairs = random_pairs(seed, n)
-    found = pair_costs(a, b, covariance, variance, pairs, WEIGHTS)
+    found = pair_costs(a, b, covariance, variance, pairs, WEIGHTS, TUNING)
     for i, j, cost, covered in zip(*pairs, *found, strict=True):
         ends = [min(b.kdop[k, j] - a.kdop[k, i], a.kdop[k + 4, i] - b.kdop[k + 4, j], key=abs) for k in range(4)]
         xx, xy, yy = covariance[:, i]
@@ -208,7 +198,7 @@ def test_costs_equal_those_of_pairs_one_by_one(seed, n):
         displacement = (shift @ np.linalg.inv(S) @ shift + np.log(np.linalg.det(S / variance))) / 2
         size, overlap = slow_similarity(a.kdop[:, i], b.kdop[:, j])
         height = abs(a.top[i] - b.top[j]) + abs(a.bottom[i] - b.bottom[j])
-        count = abs(a.log_count[i] - b.log_count[j])
+        count = abs(a.log_points[i] - b.log_points[j])
         shape = 1.5 * size + 0.8 * (1 - overlap) + 2.0 * height / 2 + 0.5 * count
         np.testing.assert_allclose(cost, displacement + shape, atol=1e-9)
         assert overlap - 1e-9 <= covered <= 1

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from modt.geometry.tuning import ShapeTuning
 from modt.types import Bool, Float32, Float64, Int, Self
 
 _BEARINGS_RAD = np.deg2rad([0.0, 45.0, 90.0, 135.0])
@@ -19,8 +20,8 @@ AXES = np.stack([np.cos(_BEARINGS_RAD), np.sin(_BEARINGS_RAD)])
 """(2, 4) unit vectors of the axes, world frame."""
 DIRECTIONS = np.concatenate([AXES, -AXES], axis=1)
 """(2, 8) the directions: each axis forth, then each axis back."""
-JITTER_M = 0.15
-"""Jitter of the ends of k-DOPs."""
+HALF_ROOT = float(np.sqrt(0.5))
+"""Components of the axes at 45 and 135 degrees."""
 
 
 def kdop_ends(xyz: Float32, offsets: Int, axes: Float32) -> Float32:
@@ -34,8 +35,10 @@ def kdop_ends(xyz: Float32, offsets: Int, axes: Float32) -> Float32:
     along = axes[0][:, None] * xyz[0]
     along += axes[1][:, None] * xyz[1]
     along += axes[2][:, None] * xyz[2]
-    ahead, behind = (f.reduceat(along, offsets[:-1], axis=1) for f in (np.maximum, np.minimum))
-    return np.concatenate([ahead, -behind])
+    starts = offsets[:-1]
+    greatest = np.maximum.reduceat(along, starts, axis=1)
+    least = np.minimum.reduceat(along, starts, axis=1)
+    return np.concatenate([greatest, -least])
 
 
 def widths(kdop: Float64) -> Float64:
@@ -50,38 +53,37 @@ def centres(kdop: Float64) -> Float64:
     return centre
 
 
-def coverage(a: Float64, b: Float64, rows: Int, columns: Int) -> Float64:
-    """(K,) part of a k-DOP of a (8, n) that one of b (8, k) covers: the lesser for the two rectangles around it.
+def coverage(a: Float64, b: Float64, rows: Int, columns: Int, tuning: ShapeTuning) -> Float64:
+    """(K,) share of a k-DOP of a that one of b covers: the lesser of the shares of the two rectangles around it.
 
     Args:
-        a: n k-DOPs.
-        b: k others.
-        rows: (K,) index of each pair among a.
+        a: (8, n) k-DOPs.
+        b: (8, k) k-DOPs that may cover them.
+        rows: (K,) index among a of each pair.
         columns: (K,) its index among b.
+        tuning: how k-DOPs are compared.
     """
-    kdop = a.take(rows, axis=1)
-    common = np.maximum(widths(np.minimum(kdop, b.take(columns, axis=1) + JITTER_M)), 0.0)
-    part = common / np.maximum(widths(kdop), JITTER_M)
-    least: Float64 = np.minimum(part[0] * part[2], part[1] * part[3])
+    covered = a.take(rows, axis=1)
+    extended = b.take(columns, axis=1) + tuning.end_jitter_m
+    common = np.maximum(widths(np.minimum(covered, extended)), 0.0)
+    share = common / np.maximum(widths(covered), tuning.end_jitter_m)
+    least: Float64 = np.minimum(share[0] * share[2], share[1] * share[3])
     return least
 
 
 def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
-    """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices."""
-    near: Bool = a[0][:, None] >= -b[4]
+    """Pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y.
+
+    Returns:
+        rows: (K,) index of each pair among a, ascending.
+        columns: (K,) its index among b, ascending for equal rows.
+    """
+    overlap: Bool = a[0][:, None] >= -b[4]
     for side in (2, 4, 6):
-        near &= a[side][:, None] >= -b[side - 4]
-    pair = near.ravel().nonzero()[0]
-    one = pair // near.shape[1]
-    return one, pair - one * near.shape[1]
-
-
-HALF_ROOT = float(np.sqrt(0.5))
-"""Components of the axes at 45 and 135 degrees."""
-SOFT_M = 0.3
-"""Added to widths that are compared: a difference of a few returns is noise."""
-PAD_M = SOFT_M / 3
-"""Added to widths before areas are compared."""
+        overlap &= a[side][:, None] >= -b[side - 4]
+    pair = overlap.ravel().nonzero()[0]
+    rows = pair // overlap.shape[1]
+    return rows, pair - rows * overlap.shape[1]
 
 
 class PairWeights(NamedTuple):
@@ -101,30 +103,49 @@ class Shapes:
     log_width: Float64  # (4, n)
     bottom: Float64  # (n,) [m]
     top: Float64  # (n,) [m]
-    log_count: Float64  # (n,)
+    log_points: Float64  # (n,)
 
     @classmethod
-    def of(cls, kdop: Float64, bottom: Float64, top: Float64, count: Int) -> Self:
+    def of(cls, kdop: Float64, bottom: Float64, top: Float64, points: Int, tuning: ShapeTuning) -> Self:
         """Make shapes from (8, n) k-DOPs with (n,) bottoms, tops and numbers of points."""
-        return cls(kdop, np.log(widths(kdop) + SOFT_M), bottom, top, np.log(count))
+        return cls(kdop, np.log(widths(kdop) + tuning.width_softening_m), bottom, top, np.log(points))
 
     def __len__(self) -> int:
         return len(self.top)
 
 
-def shares(a: Float64, b: Float64) -> tuple[Float64, Float64]:
-    """(K,) intersection over union of k-DOPs a and b (8, K), one by one, and over the smaller of the two.
+def overlap_shares(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64, Float64]:
+    """Areas that k-DOPs a and b (8, K) have in common, one by one.
 
-    Of their upright rectangles, or of those at 45 degrees, whichever is less.
+    Areas are those of the upright rectangles or of those at 45 degrees, whichever give less.
+
+    Returns:
+        overlap: (K,) intersection over union.
+        coverage: (K,) intersection over the smaller of the two.
     """
-    common = np.maximum(widths(np.minimum(a, b)) + PAD_M, 0.0)
-    area, other_area, shared = (side[:2] * side[2:] for side in (widths(a) + PAD_M, widths(b) + PAD_M, common))
-    overlap, coverage = shared / (area + other_area - shared), shared / np.minimum(area, other_area)
+    padding_m = tuning.area_padding_m
+    area_a = _rectangle_areas(widths(a) + padding_m)
+    area_b = _rectangle_areas(widths(b) + padding_m)
+    common = _rectangle_areas(np.maximum(widths(np.minimum(a, b)) + padding_m, 0.0))
+    overlap = common / (area_a + area_b - common)
+    coverage = common / np.minimum(area_a, area_b)
     return np.minimum(*overlap), np.minimum(*coverage)
 
 
+def _rectangle_areas(width: Float64) -> Float64:
+    """(2, K) areas of the upright rectangle and of that at 45 degrees, given (4, K) widths along the axes [m2]."""
+    area: Float64 = width[:2] * width[2:]
+    return area
+
+
 def pair_costs(
-    a: Shapes, b: Shapes, covariance: Float64, variance: float, pairs: tuple[Int, Int], weights: PairWeights
+    a: Shapes,
+    b: Shapes,
+    covariance: Float64,
+    variance: float,
+    pairs: tuple[Int, Int],
+    weights: PairWeights,
+    tuning: ShapeTuning,
 ) -> tuple[Float64, Float64]:
     """Costs of pairs of shapes.
 
@@ -139,35 +160,61 @@ def pair_costs(
         variance: variance of the positions of b [m2].
         pairs: (K,) index of each among a, and among b.
         weights: weights of the terms of the cost.
+        tuning: how k-DOPs are compared.
 
     Returns:
         cost: (K,) cost of the displacement and of the differences in shape.
         coverage: (K,) intersection over the smaller of the two.
     """
     rows, columns = pairs
-    one, other = a.kdop.take(rows, axis=1), b.kdop.take(columns, axis=1)
-    xx, xy, yy = covariance.take(rows, axis=1)
-    xx, yy = xx + variance, yy + variance
-    gain = other - one
-    ahead, behind = gain[:4], -gain[4:]
-    east, north_east, north, north_west = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
-    dx = (east + HALF_ROOT * (north_east - north_west)) / 2
-    dy = (north + HALF_ROOT * (north_east + north_west)) / 2
-    determinant = xx * yy - xy * xy
-    distance = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant
-    overlap, coverage = shares(one, other)
+    kdop_a = a.kdop.take(rows, axis=1)
+    kdop_b = b.kdop.take(columns, axis=1)
+    distance, spread = _mahalanobis(kdop_b - kdop_a, covariance.take(rows, axis=1), variance)
+    overlap, coverage = overlap_shares(kdop_a, kdop_b, tuning)
     size = np.abs(b.log_width.take(columns, axis=1) - a.log_width.take(rows, axis=1)).sum(axis=0) / 4
     height = np.abs(a.top[rows] - b.top[columns]) + np.abs(a.bottom[rows] - b.bottom[columns])
+    points = np.abs(a.log_points[rows] - b.log_points[columns])
     shape = weights.size * size + weights.overlap * (1 - overlap)
-    shape += weights.height * height / 2 + weights.points * np.abs(a.log_count[rows] - b.log_count[columns])
-    return distance / 2 + shape + np.log(determinant / variance**2) / 2, coverage
+    shape += weights.height * height / 2 + weights.points * points
+    return distance / 2 + shape + np.log(spread) / 2, coverage
+
+
+def _mahalanobis(outward: Float64, covariance: Float64, variance: float) -> tuple[Float64, Float64]:
+    """Displacements by the ends that moved less, relative to the uncertainty of the position.
+
+    Args:
+        outward: (8, K) displacement of each end [m].
+        covariance: (3, K) xx, xy and yy of the position [m2].
+        variance: further variance along x and y [m2].
+
+    Returns:
+        distance: (K,) squared Mahalanobis distance.
+        spread: (K,) determinant of the covariance, relative to its least value.
+    """
+    ahead = outward[:4]
+    behind = -outward[4:]
+    x, y = _in_plane(np.where(np.abs(ahead) < np.abs(behind), ahead, behind))
+    dx = x / 2
+    dy = y / 2
+    xx, xy, yy = covariance
+    xx = xx + variance
+    yy = yy + variance
+    determinant = xx * yy - xy * xy
+    distance = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant
+    return distance, determinant / variance**2
+
+
+def _in_plane(along: Float64) -> tuple[Float64, Float64]:
+    """(K,) x and (K,) y of the sum of the vectors along the four axes, of which (4, K) lengths are given."""
+    east, north_east, north, north_west = along
+    return east + HALF_ROOT * (north_east - north_west), north + HALF_ROOT * (north_east + north_west)
 
 
 def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
     """Pairs that a least-cost assignment keeps for certain, and those that it must decide among.
 
-    A pair is kept for certain if the next best pairs of its row and of its column together cost more than the pair
-    and limit, the most that their partners then lose.
+    A pair is kept for certain if the second cheapest pairs of its row and of its column together cost more than the
+    pair and limit, the most that their partners then lose.
 
     Args:
         rows: (K,) first index of each pair.
@@ -178,43 +225,49 @@ def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple
     Returns:
         (C,) and (D,) indices of pairs, ascending.
     """
-    order = (-cost).argsort(kind="stable")
-    rows, columns, cost = rows[order], columns[order], cost[order]
-    of_row, other_row = _two_best(rows, cost, limit)
-    of_column, other_column = _two_best(columns, cost, limit)
-    kept = cost + limit < other_row + other_column
-    certain, contested = order[kept], order[~(kept[of_row] | kept[of_column])]
-    return np.sort(certain), np.sort(contested)
+    cheapest_of_row, second_cost_of_row = _two_cheapest(rows, cost, limit)
+    cheapest_of_column, second_cost_of_column = _two_cheapest(columns, cost, limit)
+    certain = cost + limit < second_cost_of_row + second_cost_of_column
+    contested = ~(certain[cheapest_of_row] | certain[cheapest_of_column])
+    return certain.nonzero()[0], contested.nonzero()[0]
 
 
-def _two_best(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
-    """(K,) best pair of the same index, (K,) cost of the next best or limit; pairs sorted by falling cost."""
-    k = np.arange(len(index))
-    best = np.zeros(index.max(initial=-1) + 1, np.int64)
-    best[index] = k  # the last written is the cheapest
-    of_index = best[index]
-    others = (of_index != k).nonzero()[0]
-    next_best = np.full(len(best), limit)
-    next_best[index[others]] = cost[others]
-    return of_index, next_best[index]
+def _two_cheapest(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
+    """Rivals of each pair: those with the same index, itself included.
+
+    Args:
+        index: (K,) row, or column, of each pair.
+        cost: (K,) cost of each pair.
+        limit: cost of having no partner.
+
+    Returns:
+        cheapest: (K,) cheapest pair of the same index, the last one of equals.
+        second_cost: (K,) cost of the second cheapest, limit where there is none.
+    """
+    latest_first = -np.arange(len(index))
+    order = np.lexsort((latest_first, cost, index))
+    is_first = np.diff(index[order], prepend=-1) != 0  # among those with the same index, in this order
+    is_second = ~is_first
+    is_second[1:] &= is_first[:-1]
+    first = order[is_first]
+    second = order[is_second]
+    cheapest = np.empty(index.max(initial=-1) + 1, np.int64)
+    cheapest[index[first]] = first
+    second_cost = np.full(len(cheapest), limit)
+    second_cost[index[second]] = cost[second]
+    return cheapest[index], second_cost[index]
 
 
-AGREE_M = 0.6
-"""Ends whose displacements differ by less agree, of a k-DOP up to a metre long; the limit falls with the length."""
-DISAGREEMENT = 0.3
-"""Standard deviation of a displacement by ends that disagree, relative to the disagreement or the width, if less."""
-DECAY = 0.97
-"""Share of that variance that is left a frame later."""
-
-
-def shift_between(a: Float64, b: Float64) -> Float64:
+def shift_between(a: Float64, b: Float64, tuning: ShapeTuning) -> Float64:
     """(K, 2) displacement from k-DOPs a to b [m], all axes weighted alike."""
-    moved, _, _ = _moved(a, b)
-    shift: Float64 = (AXES @ moved).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    along, _, _ = _shift_along_axes(a, b, tuning)
+    shift: Float64 = (AXES @ along).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     return shift
 
 
-def measured(a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
+def measured(
+    a: Float64, b: Float64, variance: float, before: Float64, tuning: ShapeTuning
+) -> tuple[Float64, Float64, Float64]:
     """Displacement between k-DOPs with its covariance.
 
     An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the
@@ -227,48 +280,63 @@ def measured(a: Float64, b: Float64, variance: float, before: Float64) -> tuple[
         b: (8, K) and after [m].
         variance: variance of the displacement if the ends agree [m2].
         before: (4, K) variance along each axis by ends that disagreed, a frame ago [m2].
+        tuning: how k-DOPs are compared.
 
     Returns:
         shift: (K, 2) from a to b [m].
         covariance: (K, 2, 2) covariance of the displacement [m2].
         end_variance: (4, K) variance along each axis by ends that disagree, or did [m2].
     """
-    width = widths(b)
-    moved, unlike, apart = _moved(a, b)
-    end_variance = np.maximum(DISAGREEMENT**2 * unlike * np.square(apart), DECAY * before)
-    np.minimum(end_variance, DISAGREEMENT**2 * np.square(width.max(axis=0)), out=end_variance)
+    along, disagreement, growth = _shift_along_axes(a, b, tuning)
+    doubt = tuning.disagreement * tuning.disagreement
+    end_variance = np.maximum(doubt * disagreement * np.square(growth), tuning.end_variance_decay * before)
+    np.minimum(end_variance, doubt * np.square(widths(b).max(axis=0)), out=end_variance)
     # The four axes together weigh as much as one measurement in each direction.
     weight = 0.5 / (variance + end_variance)
+    x, y = _in_plane(weight * along)
+    # The inverse of the covariance is the sum over the axes of weight * axis * axis'.
     east, north_east, north, north_west = weight
-    xx, yy = east + (north_east + north_west) / 2, north + (north_east + north_west) / 2
-    xy = (north_east - north_west) / 2
-    east, north_east, north, north_west = weight * moved
-    x, y = east + HALF_ROOT * (north_east - north_west), north + HALF_ROOT * (north_east + north_west)
-    scale = 1.0 / (xx * yy - xy * xy)
-    xx, yy, xy = scale * yy, scale * xx, -scale * xy  # the inverse
-    shift, covariance = np.empty((len(x), 2)), np.empty((len(x), 2, 2))
-    shift[:, 0], shift[:, 1] = xx * x + xy * y, xy * x + yy * y
-    covariance[:, 0, 0], covariance[:, 1, 1] = xx, yy
-    covariance[:, 0, 1] = covariance[:, 1, 0] = xy
+    inverse_xx = east + (north_east + north_west) / 2
+    inverse_yy = north + (north_east + north_west) / 2
+    inverse_xy = (north_east - north_west) / 2
+    scale = 1.0 / (inverse_xx * inverse_yy - inverse_xy * inverse_xy)
+    covariance = np.empty((len(x), 2, 2))
+    covariance[:, 0, 0] = xx = scale * inverse_yy
+    covariance[:, 1, 1] = yy = scale * inverse_xx
+    covariance[:, 0, 1] = covariance[:, 1, 0] = xy = -scale * inverse_xy
+    shift = np.empty((len(x), 2))
+    shift[:, 0] = xx * x + xy * y
+    shift[:, 1] = xy * x + yy * y
     return shift, covariance, end_variance
 
 
-def _moved(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
+def _shift_along_axes(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64, Float64, Float64]:
     """Displacement along each axis from k-DOPs a to b (8, K).
 
     Returns:
-        moved: (4, K) mean of both ends where they agree, else that of the end that moved less [m].
-        unlike: (4, K) from 0, where both ends moved alike, to 1.
-        apart: (4, K) difference of their displacements outward [m].
+        shift: (4, K) mean of both ends where they agree, else that of the end that moved less [m].
+        disagreement: (4, K) from 0, where both ends moved alike, to 1.
+        growth: (4, K) growth of the width, which is the difference between the displacements of the ends [m].
     """
-    width, gain = widths(b), b - a
-    both, apart = gain[:4] - gain[4:], gain[:4] + gain[4:]
-    longest = np.maximum(width, width - apart).max(axis=0)
-    unlike = 1 - np.square(np.maximum(1 - np.square(apart * (np.maximum(longest, 1.0) / AGREE_M)), 0.0))
-    return (both - unlike * np.copysign(apart, both)) / 2, unlike, apart
+    outward = b - a
+    both = outward[:4] - outward[4:]
+    growth = outward[:4] + outward[4:]
+    width = widths(b)
+    longest = np.maximum(width, width - growth).max(axis=0)  # of the widths after and before
+    relative_growth = growth * (np.maximum(longest, 1.0) / tuning.agreement_m)
+    disagreement = 1 - np.square(np.maximum(1 - np.square(relative_growth), 0.0))
+    # Less half the growth, the mean of both ends is the displacement of the one that moved less.
+    return (both - disagreement * np.copysign(growth, both)) / 2, disagreement, growth
 
 
-def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64]:
-    """(K,) mean difference of the logarithms of the widths of k-DOPs a and b (8, K), one by one, and (K,) overlap."""
-    size = np.abs(np.log((widths(b) + SOFT_M) / (widths(a) + SOFT_M))).sum(axis=0) / 4
-    return size, shares(a, b)[0]
+def shape_similarity(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64, Float64]:
+    """Likeness of k-DOPs a and b (8, K), one by one.
+
+    Returns:
+        size: (K,) mean difference of the logarithms of the widths.
+        overlap: (K,) intersection over union.
+    """
+    softening_m = tuning.width_softening_m
+    size = np.abs(np.log((widths(b) + softening_m) / (widths(a) + softening_m))).sum(axis=0) / 4
+    overlap, _ = overlap_shares(a, b, tuning)
+    return size, overlap

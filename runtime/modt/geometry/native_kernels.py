@@ -4,30 +4,60 @@ from __future__ import annotations
 
 import ctypes
 from array import array
+from dataclasses import fields
 
 import numpy as np
 
-from modt.geometry.kdop import AGREE_M, DECAY, DISAGREEMENT, HALF_ROOT, JITTER_M, PAD_M, PairWeights, Shapes
+from modt.geometry.kdop import PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT32, FLOAT64, INT64, Own, Signatures, declare, pointers, structure
+from modt.geometry.tuning import ShapeTuning
+from modt.native.library import FLOAT32, FLOAT64, INT64, Array, Filled, Layout, Number, Own, Rows, Signatures, declare
 from modt.types import Float32, Float64, Int
 
 _D, _L = ctypes.c_double, ctypes.c_int64
+
+_TUNING = Layout("ShapeTuning", **{field.name: Number(np.float64) for field in fields(ShapeTuning)})
+_WEIGHTS = Layout("PairWeights", **{name: Number(np.float64) for name in PairWeights._fields})
+_SHAPES = Layout(
+    "Shapes",
+    kdop=Array(np.float64, 8, "n"),
+    log_width=Array(np.float64, 4, "n"),
+    bottom=Array(np.float64, "n"),
+    top=Array(np.float64, "n"),
+    log_points=Array(np.float64, "n"),
+    n=Number(np.int64),
+)
+_MEMBERS = Layout("Rows", index=Array(np.int64, "k"), xyz=Rows(np.float32, 3, "k"))
+_ASSIGNMENT = Layout(
+    "Assignment",
+    cost=Array(np.float64, "rows", "columns"),
+    row_potential=Array(np.float64, "rows"),
+    column_potential=Array(np.float64, "columns"),
+    distance=Array(np.float64, "columns"),
+    column_of_row=Array(np.int64, "rows"),
+    row_of_column=Array(np.int64, "columns"),
+    row_before=Array(np.int64, "columns"),
+    to_visit=Array(np.int64, "columns"),
+    rows=Number(np.int64),
+    columns=Number(np.int64),
+)
 _SIGNATURES: Signatures = {
-    "modt_upright_boxes": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT64, Own, Own, _D, Own)),
+    "modt_upright_boxes": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT64, Own, Own, Own)),
     "modt_kdop_ends": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT32, Own)),
     "modt_group_sums": (None, (FLOAT32, _L, _L, INT64, _L, Own)),
-    "modt_copy_runs": (None, (Own, INT64, INT64, _L, Own)),
-    "modt_overlapping_pairs": (_L, (FLOAT64, _L, FLOAT64, _L, Own, _L, Own, Own)),
-    "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _D, Own)),
-    "modt_measured": (None, (FLOAT64, FLOAT64, _L, _D, FLOAT64, Own, _D, Own, Own, Own)),
-    "modt_pair_costs": (None, (Own, Own, FLOAT64, _D, INT64, INT64, _L, Own, _D, _D, Own, Own, Own)),
-    "modt_certain_pairs": (None, (INT64, INT64, FLOAT64, _L, _D, Own, Own, Own, _L, Own)),
-    "modt_settle_pairs": (ctypes.c_int, (INT64, INT64, FLOAT64, _L, _D, Own, _L, Own, Own, Own, Own)),
-    "modt_regrouped": (None, (Own, INT64, _L, INT64, INT64, INT64, _L, _L, Own, Own, Own)),
+    "modt_copy_runs": (None, (_MEMBERS, INT64, INT64, _L, _MEMBERS)),
+    "modt_overlapping_pairs": (_L, (FLOAT64, _L, FLOAT64, _L, Own, _L, _L, Own, Own)),
+    "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _TUNING, Own)),
+    "modt_measured": (None, (FLOAT64, FLOAT64, _L, _D, FLOAT64, _TUNING, Own, Own, Own)),
+    "modt_pair_costs": (None, (_SHAPES, _SHAPES, FLOAT64, _D, INT64, INT64, _L, _WEIGHTS, _TUNING, Own, Own, Own)),
+    "modt_certain_pairs": (None, (INT64, INT64, FLOAT64, _L, _D, _L, _L, Own, Own, Own, Own, Own)),
+    "modt_settle_pairs": (ctypes.c_int, (INT64, INT64, FLOAT64, _L, _D, Own, Own, _ASSIGNMENT, Own)),
+    "modt_regrouped": (None, (_MEMBERS, INT64, _L, INT64, INT64, INT64, _L, _L, Own, Own, _MEMBERS)),
 }
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
+_BLOCK = 16
+"""k-DOPs that are compared together, BLOCK of geometry.c."""
 
 
 class NativeGeometryKernels(GeometryKernels):
@@ -35,16 +65,19 @@ class NativeGeometryKernels(GeometryKernels):
 
     Args:
         library: the compiled library (`modt.native.library`).
+        tuning: how k-DOPs are compared.
     """
 
-    def __init__(self, library: ctypes.CDLL) -> None:
+    def __init__(self, library: ctypes.CDLL, tuning: ShapeTuning = ShapeTuning()) -> None:
+        super().__init__(tuning)
         declare(library, _SIGNATURES)
         self.library: ctypes.CDLL = library
+        self._tuning = _TUNING.of(tuning)
 
     def upright_boxes(self, xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
         """(G, 7) boxes at (G,) headings, or across them, about groups of (3, K) points."""
         box = np.empty((len(yaw), 7))
-        self.library.modt_upright_boxes(*xyz, offsets, len(yaw), yaw, np.cos(yaw), np.sin(yaw), np.pi / 2, box)
+        self.library.modt_upright_boxes(*xyz, offsets, len(yaw), yaw, np.cos(yaw), np.sin(yaw), box)
         return box
 
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
@@ -62,35 +95,49 @@ class NativeGeometryKernels(GeometryKernels):
 
     def copy_runs(self, members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:
         """Members and (3, ...) coordinates of (2, R) runs of them, one after the other."""
-        (begin, end), n = runs, int((runs[1] - runs[0]).sum())
-        rows, xyz = np.empty(n, np.int64), np.empty((3, n), np.float32)
-        given, out = pointers(members, coordinates), pointers(rows, xyz)
+        begin, end = runs
+        n = int((end - begin).sum())
+        copied_members = np.empty(n, np.int64)
+        copied = np.empty((3, n), np.float32)
+        given = _MEMBERS(index=members, xyz=coordinates)
+        out = _MEMBERS(index=copied_members, xyz=copied)
         self.library.modt_copy_runs(given, begin, end, len(begin), out)
-        return rows, xyz
+        return copied_members, copied
 
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
         """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""
-        a, b, n, k = np.ascontiguousarray(a), np.ascontiguousarray(b), a.shape[1], b.shape[1]
-        least, limit = np.empty(4 * (k + 15)), _PAIRS_EACH * (n + k)
+        a = np.ascontiguousarray(a)
+        b = np.ascontiguousarray(b)
+        n_a = a.shape[1]
+        n_b = b.shape[1]
+        n_blocks = -(-n_b // _BLOCK)
+        reach = np.empty((n_blocks, 4, _BLOCK), np.float32)
+        limit = _PAIRS_EACH * (n_a + n_b)
         while True:
-            one, other = np.empty((2, limit), np.int64)
-            count = self.library.modt_overlapping_pairs(a, n, b, k, least, limit, one, other)
+            rows, columns = np.empty((2, limit), np.int64)
+            count = self.library.modt_overlapping_pairs(a, n_a, b, n_b, reach, n_blocks, limit, rows, columns)
             if count <= limit:
-                return one[:count], other[:count]
+                return rows[:count], columns[:count]
             limit = count
 
     def coverage(self, a: Float64, b: Float64, rows: Int, columns: Int) -> Float64:
-        """(K,) part of the k-DOP of a (8, n) that that of b (8, k) covers, of each pair."""
-        a, b, part = np.ascontiguousarray(a), np.ascontiguousarray(b), np.empty(len(rows))
-        self.library.modt_coverage(a, a.shape[1], b, b.shape[1], rows, columns, len(rows), JITTER_M, part)
-        return part
+        """(K,) share of each k-DOP of a (8, n) that one of b (8, k) covers."""
+        a = np.ascontiguousarray(a)
+        b = np.ascontiguousarray(b)
+        share = np.empty(len(rows))
+        self.library.modt_coverage(
+            a, a.shape[1], b, b.shape[1], rows, columns, len(rows), self._tuning, share,
+        )  # fmt: skip
+        return share
 
     def measured(self, a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
         """Displacement between k-DOPs a and b (8, K) with its covariance, and the variance by ends that disagree."""
-        n, limits = a.shape[1], array("d", (AGREE_M, DISAGREEMENT**2, DECAY))
-        out = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((4, n))
-        self.library.modt_measured(a, b, n, variance, before, limits, HALF_ROOT, *out)
-        return out
+        n = a.shape[1]
+        shift = np.empty((n, 2))
+        covariance = np.empty((n, 2, 2))
+        end_variance = np.empty((4, n))
+        self.library.modt_measured(a, b, n, variance, before, self._tuning, shift, covariance, end_variance)
+        return shift, covariance, end_variance
 
     def pair_costs(
         self,
@@ -102,23 +149,39 @@ class NativeGeometryKernels(GeometryKernels):
         weights: PairWeights,
     ) -> tuple[Float64, Float64]:
         """(K,) cost and coverage of pairs of shapes."""
-        n, weighted = len(pairs[0]), array("d", weights)
-        spread, cost, coverage = np.empty((3, n))
-        tracks, proposals = (structure(s.kdop, s.log_width, s.bottom, s.top, s.log_count, len(s)) for s in (a, b))
-        given = tracks, proposals, covariance, variance, *pairs, n, weighted, HALF_ROOT, PAD_M
-        self.library.modt_pair_costs(*given, spread, cost, coverage)
+        rows, columns = pairs
+        spread, cost, coverage = np.empty((3, len(rows)))
+        shapes_a = _SHAPES.of(a, n=len(a))
+        shapes_b = _SHAPES.of(b, n=len(b))
+        self.library.modt_pair_costs(
+            shapes_a, shapes_b, covariance, variance, rows, columns, len(rows), _WEIGHTS.of(weights), self._tuning,
+            spread, cost, coverage,
+        )  # fmt: skip
         return cost + np.log(spread) / 2, coverage
 
     def assign(self, rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
         """Indices, ascending, of the candidate pairs that a least-cost assignment keeps."""
-        n, sizes = len(rows), array("q", (int(rows.max(initial=-1)) + 1, int(columns.max(initial=-1)) + 1))
-        most, given, state = max(sizes), (rows, columns, cost, n, limit), np.empty(n, np.uint8)
-        number = np.empty((2, most), np.int64)
-        self.library.modt_certain_pairs(*given, sizes, number, np.empty((2, most)), most, state)
-        if sizes[0]:
-            few, many = sorted(sizes)
-            costs, partners = np.empty(few * many + few + 2 * many), np.empty(few + 3 * many, np.int64)
-            if not self.library.modt_settle_pairs(*given, number, most, sizes, costs, partners, state):
+        n_pairs = len(rows)
+        n_rows = int(rows.max(initial=-1)) + 1
+        n_columns = int(columns.max(initial=-1)) + 1
+        row_number = np.empty(n_rows, np.int64)
+        column_number = np.empty(n_columns, np.int64)
+        state = np.empty(n_pairs, np.uint8)
+        contested = array("q", (0, 0))
+        self.library.modt_certain_pairs(
+            rows, columns, cost, n_pairs, limit, n_rows, n_columns, np.empty(n_rows + n_columns), row_number,
+            column_number, state, contested,
+        )  # fmt: skip
+        few, many = contested
+        if few > many:  # the assignment wants at least as many columns as rows
+            few, many = many, few
+            rows, columns = columns, rows
+            row_number, column_number = column_number, row_number
+        if few:
+            assignment = _room_for_assignment(few, many)
+            if not self.library.modt_settle_pairs(
+                rows, columns, cost, n_pairs, limit, row_number, column_number, assignment, state
+            ):
                 raise ValueError("no assignment has a finite cost")
         return state.nonzero()[0]
 
@@ -126,8 +189,30 @@ class NativeGeometryKernels(GeometryKernels):
         self, members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int
     ) -> tuple[Int, Float32, Int]:
         """Members and (3, K) coordinates by the label of their group or, if moved, their own; (n,) count of each."""
-        rows, xyz, (following, count) = np.empty_like(members), np.empty_like(coordinates), np.empty((2, n), np.int64)
-        given, out = pointers(members, coordinates), pointers(rows, xyz)
-        groups = offsets, len(label), label, *moved, len(moved[0]), n
-        self.library.modt_regrouped(given, *groups, following, count, out)
-        return rows, xyz, count
+        moved_members, moved_labels = moved
+        sorted_members = np.empty_like(members)
+        sorted_coordinates = np.empty_like(coordinates)
+        count = np.empty(n, np.int64)
+        given = _MEMBERS(index=members, xyz=coordinates)
+        out = _MEMBERS(index=sorted_members, xyz=sorted_coordinates)
+        self.library.modt_regrouped(
+            given, offsets, len(label), label, moved_members, moved_labels, len(moved_members), n,
+            np.empty(n, np.int64), count, out,
+        )  # fmt: skip
+        return sorted_members, sorted_coordinates, count
+
+
+def _room_for_assignment(rows: int, columns: int) -> Filled:
+    """Room for an assignment of rows to columns; the passes in C write it and read it."""
+    return _ASSIGNMENT(
+        cost=np.empty((rows, columns)),
+        row_potential=np.empty(rows),
+        column_potential=np.empty(columns),
+        distance=np.empty(columns),
+        column_of_row=np.empty(rows, np.int64),
+        row_of_column=np.empty(columns, np.int64),
+        row_before=np.empty(columns, np.int64),
+        to_visit=np.empty(columns, np.int64),
+        rows=rows,
+        columns=columns,
+    )

@@ -1,17 +1,29 @@
-/* Extents and boxes of groups of points, and pairs of k-DOPs. A group i has the points from offsets[i] to
- * offsets[i + 1]; none is empty. */
+/* Extents and boxes of groups of points, and pairs of k-DOPs: boxes.py and kdop.py of modt.geometry.
+ *
+ * A group g has the points from offsets[g] to offsets[g + 1]; none is empty.
+ *
+ * k-DOPs are eight rows of n numbers: the greatest coordinates along four axes, then along the same axes backwards. Along
+ * axis k, k-DOP i reaches from -kdop[(k + 4) * n + i] to kdop[k * n + i]. The axes point east, north-east, north and
+ * north-west. */
 #include "kernels.h"
 
 typedef float f8 __attribute__((vector_size(32), aligned(4)));
 typedef i32 i8 __attribute__((vector_size(32)));
 typedef i64 l4 __attribute__((vector_size(32)));
 
-/* Least and greatest coordinates of points, at least one, along four axes of which x, y and z are given. */
-static ALWAYS_INLINE void ends_along(const float *x, const float *y, const float *z, i64 i, i64 end, const f4 axes[3],
-                                     f4 *least, f4 *greatest)
+enum { EAST, NORTH_EAST, NORTH, NORTH_WEST, AXES }; /* axes of k-DOPs; AXES more is the same axis backwards */
+
+static const double HALF_ROOT = 0x1.6a09e667f3bcdp-1;    /* component of the axes north-east and north-west */
+static const double QUARTER_TURN = 0x1.921fb54442d18p+0; /* radians */
+
+/* Least and greatest coordinates along four axes of the points from `begin` to before `end`, at least one. The x, y and z
+ * of the axes are given. Two points are taken at a time, into two extents that do not wait for one another. */
+static ALWAYS_INLINE void extent_along(const float *x, const float *y, const float *z, i64 begin, i64 end,
+                                       const f4 axes[3], f4 *least, f4 *greatest)
 {
     f4 low[2] = {spread(INFINITY), spread(INFINITY)}, high[2] = {-low[0], -low[0]};
-    if ((end - i) & 1) { /* then two at a time, which do not wait for one another */
+    i64 i = begin;
+    if ((end - begin) & 1) {
         low[0] = high[0] = axes[0] * spread(x[i]) + axes[1] * spread(y[i]) + axes[2] * spread(z[i]);
         i++;
     }
@@ -25,218 +37,230 @@ static ALWAYS_INLINE void ends_along(const float *x, const float *y, const float
     *greatest = most4(high[0], high[1]);
 }
 
-/* kdop_ends: greatest coordinates of n groups of points along four axes, then against them, eight rows of n. */
-EXPORT void modt_kdop_ends(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
-                           const float *axes, float *ends)
+/* kdop_ends: k-DOPs (8, n_groups) of groups of points, given the axes (3, 4). */
+EXPORT void modt_kdop_ends(const float *x, const float *y, const float *z, const i64 *offsets, i64 n_groups,
+                           const float *axes, float *kdop)
 {
-    f4 along[3], low, high;
-    __builtin_memcpy(along, axes, sizeof along);
-    for (i64 g = 0; g < n; g++) {
-        ends_along(x, y, z, offsets[g], offsets[g + 1], along, &low, &high);
-        for (int k = 0; k < 4; k++) {
-            ends[k * n + g] = high[k];
-            ends[(k + 4) * n + g] = -low[k];
+    f4 axes_xyz[3], low, high;
+    __builtin_memcpy(axes_xyz, axes, sizeof axes_xyz);
+    for (i64 g = 0; g < n_groups; g++) {
+        extent_along(x, y, z, offsets[g], offsets[g + 1], axes_xyz, &low, &high);
+        for (int k = 0; k < AXES; k++) {
+            kdop[k * n_groups + g] = high[k];
+            kdop[(k + AXES) * n_groups + g] = -low[k];
         }
     }
 }
 
-/* upright_boxes: boxes of n groups of points, at headings of which the cosine and the sine are given, or across them. */
-EXPORT void modt_upright_boxes(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
-                               const double *yaw, const double *cosine, const double *sine, double quarter_turn,
-                               double (*box)[7])
+/* upright_boxes: boxes (n_groups, 7) of groups of points, given a heading of each, with its cosine and sine. A box that
+ * is wider than long across its heading is turned. */
+EXPORT void modt_upright_boxes(const float *x, const float *y, const float *z, const i64 *offsets, i64 n_groups,
+                               const double *yaw, const double *cosine, const double *sine, double (*box)[7])
 {
-    for (i64 g = 0; g < n; g++) {
+    for (i64 g = 0; g < n_groups; g++) {
         float c = (float)cosine[g], s = (float)sine[g];
         f4 axes[3] = {{c, -s, 0.0f, 0.0f}, {s, c, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f, 0.0f}}, low, high;
-        double middle[3], side[3];
-        ends_along(x, y, z, offsets[g], offsets[g + 1], axes, &low, &high);
+        double middle[3], side[3]; /* along the heading, across it, and upwards */
+        extent_along(x, y, z, offsets[g], offsets[g + 1], axes, &low, &high);
         for (int k = 0; k < 3; k++) {
             middle[k] = ((double)low[k] + (double)high[k]) / 2;
             side[k] = (double)high[k] - (double)low[k];
         }
-        int turn = side[0] < side[1];
+        int turned = side[0] < side[1];
         box[g][0] = middle[0] * cosine[g] - middle[1] * sine[g];
         box[g][1] = middle[0] * sine[g] + middle[1] * cosine[g];
         box[g][2] = middle[2];
-        box[g][3] = side[turn];
-        box[g][4] = side[!turn];
+        box[g][3] = side[turned];
+        box[g][4] = side[!turned];
         box[g][5] = side[2];
-        box[g][6] = turn ? yaw[g] - quarter_turn : yaw[g];
+        box[g][6] = turned ? yaw[g] - QUARTER_TURN : yaw[g];
     }
 }
 
-/* overlapping_pairs: pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y. Returns how many there are;
- * no more than `limit` are written. Rounding keeps the order of numbers, so that pairs which do not overlap in single
- * precision need no other look. Scratch: `least`, 64 numbers for each sixteen of b. */
-EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, f8 (*least)[4][2], i64 limit,
-                                  i64 *one, i64 *other)
+enum { LANES = 8, HALVES = 2, BLOCK = LANES * HALVES, SIDES = 4 }; /* k-DOPs compared together, in two vectors */
+
+/* overlapping_pairs: pairs of k-DOPs a (8, n_a) and b (8, n_b) that overlap along x and along y, as indices among both.
+ * Returns how many there are; no more than `limit` are written.
+ *
+ * An end of a has to reach as far as the opposite end of b on each of the four sides. Single precision decides first,
+ * sixteen of b together: rounding keeps the order of numbers, so pairs that do not overlap there need no other look.
+ * Scratch: `reach`, for each block of sixteen of b, the coordinates to be reached on each side. */
+EXPORT i64 modt_overlapping_pairs(const double *a, i64 n_a, const double *b, i64 n_b, f8 (*reach)[SIDES][HALVES],
+                                  i64 n_blocks, i64 limit, i64 *rows, i64 *columns)
 {
-    const double *to[4] = {b + 4 * k, b, b + 6 * k, b + 2 * k}; /* what the ends of a, negated, have to reach */
-    i64 groups = (k + 15) / 16, count = 0;
-    for (i64 j = 0; j < 16 * groups; j++)
-        for (int side = 0; side < 4; side++)
-            least[j / 16][side][j / 8 % 2][j % 8] = j < k ? (float)-to[side][j] : __builtin_nanf(""); /* not reached */
-    for (i64 i = 0; i < n; i++) {
-        double end[4] = {a[i], a[4 * n + i], a[2 * n + i], a[6 * n + i]}; /* to the east, west, north and south */
+    static const int side_row[SIDES] = {EAST, EAST + AXES, NORTH, NORTH + AXES};
+    static const int opposite_row[SIDES] = {EAST + AXES, EAST, NORTH + AXES, NORTH};
+    i64 count = 0;
+    PROVEN(n_blocks * BLOCK >= n_b);
+    for (i64 j = 0; j < n_blocks * BLOCK; j++)
+        for (int side = 0; side < SIDES; side++) /* nothing reaches beyond the last of b */
+            reach[j / BLOCK][side][j / LANES % HALVES][j % LANES] =
+                j < n_b ? (float)-b[opposite_row[side] * n_b + j] : __builtin_nanf("");
+    for (i64 i = 0; i < n_a; i++) {
+        double end[SIDES];
+        for (int side = 0; side < SIDES; side++)
+            end[side] = a[side_row[side] * n_a + i];
         float east = (float)end[0], west = (float)end[1], north = (float)end[2], south = (float)end[3];
-        for (i64 g = 0; g < groups; g++) {
-            i8 near[2];
-            for (int f = 0; f < 2; f++)
-                near[f] = (east >= least[g][0][f]) & (west >= least[g][1][f]) & (north >= least[g][2][f]) &
-                          (south >= least[g][3][f]);
+        for (i64 block = 0; block < n_blocks; block++) {
+            i8 near[HALVES];
+            for (int half = 0; half < HALVES; half++)
+                near[half] = (east >= reach[block][0][half]) & (west >= reach[block][1][half]) &
+                             (north >= reach[block][2][half]) & (south >= reach[block][3][half]);
             l4 any = (l4)(near[0] | near[1]);
             if (!(any[0] | any[1] | any[2] | any[3]))
                 continue;
-            for (i64 at = 0, j = 16 * g; at < 16; at++, j++)
-                if (near[at / 8][at % 8] && end[0] >= -to[0][j] && end[1] >= -to[1][j] && end[2] >= -to[2][j] &&
-                    end[3] >= -to[3][j]) {
-                    if (count < limit) {
-                        one[count] = i;
-                        other[count] = j;
-                    }
-                    count++;
+            for (i64 lane = 0; lane < BLOCK; lane++) {
+                i64 j = block * BLOCK + lane;
+                if (!near[lane / LANES][lane % LANES])
+                    continue;
+                int overlap = 1;
+                for (int side = 0; side < SIDES; side++)
+                    overlap &= end[side] >= -b[opposite_row[side] * n_b + j];
+                if (!overlap)
+                    continue;
+                if (count < limit) {
+                    rows[count] = i;
+                    columns[count] = j;
                 }
+                count++;
+            }
         }
     }
     return count;
 }
 
+/* modt.geometry.tuning.ShapeTuning, which says what each member does. */
 typedef struct {
-    const double *kdop, *log_width, *bottom, *top, *log_count; /* 8, 4, 1, 1, 1 numbers of each, row by row */
+    double end_jitter_m, width_softening_m, area_padding_m, agreement_m, disagreement, end_variance_decay;
+} ShapeTuning;
+
+typedef struct {
+    const double *kdop;      /* (8, n) [m] */
+    const double *log_width; /* (4, n) */
+    const double *bottom, *top, *log_points;
     i64 n;
 } Shapes;
 
 typedef struct {
-    double size, overlap, height, count;
+    double size, overlap, height, points;
 } PairWeights;
 
-static inline double apart(double a, double b) { return __builtin_fabs(a - b); }
+static inline double difference(double a, double b) { return __builtin_fabs(a - b); }
 
-/* pair_costs: coverage of n pairs (i, j) of shapes a and b, cost without the term of the determinant, and that
- * determinant over its least; `covariance` has the xx, then the xy, then the yy of a. */
-EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *covariance, double variance,
-                            const i64 *rows, const i64 *columns, i64 n, const PairWeights *weights, double half_root,
-                            double pad_m, double *spread, double *cost, double *coverage)
+/* x and y of the sum of the vectors along the four axes, of which the lengths are given. */
+static inline double sum_x(const double along[AXES])
 {
-    for (i64 pair = 0; pair < n; pair++) {
+    return along[EAST] + HALF_ROOT * (along[NORTH_EAST] - along[NORTH_WEST]);
+}
+
+static inline double sum_y(const double along[AXES])
+{
+    return along[NORTH] + HALF_ROOT * (along[NORTH_EAST] + along[NORTH_WEST]);
+}
+
+/* pair_costs: costs of n_pairs pairs (rows[p], columns[p]) of shapes a and b, and how much of the smaller one is covered.
+ * `covariance` (3, a->n) holds xx, xy and yy of the positions of a. The cost lacks half the logarithm of `spread`, the
+ * determinant of the covariance over its least, so that NumPy takes the logarithm. */
+EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *covariance, double variance,
+                            const i64 *rows, const i64 *columns, i64 n_pairs, const PairWeights *weights,
+                            const ShapeTuning *tuning, double *spread, double *cost, double *coverage)
+{
+    for (i64 pair = 0; pair < n_pairs; pair++) {
         i64 i = rows[pair], j = columns[pair];
         PROVEN(i >= 0 && i < a->n && j >= 0 && j < b->n);
-        double moved[4], side[4], other_side[4], common[4], size = 0.0, overlap[2], covered[2];
-        for (int k = 0; k < 4; k++) {
-            double one = a->kdop[k * a->n + i], one_back = a->kdop[(k + 4) * a->n + i];
-            double other = b->kdop[k * b->n + j], other_back = b->kdop[(k + 4) * b->n + j];
-            double ahead = other - one, behind = -(other_back - one_back);
+        /* Along each axis: displacement by the end that moved less, widths of both, and of what they have in common. */
+        double moved[AXES], width_a[AXES], width_b[AXES], common[AXES], size = 0.0;
+        for (int k = 0; k < AXES; k++) {
+            double end_a = a->kdop[k * a->n + i], back_a = a->kdop[(k + AXES) * a->n + i];
+            double end_b = b->kdop[k * b->n + j], back_b = b->kdop[(k + AXES) * b->n + j];
+            double ahead = end_b - end_a, behind = -(back_b - back_a);
             moved[k] = __builtin_fabs(ahead) < __builtin_fabs(behind) ? ahead : behind;
-            common[k] = high(low(one, other) + low(one_back, other_back) + pad_m, 0.0);
-            side[k] = one + one_back + pad_m;
-            other_side[k] = other + other_back + pad_m;
-            size += apart(b->log_width[k * b->n + j], a->log_width[k * a->n + i]);
+            common[k] = high(low(end_a, end_b) + low(back_a, back_b) + tuning->area_padding_m, 0.0);
+            width_a[k] = end_a + back_a + tuning->area_padding_m;
+            width_b[k] = end_b + back_b + tuning->area_padding_m;
+            size += difference(b->log_width[k * b->n + j], a->log_width[k * a->n + i]);
         }
-        for (int k = 0; k < 2; k++) { /* of the upright rectangles, and of those at 45 degrees */
-            double area = side[k] * side[k + 2], other_area = other_side[k] * other_side[k + 2];
+        /* Areas in common, of the upright rectangles, and of those at 45 degrees. */
+        double overlap[2], covered[2];
+        for (int k = 0; k < 2; k++) {
+            double area_a = width_a[k] * width_a[k + 2], area_b = width_b[k] * width_b[k + 2];
             double shared = common[k] * common[k + 2];
-            overlap[k] = shared / (area + other_area - shared);
-            covered[k] = shared / low(area, other_area);
+            overlap[k] = shared / (area_a + area_b - shared);
+            covered[k] = shared / low(area_a, area_b);
         }
-        double xx = covariance[i] + variance, xy = covariance[a->n + i], yy = covariance[2 * a->n + i] + variance;
-        double dx = (moved[0] + half_root * (moved[1] - moved[3])) / 2;
-        double dy = (moved[2] + half_root * (moved[1] + moved[3])) / 2;
+        double height = difference(a->top[i], b->top[j]) + difference(a->bottom[i], b->bottom[j]);
         double shape = weights->size * (size / 4) + weights->overlap * (1 - low(overlap[0], overlap[1]));
-        double height = apart(a->top[i], b->top[j]) + apart(a->bottom[i], b->bottom[j]);
-        shape += weights->height * height / 2 + weights->count * apart(a->log_count[i], b->log_count[j]);
+        shape += weights->height * height / 2 + weights->points * difference(a->log_points[i], b->log_points[j]);
+        /* Squared Mahalanobis distance of the displacement. */
+        double xx = covariance[i] + variance, xy = covariance[a->n + i], yy = covariance[2 * a->n + i] + variance;
+        double dx = sum_x(moved) / 2, dy = sum_y(moved) / 2;
         double determinant = xx * yy - xy * xy;
+        double distance = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant;
         spread[pair] = determinant / (variance * variance);
-        cost[pair] = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant / 2 + shape;
+        cost[pair] = distance / 2 + shape;
         coverage[pair] = low(covered[0], covered[1]);
     }
 }
 
-/* coverage: part of each k-DOP a (8, n_a) that b (8, n_b) covers, of n pairs (i, j). */
-EXPORT void modt_coverage(const double *a, i64 n_a, const double *b, i64 n_b, const i64 *rows, const i64 *columns, i64 n,
-                          double pad_m, double *coverage)
+/* coverage: share of k-DOP rows[p] of a (8, n_a) that columns[p] of b (8, n_b) covers, for each pair p. */
+EXPORT void modt_coverage(const double *a, i64 n_a, const double *b, i64 n_b, const i64 *rows, const i64 *columns,
+                          i64 n_pairs, const ShapeTuning *tuning, double *coverage)
 {
-    for (i64 pair = 0; pair < n; pair++) {
-        double part[4];
+    double jitter_m = tuning->end_jitter_m;
+    for (i64 pair = 0; pair < n_pairs; pair++) {
+        double share[AXES];
         i64 i = rows[pair], j = columns[pair];
         PROVEN(i >= 0 && i < n_a && j >= 0 && j < n_b);
-        for (int k = 0; k < 4; k++) {
-            double one = a[k * n_a + i], back = a[(k + 4) * n_a + i];
-            double common = low(one, b[k * n_b + j] + pad_m) + low(back, b[(k + 4) * n_b + j] + pad_m);
-            part[k] = high(common, 0.0) / high(one + back, pad_m);
+        for (int k = 0; k < AXES; k++) {
+            double end = a[k * n_a + i], back = a[(k + AXES) * n_a + i];
+            double common = low(end, b[k * n_b + j] + jitter_m) + low(back, b[(k + AXES) * n_b + j] + jitter_m);
+            share[k] = high(common, 0.0) / high(end + back, jitter_m);
         }
-        coverage[pair] = low(part[0] * part[2], part[1] * part[3]);
+        coverage[pair] = low(share[EAST] * share[NORTH], share[NORTH_EAST] * share[NORTH_WEST]);
     }
 }
 
-/* measured: displacements between n k-DOPs a and b (8, n) with their covariances, and the variances by ends that
- * disagree, of which `before` were a frame ago; given the limit of agreement, the squared share and the decay. */
+/* measured: displacements from k-DOPs a to b (8, n) with their covariances. `end_variance` (4, n) is the variance by ends
+ * that disagree; `before` (4, n) is what it was a frame ago. */
 EXPORT void modt_measured(const double *a, const double *b, i64 n, double variance, const double *before,
-                          const double limits[3], double half_root, double (*shift)[2], double (*covariance)[2][2],
+                          const ShapeTuning *tuning, double (*shift)[2], double (*covariance)[2][2],
                           double *end_variance)
 {
-    for (i64 m = 0; m < n; m++) {
-        double both[4], apart[4], weight[4], widest = -INFINITY, longest = 1.0;
-        for (int k = 0; k < 4; k++) {
-            double ahead = b[k * n + m] - a[k * n + m], behind = b[(k + 4) * n + m] - a[(k + 4) * n + m];
-            double width = b[k * n + m] + b[(k + 4) * n + m];
-            both[k] = ahead - behind, apart[k] = ahead + behind;
-            widest = high(widest, width), longest = high(longest, high(width, width - apart[k]));
+    double doubt = tuning->disagreement * tuning->disagreement;
+    for (i64 i = 0; i < n; i++) {
+        /* Along each axis: twice the mean displacement of its ends, and by how much the width grew. */
+        double both[AXES], growth[AXES], widest = -INFINITY, longest = 1.0;
+        for (int k = 0; k < AXES; k++) {
+            double ahead = b[k * n + i] - a[k * n + i], behind = b[(k + AXES) * n + i] - a[(k + AXES) * n + i];
+            double width = b[k * n + i] + b[(k + AXES) * n + i];
+            both[k] = ahead - behind;
+            growth[k] = ahead + behind;
+            widest = high(widest, width);
+            longest = high(longest, high(width, width - growth[k])); /* after and before */
         }
-        for (int k = 0; k < 4; k++) {
-            double off = apart[k] * (longest / limits[0]), alike = high(1 - off * off, 0.0), unlike = 1 - alike * alike;
-            double by_ends = high(limits[1] * unlike * (apart[k] * apart[k]), limits[2] * before[k * n + m]);
-            end_variance[k * n + m] = by_ends = low(by_ends, limits[1] * (widest * widest));
+        double weight[AXES], weighted[AXES];
+        for (int k = 0; k < AXES; k++) {
+            double relative_growth = growth[k] * (longest / tuning->agreement_m);
+            double agreement = high(1 - relative_growth * relative_growth, 0.0);
+            double disagreement = 1 - agreement * agreement;
+            double by_ends = high(doubt * disagreement * (growth[k] * growth[k]),
+                                  tuning->end_variance_decay * before[k * n + i]);
+            by_ends = low(by_ends, doubt * (widest * widest));
+            end_variance[k * n + i] = by_ends;
             weight[k] = 0.5 / (variance + by_ends);
-            both[k] = weight[k] * ((both[k] - unlike * __builtin_copysign(apart[k], both[k])) / 2);
+            weighted[k] = weight[k] * ((both[k] - disagreement * __builtin_copysign(growth[k], both[k])) / 2);
         }
-        double xx = weight[0] + (weight[1] + weight[3]) / 2, yy = weight[2] + (weight[1] + weight[3]) / 2;
-        double xy = (weight[1] - weight[3]) / 2, scale = 1.0 / (xx * yy - xy * xy);
-        double x = both[0] + half_root * (both[1] - both[3]), y = both[2] + half_root * (both[1] + both[3]);
-        covariance[m][0][0] = scale * yy, covariance[m][1][1] = scale * xx;
-        covariance[m][0][1] = covariance[m][1][0] = -scale * xy;
-        shift[m][0] = covariance[m][0][0] * x + covariance[m][0][1] * y;
-        shift[m][1] = covariance[m][0][1] * x + covariance[m][1][1] * y;
-    }
-}
-
-/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. The rows and the columns of
- * contested pairs are numbered in two rows of `best`, of `most` each like the scratch `next`, and counted in `sizes`, which
- * held the greatest index + 1. */
-EXPORT void modt_certain_pairs(const i64 *rows, const i64 *columns, const double *cost, i64 n, double limit,
-                               i64 sizes[2], i64 *best, double *next, i64 most, uint8_t *state)
-{
-    const i64 *index[2] = {rows, columns};
-    for (int side = 0; side < 2; side++) {
-        for (i64 k = 0; k < sizes[side]; k++) {
-            best[side * most + k] = NONE;
-            next[side * most + k] = limit;
-        }
-        for (i64 pair = 0; pair < n; pair++) {
-            PROVEN(index[side][pair] >= 0 && index[side][pair] < sizes[side]);
-            i64 *own = &best[side * most + index[side][pair]];
-            double *second = &next[side * most + index[side][pair]];
-            if (*own == NONE || cost[pair] <= cost[*own]) {
-                *second = *own == NONE ? limit : cost[*own];
-                *own = pair;
-            } else
-                *second = low(cost[pair], *second);
-        }
-    }
-    for (i64 pair = 0; pair < n; pair++)
-        state[pair] = cost[pair] + limit < next[rows[pair]] + next[most + columns[pair]];
-    for (i64 pair = 0; pair < n; pair++)
-        if (state[best[rows[pair]]] != 1 && state[best[most + columns[pair]]] != 1)
-            state[pair] = 2;
-    for (int side = 0; side < 2; side++) {
-        i64 number = 0, *numbers = best + side * most;
-        for (i64 k = 0; k < sizes[side]; k++)
-            numbers[k] = NONE;
-        for (i64 pair = 0; pair < n; pair++)
-            if (state[pair] == 2)
-                numbers[index[side][pair]] = 0;
-        for (i64 k = 0; k < sizes[side]; k++)
-            if (numbers[k] != NONE)
-                numbers[k] = number++;
-        sizes[side] = number;
+        /* The inverse of the covariance is the sum over the axes of weight * axis * axis'. */
+        double diagonal = (weight[NORTH_EAST] + weight[NORTH_WEST]) / 2;
+        double inverse_xx = weight[EAST] + diagonal, inverse_yy = weight[NORTH] + diagonal;
+        double inverse_xy = (weight[NORTH_EAST] - weight[NORTH_WEST]) / 2;
+        double scale = 1.0 / (inverse_xx * inverse_yy - inverse_xy * inverse_xy);
+        double xx = scale * inverse_yy, yy = scale * inverse_xx, xy = -scale * inverse_xy;
+        double x = sum_x(weighted), y = sum_y(weighted);
+        covariance[i][0][0] = xx;
+        covariance[i][1][1] = yy;
+        covariance[i][0][1] = covariance[i][1][0] = xy;
+        shift[i][0] = xx * x + xy * y;
+        shift[i][1] = xy * x + yy * y;
     }
 }

@@ -42,8 +42,14 @@ class KdopAssociation:
         xx, xy, yy = covariance = np.array((tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]))
         rows, columns = self._kernels.overlapping_pairs(expected + _reach(xx, xy, yy), observations.kdop)
         cost, coverage = self._kernels.pair_costs(
-            Shapes.of(expected, tracks.bottom, tracks.top, tracks.points),
-            Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count),
+            Shapes.of(expected, tracks.bottom, tracks.top, tracks.points, self._kernels.shape_tuning),
+            Shapes.of(
+                observations.kdop,
+                observations.bottom,
+                observations.top,
+                observations.count,
+                self._kernels.shape_tuning,
+            ),
             covariance,
             variance + JUMP_SIGMA_M**2,
             (rows, columns),

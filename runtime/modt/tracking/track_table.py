@@ -11,7 +11,8 @@ import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_SIZE_M
 from modt.classes import ObjectClass
-from modt.geometry.kdop import AGREE_M, DIRECTIONS
+from modt.geometry.kdop import DIRECTIONS
+from modt.geometry.tuning import ShapeTuning
 from modt.native.library import FLOAT64, INT64, Own, declare, structure
 from modt.observations import Observations
 from modt.types import Bool, Float64, Int, Tracks, column
@@ -20,6 +21,7 @@ ESTABLISHED_HITS = 4
 """Frames in which a track was observed, from which its velocity and class change proposals."""
 LAG_S = 1.5
 """Time constant of the place that a displacement is measured from."""
+AGREE_M = ShapeTuning().agreement_m
 ENVELOPE_DECAY, MEAN_KDOP_DECAY = 0.98, 0.8
 """Share kept a frame of an extent that is not seen again; greatest weight of the past in a mean k-DOP."""
 GROWTH, PERSON_GROWTH, SHRINKAGE = 0.5, 0.1, 0.02

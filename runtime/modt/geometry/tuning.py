@@ -1,0 +1,39 @@
+"""Tuning of the comparison of k-DOPs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeTuning:
+    """How k-DOPs are compared. The kernels hold it, for every stage that compares some."""
+
+    end_jitter_m: float = 0.15
+    """Jitter of the ends of a k-DOP from frame to frame [m]. Coverage extends the covering k-DOP by it, and no k-DOP
+    counts as narrower. Greater: parts outside an object are taken for parts of it.
+    Chosen on: judgement."""
+
+    width_softening_m: float = 0.3
+    """Added to widths before their logarithms are compared [m], since a difference of a few returns is noise.
+    Greater: the sizes of small objects differ less.
+    Chosen on: judgement."""
+
+    area_padding_m: float = 0.3 / 3
+    """Added to widths before areas are compared [m]. Greater: thin k-DOPs beside each other overlap.
+    Chosen on: judgement, a third of `width_softening_m`."""
+
+    agreement_m: float = 0.6
+    """The two ends along an axis agree fully where their displacements are equal, and not at all where they differ by
+    this much, of a k-DOP up to a metre long; the limit falls with the length [m]. Greater: an end that comes into
+    view is taken for motion.
+    Chosen on: simulated crossings and streets, by the error of positions and of walkers' speeds."""
+
+    disagreement: float = 0.3
+    """Standard deviation of a displacement by ends that disagree, relative to the disagreement, or to the width if
+    that is less. Greater: the filter trusts such axes less.
+    Chosen on: simulated drives, by the consistency of the filter (NEES)."""
+
+    end_variance_decay: float = 0.97
+    """Share of the variance by ends that disagreed that is left a frame later.
+    Chosen on: simulated drives, by the consistency of the filter (NEES)."""
