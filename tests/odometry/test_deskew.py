@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.geometry import inverse, rotation_zyx, se3, transform, yaw_of
-from modt.odometry.odometry import delays
+from modt.odometry.pose_estimator import delays
 from modt.placement import Placement, PlanarMotion
 from modt.types import Proposals
 from tests.odometry.odometry_scenes import constant_turn, constant_turn_pose, street

@@ -9,11 +9,14 @@ from hypothesis import strategies as st
 
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
 from modt.observations import observe
-from modt.odometry.registration import ESTABLISHED_FRAMES, REACH_M, LandmarkMap, Landmarks, Registration
+from modt.odometry.registration import LandmarkMap, Landmarks, Registration
+from modt.odometry.tuning import LandmarkTuning, RegistrationTuning
 from tests.odometry.odometry_scenes import static_tracks, street
 from tests.tracking.tracking_scenes import Follower, frame_of
 
 N_OBJECTS = 40
+ESTABLISHED_FRAMES = LandmarkTuning().established_frames
+REACH_M = RegistrationTuning().reach_m
 
 
 def gentle_curve(i):

@@ -18,7 +18,7 @@ from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.observations import observe
-from modt.odometry.odometry import Odometry
+from modt.odometry.pose_estimator import PoseEstimator
 from modt.segmentation.clusters import CellClusterer, Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
@@ -282,7 +282,7 @@ def test_tracks_of_simulated_sweeps(kernels, name, fov):
     config, runs = profile.load(name), []
     for each in (NUMPY, kernels):
         segmenter = Segmenter(config.segmentation, config.sensor, fov, each)
-        odometry, tracker = Odometry(each), Tracker(config.tracking, ACCURATE, kernels=each)
+        odometry, tracker = PoseEstimator(each), Tracker(config.tracking, ACCURATE, kernels=each)
         runs.append([])
         for frame in SyntheticStream("street", name, 1.0, 4):
             proposals = segmenter.segment(frame.points)

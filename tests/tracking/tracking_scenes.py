@@ -9,7 +9,7 @@ from modt.config import TrackingConfig
 from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
-from modt.odometry.odometry import Odometry
+from modt.odometry.pose_estimator import PoseEstimator
 from modt.placement import Placement
 from modt.tracking.association import Matches
 from modt.tracking.regrouping import Associated, Regrouping
@@ -25,7 +25,7 @@ class Follower:
     """Odometry and tracker in a row, with what the last frame gave."""
 
     def __init__(self, config=None, machine=EFFICIENT, **parts):
-        self.frames, self.odometry = 0, Odometry()
+        self.frames, self.odometry = 0, PoseEstimator()
         self.tracker = Tracker(config or TrackingConfig(), machine, **parts)
         self.proposals = self.wants_class = self.T_world_sensor = None
 

@@ -25,7 +25,7 @@ from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
 from modt.geometry.kernels import GeometryKernels
 from modt.native.library import NotAvailableError, load
-from modt.odometry.odometry import Odometry
+from modt.odometry.pose_estimator import PoseEstimator
 from modt.pipeline import Classifier, Fusion, Pipeline
 from modt.pipeline import Segmenter as SegmenterStage
 from modt.placement import Mount
@@ -167,7 +167,7 @@ def stages(
     decision = LikeliestClass if profile.decision.rule == "likeliest" else Decision
     return Pipeline(
         segmenter=segmenter,
-        odometry=Odometry(kernels),
+        odometry=PoseEstimator(kernels),
         tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
         fusion=mode.fusion(profile.fusion, prior),
         scheduler=Scheduler(cost, profile.sensor.period_s),

@@ -14,7 +14,7 @@ from modt.app import assembly, inputs
 from modt.app.chosen_profile import ChosenProfile, choose
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
-from modt.odometry.odometry import Odometry
+from modt.odometry.pose_estimator import PoseEstimator
 from modt.pipeline import Pipeline
 from modt.placement import Mount
 from modt.sensor_fit.recognition import recognise
@@ -203,7 +203,7 @@ class Stages:
         old, new = self.pipeline, self._new_pipeline(chosen.config)
         if isinstance(old.tracker, Tracker) and isinstance(new.tracker, Tracker):
             new.tracker.adopt(old.tracker)
-        if isinstance(old.odometry, Odometry) and isinstance(new.odometry, Odometry):
+        if isinstance(old.odometry, PoseEstimator) and isinstance(new.odometry, PoseEstimator):
             new.odometry.adopt(old.odometry)
         self.chosen, self.pipeline = chosen, new
         host.release_freed_pages()

@@ -13,7 +13,9 @@ import numpy as np
 from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS, centres, shape_similarity, shift_between
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
+from modt.geometry.tuning import ShapeTuning
 from modt.observations import Observations, StaticTracks
+from modt.odometry.tuning import LandmarkTuning, RegistrationTuning
 from modt.types import Bool, Float64, Int
 
 
@@ -30,21 +32,17 @@ class Landmarks:
     established: Bool
 
 
-ESTABLISHED_FRAMES = 3
-"""Frames at rest from which the mean is the landmark's position."""
-MIN_GAIN = 0.03
-"""Least weight of a new view in the mean: a landmark follows a drift of the poses within about 33 frames."""
-MAX_JUMP_M = 0.2
-"""Distance of an end of a k-DOP from its mean beyond which that mean restarts [m]: another part is in view."""
-
-
 class LandmarkMap:
     """Mean k-DOPs of stationary tracks, by track id; kept only while no poses are given.
 
     A landmark lies at the mean of its sightings, so that the error of one frame is not carried on.
+
+    Args:
+        tuning: how the means are kept.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, tuning: LandmarkTuning = LandmarkTuning()) -> None:
+        self._tuning = tuning
         self.clear()
 
     def clear(self) -> None:
@@ -55,45 +53,44 @@ class LandmarkMap:
 
     def update(self, tracks: StaticTracks) -> Landmarks:
         """Add the last frame and return the landmarks; to be called once in each frame without a pose."""
-        frames, mean = np.zeros(len(tracks.id), np.int64), np.zeros((len(tracks.id), 8))
-        known = np.isin(tracks.id, self._id, assume_unique=True)
-        before = self._id.searchsorted(tracks.id[known])
-        frames[known], mean[known] = self._frames[before], self._mean.take(before, axis=0)
-        rows = tracks.observed.nonzero()[0]
-        frames[rows] = np.where(tracks.stationary[rows], frames[rows] + 1, 0)
-        gain = np.maximum(1.0 / np.maximum(frames[rows], 1), MIN_GAIN)[:, None]
-        off = tracks.kdop.take(rows, axis=0) - mean.take(rows, axis=0)
-        mean[rows] += np.where(np.abs(off) < MAX_JUMP_M, gain, 1.0) * off
-        self._id, self._frames, self._mean = tracks.id, frames, mean
+        self._renumber(tracks.id)
+        self._add(tracks)
+        # The landmarks are the candidates among the tracks, in their order.
         candidates = tracks.candidate.nonzero()[0]
-        established = (tracks.stationary & (frames >= ESTABLISHED_FRAMES))[candidates]
+        rested = tracks.stationary & (self._frames >= self._tuning.established_frames)
+        established = rested[candidates]
         kdop = tracks.predicted_kdop.take(candidates, axis=1)
-        kdop[:, established] = mean[candidates[established]].T
+        kdop[:, established] = self._mean[candidates[established]].T
         return Landmarks(kdop, established)
 
+    def _renumber(self, track_id: Int) -> None:
+        """Bring the rows into the order of (M,) ascending track ids. New tracks have no frames and a mean of zero."""
+        frames = np.zeros(len(track_id), np.int64)
+        mean = np.zeros((len(track_id), 8))
+        known = np.isin(track_id, self._id, assume_unique=True)
+        before = self._id.searchsorted(track_id[known])
+        frames[known] = self._frames[before]
+        mean[known] = self._mean.take(before, axis=0)
+        self._id = track_id
+        self._frames = frames
+        self._mean = mean
 
-REACH_M = 2.5
-"""Greatest correction of a pose, and greatest error of the first prediction [m]. A larger one is refused."""
-GATE_M = 0.8
-"""Greatest error of a prediction once the motion is known [m]. Farther landmarks are no candidates."""
-MAX_TURN_RAD = 0.2
-"""Greatest turn of a correction [rad]. A larger one is refused."""
-END_SIGMA_M, END_SIGMA_PER_M = 0.02, 0.0007
-"""Scale of the error of an end of a k-DOP at range 0 [m], and its growth per metre of range."""
-YOUNG_SIGMA_M = 0.07
-"""Further error of a landmark without an established mean [m]; lowers its weight in the fit."""
-INLIER_M = 0.2
-"""Distance to its landmark within which an observation agrees with a motion [m]."""
-MIN_AGREEMENT = 0.3
-"""Share of inliers above which the motion is known and the next search is a near one."""
-INLIER_RATIO, INLIER_DROP = 0.75, 0.5
-"""Shares of inliers, of the pairs and of the last frame's inliers, below which pairs are sought farther away."""
-INITIAL_TURN_RAD = 0.05
-"""Step between the seven turns that are tried while no motion is known [rad]."""
+    def _add(self, tracks: StaticTracks) -> None:
+        """Add the k-DOPs of the tracks that the last frame showed to their means."""
+        rows = tracks.observed.nonzero()[0]
+        frames = np.where(tracks.stationary[rows], self._frames[rows] + 1, 0)
+        gain = np.maximum(1.0 / np.maximum(frames, 1), self._tuning.min_gain)[:, None]
+        off = tracks.kdop.take(rows, axis=0) - self._mean.take(rows, axis=0)
+        self._frames[rows] = frames
+        self._mean[rows] += np.where(np.abs(off) < self._tuning.max_jump_m, gain, 1.0) * off
+
+
 _SCALES = (8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 """Factors on the scale of the errors in the iterations of a fit, from coarse to fine against local minima."""
 _MATCH_ROUNDS = 4
 """Rounds of matching and fitting in a wide search, and number of the coarsest scales that each fit uses."""
+_INITIAL_TURNS = (0, 1, -1, 2, -2, 3, -3)
+"""Turns that are tried while no motion is known, in steps of RegistrationTuning.initial_turn_rad."""
 _MIN_LANDMARKS = 3
 """Fewest pairs of a fit. A planar motion needs two, and the third one checks it."""
 
@@ -117,17 +114,42 @@ class Fit:
         return self.inliers >= _MIN_LANDMARKS and self.inliers > min_inlier_share * self.pairs
 
 
+def _best(*fits: Fit | None) -> Fit | None:
+    """The fit with the most inliers, the first of equals; None if there is none."""
+    return max((fit for fit in fits if fit is not None), key=lambda fit: fit.inliers, default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    """Landmarks, and the observations that are to be brought onto them.
+
+    Attributes:
+        landmarks: stationary objects of the frames before.
+        observations: proposals of the frame, placed by the predicted pose.
+        jacobian: (3, 8, P) outward displacement of each end of their k-DOPs, per metre of x and y and per radian.
+    """
+
+    landmarks: Landmarks
+    observations: Observations
+    jacobian: Float64
+
+
 class Registration:
     """Correction of a predicted pose by stationary objects.
 
     Args:
         kernels: passes over pairs.
+        tuning: how a pose is fitted.
     """
 
-    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+    def __init__(
+        self, kernels: GeometryKernels = NUMPY_GEOMETRY, tuning: RegistrationTuning = RegistrationTuning()
+    ) -> None:
         self._kernels = kernels
-        self._initialised = self._motion_known = False
-        self._inliers = 0
+        self._tuning = tuning
+        self._initialised = False  # whether a motion was known once
+        self._motion_known = False  # whether that of the last frame is
+        self._inliers = 0  # of the last frame
 
     def correct(
         self, landmarks: Landmarks, observations: Observations, motion_share: Float64 | float = 1.0
@@ -142,78 +164,90 @@ class Registration:
         Returns:
             (4, 4) motion of the pose; identity without support for another one.
         """
-        jacobian = _jacobian(observations) * motion_share
-        rest = np.zeros(3)
-        fit = None
-        if self._motion_known:
-            fit = self._solve(landmarks, observations, jacobian, rest, GATE_M, _SCALES, match_rounds=1)
-        enough = INLIER_DROP * self._inliers
-        if fit is None or not fit.supported(INLIER_RATIO) or fit.inliers < enough:  # search farther away
-            wide_fit = self._search(landmarks, observations, jacobian, rest)
-            if self._initialised and wide_fit is not None and not wide_fit.supported(MIN_AGREEMENT):
-                retry = self._search(landmarks, observations, jacobian, wide_fit.motion)
-                wide_fit = retry if retry is not None and retry.inliers > wide_fit.inliers else wide_fit
-            if fit is None or (wide_fit is not None and wide_fit.inliers > fit.inliers):
-                fit = wide_fit
+        view = _View(landmarks, observations, _jacobian(observations) * motion_share)
+        fit = self._solve_near(view) if self._motion_known else None
+        if fit is None or not self._is_convincing(fit):
+            fit = _best(fit, self._solve_wide(view))
         self._inliers = 0 if fit is None else fit.inliers
-        self._motion_known = fit is not None and fit.supported(MIN_AGREEMENT)
+        self._motion_known = fit is not None and fit.supported(self._tuning.min_agreement)
         self._initialised |= self._motion_known
         if fit is None:
             return np.eye(4)
-        if np.hypot(*fit.motion[:2]) > REACH_M or abs(fit.motion[2]) > MAX_TURN_RAD:
+        if np.hypot(*fit.motion[:2]) > self._tuning.reach_m or abs(fit.motion[2]) > self._tuning.max_turn_rad:
             self._motion_known = False
             return np.eye(4)
         return _turn_about_sensor(fit.motion, observations.sensor_xy)
 
-    def _search(
-        self, landmarks: Landmarks, observations: Observations, jacobian: Float64, motion: Float64
-    ) -> Fit | None:
-        """Motion with the most inliers near a given one, or near several turns while no motion is known."""
-        initial = not self._initialised
-        starts = [[0.0, 0.0, k * INITIAL_TURN_RAD] for k in (0, 1, -1, 2, -2, 3, -3)] if initial else [motion]
-        scales = _SCALES[:_MATCH_ROUNDS]
-        fits = (
-            self._solve(landmarks, observations, jacobian, np.asarray(start), REACH_M, scales, _MATCH_ROUNDS)
-            for start in starts
-        )
-        return max((fit for fit in fits if fit is not None), key=lambda fit: fit.inliers, default=None)
+    def _is_convincing(self, fit: Fit) -> bool:
+        """Whether a fit near the prediction agrees with most pairs, and with about as many as in the last frame."""
+        enough = self._tuning.inlier_drop * self._inliers
+        return fit.supported(self._tuning.inlier_ratio) and fit.inliers >= enough
+
+    def _solve_near(self, view: _View) -> Fit | None:
+        """Motion near the predicted one, matched once."""
+        return self._solve(view, np.zeros(3), self._tuning.gate_m, _SCALES, match_rounds=1)
+
+    def _solve_wide(self, view: _View) -> Fit | None:
+        """Motion within reach of the predicted one, or of several turns while no motion was ever known."""
+        if not self._initialised:
+            turns = (k * self._tuning.initial_turn_rad for k in _INITIAL_TURNS)
+            return _best(*(self._solve_coarsely(view, np.array([0.0, 0.0, turn])) for turn in turns))
+        fit = self._solve_coarsely(view, np.zeros(3))
+        if fit is None or fit.supported(self._tuning.min_agreement):
+            return fit
+        return _best(fit, self._solve_coarsely(view, fit.motion))  # once more, from where it arrived
+
+    def _solve_coarsely(self, view: _View, motion: Float64) -> Fit | None:
+        """Motion within reach of a given one, matched several times, with the coarsest scales of the errors."""
+        return self._solve(view, motion, self._tuning.reach_m, _SCALES[:_MATCH_ROUNDS], _MATCH_ROUNDS)
 
     def _solve(
-        self,
-        landmarks: Landmarks,
-        observations: Observations,
-        jacobian: Float64,
-        motion: Float64,
-        reach_m: float,
-        scales: tuple[float, ...],
-        match_rounds: int,
+        self, view: _View, motion: Float64, reach_m: float, scales: tuple[float, ...], match_rounds: int
     ) -> Fit | None:
         """Motion fitted to pairs within reach of a given motion, matched anew in each round."""
-        near = observations.kdop + np.tensordot(motion, jacobian, 1)
-        i, j = self._pairs(landmarks.kdop, near, reach_m)
-        if len(i) < _MIN_LANDMARKS:
+        landmarks = view.landmarks
+        observations = view.observations
+        near = observations.kdop + np.tensordot(motion, view.jacobian, 1)
+        landmark, observation = self._pairs_within(reach_m, landmarks.kdop, near)
+        if len(landmark) < _MIN_LANDMARKS:
             return None
-        a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
-        outward_shift, young = b - a, np.where(landmarks.established, 0.0, YOUNG_SIGMA_M)
-        sigma = END_SIGMA_M + END_SIGMA_PER_M * observations.range_m[j]
-        variance = young[i] ** 2 + sigma**2
+        # From here on columns are pairs of a landmark and an observation.
+        target = landmarks.kdop.take(landmark, axis=1)
+        start = observations.kdop.take(observation, axis=1)
+        jacobian = view.jacobian.take(observation, axis=2)
+        outward_shift = start - target
+        variance = self._variance(landmarks.established[landmark], observations.range_m[observation])
+        tuning = self._kernels.shape_tuning
         for _ in range(match_rounds):
-            moved = b + np.tensordot(motion, jacobian, 1)
-            shift = shift_between(a, moved)
-            size, overlap = shape_similarity(a, moved)
-            best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
-            motion = _fit(
-                outward_shift.take(best, axis=1), jacobian.take(best, axis=2), variance[best], motion, scales
-            )
-        a, b, jacobian = a.take(best, axis=1), b.take(best, axis=1), jacobian.take(best, axis=2)
-        shift = shift_between(a, b + np.tensordot(motion, jacobian, 1))
-        inliers = int((np.hypot(shift[:, 0], shift[:, 1]) < INLIER_M).sum())
-        return Fit(motion, inliers, len(best))
+            moved = start + np.tensordot(motion, jacobian, 1)
+            size, overlap = shape_similarity(target, moved, tuning)
+            best = _mutual_best(landmark, observation, _distance(target, moved, tuning) + size - overlap)
+            shift = outward_shift.take(best, axis=1)
+            motion = _fit(shift, jacobian.take(best, axis=2), variance[best], motion, scales)
+        moved = start.take(best, axis=1) + np.tensordot(motion, jacobian.take(best, axis=2), 1)
+        distance = _distance(target.take(best, axis=1), moved, tuning)
+        return Fit(motion, int((distance < self._tuning.inlier_m).sum()), len(best))
 
-    def _pairs(self, a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
-        """Indices of k-DOPs a and b whose centres are within reach of one another, along x and along y."""
-        middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (centres(a), centres(b)))
-        return self._kernels.overlapping_pairs(middle_a + reach, middle_b)
+    def _pairs_within(self, reach_m: float, a: Float64, b: Float64) -> tuple[Int, Int]:
+        """Indices of k-DOPs a (8, n) and b (8, k) whose centres are within reach of one another, along x and y."""
+        centre_a = centres(a)
+        centre_b = centres(b)
+        widened = np.concatenate([centre_a, -centre_a]) + reach_m
+        return self._kernels.overlapping_pairs(widened, np.concatenate([centre_b, -centre_b]))
+
+    def _variance(self, established: Bool, range_m: Float64) -> Float64:
+        """(K,) square of the scale of the errors of pairs: of a landmark, and of an observation at a range [m2]."""
+        young_sigma_m = np.where(established, 0.0, self._tuning.young_sigma_m)
+        end_sigma_m = self._tuning.end_sigma_m + self._tuning.end_sigma_per_m * range_m
+        variance: Float64 = young_sigma_m**2 + end_sigma_m**2
+        return variance
+
+
+def _distance(a: Float64, b: Float64, tuning: ShapeTuning) -> Float64:
+    """(K,) distance from k-DOPs a to b (8, K), one by one [m]."""
+    shift = shift_between(a, b, tuning)
+    distance: Float64 = np.hypot(shift[:, 0], shift[:, 1])
+    return distance
 
 
 def _jacobian(observations: Observations) -> Float64:
@@ -225,13 +259,32 @@ def _jacobian(observations: Observations) -> Float64:
     return jacobian
 
 
-def _mutual(i: Int, j: Int, cost: Float64) -> Int:
-    """Indices of the pairs that are the best of their row and of their column."""
-    worst_first = np.argsort(cost, kind="stable")[::-1]
-    best_of_i, best_of_j = (np.empty(int(index.max(initial=0)) + 1, np.int64) for index in (i, j))
-    best_of_i[i[worst_first]] = best_of_j[j[worst_first]] = worst_first  # the best is written last and remains
-    k = np.arange(len(cost))
-    return np.flatnonzero((best_of_i[i] == k) & (best_of_j[j] == k))
+def _mutual_best(landmark: Int, observation: Int, cost: Float64) -> Int:
+    """(B,) pairs that are the cheapest of their landmark and of their observation, ascending.
+
+    Args:
+        landmark: (K,) landmark of each pair.
+        observation: (K,) its observation.
+        cost: (K,) its cost; of equal ones the first pair counts as cheaper.
+    """
+    rank = np.empty(len(cost), np.int64)
+    rank[cost.argsort(kind="stable")] = np.arange(len(cost))
+    best: Bool = (rank == _least_of_group(rank, landmark)) & (rank == _least_of_group(rank, observation))
+    return best.nonzero()[0]
+
+
+def _least_of_group(rank: Int, group: Int) -> Int:
+    """(K,) least of the ranks, which are below K, in the group of each."""
+    least: Int = np.full(int(group.max(initial=-1)) + 1, len(rank))
+    np.minimum.at(least, group, rank)
+    of_group: Int = least[group]
+    return of_group
+
+
+_UPPER_ROW, _UPPER_COLUMN = np.triu_indices(3)
+"""(6,) and (6,) elements of the upper triangle of a (3, 3) matrix, row by row."""
+_PLACE_IN_UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+"""(3, 3) place of each element of a symmetric matrix in its upper triangle."""
 
 
 def _fit(
@@ -252,18 +305,21 @@ def _fit(
     Returns:
         (3,) x, y [m] and turn [rad].
     """
-    J, shift, variance = jacobian.reshape(3, -1), outward_shift.ravel(), np.tile(variance, 8)
-    products = np.concatenate([J[0] * J, J[1] * J[1:], J[2:] * J[2], shift * J])
+    J = jacobian.reshape(3, -1)
+    shift = outward_shift.ravel()
+    variance = np.tile(variance, 8)
+    # Weighted sums of these rows are the normal matrix J W J', its upper triangle, and the right side J W shift.
+    products = np.concatenate([J[_UPPER_ROW] * J[_UPPER_COLUMN], J * shift])
     for scale in scales:
-        left = motion @ J
-        left += shift
-        left *= left
-        left += scale**2 * variance
-        # Normal equations of x, y and turn t: weighted sums over products of two rows of J, or of one and the shift
-        xx, xy, xt, yy, yt, tt, x, y, t = (products @ (1.0 / left)).tolist()
-        little = 1e-6 * (xx + yy + tt)
-        normal = np.array([[xx + little, xy, xt], [xy, yy + little, yt], [xt, yt, tt + little]])
-        motion = -np.linalg.solve(normal, np.array([x, y, t]))
+        residual = motion @ J
+        residual += shift
+        residual *= residual
+        residual += scale**2 * variance
+        sums = products @ (1.0 / residual)
+        normal = sums.take(_PLACE_IN_UPPER)
+        normal.flat[::4] += 1e-6 * (normal[0, 0] + normal[1, 1] + normal[2, 2])
+        solution: Float64 = np.linalg.solve(normal, sums[6:])
+        motion = -solution
     return motion
 
 

@@ -19,7 +19,7 @@ from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig, TrackingConfig
 from modt.geometry import FieldOfView
 from modt.observations import Located, StaticTracks, observe
-from modt.odometry.odometry import Odometry
+from modt.odometry.pose_estimator import PoseEstimator
 from modt.placement import Placement
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
@@ -109,10 +109,10 @@ def chosen(proposals: Proposals, which: Int) -> Proposals:
 def _ideal_tracks(drive: SegmentedDrive, tracking: TrackingConfig, period_s: float) -> tuple[Int, ...]:
     """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
     tracker = Tracker(replace(tracking, extensions="none"), ACCURATE, period_s=period_s)  # joins no proposals
-    return tuple(_tracks(drive, tracker, Odometry()))
+    return tuple(_tracks(drive, tracker, PoseEstimator()))
 
 
-def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: Odometry) -> Iterator[Int]:
+def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: PoseEstimator) -> Iterator[Int]:
     rows: dict[tuple[str, int], int] = {}
     for made in drive.frames:
         frame, proposals = made.frame, made.proposals

@@ -1,0 +1,97 @@
+"""Tuning of the odometry: registration, its landmarks, and when a sweep is registered twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkTuning:
+    """How the mean k-DOP of a stationary track is kept."""
+
+    established_frames: int = 3
+    """Frames at rest from which the mean is the position of the landmark; before, it is the filter's prediction.
+    Chosen on: judgement."""
+
+    min_gain: float = 0.03
+    """Least weight of a new view in the mean. Greater: landmarks follow a drift of the poses faster, and hold the
+    poses less; 0.03 follows within about 33 frames.
+    Chosen on: twelve simulated drives, by the error of the heading at their ends."""
+
+    max_jump_m: float = 0.2
+    """Distance of an end from its mean beyond which the mean of that end restarts, since another part of the object
+    has come into view [m].
+    Chosen on: twelve simulated drives, by the error of the heading at their ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationTuning:
+    """How the pose of a sweep is fitted to landmarks."""
+
+    reach_m: float = 2.5
+    """Greatest correction of a pose, and greatest error of the first prediction [m]. A larger correction is refused.
+    Greater: faster starts are found, and wrong pairs are more likely.
+    Chosen on: judgement."""
+
+    gate_m: float = 0.8
+    """Greatest error of a prediction once the motion is known [m]; landmarks farther away are no candidates. Less: a
+    sudden turn is found by the wide search, which costs more.
+    Chosen on: judgement."""
+
+    max_turn_rad: float = 0.2
+    """Greatest turn of a correction [rad]. A larger one is refused.
+    Chosen on: judgement."""
+
+    end_sigma_m: float = 0.02
+    """Scale of the error of an end of a k-DOP at range 0 [m]. Greater: ends that came into view weigh more.
+    Chosen on: simulated drives, by the errors of the ends of landmarks."""
+
+    end_sigma_per_m: float = 0.0007
+    """Growth of that scale per metre of range.
+    Chosen on: simulated drives, by the errors of the ends of landmarks."""
+
+    young_sigma_m: float = 0.07
+    """Further error of a landmark without an established mean [m]. Greater: such landmarks weigh less in the fit.
+    Chosen on: judgement."""
+
+    inlier_m: float = 0.2
+    """Distance to its landmark within which an observation agrees with a motion [m].
+    Chosen on: judgement."""
+
+    min_agreement: float = 0.3
+    """Share of inliers among the pairs above which the motion is known, and the next search is a near one.
+    Chosen on: judgement."""
+
+    inlier_ratio: float = 0.75
+    """Share of inliers among the pairs of the near search below which pairs are sought farther away. Greater: more
+    wide searches, at more cost.
+    Chosen on: judgement."""
+
+    inlier_drop: float = 0.5
+    """Share of the last frame's inliers below which pairs are sought farther away, since a few may agree by chance.
+    Chosen on: judgement."""
+
+    initial_turn_rad: float = 0.05
+    """Step between the seven turns that are tried while no motion is known [rad].
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryTuning:
+    """Everything that is chosen in the odometry.
+
+    A sweep is registered a second time if the first registration changes the motion, and so the deskewed positions,
+    by too much.
+    """
+
+    landmarks: LandmarkTuning = LandmarkTuning()
+    registration: RegistrationTuning = RegistrationTuning()
+
+    repeat_range_m: float = 20.0
+    """Range at which the change of the deskewed positions is judged [m]. Greater: changes of the turn count more.
+    Chosen on: judgement; with `repeat_tolerance_m` 1 m/s or 3 degrees/s at 10 Hz."""
+
+    repeat_tolerance_m: float = 0.05
+    """Change of a deskewed position at that range beyond which a sweep is registered a second time [m]. Less: more
+    second registrations, at more cost.
+    Chosen on: judgement."""
