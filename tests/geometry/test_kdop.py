@@ -11,13 +11,11 @@ from modt.geometry.kdop import (
     PairWeights,
     Shapes,
     certain_pairs,
-    coverage,
-    measured,
     overlapping_pairs,
-    pair_costs,
     shape_similarity,
     shift_between,
 )
+from modt.geometry.kernels import NUMPY_GEOMETRY
 from modt.geometry.tuning import ShapeTuning
 from modt.observations import observe
 from modt.types import Proposals
@@ -65,7 +63,7 @@ def test_coverage_is_the_lesser_of_both_squares(n, seed):
     (low, high), (low_position, high_position) = random_ends(n, seed, 9), random_ends(n, seed + 1, 30)
     rows, columns = np.random.default_rng(seed).integers(0, max(n, 1), (2, n))
     jitter_m = TUNING.end_jitter_m
-    found = coverage(kdop(low, high), kdop(low_position, high_position), rows, columns, TUNING)
+    found = NUMPY_GEOMETRY.coverage(kdop(low, high), kdop(low_position, high_position), rows, columns)
     for one, i, j in zip(found, rows, columns, strict=True):
         common = np.minimum(high[i], high_position[j] + jitter_m) - np.maximum(low[i], low_position[j] - jitter_m)
         part = np.maximum(common, 0.0) / np.maximum(high[i] - low[i], jitter_m)
@@ -145,7 +143,7 @@ def test_measured_displacement_matches_the_slow_reference(n, seed):
     rng = np.random.default_rng(seed)
     a, b = random_kdops(rng, n)
     variance, before = rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
-    shift, covariance, end_variance = measured(a, b, variance, before, TUNING)
+    shift, covariance, end_variance = NUMPY_GEOMETRY.measured(a, b, variance, before)
     for k in range(n):
         slow = slow_measured(a[:, k], b[:, k], variance, before[:, k])
         for fast, one in zip((shift[k], covariance[k], end_variance[:, k]), slow, strict=True):
@@ -189,7 +187,7 @@ def random_pairs(seed, n):
 @given(st.integers(0, 2**16), st.integers(0, 6))
 def test_costs_equal_those_of_pairs_one_by_one(seed, n):
     a, b, covariance, variance, pairs = random_pairs(seed, n)
-    found = pair_costs(a, b, covariance, variance, pairs, WEIGHTS, TUNING)
+    found = NUMPY_GEOMETRY.pair_costs(a, b, covariance, variance, pairs, WEIGHTS)
     for i, j, cost, covered in zip(*pairs, *found, strict=True):
         ends = [min(b.kdop[k, j] - a.kdop[k, i], a.kdop[k + 4, i] - b.kdop[k + 4, j], key=abs) for k in range(4)]
         xx, xy, yy = covariance[:, i]

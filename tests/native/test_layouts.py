@@ -120,3 +120,9 @@ def test_a_missing_member_and_another_structure_are_refused():
     other = Layout("Other", n=Number(np.int64))
     with pytest.raises(TypeError, match="a structure Shapes is needed, not Other"):
         SHAPES.from_param(other(n=1))
+
+
+def test_room_has_the_declared_sizes():
+    layout = Layout("Room", cost=Array(np.float64, "rows", 2), next=Array(np.int64, "rows"), rows=Number(np.int64))
+    cost, following = layout.room(rows=3).arrays
+    assert (cost.shape, cost.dtype, following.shape, following.dtype) == ((3, 2), np.float64, (3,), np.int64)

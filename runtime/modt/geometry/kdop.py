@@ -53,24 +53,6 @@ def centres(kdop: Float64) -> Float64:
     return centre
 
 
-def coverage(a: Float64, b: Float64, rows: Int, columns: Int, tuning: ShapeTuning) -> Float64:
-    """(K,) share of a k-DOP of a that one of b covers: the lesser of the shares of the two rectangles around it.
-
-    Args:
-        a: (8, n) k-DOPs.
-        b: (8, k) k-DOPs that may cover them.
-        rows: (K,) index among a of each pair.
-        columns: (K,) its index among b.
-        tuning: how k-DOPs are compared.
-    """
-    covered = a.take(rows, axis=1)
-    extended = b.take(columns, axis=1) + tuning.end_jitter_m
-    common = np.maximum(widths(np.minimum(covered, extended)), 0.0)
-    share = common / np.maximum(widths(covered), tuning.end_jitter_m)
-    least: Float64 = np.minimum(share[0] * share[2], share[1] * share[3])
-    return least
-
-
 def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
     """Pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y.
 
@@ -138,48 +120,7 @@ def _rectangle_areas(width: Float64) -> Float64:
     return area
 
 
-def pair_costs(
-    a: Shapes,
-    b: Shapes,
-    covariance: Float64,
-    variance: float,
-    pairs: tuple[Int, Int],
-    weights: PairWeights,
-    tuning: ShapeTuning,
-) -> tuple[Float64, Float64]:
-    """Costs of pairs of shapes.
-
-    The displacement of a pair, by the ends that moved less, costs the negative logarithm of its Gaussian density,
-    relative to the density at no displacement from a position known exactly. The distance alone would favour
-    whatever is expected least precisely.
-
-    Args:
-        a: n of them, where they are expected.
-        b: k of them.
-        covariance: (3, n) xx, xy and yy of the position of each of a [m2].
-        variance: variance of the positions of b [m2].
-        pairs: (K,) index of each among a, and among b.
-        weights: weights of the terms of the cost.
-        tuning: how k-DOPs are compared.
-
-    Returns:
-        cost: (K,) cost of the displacement and of the differences in shape.
-        coverage: (K,) intersection over the smaller of the two.
-    """
-    rows, columns = pairs
-    kdop_a = a.kdop.take(rows, axis=1)
-    kdop_b = b.kdop.take(columns, axis=1)
-    distance, spread = _mahalanobis(kdop_b - kdop_a, covariance.take(rows, axis=1), variance)
-    overlap, coverage = overlap_shares(kdop_a, kdop_b, tuning)
-    size = np.abs(b.log_width.take(columns, axis=1) - a.log_width.take(rows, axis=1)).sum(axis=0) / 4
-    height = np.abs(a.top[rows] - b.top[columns]) + np.abs(a.bottom[rows] - b.bottom[columns])
-    points = np.abs(a.log_points[rows] - b.log_points[columns])
-    shape = weights.size * size + weights.overlap * (1 - overlap)
-    shape += weights.height * height / 2 + weights.points * points
-    return distance / 2 + shape + np.log(spread) / 2, coverage
-
-
-def _mahalanobis(outward: Float64, covariance: Float64, variance: float) -> tuple[Float64, Float64]:
+def mahalanobis(outward: Float64, covariance: Float64, variance: float) -> tuple[Float64, Float64]:
     """Displacements by the ends that moved less, relative to the uncertainty of the position.
 
     Args:
@@ -193,7 +134,7 @@ def _mahalanobis(outward: Float64, covariance: Float64, variance: float) -> tupl
     """
     ahead = outward[:4]
     behind = -outward[4:]
-    x, y = _in_plane(np.where(np.abs(ahead) < np.abs(behind), ahead, behind))
+    x, y = in_plane(np.where(np.abs(ahead) < np.abs(behind), ahead, behind))
     dx = x / 2
     dy = y / 2
     xx, xy, yy = covariance
@@ -204,7 +145,7 @@ def _mahalanobis(outward: Float64, covariance: Float64, variance: float) -> tupl
     return distance, determinant / variance**2
 
 
-def _in_plane(along: Float64) -> tuple[Float64, Float64]:
+def in_plane(along: Float64) -> tuple[Float64, Float64]:
     """(K,) x and (K,) y of the sum of the vectors along the four axes, of which (4, K) lengths are given."""
     east, north_east, north, north_west = along
     return east + HALF_ROOT * (north_east - north_west), north + HALF_ROOT * (north_east + north_west)
@@ -260,57 +201,12 @@ def _two_cheapest(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64
 
 def shift_between(a: Float64, b: Float64, tuning: ShapeTuning) -> Float64:
     """(K, 2) displacement from k-DOPs a to b [m], all axes weighted alike."""
-    along, _, _ = _shift_along_axes(a, b, tuning)
+    along, _, _ = shift_along_axes(a, b, tuning)
     shift: Float64 = (AXES @ along).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     return shift
 
 
-def measured(
-    a: Float64, b: Float64, variance: float, before: Float64, tuning: ShapeTuning
-) -> tuple[Float64, Float64, Float64]:
-    """Displacement between k-DOPs with its covariance.
-
-    An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the
-    object moved by the mean of both ends where they agree, else by the displacement of the end that moved less. The
-    disagreement of the two ends is a variance of the position along that axis, which lasts: the next k-DOP is
-    compared with one that was already in doubt.
-
-    Args:
-        a: (8, K) k-DOPs before [m].
-        b: (8, K) and after [m].
-        variance: variance of the displacement if the ends agree [m2].
-        before: (4, K) variance along each axis by ends that disagreed, a frame ago [m2].
-        tuning: how k-DOPs are compared.
-
-    Returns:
-        shift: (K, 2) from a to b [m].
-        covariance: (K, 2, 2) covariance of the displacement [m2].
-        end_variance: (4, K) variance along each axis by ends that disagree, or did [m2].
-    """
-    along, disagreement, growth = _shift_along_axes(a, b, tuning)
-    doubt = tuning.disagreement * tuning.disagreement
-    end_variance = np.maximum(doubt * disagreement * np.square(growth), tuning.end_variance_decay * before)
-    np.minimum(end_variance, doubt * np.square(widths(b).max(axis=0)), out=end_variance)
-    # The four axes together weigh as much as one measurement in each direction.
-    weight = 0.5 / (variance + end_variance)
-    x, y = _in_plane(weight * along)
-    # The inverse of the covariance is the sum over the axes of weight * axis * axis'.
-    east, north_east, north, north_west = weight
-    inverse_xx = east + (north_east + north_west) / 2
-    inverse_yy = north + (north_east + north_west) / 2
-    inverse_xy = (north_east - north_west) / 2
-    scale = 1.0 / (inverse_xx * inverse_yy - inverse_xy * inverse_xy)
-    covariance = np.empty((len(x), 2, 2))
-    covariance[:, 0, 0] = xx = scale * inverse_yy
-    covariance[:, 1, 1] = yy = scale * inverse_xx
-    covariance[:, 0, 1] = covariance[:, 1, 0] = xy = -scale * inverse_xy
-    shift = np.empty((len(x), 2))
-    shift[:, 0] = xx * x + xy * y
-    shift[:, 1] = xy * x + yy * y
-    return shift, covariance, end_variance
-
-
-def _shift_along_axes(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64, Float64, Float64]:
+def shift_along_axes(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64, Float64, Float64]:
     """Displacement along each axis from k-DOPs a to b (8, K).
 
     Returns:

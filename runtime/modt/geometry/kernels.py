@@ -6,8 +6,19 @@ import ctypes
 
 import numpy as np
 
-from modt.geometry import kdop
 from modt.geometry.boxes import upright_boxes
+from modt.geometry.kdop import (
+    PairWeights,
+    Shapes,
+    certain_pairs,
+    in_plane,
+    kdop_ends,
+    mahalanobis,
+    overlap_shares,
+    overlapping_pairs,
+    shift_along_axes,
+    widths,
+)
 from modt.geometry.tuning import ShapeTuning
 from modt.types import Float32, Float64, Int, copy_runs, regrouped
 
@@ -26,7 +37,7 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     Raises:
         ValueError: every assignment has an infinite cost.
     """
-    certain, contested = kdop.certain_pairs(rows, columns, cost, limit)
+    certain, contested = certain_pairs(rows, columns, cost, limit)
     if not len(contested):
         return certain
     from scipy.optimize import linear_sum_assignment  # large, and the compiled kernels do without
@@ -56,34 +67,111 @@ class GeometryKernels:
     library: ctypes.CDLL | None = None
     """Library of the compiled passes, for the kernels of other stages."""
     upright_boxes = staticmethod(upright_boxes)
-    kdop_ends = staticmethod(kdop.kdop_ends)
+    kdop_ends = staticmethod(kdop_ends)
     copy_runs = staticmethod(copy_runs)
     regrouped = staticmethod(regrouped)
-    overlapping_pairs = staticmethod(kdop.overlapping_pairs)
+    overlapping_pairs = staticmethod(overlapping_pairs)
     assign = staticmethod(assign)
 
     def __init__(self, tuning: ShapeTuning = ShapeTuning()) -> None:
         self.shape_tuning = tuning
 
     def coverage(self, a: Float64, b: Float64, rows: Int, columns: Int) -> Float64:
-        """(K,) share of each k-DOP of a (8, n) that one of b (8, k) covers, see `kdop.coverage`."""
-        return kdop.coverage(a, b, rows, columns, self.shape_tuning)
+        """(K,) share of a k-DOP of a that one of b covers: the lesser of the shares of the two rectangles around it.
+
+        Args:
+            a: (8, n) k-DOPs.
+            b: (8, k) k-DOPs that may cover them.
+            rows: (K,) index among a of each pair.
+            columns: (K,) its index among b.
+        """
+        covered = a.take(rows, axis=1)
+        extended = b.take(columns, axis=1) + self.shape_tuning.end_jitter_m
+        common = np.maximum(widths(np.minimum(covered, extended)), 0.0)
+        share = common / np.maximum(widths(covered), self.shape_tuning.end_jitter_m)
+        least: Float64 = np.minimum(share[0] * share[2], share[1] * share[3])
+        return least
 
     def pair_costs(
         self,
-        a: kdop.Shapes,
-        b: kdop.Shapes,
+        a: Shapes,
+        b: Shapes,
         covariance: Float64,
         variance: float,
         pairs: tuple[Int, Int],
-        weights: kdop.PairWeights,
+        weights: PairWeights,
     ) -> tuple[Float64, Float64]:
-        """(K,) cost and coverage of pairs of shapes, see `kdop.pair_costs`."""
-        return kdop.pair_costs(a, b, covariance, variance, pairs, weights, self.shape_tuning)
+        """Costs of pairs of shapes.
+
+        The displacement of a pair, by the ends that moved less, costs the negative logarithm of its Gaussian density,
+        relative to the density at no displacement from a position known exactly. The distance alone would favour
+        whatever is expected least precisely.
+
+        Args:
+            a: n of them, where they are expected.
+            b: k of them.
+            covariance: (3, n) xx, xy and yy of the position of each of a [m2].
+            variance: variance of the positions of b [m2].
+            pairs: (K,) index of each among a, and among b.
+            weights: weights of the terms of the cost.
+
+        Returns:
+            cost: (K,) cost of the displacement and of the differences in shape.
+            coverage: (K,) intersection over the smaller of the two.
+        """
+        rows, columns = pairs
+        kdop_a = a.kdop.take(rows, axis=1)
+        kdop_b = b.kdop.take(columns, axis=1)
+        distance, spread = mahalanobis(kdop_b - kdop_a, covariance.take(rows, axis=1), variance)
+        overlap, coverage = overlap_shares(kdop_a, kdop_b, self.shape_tuning)
+        size = np.abs(b.log_width.take(columns, axis=1) - a.log_width.take(rows, axis=1)).sum(axis=0) / 4
+        height = np.abs(a.top[rows] - b.top[columns]) + np.abs(a.bottom[rows] - b.bottom[columns])
+        points = np.abs(a.log_points[rows] - b.log_points[columns])
+        shape = weights.size * size + weights.overlap * (1 - overlap)
+        shape += weights.height * height / 2 + weights.points * points
+        return distance / 2 + shape + np.log(spread) / 2, coverage
 
     def measured(self, a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
-        """Displacement between k-DOPs a and b (8, K), its covariance and end variances, see `kdop.measured`."""
-        return kdop.measured(a, b, variance, before, self.shape_tuning)
+        """Displacement between k-DOPs with its covariance.
+
+        An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the
+        object moved by the mean of both ends where they agree, else by the displacement of the end that moved less.
+        The disagreement of the two ends is a variance of the position along that axis, which lasts: the next k-DOP is
+        compared with one that was already in doubt.
+
+        Args:
+            a: (8, K) k-DOPs before [m].
+            b: (8, K) and after [m].
+            variance: variance of the displacement if the ends agree [m2].
+            before: (4, K) variance along each axis by ends that disagreed, a frame ago [m2].
+
+        Returns:
+            shift: (K, 2) from a to b [m].
+            covariance: (K, 2, 2) covariance of the displacement [m2].
+            end_variance: (4, K) variance along each axis by ends that disagree, or did [m2].
+        """
+        tuning = self.shape_tuning
+        along, disagreement, growth = shift_along_axes(a, b, tuning)
+        doubt = tuning.disagreement * tuning.disagreement
+        end_variance = np.maximum(doubt * disagreement * np.square(growth), tuning.end_variance_decay * before)
+        np.minimum(end_variance, doubt * np.square(widths(b).max(axis=0)), out=end_variance)
+        # The four axes together weigh as much as one measurement in each direction.
+        weight = 0.5 / (variance + end_variance)
+        x, y = in_plane(weight * along)
+        # The inverse of the covariance is the sum over the axes of weight * axis * axis'.
+        east, north_east, north, north_west = weight
+        inverse_xx = east + (north_east + north_west) / 2
+        inverse_yy = north + (north_east + north_west) / 2
+        inverse_xy = (north_east - north_west) / 2
+        scale = 1.0 / (inverse_xx * inverse_yy - inverse_xy * inverse_xy)
+        covariance = np.empty((len(x), 2, 2))
+        covariance[:, 0, 0] = xx = scale * inverse_yy
+        covariance[:, 1, 1] = yy = scale * inverse_xx
+        covariance[:, 0, 1] = covariance[:, 1, 0] = xy = -scale * inverse_xy
+        shift = np.empty((len(x), 2))
+        shift[:, 0] = xx * x + xy * y
+        shift[:, 1] = xy * x + yy * y
+        return shift, covariance, end_variance
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""

@@ -7,39 +7,40 @@ from array import array
 from dataclasses import fields
 
 import numpy as np
+from numpy import float32, float64, int64
 
 from modt.geometry.kdop import PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
 from modt.geometry.tuning import ShapeTuning
-from modt.native.library import FLOAT32, FLOAT64, INT64, Array, Filled, Layout, Number, Own, Rows, Signatures, declare
+from modt.native.library import FLOAT32, FLOAT64, INT64, Array, Layout, Number, Own, Rows, Signatures, declare
 from modt.types import Float32, Float64, Int
 
 _D, _L = ctypes.c_double, ctypes.c_int64
 
-_TUNING = Layout("ShapeTuning", **{field.name: Number(np.float64) for field in fields(ShapeTuning)})
-_WEIGHTS = Layout("PairWeights", **{name: Number(np.float64) for name in PairWeights._fields})
+_TUNING = Layout("ShapeTuning", **{field.name: Number(float64) for field in fields(ShapeTuning)})
+_WEIGHTS = Layout("PairWeights", **{name: Number(float64) for name in PairWeights._fields})
 _SHAPES = Layout(
     "Shapes",
-    kdop=Array(np.float64, 8, "n"),
-    log_width=Array(np.float64, 4, "n"),
-    bottom=Array(np.float64, "n"),
-    top=Array(np.float64, "n"),
-    log_points=Array(np.float64, "n"),
-    n=Number(np.int64),
+    kdop=Array(float64, 8, "n"),
+    log_width=Array(float64, 4, "n"),
+    bottom=Array(float64, "n"),
+    top=Array(float64, "n"),
+    log_points=Array(float64, "n"),
+    n=Number(int64),
 )
-_MEMBERS = Layout("Rows", index=Array(np.int64, "k"), xyz=Rows(np.float32, 3, "k"))
+_MEMBERS = Layout("Rows", index=Array(int64, "k"), xyz=Rows(float32, 3, "k"))
 _ASSIGNMENT = Layout(
     "Assignment",
-    cost=Array(np.float64, "rows", "columns"),
-    row_potential=Array(np.float64, "rows"),
-    column_potential=Array(np.float64, "columns"),
-    distance=Array(np.float64, "columns"),
-    column_of_row=Array(np.int64, "rows"),
-    row_of_column=Array(np.int64, "columns"),
-    row_before=Array(np.int64, "columns"),
-    to_visit=Array(np.int64, "columns"),
-    rows=Number(np.int64),
-    columns=Number(np.int64),
+    cost=Array(float64, "rows", "columns"),
+    row_potential=Array(float64, "rows"),
+    column_potential=Array(float64, "columns"),
+    distance=Array(float64, "columns"),
+    column_of_row=Array(int64, "rows"),
+    row_of_column=Array(int64, "columns"),
+    row_before=Array(int64, "columns"),
+    to_visit=Array(int64, "columns"),
+    rows=Number(int64),
+    columns=Number(int64),
 )
 _SIGNATURES: Signatures = {
     "modt_upright_boxes": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT64, Own, Own, Own)),
@@ -83,13 +84,13 @@ class NativeGeometryKernels(GeometryKernels):
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
         """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
         n = len(offsets) - 1
-        ends = np.empty((8, n), np.float32)
+        ends = np.empty((8, n), float32)
         self.library.modt_kdop_ends(*xyz, offsets, n, axes, ends)
         return ends
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""
-        sums = np.empty((len(values), len(offsets) - 1), np.float64)
+        sums = np.empty((len(values), len(offsets) - 1), float64)
         self.library.modt_group_sums(values, *values.shape, offsets, sums.shape[1], sums)
         return sums
 
@@ -97,8 +98,8 @@ class NativeGeometryKernels(GeometryKernels):
         """Members and (3, ...) coordinates of (2, R) runs of them, one after the other."""
         begin, end = runs
         n = int((end - begin).sum())
-        copied_members = np.empty(n, np.int64)
-        copied = np.empty((3, n), np.float32)
+        copied_members = np.empty(n, int64)
+        copied = np.empty((3, n), float32)
         given = _MEMBERS(index=members, xyz=coordinates)
         out = _MEMBERS(index=copied_members, xyz=copied)
         self.library.modt_copy_runs(given, begin, end, len(begin), out)
@@ -111,10 +112,10 @@ class NativeGeometryKernels(GeometryKernels):
         n_a = a.shape[1]
         n_b = b.shape[1]
         n_blocks = -(-n_b // _BLOCK)
-        reach = np.empty((n_blocks, 4, _BLOCK), np.float32)
+        reach = np.empty((n_blocks, 4, _BLOCK), float32)
         limit = _PAIRS_EACH * (n_a + n_b)
         while True:
-            rows, columns = np.empty((2, limit), np.int64)
+            rows, columns = np.empty((2, limit), int64)
             count = self.library.modt_overlapping_pairs(a, n_a, b, n_b, reach, n_blocks, limit, rows, columns)
             if count <= limit:
                 return rows[:count], columns[:count]
@@ -164,8 +165,8 @@ class NativeGeometryKernels(GeometryKernels):
         n_pairs = len(rows)
         n_rows = int(rows.max(initial=-1)) + 1
         n_columns = int(columns.max(initial=-1)) + 1
-        row_number = np.empty(n_rows, np.int64)
-        column_number = np.empty(n_columns, np.int64)
+        row_number = np.empty(n_rows, int64)
+        column_number = np.empty(n_columns, int64)
         state = np.empty(n_pairs, np.uint8)
         contested = array("q", (0, 0))
         self.library.modt_certain_pairs(
@@ -178,7 +179,7 @@ class NativeGeometryKernels(GeometryKernels):
             rows, columns = columns, rows
             row_number, column_number = column_number, row_number
         if few:
-            assignment = _room_for_assignment(few, many)
+            assignment = _ASSIGNMENT.room(rows=few, columns=many)
             if not self.library.modt_settle_pairs(
                 rows, columns, cost, n_pairs, limit, row_number, column_number, assignment, state
             ):
@@ -192,27 +193,11 @@ class NativeGeometryKernels(GeometryKernels):
         moved_members, moved_labels = moved
         sorted_members = np.empty_like(members)
         sorted_coordinates = np.empty_like(coordinates)
-        count = np.empty(n, np.int64)
+        count = np.empty(n, int64)
         given = _MEMBERS(index=members, xyz=coordinates)
         out = _MEMBERS(index=sorted_members, xyz=sorted_coordinates)
         self.library.modt_regrouped(
             given, offsets, len(label), label, moved_members, moved_labels, len(moved_members), n,
-            np.empty(n, np.int64), count, out,
+            np.empty(n, int64), count, out,
         )  # fmt: skip
         return sorted_members, sorted_coordinates, count
-
-
-def _room_for_assignment(rows: int, columns: int) -> Filled:
-    """Room for an assignment of rows to columns; the passes in C write it and read it."""
-    return _ASSIGNMENT(
-        cost=np.empty((rows, columns)),
-        row_potential=np.empty(rows),
-        column_potential=np.empty(columns),
-        distance=np.empty(columns),
-        column_of_row=np.empty(rows, np.int64),
-        row_of_column=np.empty(columns, np.int64),
-        row_before=np.empty(columns, np.int64),
-        to_visit=np.empty(columns, np.int64),
-        rows=rows,
-        columns=columns,
-    )

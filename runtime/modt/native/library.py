@@ -114,7 +114,7 @@ class Member:
                 struct.pack(self.format, value)
             except struct.error as error:
                 return f"is {value!r}: {error}"
-        elif not isinstance(value, np.ndarray) or value.dtype != self.dtype:
+        elif getattr(value, "dtype", None) != self.dtype:
             return f"is of {getattr(value, 'dtype', type(value).__name__)}"
         elif value.ndim != len(self.shape):
             return f"has {value.ndim} axes"
@@ -171,7 +171,6 @@ class Layout:
         self.name = name
         self.members = members
         self._arrays = [name for name, member in members.items() if member.kind != "number"]
-        self._kinds = [(name, member.kind) for name, member in members.items()]
         self._dtypes = [members[name].dtype for name in self._arrays]
         # Each size is taken from one place: the number of its name, or the first axis that has it.
         self._places: dict[str, tuple[str, int | None]] = {}
@@ -210,6 +209,12 @@ class Layout:
         """Fill a structure with others, and with the attributes of an object that have the names of the rest."""
         return self(**{name: getattr(source, name) for name in self.members if name not in others}, **others)
 
+    def room(self, **numbers: int) -> Filled:
+        """Fill a structure with arrays that hold nothing yet; its numbers are given, and are all sizes of arrays."""
+        shapes = self._shapes_of(tuple(numbers[size] for size in self._places))
+        arrays = map(np.empty, shapes, self._dtypes)
+        return self(**numbers, **dict(zip(self._arrays, arrays, strict=True)))
+
     def from_param(self, filled: Filled) -> Any:
         """The structure as ctypes passes it."""
         if filled.layout is not self:
@@ -225,10 +230,10 @@ class Layout:
     def _filled(self, values: dict[str, Any], arrays: list[NDArray[Any]]) -> Filled:
         """Structure of values that fit."""
         fields: list[Any] = []
-        for name, kind in self._kinds:
-            if kind == "array":
+        for name, member in self.members.items():
+            if member.kind == "array":
                 fields.append(address(values[name]))
-            elif kind == "rows":
+            elif member.kind == "rows":
                 fields.extend(pointers(values[name]))
             else:
                 fields.append(values[name])

@@ -318,8 +318,7 @@ def _fit(
         sums = products @ (1.0 / residual)
         normal = sums.take(_PLACE_IN_UPPER)
         normal.flat[::4] += 1e-6 * (normal[0, 0] + normal[1, 1] + normal[2, 2])
-        solution: Float64 = np.linalg.solve(normal, sums[6:])
-        motion = -solution
+        motion = -np.asarray(np.linalg.solve(normal, sums[6:]), np.float64)
     return motion
 
 
