@@ -7,11 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.classes import CLASSES, PERSON_M, ObjectClass
-from modt.types import Bool, Cut, Float32, Float64, FrameResult
+from modt.types import NONE, Bool, Cut, Float32, Float64, FrameResult
 
 MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
 """(4, 2) greatest length and width of each class."""
-MAX_CAR_M, MAX_PERSON_M = (CLASSES[c].max_length_m for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN))
+MAX_CAR_M = CLASSES[ObjectClass.CAR].max_length_m
+"""Length of the longest car."""
+MAX_PERSON_M = CLASSES[ObjectClass.PEDESTRIAN].max_length_m
+"""Length of the longest pedestrian."""
 USUAL_CAR_M = 5.5, 2.2
 """Length and width that most cars do not exceed; larger ones would hold a car and its neighbour as well."""
 IS_PERSON: Bool = np.array([spec.person for spec in CLASSES.values()])
@@ -51,10 +54,13 @@ PART_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
 
 def unknown_near(result: FrameResult) -> Bool:
     """(M,) visible background tracks that may be people: the view ends below a third of a person's height."""
-    own, box = result.tracks.proposal, result.proposals.box
-    may_be = (result.proposals.cut & Cut.TOP > 0) & (box[:, 5] < PERSON_M / 3) & (box[:, 3] < MAX_PERSON_M)
-    unknown: Bool = np.append(may_be, False)[own]  # the last value is for NONE
-    unknown &= result.tracks.object_class == ObjectClass.BACKGROUND
+    proposals = result.proposals
+    length_m = proposals.box[:, 3]
+    height_m = proposals.box[:, 5]
+    may_be_person = (proposals.cut & Cut.TOP > 0) & (height_m < PERSON_M / 3) & (length_m < MAX_PERSON_M)
+    visible = result.tracks.proposal != NONE
+    unknown: Bool = visible & (result.tracks.object_class == ObjectClass.BACKGROUND)
+    unknown[unknown] = may_be_person[result.tracks.proposal[unknown]]
     return unknown
 
 

@@ -46,8 +46,9 @@ class Observations:
 
     def move(self, step: Float64) -> None:
         """Displace all in place by steps (P, 2) [m, world]."""
-        for own, along in ((self.box[:, :2], step), (self.centroid, step), (self.kdop, DIRECTIONS.T @ step.T)):
-            np.add(own, along, out=own)
+        self.box[:, :2] += step
+        self.centroid[:] += step
+        self.kdop[:] += DIRECTIONS.T @ step.T
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""
@@ -64,8 +65,12 @@ class Observations:
 
     def put(self, rows: Int, few: Observations) -> None:
         """Overwrite the rows given."""
-        self.box[rows], self.centroid[rows], self.kdop[:, rows] = few.box, few.centroid, few.kdop
-        self.bottom[rows], self.top[rows], self.count[rows] = few.bottom, few.top, few.count
+        self.box[rows] = few.box
+        self.centroid[rows] = few.centroid
+        self.kdop[:, rows] = few.kdop
+        self.bottom[rows] = few.bottom
+        self.top[rows] = few.top
+        self.count[rows] = few.count
         self.range_m[rows] = few.range_m
 
 

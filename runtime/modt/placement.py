@@ -38,7 +38,8 @@ class Mount:
 
     def level(self, frame: Frame) -> Frame:
         """The same sweep in the level frame. The head of a sensor that hangs upside down turns the other way."""
-        R, T = self.R_level_sensor, frame.T_world_sensor
+        R = self.R_level_sensor
+        T = frame.T_world_sensor
         if R is None:
             return frame
         pose = None if T is None else T @ inverse(se3(R, np.zeros(3)))
@@ -105,8 +106,8 @@ class Placement:
 
     def deskew(self, position: Float64) -> Float64:
         """(P, 2) correction of positions (P, 2) that the pose at the stamp alone yields [m, world]."""
-        R, t = self.T_world_sensor[:2, :2], self.T_world_sensor[:2, 3]
-        local = (position - t) @ R
+        R = self.T_world_sensor[:2, :2]
+        local = (position - self.T_world_sensor[:2, 3]) @ R
         delay_s = np.arctan2(local[:, 1], local[:, 0]) * (-self.turn_s / (2 * np.pi))
         step: Float64 = self.motion.displacement(local, delay_s) @ R.T
         return step

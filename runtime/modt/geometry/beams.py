@@ -42,14 +42,16 @@ class BeamTable:
         tangent = np.tan(np.deg2rad(np.unique(elevations_deg)))
         gap = np.diff(np.arctan(tangent))
         wider = np.maximum(np.append(gap[0], gap), np.append(gap, gap[-1]))
-        self._low, span = tangent[0], tangent[-1] - tangent[0]
+        low = tangent[0]
+        span = tangent[-1] - low
+        self._low = np.float32(low)
         self._scale = np.float32((self.CELLS - 1) / span)
-        middle = self._low + np.arange(self.CELLS) * span / (self.CELLS - 1)
+        middle = low + np.arange(self.CELLS) * span / (self.CELLS - 1)
         self._step_rad = wider[np.searchsorted((tangent[1:] + tangent[:-1]) / 2, middle)].astype(np.float32)
 
     def step_rad(self, tangent: Float32) -> Float32:
         """(N,) spacing at (N,) elevations; above and below all beams that of the outermost."""
-        cell = ((tangent - np.float32(self._low)) * self._scale).astype(np.int32)
+        cell = ((tangent - self._low) * self._scale).astype(np.int32)
         step_rad: Float32 = self._step_rad.take(cell, mode="clip")
         return step_rad
 

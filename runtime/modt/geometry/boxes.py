@@ -30,7 +30,8 @@ def rotation_zyx(roll: float, pitch: float, yaw: float) -> Float64:
 def se3(rotation: Float64, translation: Float64) -> Float64:
     """(4, 4) rigid transform of a (3, 3) rotation and a (3,) translation."""
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotation, translation
+    T[:3, :3] = rotation
+    T[:3, 3] = translation
     return T
 
 
@@ -46,11 +47,16 @@ def yaw_of(T: Float64) -> float:
 
 
 def quaternion_of(T: Float64) -> Float64:
-    """(4,) rotation of a rigid transform as a quaternion x, y, z, w."""
-    R, diagonal = T[:3, :3], T.diagonal()[:3]
+    """(4,) rotation of a rigid transform as a quaternion x, y, z, w.
+
+    The greatest component is computed first, so that none is divided by a small number.
+    """
+    R = T[:3, :3]
+    diagonal = R.diagonal()
     trace = diagonal.sum()
     i = int(diagonal.argmax())
-    j, k = (i + 1) % 3, (i + 2) % 3
+    j = (i + 1) % 3
+    k = (i + 2) % 3
     quaternion = np.empty(4)
     if diagonal[i] > trace:
         quaternion[[i, j, k]] = 1 - trace + 2 * R[i, i], R[j, i] + R[i, j], R[k, i] + R[i, k]
@@ -105,27 +111,38 @@ def upright_boxes(xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
         offsets: (G + 1,) group i owns the columns from offsets[i] to offsets[i + 1]; none is empty.
         yaw: (G,) headings [rad].
     """
-    cosine, sine = np.cos(yaw), np.sin(yaw)
-    count = offsets[1:] - offsets[:-1]
-    c, s = (np.repeat(along.astype(np.float32), count) for along in (cosine, sine))
+    cosine = np.cos(yaw)
+    sine = np.sin(yaw)
+    starts = offsets[:-1]
+    count = offsets[1:] - starts
+    c = np.repeat(cosine.astype(np.float32), count)
+    s = np.repeat(sine.astype(np.float32), count)
     x, y, z = xyz
-    sides = (x * c + y * s, y * c - x * s, z)
-    low, high = (
-        np.stack([f.reduceat(side, offsets[:-1]) for side in sides]).astype(np.float64)
-        for f in (np.minimum, np.maximum)
-    )
-    (u, v, w), (length, width, height) = (low + high) / 2, high - low
-    turn = length < width
-    longer, shorter = np.where(turn, width, length), np.where(turn, length, width)
-    x, y = u * cosine - v * sine, u * sine + v * cosine
-    return np.stack([x, y, w, longer, shorter, height, yaw - np.where(turn, np.pi / 2, 0.0)], axis=1)
+    turned_points = (x * c + y * s, y * c - x * s, z)  # along the heading of their group, across it, and upwards
+    low = np.stack([np.minimum.reduceat(along, starts) for along in turned_points]).astype(np.float64)
+    high = np.stack([np.maximum.reduceat(along, starts) for along in turned_points]).astype(np.float64)
+    u, v, z = (low + high) / 2
+    length, width, height = high - low
+    across = length < width
+    columns = [
+        u * cosine - v * sine,
+        u * sine + v * cosine,
+        z,
+        np.where(across, width, length),
+        np.where(across, length, width),
+        height,
+        yaw - np.where(across, np.pi / 2, 0.0),
+    ]
+    return np.stack(columns, axis=1)
 
 
 def corners(boxes: Float64) -> Float64:
     """(n, 4, 2) bird's-eye corners of (n, 7) boxes, counter-clockwise."""
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
     local = signs * boxes[:, None, 3:5]
-    c, s = np.cos(boxes[:, 6])[:, None], np.sin(boxes[:, 6])[:, None]
+    yaw = boxes[:, None, 6]
+    c = np.cos(yaw)
+    s = np.sin(yaw)
     x = c * local[..., 0] - s * local[..., 1] + boxes[:, None, 0]
     y = s * local[..., 0] + c * local[..., 1] + boxes[:, None, 1]
     return np.stack([x, y], axis=-1)

@@ -43,7 +43,7 @@ class FieldOfView:
     @classmethod
     def of_camera(cls, camera: Camera) -> FieldOfView:
         """View between the left and the right edge of a camera's image."""
-        u, w = camera.P_image_sensor[0], camera.P_image_sensor[2]
+        u, _, w = camera.P_image_sensor
         planes = np.stack([u, camera.width_px * w - u])
         return cls(planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True))
 
@@ -74,14 +74,15 @@ class BlindSectors:
     """
 
     def __init__(self, bounds_deg: Sequence[float], range_m: float) -> None:
-        self.bounds_deg, self.range_m = np.reshape(np.asarray(bounds_deg, np.float32), (-1, 2)), range_m
-        turn = np.diff(self.bounds_deg)[:, 0]
-        self.width_deg = np.where(turn >= 360, 360, turn % 360)
+        self._from_deg, to_deg = np.reshape(np.asarray(bounds_deg, np.float32), (-1, 2)).T
+        turn_deg = to_deg - self._from_deg
+        self._width_deg = np.where(turn_deg >= 360, 360, turn_deg % 360)
+        self._range_m = range_m
 
     def contain(self, points: Float32) -> Bool:
         """(N,) points that lie in a sector."""
-        inside: Bool = np.hypot(points[:, 0], points[:, 1]) < self.range_m
+        inside: Bool = np.hypot(points[:, 0], points[:, 1]) < self._range_m
         near = np.flatnonzero(inside)
         azimuth_deg = np.rad2deg(np.arctan2(points[near, 1], points[near, 0]))[:, None]
-        inside[near] = ((azimuth_deg - self.bounds_deg[:, 0]) % 360 <= self.width_deg).any(axis=1)
+        inside[near] = ((azimuth_deg - self._from_deg) % 360 <= self._width_deg).any(axis=1)
         return inside

@@ -15,7 +15,8 @@ from modt.geometry.tuning import ShapeTuning
 from modt.native.library import FLOAT32, FLOAT64, INT64, Array, Layout, Number, Own, Rows, Signatures, declare
 from modt.types import Float32, Float64, Int
 
-_D, _L = ctypes.c_double, ctypes.c_int64
+_D = ctypes.c_double
+_L = ctypes.c_int64
 
 _TUNING = Layout("ShapeTuning", **{field.name: Number(float64) for field in fields(ShapeTuning)})
 _WEIGHTS = Layout("PairWeights", **{name: Number(float64) for name in PairWeights._fields})

@@ -1,1 +1,1 @@
-"""Passes of segmentation in C99: sources, their compilation, and the library in a process."""
+"""Passes of segmentation, geometry and tracking in C99: their sources, their compilation, and their use."""

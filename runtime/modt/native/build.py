@@ -11,9 +11,12 @@ import sys
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-BASELINE, X86_64_V3 = "baseline", "x86-64-v3"
-"""Instruction sets: that of every machine of its kind, and that of most x86-64 since 2014, AVX2."""
+BASELINE = "baseline"
+"""Instruction set of every machine of its kind."""
+X86_64_V3 = "x86-64-v3"
+"""Instruction set of most x86-64 processors since 2014, with AVX2."""
 TIMEOUT_S = 300.0
+"""Time limit of a compilation [s]."""
 TARGETS = {
     "x86_64": "x86_64-linux-gnu.2.17",
     "aarch64": "aarch64-linux-gnu.2.17",
@@ -23,8 +26,11 @@ FLAGS = (
     "-std=c99", "-O3", "-fPIC", "-shared", "-nostdlib", "-fvisibility=hidden", "-fno-math-errno",
     "-fno-trapping-math", "-ffp-contract=off", "-Wall", "-Wextra",
 )  # fmt: skip
+"""Options of the compiler. Contraction of products and sums is off, since the results equal NumPy's to the byte."""
 CHECKED = ("-std=c99", "-O1", "-g", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-DMODT_CHECKED")
+"""Options of a build whose assertions (PROVEN in kernels.h) are checked."""
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-omit-frame-pointer")
+"""Further options that stop such a build at memory errors and undefined behaviour."""
 
 
 class NoCompilerError(Exception):

@@ -1,4 +1,4 @@
-"""The compiled passes in this process, and arrays as their arguments."""
+"""The compiled passes in this process, with arrays and structures as their arguments."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 from modt.native import build
 
 Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
-"""Result and arguments of every function."""
+"""Types of the result and of the arguments of each function, by its name."""
 _start: Any = (ctypes.c_char * 0).from_buffer
 """Start of a contiguous, writable array: several times faster than what NumPy offers for it."""
 
@@ -27,7 +27,8 @@ def declare(library: ctypes.CDLL, signatures: Signatures) -> None:
     """Tell the library what its functions take and return."""
     for name, (result, arguments) in signatures.items():
         function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
+        function.restype = result
+        function.argtypes = arguments
 
 
 class Given:
@@ -79,7 +80,8 @@ def pointers(*arrays: NDArray[Any]) -> array[int]:
     """A C structure of pointers to contiguous arrays, and to each row of those of two dimensions."""
     addresses: list[int] = []
     for numbers in arrays:
-        first, rows = address(numbers), 1 if numbers.ndim == 1 else len(numbers)
+        first = address(numbers)
+        rows = 1 if numbers.ndim == 1 else len(numbers)
         step = numbers.strides[0] or 1  # of an empty one
         addresses += range(first, first + rows * step, step)
     return array("Q", addresses)
@@ -279,7 +281,8 @@ def load(folder: Path = build.FOLDER, cpu_info: Path = Path("/proc/cpuinfo")) ->
     Raises:
         NotAvailableError: there is none, or it is made of other sources.
     """
-    machine, remedy = platform.machine(), "install modt again where a C compiler is"
+    machine = platform.machine()
+    remedy = "install modt again where a C compiler is"
     try:
         kind = instructions(cpu_info.read_text(errors="replace")) if machine == "x86_64" else build.BASELINE
     except OSError:
