@@ -1,7 +1,5 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from modt.geometry.beams import BeamTable, EvenBeams
 
@@ -19,10 +17,3 @@ def test_even_beams_are_alike_everywhere():
 def test_the_spacing_is_that_of_the_wider_gap_at_the_nearest_beam_and_outside_the_view_the_outermost_one():
     at_deg, gap_deg = np.array([(0, 0.5), (0.2, 0.5), (1, 1), (-1.1, 1), (-2.1, 4), (-5, 6), (40, 1), (-80, 6)]).T
     assert np.rad2deg(BeamTable(UNEVEN_DEG).step_rad(tangent(*at_deg))) == pytest.approx(gap_deg, rel=1e-4)
-
-
-@given(st.lists(st.floats(-60, 60), min_size=2, max_size=64, unique_by=lambda v: round(v, 1)), st.floats(-70, 70))
-def test_the_spacing_is_one_of_the_gaps(elevations_deg, at_deg):
-    gaps = np.diff(np.sort(elevations_deg))
-    found = np.rad2deg(BeamTable(elevations_deg).step_rad(tangent(at_deg)))
-    assert np.abs(gaps - found).min() < 1e-3

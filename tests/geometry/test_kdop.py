@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import (
     AXES,
     DIRECTIONS,
@@ -28,7 +29,8 @@ WEIGHTS = PairWeights(size=1.5, overlap=0.8, height=2.0, points=0.5)
 def random_ends(n, seed, max_length):
     """(n, 4) low and (n, 4) high ends, in half metres."""
     rng = np.random.default_rng(seed)
-    middle, length = rng.integers(-20, 20, (n, 4)), rng.integers(0, max_length + 1, (n, 4))
+    middle = rng.integers(-20, 20, (n, 4))
+    length = rng.integers(0, max_length + 1, (n, 4))
     return middle - length / 2, middle + length / 2
 
 
@@ -49,7 +51,8 @@ def slow_overlapping_pairs(low_a, high_a, low_b, high_b):
 
 @given(n=st.integers(0, 30), k=st.integers(0, 30), seed=st.integers(0, 2**16), max_length=st.integers(0, 30))
 def test_overlapping_pairs_match_the_slow_reference(n, k, seed, max_length):
-    a, b = random_ends(n, seed, max_length), random_ends(k, seed + 1, max_length)
+    a = random_ends(n, seed, max_length)
+    b = random_ends(k, seed + 1, max_length)
     i, j = overlapping_pairs(kdop(*a), kdop(*b))
     assert list(zip(i.tolist(), j.tolist(), strict=True)) == slow_overlapping_pairs(*a, *b)
 
@@ -60,7 +63,8 @@ def test_an_empty_envelope_overlaps_nothing():
 
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_coverage_is_the_lesser_of_both_squares(n, seed):
-    (low, high), (low_position, high_position) = random_ends(n, seed, 9), random_ends(n, seed + 1, 30)
+    low, high = random_ends(n, seed, 9)
+    low_position, high_position = random_ends(n, seed + 1, 30)
     rows, columns = np.random.default_rng(seed).integers(0, max(n, 1), (2, n))
     jitter_m = TUNING.end_jitter_m
     found = NUMPY_GEOMETRY.coverage(kdop(low, high), kdop(low_position, high_position), rows, columns)
@@ -71,8 +75,7 @@ def test_coverage_is_the_lesser_of_both_squares(n, seed):
 
 
 def test_kdops_are_the_greatest_coordinates_of_the_points():
-    c, s = np.cos(0.4), np.sin(0.4)
-    T = np.array([[c, -s, 0, 5], [s, c, 0, -3], [0, 0, 1, 1.7], [0, 0, 0, 1.0]])
+    T = se3(rotation_zyx(0, 0, 0.4), np.array([5, -3, 1.7]))
     frame, proposals = frame_of([box(10, 0, yaw=0.3), box(-4, 7)], 0, T)
     found = observe(proposals, T).kdop
     world = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
@@ -84,65 +87,61 @@ def test_kdops_are_the_greatest_coordinates_of_the_points():
 
 def random_kdops(rng, n):
     """(8, n) k-DOPs, and others that differ from them little or much."""
-    middle, half = rng.uniform(-2, 2, (4, n)), rng.uniform(0.1, 3.0, (4, n))
+    middle = rng.uniform(-2, 2, (4, n))
+    half = rng.uniform(0.1, 3.0, (4, n))
     a = np.concatenate([half + middle, half - middle])
     change = rng.normal(0, 1, (8, n)) * rng.choice([0.02, 0.3], n)
     return a, a + np.maximum(change, -rng.uniform(0.5, 0.9, (8, n)) * np.tile(half, (2, 1)))  # no width is negative
 
 
-def square(centre, half):
-    """(8, 1) k-DOP that reaches half a width in each direction."""
-    return (np.asarray(centre) @ DIRECTIONS + half)[:, None]
-
-
-def slow_moved(a, b, k):
+def slow_shift_along(a, b, k):
     """Displacement along an axis, and from 0 to 1 how little its ends agree."""
     longest = max(*(a[:4] + a[4:]), *(b[:4] + b[4:]), 1.0)
-    ahead, behind = b[k] - a[k], a[k + 4] - b[k + 4]
+    ahead = b[k] - a[k]
+    behind = a[k + 4] - b[k + 4]
     agree = max(0.0, 1 - ((ahead - behind) * longest / TUNING.agreement_m) ** 2) ** 2
     return agree * (ahead + behind) / 2 + (1 - agree) * min(ahead, behind, key=abs), 1 - agree
 
 
 def slow_measured(a, b, variance, before):
     """Displacement, covariance and end variances of one pair, axis by axis."""
-    width_a, width_b = a[:4] + a[4:], b[:4] + b[4:]
-    information, weighted, end_variance = np.zeros((2, 2)), np.zeros(2), []
+    width = b[:4] + b[4:]
+    growth = width - (a[:4] + a[4:])
+    information = np.zeros((2, 2))
+    weighted = np.zeros(2)
+    end_variance = []
     for k in range(4):
-        axis, (moved, unlike) = AXES[:, k], slow_moved(a, b, k)
-        new = unlike * (TUNING.disagreement * (width_b[k] - width_a[k])) ** 2
-        lasting = max(new, TUNING.end_variance_decay * before[k])
-        end_variance.append(min(lasting, (TUNING.disagreement * max(width_b)) ** 2))
-        information += np.outer(axis, axis) / (2 * (variance + end_variance[-1]))
-        weighted += axis * moved / (2 * (variance + end_variance[-1]))
+        shift, disagreement = slow_shift_along(a, b, k)
+        by_ends = disagreement * (TUNING.disagreement * growth[k]) ** 2
+        by_ends = max(by_ends, TUNING.end_variance_decay * before[k])
+        end_variance.append(min(by_ends, (TUNING.disagreement * max(width)) ** 2))
+        weight = 1 / (2 * (variance + end_variance[-1]))
+        information += weight * np.outer(AXES[:, k], AXES[:, k])
+        weighted += weight * shift * AXES[:, k]
     covariance = np.linalg.inv(information)
     return covariance @ weighted, covariance, end_variance
 
 
 def slow_similarity(a, b):
     """Difference of log sizes and overlap of one pair of k-DOPs."""
-    softening_m, padding_m = TUNING.width_softening_m, TUNING.area_padding_m
-    width_a, width_b = a[:4] + a[4:], b[:4] + b[4:]
-    size = np.abs(np.log(width_b + softening_m) - np.log(width_a + softening_m)).mean()
-    common = np.maximum(np.minimum(a, b)[:4] + np.minimum(a, b)[4:] + padding_m, 0.0)
-    overlaps = []
-    for k in range(2):  # upright, and at 45 degrees
-        area_a, area_b, shared = (
-            width[k] * width[k + 2] for width in (width_a + padding_m, width_b + padding_m, common)
-        )
-        overlaps.append(shared / (area_a + area_b - shared))
-    return size, min(overlaps)
+    width_a, width_b, common = (kdop[:4] + kdop[4:] for kdop in (a, b, np.minimum(a, b)))
+    size = abs(np.log(width_b + TUNING.width_softening_m) - np.log(width_a + TUNING.width_softening_m)).mean()
+    widths = np.maximum(np.stack([width_a, width_b, common]) + TUNING.area_padding_m, 0.0)
+    area_a, area_b, shared = widths[:, :2] * widths[:, 2:]  # upright, and at 45 degrees
+    return size, min(shared / (area_a + area_b - shared))
 
 
 def slow_shift(a, b):
     """Displacement of one pair of k-DOPs, axis by axis."""
-    return sum(AXES[:, k] * slow_moved(a, b, k)[0] for k in range(4)) / 2
+    return sum(AXES[:, k] * slow_shift_along(a, b, k)[0] for k in range(4)) / 2
 
 
 @given(st.integers(0, 6), st.integers(0, 2**16))
 def test_measured_displacement_matches_the_slow_reference(n, seed):
     rng = np.random.default_rng(seed)
     a, b = random_kdops(rng, n)
-    variance, before = rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
+    variance = rng.uniform(0.01, 1.0)
+    before = rng.uniform(0, 0.5, (4, n))
     shift, covariance, end_variance = NUMPY_GEOMETRY.measured(a, b, variance, before)
     for k in range(n):
         slow = slow_measured(a[:, k], b[:, k], variance, before[:, k])
@@ -162,7 +161,7 @@ def test_shift_and_similarity_match_the_slow_reference(n, seed):
 
 @pytest.mark.parametrize("growth", [[2.0, 1.5, 0, 0, 0, 0, 0, 0], [0, 1.0, 2.0, 1.0, 0, 0, 0, 0]])
 def test_growth_at_one_end_is_no_displacement(growth):
-    before = square((0, 0), 1.0)
+    before = np.ones((8, 1))
     after = before + np.array(growth)[:, None]
     np.testing.assert_allclose(shift_between(before, after, TUNING), 0, atol=1e-9)
 
@@ -203,11 +202,11 @@ def test_costs_equal_those_of_pairs_one_by_one(seed, n):
 
 
 def test_pairs_without_a_rival_are_certain():
-    rows, columns = np.array([0, 1, 1, 2, 3]), np.array([0, 1, 2, 2, 3])
-    cost = np.array([0.5, 0.1, 0.2, 0.1, 0.9])
-    certain, contested = certain_pairs(rows, columns, cost, 1.0)
-    assert certain.tolist() == [0, 1, 3, 4]
-    assert contested.tolist() == []
-    certain, contested = certain_pairs(rows, columns, np.array([0.5, 0.5, 0.2, 0.3, 0.9]), 1.0)
-    assert certain.tolist() == [0, 4]
-    assert contested.tolist() == [1, 2, 3]
+    rows = np.array([0, 1, 1, 2, 3])
+    columns = np.array([0, 1, 2, 2, 3])
+    for cost, certain, contested in (
+        ([0.5, 0.1, 0.2, 0.1, 0.9], [0, 1, 3, 4], []),
+        ([0.5, 0.5, 0.2, 0.3, 0.9], [0, 4], [1, 2, 3]),
+    ):
+        found = certain_pairs(rows, columns, np.array(cost), 1.0)
+        assert [pairs.tolist() for pairs in found] == [certain, contested]

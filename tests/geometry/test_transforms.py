@@ -37,13 +37,15 @@ half_turns = st.sampled_from([np.eye(4)[i] for i in range(4)])
 def test_quaternions_are_those_of_scipy(quaternion):
     R = Rotation.from_quat(quaternion).as_matrix()
     np.testing.assert_allclose(rotation_of(quaternion), R, atol=1e-12)
-    found, expected = quaternion_of(se3(R, np.zeros(3))), quaternion / np.linalg.norm(quaternion)
+    found = quaternion_of(se3(R, np.zeros(3)))
+    expected = quaternion / np.linalg.norm(quaternion)
     np.testing.assert_allclose(found * np.sign(found @ expected), expected, atol=1e-7)
 
 
 @given(turns, turns | half_turns, st.floats(-2, 2))
 def test_a_share_of_a_turn_is_that_of_its_rotation_vector(q, turn, share):
-    a, rotation = Rotation.from_quat(q), Rotation.from_quat(turn)
+    a = Rotation.from_quat(q)
+    rotation = Rotation.from_quat(turn)
     part = Rotation.from_rotvec(share * rotation.as_rotvec())
     if rotation.magnitude() > np.pi - 1e-3:  # either way round
         return
@@ -75,8 +77,7 @@ def test_corners_of_a_moved_box_are_the_moved_corners(T, box):
 
 @given(boxes)
 def test_corners_enclose_length_times_width(box):
-    c = corners(box)
-    x, y = c[..., 0], c[..., 1]
+    x, y = np.moveaxis(corners(box), 2, 0)
     area = 0.5 * np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1))
     assert np.allclose(area, box[:, 3] * box[:, 4])
 

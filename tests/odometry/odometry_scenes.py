@@ -26,19 +26,9 @@ def constant_turn_pose(time_s, speed_mps, yaw_rate_radps):
     return se3(rotation_zyx(0, 0, yaw), np.array([c.real, c.imag, 0.0]))
 
 
-def static_tracks(kdop, ids=None, observed=None, stationary=None, candidate=None):
+def static_tracks(kdop, ids=None, **flags):
     """Tracks with k-DOPs (M, 8), by default all observed, at rest and candidates."""
-    kdop = np.asarray(kdop, np.float64)
     n = len(kdop)
-
-    def flags(given):
-        return np.ones(n, np.bool_) if given is None else np.array(given, np.bool_)
-
-    return StaticTracks(
-        id=np.arange(n) if ids is None else np.array(ids, np.int64),
-        observed=flags(observed),
-        stationary=flags(stationary),
-        candidate=flags(candidate),
-        kdop=kdop,
-        predicted_kdop=kdop.T.copy(),
-    )
+    columns = {name: np.array(flags.get(name, [True] * n)) for name in ("observed", "stationary", "candidate")}
+    ids = np.arange(n) if ids is None else np.array(ids)
+    return StaticTracks(id=ids, kdop=kdop, predicted_kdop=kdop.T.copy(), **columns)
