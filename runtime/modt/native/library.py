@@ -110,7 +110,7 @@ class Member:
         return "P" if self.kind == "array" else self.dtype.char
 
     def fault(self, value: Any) -> str | None:
-        """What keeps a value from being the member, whatever the sizes; None if nothing does."""
+        """Reason why a value cannot be the member, whatever its sizes; None if it can."""
         if self.kind == "number":
             try:
                 struct.pack(self.format, value)

@@ -25,7 +25,7 @@ class PoseEstimator:
 
     Args:
         kernels: passes over points and pairs.
-        tuning: what is chosen in the odometry.
+        tuning: thresholds and scales of the odometry.
     """
 
     def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY, tuning: OdometryTuning = OdometryTuning()) -> None:

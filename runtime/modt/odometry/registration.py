@@ -165,7 +165,9 @@ class Registration:
             (4, 4) motion of the pose; identity without support for another one.
         """
         view = _View(landmarks, observations, _jacobian(observations) * motion_share)
-        fit = self._solve_near(view) if self._motion_known else None
+        fit = None
+        if self._motion_known:
+            fit = self._solve(view, np.zeros(3), self._tuning.gate_m, _SCALES, match_rounds=1)
         if fit is None or not self._is_convincing(fit):
             fit = _best(fit, self._solve_wide(view))
         self._inliers = 0 if fit is None else fit.inliers
@@ -179,13 +181,9 @@ class Registration:
         return _turn_about_sensor(fit.motion, observations.sensor_xy)
 
     def _is_convincing(self, fit: Fit) -> bool:
-        """Whether a fit near the prediction agrees with most pairs, and with about as many as in the last frame."""
+        """Whether a fit within the gate agrees with most pairs, and with about as many as in the last frame."""
         enough = self._tuning.inlier_drop * self._inliers
         return fit.supported(self._tuning.inlier_ratio) and fit.inliers >= enough
-
-    def _solve_near(self, view: _View) -> Fit | None:
-        """Motion near the predicted one, matched once."""
-        return self._solve(view, np.zeros(3), self._tuning.gate_m, _SCALES, match_rounds=1)
 
     def _solve_wide(self, view: _View) -> Fit | None:
         """Motion within reach of the predicted one, or of several turns while no motion was ever known."""
