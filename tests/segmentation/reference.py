@@ -5,11 +5,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from modt.class_sizes import STRIP_PERSON
-from modt.segmentation import ground
-from modt.segmentation.clusters import MAX_CELL_GAP_BEAMS, MAX_CELL_GAP_M
 from modt.segmentation.grids import SECTORS
 from modt.segmentation.groups import HEADINGS
+from modt.segmentation.tuning import DEFAULT
 
 
 def within_distance(plane, radius):
@@ -34,14 +32,15 @@ def flood_fill(cells, beam_m):
                 if j is not None and component[j] < 0:
                     first = min(i, j, key=lambda k: (row[k], column[k]))
                     gap = max(low[i], low[j]) - min(high[i], high[j])
-                    if gap < MAX_CELL_GAP_M + MAX_CELL_GAP_BEAMS * beam_m[first]:
+                    if gap < DEFAULT.cells.max_gap_m + DEFAULT.cells.max_gap_beams * beam_m[first]:
                         todo.append(j)
     return component
 
 
 def trace(lowest, stands, range_m, height_m, max_slope_deg):
     """(rings, SECTORS) ground cells, cells on and beside a ramp, and (SECTORS,) slope of the ramp at a ray's end."""
-    max_slope, ramp_slope = (np.tan(np.deg2rad(v * max_slope_deg)) for v in (1.0, ground.RAMP_SHARE))
+    ground = DEFAULT.ground
+    max_slope, ramp_slope = (np.tan(np.deg2rad(v * max_slope_deg)) for v in (1.0, ground.ramp_share))
     is_ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
     last = [(-height_m, 0.0, 0.0)] * SECTORS
     for ring in range(len(range_m)):
@@ -49,18 +48,18 @@ def trace(lowest, stands, range_m, height_m, max_slope_deg):
             here, (height, at, slope) = lowest[ring, ray], last[ray]
             if np.isfinite(here):
                 gap = range_m[ring] - at
-                reach = min(gap, ground.MAX_GAP_M)
+                reach = min(gap, ground.max_gap_m)
                 off = here - height - slope * reach
-                near = ground.MAX_GAP_M if ring and ramp[ring - 1, ray] else ground.NEAR_M
+                near = ground.max_gap_m if ring and ramp[ring - 1, ray] else ground.near_m
                 bound = 0.0 if stands[ring, ray] else min(gap, near) * max_slope
-                if -gap * max_slope - ground.NOISE_M < off < bound + ground.NOISE_M:
+                if -gap * max_slope - ground.noise_m < off < bound + ground.noise_m:
                     is_ground[ring, ray] = True
-                    slope = slope + ground.SLOPE_GAIN * ((here - height) / gap - slope)
+                    slope = slope + ground.slope_gain * ((here - height) / gap - slope)
                     slope = float(np.clip(slope, -max_slope, max_slope))
                     last[ray] = here, range_m[ring], slope
             steep[ring, ray] = abs(slope) > ramp_slope
         for ray in range(SECTORS):
-            ramp[ring, ray] = steep[ring, [(ray + k * ground.FLANK_SECTORS) % SECTORS for k in (-1, 0, 1)]].any()
+            ramp[ring, ray] = steep[ring, [(ray + k * ground.flank_sectors) % SECTORS for k in (-1, 0, 1)]].any()
     slope = np.array([of[2] for of in last])
     return is_ground, ramp, np.where(np.abs(slope) > ramp_slope, slope, 0.0)
 
@@ -99,8 +98,8 @@ def car_targets(bounds, beam, limits):
         return size < limits.max_diagonal_m and width(own) < limits.max_width_m and top[own].max() < limits.max_top_m
 
     def person(one):
-        narrow = width([one]) < STRIP_PERSON.max_extent_m and top[one] > STRIP_PERSON.min_top_m
-        return narrow and top[one] - low[one] > STRIP_PERSON.min_height_m
+        narrow = width([one]) < limits.person.max_extent_m and top[one] > limits.person.min_top_m
+        return narrow and top[one] - low[one] > limits.person.min_height_m
 
     connected = [[] for _ in range(n)]
     for front in range(n):

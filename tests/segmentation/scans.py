@@ -5,6 +5,7 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
+from modt.segmentation.tuning import DEFAULT
 
 HDL_64E = np.deg2rad(np.linspace(-24.8, 2.0, 64))
 VLP_16 = np.deg2rad(np.linspace(-15.0, 15.0, 16))
@@ -53,10 +54,10 @@ def scan(boxes=(), height_m=1.73, elevation=HDL_64E, azimuth_deg=(-180.0, 180.0)
     return points, np.argmin(ranges, axis=0)[seen]
 
 
-def owners(boxes, seed=0, step_deg=0.17, stage=None):
-    """Points of each proposal of a scene ahead by the box that they lie on."""
+def points_by_box(boxes, seed=0, step_deg=0.17, tuning=DEFAULT):
+    """Number of points of each proposal of a scene ahead by the box that they lie on."""
     points, on = scan(boxes, step_deg=step_deg, azimuth_deg=(-40, 40), seed=seed)
-    stage = stage or Segmenter(SegmentationConfig(), SensorConfig(azimuth_step_deg=step_deg), FieldOfView())
-    found = stage.segment(points)
+    sensor = SensorConfig(azimuth_step_deg=step_deg)
+    found = Segmenter(SegmentationConfig(), sensor, FieldOfView(), tuning=tuning).segment(points)
     ends = zip(found.offsets, found.offsets[1:], strict=False)
     return [np.bincount(on[found.members[a:b]], minlength=len(boxes) + 1)[1:] for a, b in ends]

@@ -1,16 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.geometry import FieldOfView
+from modt.segmentation.cells import ClusterSizes
 from modt.segmentation.clustering import Clusterer
-from modt.segmentation.clusters import ClusterSizes
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
-from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.strips import CarLimits, ViewBounds, merge_strips
+from modt.segmentation.strips import ViewBounds, merge_strips
+from modt.segmentation.tuning import DEFAULT, StripTuning
 from tests.segmentation import reference, scans
 
 BEAM = np.tan(np.deg2rad(SensorConfig().elevation_step_deg))
@@ -46,7 +47,7 @@ def strips(rng, n):
 @settings(max_examples=80)
 def test_targets_equal_those_of_pairs_one_by_one(seed, n, limit_m):
     """The random strips make pairs and chains, some of them longer than the lowest limit."""
-    bounds, limits = strips(np.random.default_rng(seed), n), CarLimits(max_diagonal_m=limit_m)
+    bounds, limits = strips(np.random.default_rng(seed), n), StripTuning(max_diagonal_m=limit_m)
     found = merge_strips(bounds, np.full(n, BEAM, np.float32), limits)
     np.testing.assert_array_equal(found, reference.car_targets(bounds, BEAM, limits))
 
@@ -54,23 +55,16 @@ def test_targets_equal_those_of_pairs_one_by_one(seed, n, limit_m):
 @given(bearing=st.floats(-1.4, 4.5), range_m=st.floats(20.0, 70.0), width_m=st.floats(0.3, 5.0))
 def test_bounds_are_in_metres(bearing, range_m, width_m):
     angle = bearing + np.linspace(-0.5, 0.5, 9) * width_m / range_m
-    cells = PointColumns.from_array(
-        (range_m * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)).astype(np.float32)
-    )
-    low, high = np.linspace(0.3, 0.5, 9, dtype=np.float32), np.linspace(1.2, 1.0, 9, dtype=np.float32)
-    bounds = ViewBounds.of_cells(
-        cells, np.full(9, -1.5, np.float32), low, high, Groups.from_labels(np.zeros(9, np.int64), 1)
-    )
+    xyz = range_m * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    low, high, ground = (np.linspace(*ends, 9, dtype=np.float32) for ends in ((0.3, 0.5), (1.2, 1.0), (-1.5, -1.5)))
+    one_group = Groups(np.arange(9), np.array([0, 9]))
+    bounds = ViewBounds.of_cells(PointColumns.from_array(xyz.astype(np.float32)), ground, low, high, one_group)
     assert bounds.width_m[0] == pytest.approx(width_m, rel=width_m / range_m, abs=0.02)
     assert bounds.min[1:, 0] == pytest.approx([range_m, 0.3, -1.2 / range_m], rel=1e-4)
     assert bounds.max[1:, 0] == pytest.approx([range_m, 1.2, -0.3 / range_m], rel=1e-4)
 
 
-def unmerged():
-    """A segmenter that merges no strips."""
-    stage = Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView())
-    stage.clusterer.may_be_strips = lambda sizes: np.zeros(len(sizes), np.bool_)
-    return stage
+UNMERGED = replace(DEFAULT, strips=StripTuning(max_diagonal_m=0.0))
 
 
 @pytest.mark.parametrize(("x", "y"), [(28.0, 0.0), (34.0, -9.0), (40.0, 6.0)])
@@ -79,8 +73,8 @@ def test_rear_and_roof_are_one_car(x, y):
     for seed in range(6):
         rear_m = x + 0.3 * seed
         car = [(rear_m, y, 0.4, 1.7, 0.3, 0.9), (rear_m + 2.2, y, 1.6, 1.5, 0.8, 1.5)]
-        apart += all(min(own) == 0 for own in scans.owners(car, seed, stage=unmerged()))
-        found = scans.owners(car, seed)
+        apart += all(min(own) == 0 for own in scans.points_by_box(car, seed, tuning=UNMERGED))
+        found = scans.points_by_box(car, seed)
         largest = max(found, key=sum)
         assert min(largest) > 0
         assert sum(largest) > 0.9 * sum(map(sum, found))
@@ -101,12 +95,12 @@ def test_rear_and_roof_are_one_car(x, y):
 def test_two_objects_stay_two(pair):
     for seed in range(4):
         moved = [(x, y + 0.05 * seed, *rest) for x, y, *rest in pair]
-        assert all(min(own) == 0 for own in scans.owners(moved, seed))
+        assert all(min(own) == 0 for own in scans.points_by_box(moved, seed))
 
 
 def test_near_clusters_are_not_merged():
     size, points = np.ones(3, np.float32), np.full(3, 50.0)
     range_m = np.array([10.0, 24.0, 27.0], np.float32)
     beam_m = range_m * np.float32(BEAM)
-    sizes = ClusterSizes(points, size, 0 * size, size, np.sqrt(range_m), np.arange(3), beam_m, np.zeros(3, np.bool_))
+    sizes = ClusterSizes(points, np.arange(3), size, 0 * size, size, np.sqrt(range_m), beam_m, np.zeros(3, np.bool_))
     assert Clusterer(SensorConfig(), SegmentationConfig()).may_be_strips(sizes).tolist() == [False, False, True]

@@ -8,11 +8,12 @@ import pytest
 from modt.config import SegmentationConfig
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.segmentation.ceiling import SAMPLED, below_ceiling_m, below_grazed_m, histogram
+from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.segmenter import Segmenter
 from modt_simulation.synthetic_stream import SyntheticStream
 
 RNG = np.random.default_rng(0)
+CEILING = CeilingFinder(2.6)
 WALLS = RNG.uniform(0.3, 2.6, 2000)
 
 
@@ -26,9 +27,9 @@ WALLS = RNG.uniform(0.3, 2.6, 2000)
 def test_a_ceiling_is_cut_just_below_but_few_returns_doors_and_what_is_higher_are_none(ceiling_m, n, cut_m):
     """Some returns of a ceiling lie 0.1 m below it."""
     height = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.02, n)]).astype(np.float32)
-    limit_m = below_ceiling_m(histogram(height[height < 2.6], 2.6))
+    limit_m = CEILING.within_m(CEILING.histogram(height[height < 2.6]))
     assert (limit_m is None) if cut_m is None else (cut_m[0] < limit_m < cut_m[1])
-    assert below_ceiling_m(histogram(np.zeros(0, np.float32), 2.6)) is None
+    assert CEILING.within_m(CEILING.histogram(np.zeros(0, np.float32))) is None
 
 
 @pytest.mark.parametrize(
@@ -37,7 +38,7 @@ def test_a_ceiling_is_cut_just_below_but_few_returns_doors_and_what_is_higher_ar
 )
 def test_a_ceiling_about_the_greatest_height_used_is_cut_well_below(ceiling_m, n, is_cut):
     level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, n)]).astype(np.float32)
-    limit_m = below_grazed_m(level[::SAMPLED], 0.0, 2.6)
+    limit_m = CEILING.limit_m(np.zeros(CEILING.bins, np.int64), level, 0.0)
     assert (2.3 < limit_m < 2.5) if is_cut else (limit_m is None)
 
 
@@ -74,5 +75,5 @@ def test_a_street_has_no_ceiling():
     config = SegmentationConfig()
     stage = Segmenter(config, load("os1-64").sensor, FieldOfView())
     for frame in SyntheticStream("street", "os1-64", 0.3, 901):
-        bounded = stage.kernels.above_ground(stage.ground, frame.points, 1.0, stage.bounds)
+        bounded = stage.kernels.above_ground(stage.ground, stage.ceiling, frame.points, 1.0, stage.bounds)
         assert stage.above_ground(frame.points)[0].tolist() == bounded[0].tolist()

@@ -18,24 +18,16 @@ from modt.segmentation.groups import (
     has_reflectance,
     reflectance_statistics,
 )
-from modt.segmentation.segmenter import SIDE_NOISE_M, Segmenter
+from modt.segmentation.segmenter import Segmenter
+from modt.segmentation.tuning import DEFAULT
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import reference, scans
+
+SIDE_NOISE_M = DEFAULT.heading.side_noise_m
 
 
 def groups_of(sizes):
     return Groups.from_labels(np.repeat(np.arange(len(sizes)), sizes), len(sizes))
-
-
-def slow_upright_box(xyz, yaw):
-    """(7,) box of one cluster of (3, n) points."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    sides = np.stack([xyz[0] * c + xyz[1] * s, xyz[1] * c - xyz[0] * s, xyz[2]])
-    low, high = sides.min(axis=1), sides.max(axis=1)
-    (u, v, w), (length, width, height) = (low + high) / 2, high - low
-    if length < width:
-        length, width, yaw = width, length, yaw - np.pi / 2
-    return np.array([u * c - v * s, u * s + v * c, w, length, width, height, yaw])
 
 
 def l_shape(length, width, yaw, centre, n=60):
@@ -49,25 +41,24 @@ def l_shape(length, width, yaw, centre, n=60):
 
 
 @given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 40), min_size=1, max_size=6))
-def test_headings_equal_those_of_each_cluster_alone(seed, sizes):
-    x, y = np.random.default_rng(seed).normal(0, 2, (2, sum(sizes))).astype(np.float32)
+def test_headings_and_boxes_are_those_of_each_cluster_alone(seed, sizes):
+    """In the frame of a box its points reach its sides, and its length is not below its width."""
+    xyz = np.random.default_rng(seed).normal(0, 2, (3, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    found = HEADINGS[best_headings(x, y, groups, 1000, SIDE_NOISE_M)]
-    for i, (start, end) in enumerate(zip(groups.offsets[:-1], groups.offsets[1:], strict=True)):
-        closeness = reference.closeness(x[start:end].astype(float), y[start:end].astype(float), SIDE_NOISE_M)
-        chosen = np.argmin(np.abs(HEADINGS - found[i]))
-        assert closeness[chosen] >= closeness.max() * 0.999
-
-
-@given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 40), min_size=1, max_size=6))
-def test_boxes_equal_those_of_each_cluster_alone(seed, sizes):
-    rng = np.random.default_rng(seed)
-    (x, y, z), yaw = rng.normal(0, 2, (3, sum(sizes))).astype(np.float32), rng.uniform(-3, 3, len(sizes))
-    groups = groups_of(sizes)
-    many = upright_boxes(np.stack([x, y, z]), groups.offsets, yaw)
-    for i, (start, end) in enumerate(zip(groups.offsets[:-1], groups.offsets[1:], strict=True)):
-        one = slow_upright_box(np.stack([x, y, z])[:, start:end].astype(np.float64), yaw[i])
-        np.testing.assert_allclose(many[i], one, atol=1e-4)
+    best = best_headings(xyz[0], xyz[1], groups, 1000, SIDE_NOISE_M)
+    boxes = upright_boxes(xyz, groups.offsets, HEADINGS[best])
+    for points, heading, box in zip(
+        np.split(xyz.astype(float), groups.offsets[1:-1], axis=1), best, boxes, strict=True
+    ):
+        closeness = reference.closeness(points[0], points[1], SIDE_NOISE_M)
+        assert closeness[heading] >= closeness.max() * 0.999
+        across = np.isclose(box[6], HEADINGS[heading] - np.pi / 2)
+        assert across or box[6] == HEADINGS[heading]
+        x, y, z = points - box[:3, None]
+        c, s = np.cos(box[6]), np.sin(box[6])
+        reach = np.stack([x * c + y * s, y * c - x * s, z])
+        np.testing.assert_allclose(np.stack([-reach.min(axis=1), reach.max(axis=1)]), [box[3:6] / 2] * 2, atol=1e-4)
+        assert box[3] >= box[4]
 
 
 @pytest.mark.parametrize("yaw_deg", [-80, -35, 0, 20, 65])

@@ -19,13 +19,13 @@ from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.observations import observe
 from modt.odometry.pose_estimator import PoseEstimator
-from modt.segmentation.clusters import CellClusterer, Clusters
+from modt.segmentation.cells import CellClusterer, Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.strips import CarLimits
+from modt.segmentation.tuning import DEFAULT
 from modt.tracking.kalman import filter_of
 from modt.tracking.states import ACCURATE
 from modt.tracking.track_table import NativeObserve
@@ -35,7 +35,7 @@ from modt.types import NONE, UNRECORDED
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs
 from tests.segmentation.test_car_merging import strips
-from tests.segmentation.test_clusters import cloud
+from tests.segmentation.test_cells import cloud
 from tests.tracking.tracking_scenes import frame_of, tracks_at
 
 SANITIZED = "MODT_SANITIZED" in os.environ
@@ -166,7 +166,7 @@ def test_groups(kernels, seed, sizes, extra):
 
 
 def some_strips(rng, n):
-    return strips(rng, n + 1), np.full(n + 1, np.deg2rad(rng.uniform(0.05, 2.0)), np.float32), CarLimits()
+    return strips(rng, n + 1), np.full(n + 1, np.deg2rad(rng.uniform(0.05, 2.0)), np.float32), DEFAULT.strips
 
 
 def some_kdops(rng, n):

@@ -1,22 +1,21 @@
 """People split off what they are clustered with, on the fine grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from modt.segmentation import clusters
+from modt.segmentation.tuning import DEFAULT, SplitTuning
 from tests.segmentation import scans
 
-STEP_DEG = 0.17
 PERSON = (0.35, 0.5, 0.0, 1.75)
 CAR = (4.2, 1.8, 0.2, 1.5)
 
 
-def owners_with(boxes, seed=0, step_deg=STEP_DEG, **constants):
-    """Points of each proposal by the box that they lie on, with other constants of clustering."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in constants.items():
-            patch.setattr(clusters, name, value)
-        return scans.owners(boxes, seed, step_deg)
+WHOLE = replace(DEFAULT, split=SplitTuning(min_extent_m=10.0))
+"""No cluster is divided."""
+FINER = replace(DEFAULT, split=SplitTuning(min_cell_returns=0.1))
+"""Clusters are divided where the returns lie far apart, too."""
 
 
 @pytest.mark.parametrize(("range_m", "gap_m"), [(8.0, 0.15), (12.0, 0.2), (16.0, 0.25)])
@@ -24,8 +23,8 @@ def test_two_people_close_together_are_two(range_m, gap_m):
     together = False
     for seed, aside in enumerate(np.linspace(-1.0, 1.0, 12)):
         pair = [(range_m, aside, *PERSON), (range_m, aside + 0.5 + gap_m, *PERSON)]
-        together = together or len(owners_with(pair, seed=seed, MIN_SPLIT_M=10.0)) == 1
-        found = scans.owners(pair, seed=seed)
+        together = together or len(scans.points_by_box(pair, seed=seed, tuning=WHOLE)) == 1
+        found = scans.points_by_box(pair, seed=seed)
         assert all(min(own) == 0 for own in found)
         assert np.max(found, axis=0).min() > 0.8 * np.sum(found, axis=0).min()
     assert together, "without splitting they are one"
@@ -43,7 +42,7 @@ def test_a_person_beside_something_is_split_off_it(thing):
     gap_m = 0.3
     _, aside, _, breadth, *_ = thing
     person = (12.0, aside - breadth / 2 - gap_m - 0.25, *PERSON)
-    found = scans.owners([person, thing])
+    found = scans.points_by_box([person, thing])
     mine = max(found, key=lambda own: own[0])
     assert mine[1] == 0
     assert mine[0] > 100
@@ -61,13 +60,14 @@ def test_a_person_beside_something_is_split_off_it(thing):
 def test_one_object_is_not_split(thing):
     for seed in range(4):
         x, y, *rest = thing
-        moved = [(x, y + 0.03 * seed, *rest)]
-        assert len(scans.owners(moved, seed=seed)) == len(owners_with(moved, seed=seed, MIN_SPLIT_M=10.0)) == 1
+        for tuning in (DEFAULT, WHOLE):
+            assert len(scans.points_by_box([(x, y + 0.03 * seed, *rest)], seed, tuning=tuning)) == 1
 
 
 def test_beyond_the_range_at_which_the_fine_grid_resolves_returns_nothing_is_split():
     """On a grid finer than the spacing of its returns a car would fall to pieces."""
     for seed in range(6):
-        never = owners_with([(35.0, 4.0, *CAR)], step_deg=0.35, seed=seed, MIN_SPLIT_M=10.0)
-        assert len(scans.owners([(35.0, 4.0, *CAR)], step_deg=0.35, seed=seed)) == len(never)
-        assert len(owners_with([(35.0, 4.0, *CAR)], step_deg=0.35, seed=seed, MIN_CELL_RETURNS=0.1)) >= len(never)
+        shipped, whole, finer = (
+            len(scans.points_by_box([(35.0, 4.0, *CAR)], seed, 0.35, tuning)) for tuning in (DEFAULT, WHOLE, FINER)
+        )
+        assert shipped == whole <= finer

@@ -1,69 +1,89 @@
-/* Cells of a grid: which are occupied, which hang together, and the bounds of what hangs together. */
+/* Cells of a grid: which are occupied, which are connected, and which clusters of them are one car. */
 #include "kernels.h"
 
+/* Cells of cells.py: n occupied cells of a square grid. */
 typedef struct {
-    i32 *row, *column;
-    float *low, *high;
-    i64 *entries;
+    i32 *row, *column;  /* (n,) */
+    float *low, *high;  /* (n,) least and greatest height of the points above ground [m] */
+    i64 *entries;       /* (n,) points in each */
 } Cells;
 
-typedef struct {
-    float *x, *y, *z, *sqrt_range; /* of one point of each cell */
-} Samples;
+/* --------------------------------------------------------------------------------------- occupied cells of points */
 
-/* Place of a cell in a table of a grid whose side is a multiple of four: neighbours mostly share a cache line. */
-static ALWAYS_INLINE i32 place_of(i32 row, i32 column, i32 side)
+/* SqrtRangeGrid: cells of a side of 1 / cells_per_unit [sqrt(m)]. */
+typedef struct {
+    float cells_per_unit;
+    i32 centre, side;
+    i32 *table; /* (side * side,) scratch: a number for each cell */
+} Grid;
+
+/* Place of a cell in the table of a grid whose side is a multiple of four. Blocks of 4x4 cells share a cache line,
+ * since points that follow one another lie in neighbouring cells. */
+static ALWAYS_INLINE i32 place_in_table(i32 row, i32 column, i32 side)
 {
     return (row >> 2) * (4 * side) + (column >> 2) * 16 + (row & 3) * 4 + (column & 3);
 }
 
-/* SqrtRangeGrid.row_column, of a point; `scale` is over the square root of its range. */
+/* SqrtRangeGrid.row_column for one coordinate; `scale` is cells_per_unit over the square root of the point's
+ * range. */
 static ALWAYS_INLINE i32 line_of(float x, float scale, i32 centre) { return (i32)(x * scale + (float)centre); }
 
-/* occupied_cells: cells of n points in the order of their last points, of a grid of cells 1 / `scale` wide. `number` is
- * scratch of side * side. Returns how many; they are the first of the n places of `sample`, `sampled` and `cells`. */
-EXPORT i64 modt_occupied_cells(const Samples *points, const float *height, i64 n, float scale, i32 centre, i32 side,
-                               i32 *number, i64 *sample, Samples *sampled, i64 *cell, Cells *cells)
+/* occupied_cells: the cells of n points, in the order of their last points. Returns how many there are, C; they
+ * are the first of the n places of `sample`, the row of the last point of each, of `sampled`, that point, and of
+ * `cells`.
+ *
+ * Neither sorts nor searches. Each point writes its number into its cell of the table; the numbers left are the
+ * last points. Then the table takes the numbers of the cells, and each point looks its own up. */
+EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, i64 n, const Grid *grid, i64 *sample,
+                               const PointColumns *sampled, i64 *cell_of_point, const Cells *cells)
 {
+    i64 *const cell = cell_of_point; /* until the last pass the place in the table */
+    i32 *const table = grid->table;
+    const i32 centre = grid->centre, side = grid->side;
     i32 count = 0;
     for (i64 i = 0; i < n; i++) {
-        float here = scale / points->sqrt_range[i];
-        cell[i] = place_of(line_of(points->x[i], here, centre), line_of(points->y[i], here, centre), side);
-    }
-    for (i64 i = 0; i < n; i++) { /* each point writes its number: that of the last one stays */
-        PROVEN(cell[i] >= 0 && cell[i] < side * side);
-        __builtin_prefetch(&number[cell[i + AHEAD < n ? i + AHEAD : i]], 1);
-        number[cell[i]] = (i32)i;
+        float scale = grid->cells_per_unit / points->sqrt_range[i];
+        cell[i] = place_in_table(line_of(points->x[i], scale, centre), line_of(points->y[i], scale, centre), side);
     }
     for (i64 i = 0; i < n; i++) {
-        sample[count] = i; /* overwritten by the next, unless it is the last one */
-        count += number[cell[i]] == i;
+        PROVEN(cell[i] >= 0 && cell[i] < side * side);
+        __builtin_prefetch(&table[cell[i + AHEAD < n ? i + AHEAD : i]], 1);
+        table[cell[i]] = (i32)i;
+    }
+    for (i64 i = 0; i < n; i++) {
+        sample[count] = i; /* overwritten by the next, unless it is the last one of its cell */
+        count += table[cell[i]] == i;
     }
     for (i32 c = 0; c < count; c++) {
-        i64 i = sample[c];
-        sampled->x[c] = points->x[i];
-        sampled->y[c] = points->y[i];
-        sampled->z[c] = points->z[i];
-        sampled->sqrt_range[c] = points->sqrt_range[i];
-        cells->low[c] = cells->high[c] = height[i];
+        i64 last = sample[c];
+        sampled->x[c] = points->x[last];
+        sampled->y[c] = points->y[last];
+        sampled->z[c] = points->z[last];
+        sampled->sqrt_range[c] = points->sqrt_range[last];
+        cells->low[c] = height[last];
+        cells->high[c] = height[last];
         cells->entries[c] = 0;
-        number[cell[i]] = c;
+        table[cell[last]] = c;
     }
     for (i64 i = 0; i < n; i++) {
-        i64 c = cell[i] = number[cell[i]];
+        i64 c = cell[i] = table[cell[i]];
         cells->low[c] = least(height[i], cells->low[c]);
         cells->high[c] = most(height[i], cells->high[c]);
         cells->entries[c]++;
     }
     for (i32 c = 0; c < count; c++) {
-        float here = scale / sampled->sqrt_range[c];
-        cells->row[c] = line_of(sampled->x[c], here, centre);
-        cells->column[c] = line_of(sampled->y[c], here, centre);
+        float scale = grid->cells_per_unit / sampled->sqrt_range[c];
+        cells->row[c] = line_of(sampled->x[c], scale, centre);
+        cells->column[c] = line_of(sampled->y[c], scale, centre);
     }
     return count;
 }
 
-/* Rem's union: a parent is never greater than its child, so a root is the least of its component. */
+/* ------------------------------------------------------------------------------------------- connected components */
+
+/* Rem's union of the trees of a and b: a parent is never greater than its child, so a root is the least of its
+ * component. Climbs from both at once, always from the one with the greater parent, and splices it below the
+ * other's. */
 static void join(i32 *parent, i32 a, i32 b)
 {
     while (parent[a] != parent[b]) {
@@ -80,148 +100,260 @@ static void join(i32 *parent, i32 a, i32 b)
     }
 }
 
+/* A cell in a grid of a side below 2^16. */
 typedef struct {
-    uint16_t row, column; /* of a grid of a side below 2^16 */
+    uint16_t row, column;
     i32 cell;
 } Place;
 
-/* Places of the cells used, of a grid 2^shift times as wide, in its order, by a radix sort; returns how many. Scratch:
- * `next` of 2 side, `half` of n_cells. */
-static i32 sort_places(const Cells *cells, const uint8_t *use, i64 n_cells, int shift, i32 side, i32 *next, Place *half,
-                       Place *sorted)
+/* A wide cell, in the order of the grid. */
+typedef struct {
+    i32 place;       /* row * side + column */
+    float low, high; /* height [m] */
+    float max_gap_m; /* vertical gap below which it is connected with those after it */
+} Span;
+
+/* Scratch of modt_cluster, for n cells and a fine grid of `side` rows. A cell is called wide on the grid in use,
+ * which may be twice as wide. Spans and the arrays beside them begin at 1: wide cell 0 is nowhere, for cells that
+ * are not used. */
+typedef struct {
+    float *max_gap_m;               /* (n,) vertical gap below which a cell is connected */
+    uint8_t *use;                   /* (n,) whether a cell takes part */
+    i64 *part;                      /* (n,) part on the fine grid of each cell */
+    i32 *number;                    /* (n,) whether a cluster is divided; then the cluster of a part, or NONE */
+    u4 (*ends)[2];                  /* (n,) least and greatest x, y and height of a cluster */
+    i32 *next_in_row;               /* (side,) counts of the radix sort; then the last span of each column */
+    i32 *next_in_column;            /* (side,) */
+    Place *by_cell, *by_column;     /* (n,) places in the order of cells and of columns */
+    Place *by_row;                  /* (n,) and of the grid: by row, then column, then cell */
+    Span *spans;                    /* (n + 1,) */
+    i32 *parent;                    /* (n + 1,) a span of the same component, not after it */
+    i32 *last_cell;                 /* (n + 1,) last cell of each span */
+    i32 *span_of_cell;              /* (n,) */
+    i32 *span_in_order;             /* (n + 1,) spans in the order of their last cells */
+    i32 *component_of_root;         /* (n + 1,) number of the component of a span that is its own parent */
+} ClusterScratch;
+
+/* Places the scratch at `memory`; returns its size in bytes. */
+static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
 {
-    i32 *of_row = next, *of_column = next + side, used = 0, rows = 0, columns = 0;
-    for (i32 d = 0; d < side; d++)
-        of_row[d] = of_column[d] = 0;
+    uintptr_t end = (uintptr_t)memory;
+    TAKE(s->max_gap_m, n);
+    TAKE(s->use, n);
+    TAKE(s->part, n);
+    TAKE(s->number, n);
+    TAKE(s->ends, n);
+    TAKE(s->next_in_row, side);
+    TAKE(s->next_in_column, side);
+    TAKE(s->by_cell, n);
+    TAKE(s->by_column, n);
+    TAKE(s->by_row, n);
+    TAKE(s->spans, n + 1);
+    TAKE(s->parent, n + 1);
+    TAKE(s->last_cell, n + 1);
+    TAKE(s->span_of_cell, n);
+    TAKE(s->span_in_order, n + 1);
+    TAKE(s->component_of_root, n + 1);
+    return (i64)(end - (uintptr_t)memory);
+}
+
+EXPORT i64 modt_cluster_scratch(i64 n_cells, i32 fine_side)
+{
+    ClusterScratch s;
+    return place_scratch(n_cells, fine_side, 0, &s);
+}
+
+/* Start of each line among what is counted by line: from counts to running sums. */
+static void starts_of(i32 *count, i32 n)
+{
+    i32 start = 0;
+    for (i32 line = 0; line < n; line++) {
+        i32 in_line = count[line];
+        count[line] = start;
+        start += in_line;
+    }
+}
+
+/* Sorts the places of the used cells on a grid 2^shift times as wide into `by_row`, by a radix sort: by column,
+ * then by row, each keeping the order before. Returns how many are used. */
+static i32 sort_places(const Cells *cells, i64 n_cells, int shift, i32 side, const ClusterScratch *s)
+{
+    i32 used = 0, *in_row = s->next_in_row, *in_column = s->next_in_column;
+    for (i32 line = 0; line < side; line++) {
+        in_row[line] = 0;
+        in_column[line] = 0;
+    }
     for (i64 i = 0; i < n_cells; i++) {
         i32 row = cells->row[i] >> shift, column = cells->column[i] >> shift;
         PROVEN(row >= 0 && row < side && column > 0 && column < side - 1);
-        sorted[used] = (Place){(uint16_t)row, (uint16_t)column, (i32)i}; /* overwritten by the next, unless it is used */
-        used += use[i], of_row[row] += use[i], of_column[column] += use[i];
+        s->by_cell[used] = (Place){(uint16_t)row, (uint16_t)column, (i32)i}; /* overwritten, unless it is used */
+        used += s->use[i];
+        in_row[row] += s->use[i];
+        in_column[column] += s->use[i];
     }
-    for (i32 d = 0; d < side; d++) {
-        i32 in_row = of_row[d], in_column = of_column[d];
-        of_row[d] = rows, of_column[d] = columns;
-        rows += in_row, columns += in_column;
-    }
+    starts_of(in_row, side);
+    starts_of(in_column, side);
     for (i32 k = 0; k < used; k++)
-        half[of_column[sorted[k].column]++] = sorted[k];
+        s->by_column[in_column[s->by_cell[k].column]++] = s->by_cell[k];
     for (i32 k = 0; k < used; k++)
-        sorted[of_row[half[k].row]++] = half[k];
+        s->by_row[in_row[s->by_column[k].row]++] = s->by_column[k];
     return used;
 }
 
-typedef struct {
-    i32 place;
-    float low, high, max_gap_m;
-} Span;
-
-/* First cell of the component of each of n cells in the order of the grid, from 1 on, where the neighbours of a cell are
- * the one before it and up to three of the row before; the cell 0 is nowhere. Scratch: `latest`, of `side`. Without
- * branches, but for the few cells that connect components, since no processor foresees which neighbours there are. */
-static void find_components(const Span *span, i32 n, i32 side, i32 *latest, i32 *parent)
+/* Unites the used cells that lie in one wide cell to a span; its gap is that of the last of them. Returns how many
+ * spans there are. */
+static i32 unite_cells(const Cells *cells, i32 used, i64 n_cells, i32 side, const ClusterScratch *s)
 {
-    const i4 back = {1, side + 1, side, side - 1};
-    for (i32 c = 0; c < side; c++)
-        latest[c] = 0;
+    const f4 none = spread(INFINITY);
+    f4 ends = none; /* least height, and the greatest negated */
+    i32 n = 0;
+    s->spans[0] = (Span){-3 * side, INFINITY, -INFINITY, 0.0f}; /* no neighbour of any */
+    s->last_cell[0] = NONE;
+    for (i64 i = 0; i < n_cells; i++)
+        s->span_of_cell[i] = 0; /* that of the cells not used */
+    for (i32 k = 0; k < used; k++) {
+        i32 i = s->by_row[k].cell, place = s->by_row[k].row * side + s->by_row[k].column;
+        i32 begins = -(place != s->spans[n].place); /* all bits set, if a span begins: a mask, and minus one */
+        i4 anew = {begins, begins, begins, begins};
+        f4 so_far = (f4)(((i4)none & anew) | ((i4)ends & ~anew));
+        ends = least4((f4){cells->low[i], -cells->high[i]}, so_far);
+        n -= begins;
+        s->spans[n] = (Span){place, ends[0], -ends[1], s->max_gap_m[i]};
+        s->last_cell[n] = i;
+        s->span_of_cell[i] = n;
+    }
+    return n;
+}
+
+/* Sets the parent of each of n spans to the first span of its component. Neighbours whose vertical gap is below
+ * the max_gap_m of the earlier one are connected.
+ *
+ * Spans come in the order of the grid. Of the eight neighbours of a span, four come before it: the one to its
+ * left, and three in the row before, which `latest` holds by column. A span of `latest` may be of an earlier row;
+ * its place tells. The span first takes the least of the roots of those that it is connected with, or itself. Only
+ * where these roots differ, rarely, are their trees joined: apart from that there are no branches, since no
+ * processor foresees which neighbours there are. */
+static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32 *parent)
+{
+    const i4 back = {1, side + 1, side, side - 1}; /* from the place of a span to those of its neighbours */
+    for (i32 column = 0; column < side; column++)
+        latest[column] = 0;
     parent[0] = 0;
-    for (i32 k = 1, start = 0, before = 0; k <= n; k++) {
-        i32 place = span[k].place;
-        for (; place >= start + side; start += side)
-            latest[before] = k - 1;
-        i32 column = place - start, *over = latest + column - 1;
-        const Span *own = &span[k], *left = own - 1;
-        const Span *beyond = &span[over[0]], *above = &span[over[1]], *ahead = &span[over[2]];
-        i4 places = {left->place, beyond->place, above->place, ahead->place};
-        f4 low = {left->low, beyond->low, above->low, ahead->low};
-        f4 high = {left->high, beyond->high, above->high, ahead->high};
-        f4 max_gap_m = {left->max_gap_m, beyond->max_gap_m, above->max_gap_m, ahead->max_gap_m};
-        f4 gap_m = most4(low, spread(own->low)) - least4(high, spread(own->high));
-        i4 joined = (places == place - back) & (gap_m < max_gap_m), alone = {k, k, k, k};
-        i4 roots = {parent[parent[k - 1]], parent[parent[over[0]]], parent[parent[over[1]]], parent[parent[over[2]]]};
-        roots = (roots & joined) | (alone & ~joined);
-        i32 one = roots[0] < roots[1] ? roots[0] : roots[1], other = roots[2] < roots[3] ? roots[2] : roots[3];
-        parent[k] = one = one < other ? one : other;
-        i4 apart = (roots != alone) & (roots != one);
+    i32 row_start = 0, column_before = 0; /* first place of the row; column of the span before */
+    for (i32 k = 1; k <= n; k++) {
+        i32 place = spans[k].place;
+        for (; place >= row_start + side; row_start += side)
+            latest[column_before] = k - 1; /* the row of the span before is behind this one */
+        i32 column = place - row_start;
+        const i32 *behind = latest + column - 1;
+        const Span *here = &spans[k], *left = here - 1;
+        const Span *behind_left = &spans[behind[0]], *behind_same = &spans[behind[1]];
+        const Span *behind_right = &spans[behind[2]];
+
+        i4 places = {left->place, behind_left->place, behind_same->place, behind_right->place};
+        f4 low = {left->low, behind_left->low, behind_same->low, behind_right->low};
+        f4 high = {left->high, behind_left->high, behind_same->high, behind_right->high};
+        f4 max_gap_m = {left->max_gap_m, behind_left->max_gap_m, behind_same->max_gap_m, behind_right->max_gap_m};
+        f4 gap_m = most4(low, spread(here->low)) - least4(high, spread(here->high));
+        i4 connected = (places == place - back) & (gap_m < max_gap_m);
+
+        i4 alone = {k, k, k, k};
+        i4 roots = {parent[parent[k - 1]], parent[parent[behind[0]]], parent[parent[behind[1]]],
+                    parent[parent[behind[2]]]};
+        roots = (roots & connected) | (alone & ~connected);
+        i32 one = roots[0] < roots[1] ? roots[0] : roots[1];
+        i32 other = roots[2] < roots[3] ? roots[2] : roots[3];
+        i32 first = one < other ? one : other;
+        parent[k] = first;
+        i4 apart = (roots != alone) & (roots != first);
         for (int j = 0; j < 4 && (apart[0] | apart[1] | apart[2] | apart[3]); j++)
             if (apart[j])
-                join(parent, roots[j], one);
-        latest[before] = k - 1; /* only now: the neighbour above it was looked up last */
-        before = column;
+                join(parent, roots[j], first);
+
+        /* The span before goes into `latest` only now: if it is the left neighbour of this one, its column had to
+         * hold what lies behind it, `behind_left`. */
+        latest[column_before] = k - 1;
+        column_before = column;
     }
-    for (i32 k = 1; k <= n; k++)
+    for (i32 k = 1; k <= n; k++) /* parents come first, so their parents are roots by now */
         parent[k] = parent[parent[k]];
 }
 
-/* connect and connect_coarse: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
- * used lies, NONE for the others; in the order of the first of their wide cells, those in the order of their last
- * cells. Returns how many components there are. Scratch: `next`, of 2 side + 10 n_cells + 8. */
-static i64 connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift, i32 side,
-                   i32 *next, i64 *component)
+/* Gives each cell the number of its span's component, NONE to those not used. Spans are in the order of their last
+ * cells, and components in the order of their first spans. Returns how many components there are. */
+static i64 number_components(i64 n_cells, i32 n, const ClusterScratch *s, i64 *component)
 {
-    Span *span = (Span *)(next + 2 * side);
-    Place *order = (Place *)(span + n_cells + 1);
-    i32 *parent = (i32 *)(order + n_cells), *wide = parent + n_cells + 1, *last = wide + n_cells;
-    i32 used = sort_places(cells, use, n_cells, shift, side, next, (Place *)span, order), n = 0, count = 0;
-    f4 none = spread(INFINITY), ends = none; /* least height, and the greatest negated */
-    span[0] = (Span){-3 * side, INFINITY, -INFINITY, 0.0f};
-    last[0] = NONE;
-    for (i64 i = 0; i < n_cells; i++)
-        wide[i] = 0; /* that of the cells not used */
-    for (i32 k = 0; k < used; k++) {
-        i32 i = order[k].cell, place = order[k].row * side + order[k].column, begins = -(place != span[n].place);
-        i4 anew = {begins, begins, begins, begins};
-        n -= begins;
-        ends = least4((f4){cells->low[i], -cells->high[i]}, (f4)(((i4)none & anew) | ((i4)ends & ~anew)));
-        span[n] = (Span){place, ends[0], -ends[1], max_gap_m[i]};
-        last[n] = i;
-        wide[i] = n;
-    }
-    find_components(span, n, side, next, parent);
-    i32 *number = (i32 *)order, *ended = last + n_cells + 1, m = 0; /* of each root's component; wide cells */
-    for (i32 c = 0; c <= n; c++)
-        number[c] = NONE;
+    i32 *const number = s->component_of_root;
+    i32 ended = 0, count = 0;
+    for (i32 k = 0; k <= n; k++)
+        number[k] = NONE;
     for (i64 i = 0; i < n_cells; i++) {
-        ended[m] = wide[i];
-        m += last[wide[i]] == i;
+        i32 k = s->span_of_cell[i];
+        s->span_in_order[ended] = k; /* overwritten by the next, unless the span ends here */
+        ended += s->last_cell[k] == i;
     }
-    for (i32 k = 0; k < m; k++)
-        if (number[parent[ended[k]]] == NONE)
-            number[parent[ended[k]]] = count++;
+    for (i32 e = 0; e < ended; e++) {
+        i32 root = s->parent[s->span_in_order[e]];
+        if (number[root] == NONE)
+            number[root] = count++;
+    }
     for (i64 i = 0; i < n_cells; i++)
-        component[i] = number[parent[wide[i]]];
+        component[i] = number[s->parent[s->span_of_cell[i]]];
     return count;
 }
 
-typedef struct {
-    i64 *points, *cell;
-    float *extent_m, *bottom_m, *top_m, *sqrt_range, *beam_m;
-    uint8_t *is_part;
-} Sizes;
-
-/* ClusterSizes.of_cells of n clusters. Scratch: `ends`, the least and the greatest x, y and height of each. */
-static void measure(const Cells *cells, const Samples *points, const float *beam_m, const i64 *cluster, i64 n_cells,
-                    i64 n, u4 (*ends)[2], const Sizes *sizes)
+/* connect, with a shift of 0, and connect_coarse, with 1: component of the cell 2^shift times as wide, of a grid
+ * of side * side, in which each of the cells lies that are used, NONE for the others. Returns how many components
+ * there are.
+ *
+ * The order of the grid, in which neighbours lie side by side in memory, is used inside alone. */
+static i64 connect(const Cells *cells, i64 n_cells, int shift, i32 side, const ClusterScratch *s, i64 *component)
 {
+    i32 used = sort_places(cells, n_cells, shift, side, s);
+    i32 n = unite_cells(cells, used, n_cells, side, s);
+    find_components(s->spans, n, side, s->next_in_row, s->parent);
+    return number_components(n_cells, n, s, component);
+}
+
+/* --------------------------------------------------------------------------------------------- clusters and parts */
+
+/* ClusterSizes of cells.py. */
+typedef struct {
+    i64 *points, *cell;                                         /* (n,) */
+    float *extent_m, *bottom_m, *top_m, *sqrt_range, *beam_m;   /* (n,) */
+    uint8_t *is_part;                                           /* (n,) */
+} ClusterSizes;
+
+/* ClusterSizes.of_cells of n clusters. `ends` is scratch, of n. */
+static void measure(const Cells *cells, const PointColumns *points, const float *beam_m, const i64 *cluster,
+                    i64 n_cells, i64 n, u4 (*ends)[2], const ClusterSizes *sizes)
+{
+    enum { LOW, HIGH };
+    enum { X, Y, Z };
     for (i64 g = 0; g < n; g++) {
-        ends[g][0] = spread(INFINITY), ends[g][1] = spread(-INFINITY);
-        sizes->points[g] = sizes->cell[g] = 0;
+        ends[g][LOW] = spread(INFINITY);
+        ends[g][HIGH] = spread(-INFINITY);
+        sizes->points[g] = 0;
+        sizes->cell[g] = 0;
     }
-    i64 part = (n_cells + 3) / 4;
-    for (i64 k = 0; k < part; k++) /* neighbours share clusters: those far apart do not wait for one another */
-        for (i64 i = k; i < n_cells; i += part) {
+    i64 stride = (n_cells + 3) / 4;
+    for (i64 k = 0; k < stride; k++) /* neighbours share clusters: those far apart do not wait for one another */
+        for (i64 i = k; i < n_cells; i += stride) {
             i64 g = cluster[i];
             PROVEN(g >= NONE && g < n);
             if (g == NONE)
                 continue;
-            f4 low = {points->x[i], points->y[i], cells->low[i]}, high = {points->x[i], points->y[i], cells->high[i]};
-            ends[g][0] = least4(low, ends[g][0]), ends[g][1] = most4(high, ends[g][1]);
+            f4 low = {points->x[i], points->y[i], cells->low[i]};
+            f4 high = {points->x[i], points->y[i], cells->high[i]};
+            ends[g][LOW] = least4(low, ends[g][LOW]);
+            ends[g][HIGH] = most4(high, ends[g][HIGH]);
             sizes->points[g] += cells->entries[i];
             sizes->cell[g] = i > sizes->cell[g] ? i : sizes->cell[g];
         }
     for (i64 g = 0; g < n; g++) {
-        float width = ends[g][1][0] - ends[g][0][0], depth = ends[g][1][1] - ends[g][0][1];
-        sizes->bottom_m[g] = ends[g][0][2], sizes->top_m[g] = ends[g][1][2];
+        float width = ends[g][HIGH][X] - ends[g][LOW][X], depth = ends[g][HIGH][Y] - ends[g][LOW][Y];
+        sizes->bottom_m[g] = ends[g][LOW][Z];
+        sizes->top_m[g] = ends[g][HIGH][Z];
         sizes->extent_m[g] = __builtin_sqrtf(width * width + depth * depth);
         sizes->sqrt_range[g] = points->sqrt_range[sizes->cell[g]];
         sizes->beam_m[g] = beam_m[sizes->cell[g]];
@@ -229,157 +361,187 @@ static void measure(const Cells *cells, const Samples *points, const float *beam
     }
 }
 
+/* CellClusterer, CellTuning and SplitTuning: values by the names that they have there. */
 typedef struct {
-    float max_gap_m, max_gap_beams, max_extent_m, min_split_m, max_split_sqrt_range, min_person_points;
-    float min_extent_m, max_person_m, min_top_m, max_top_m, min_height_m; /* of a person */
-} Rules;
+    i32 coarse_side, fine_side;
+    float max_gap_m, max_gap_beams;            /* vertical gap between connected cells */
+    float max_extent_m;                        /* of an object; a larger cluster is oversized */
+    float min_extent_m, max_split_sqrt_range;  /* of a cluster that may hold a person and more */
+    i64 min_points;                            /* of a part that is split off */
+} ClusterRules;
 
-/* CellClusterer._may_hold_person, or an oversized cluster */
-static int may_split(const Rules *r, const Sizes *s, i64 g)
+/* Oversized, or CellClusterer._may_hold_person */
+static int is_divided(const ClusterRules *r, const PersonSize *person, const ClusterSizes *s, i64 g)
 {
     return s->extent_m[g] >= r->max_extent_m ||
-           (s->extent_m[g] > r->min_split_m && s->top_m[g] > r->min_top_m &&
-            s->points[g] >= 2 * (i64)r->min_person_points && s->sqrt_range[g] < r->max_split_sqrt_range);
+           (s->extent_m[g] > r->min_extent_m && s->top_m[g] > person->min_top_m &&
+            s->points[g] >= 2 * r->min_points && s->sqrt_range[g] < r->max_split_sqrt_range);
 }
 
-/* CellClusterer._may_be_person */
-static int may_be_person(const Rules *r, const Sizes *s, i64 g)
+/* Sizes from cluster n on */
+static ClusterSizes sizes_from(const ClusterSizes *s, i64 n)
 {
-    return s->points[g] >= (i64)r->min_person_points && s->extent_m[g] > r->min_extent_m &&
-           s->extent_m[g] < r->max_person_m && s->top_m[g] > r->min_top_m && s->top_m[g] < r->max_top_m &&
-           s->top_m[g] - s->bottom_m[g] > r->min_height_m;
+    return (ClusterSizes){.points = s->points + n,
+                          .cell = s->cell + n,
+                          .extent_m = s->extent_m + n,
+                          .bottom_m = s->bottom_m + n,
+                          .top_m = s->top_m + n,
+                          .sqrt_range = s->sqrt_range + n,
+                          .beam_m = s->beam_m + n,
+                          .is_part = s->is_part + n};
 }
 
-/* CellClusterer.cluster: cluster of each cell; returns how many there are. There is room for the sizes of 2 n_cells.
- * Scratch: `work`, of 2 fine_side + 15 n_cells + 8. */
-EXPORT i64 modt_cluster(const Rules *rules, const Cells *cells, const Samples *points, const float *beam_m,
-                        i64 n_cells, i32 coarse_side, i32 fine_side, i32 *work, i64 *cluster, const Sizes *sizes)
+/* CellClusterer.cluster: cluster of each cell, given one point of each and the distance of beams there. Returns
+ * how many clusters there are; there is room for the sizes of 2 n_cells. */
+EXPORT i64 modt_cluster(const ClusterRules *rules, const PersonSize *person, const Cells *cells,
+                        const PointColumns *sampled, const float *beam_m, i64 n_cells, void *memory, i64 *cluster,
+                        const ClusterSizes *sizes)
 {
-    i64 *part = (i64 *)work; /* 2 n_cells; then 10 n_cells + 8 and two sides for connect, of which measure takes 8 */
-    i32 *next = work + 2 * n_cells, *number = next + 2 * fine_side + 10 * n_cells + 8;
-    float *gap_m = (float *)(number + n_cells);
-    u4 (*ends)[2] = (u4 (*)[2])next;
-    uint8_t *use = (uint8_t *)(gap_m + n_cells);
+    ClusterScratch scratch, *s = &scratch;
+    place_scratch(n_cells, rules->fine_side, memory, s);
+
+    /* 1. Clusters on the coarse grid. */
     for (i64 i = 0; i < n_cells; i++) {
-        gap_m[i] = rules->max_gap_m + rules->max_gap_beams * beam_m[i];
-        use[i] = 1;
+        s->max_gap_m[i] = rules->max_gap_m + rules->max_gap_beams * beam_m[i];
+        s->use[i] = 1;
     }
-    i64 n = connect(cells, gap_m, use, n_cells, 1, coarse_side, next, cluster);
-    measure(cells, points, beam_m, cluster, n_cells, n, ends, sizes);
+    i64 n = connect(cells, n_cells, 1, rules->coarse_side, s, cluster);
+    measure(cells, sampled, beam_m, cluster, n_cells, n, s->ends, sizes);
+
+    /* 2. Parts, on the fine grid, of those that are oversized or may hold a person and more. */
     for (i64 g = 0; g < n; g++)
-        number[g] = may_split(rules, sizes, g);
+        s->number[g] = is_divided(rules, person, sizes, g);
     for (i64 i = 0; i < n_cells; i++)
-        use[i] = (uint8_t)number[cluster[i]];
-    i64 parts = connect(cells, gap_m, use, n_cells, 0, fine_side, next, part);
-    Sizes own = {sizes->points + n,     sizes->cell + n,   sizes->extent_m + n, sizes->bottom_m + n, sizes->top_m + n,
-                 sizes->sqrt_range + n, sizes->beam_m + n, sizes->is_part + n};
-    measure(cells, points, beam_m, part, n_cells, parts, ends, &own);
-    for (i64 p = 0; p < parts; p++) {
-        i64 owner = cluster[own.cell[p]];
-        own.is_part[p] = sizes->extent_m[owner] >= rules->max_extent_m;
-        number[p] = own.is_part[p] || may_be_person(rules, &own, p) ? (i32)(n + p) : NONE;
-        own.points[p] = number[p] == NONE ? 0 : own.points[p];
-        sizes->points[owner] -= own.points[p];
+        s->use[i] = (uint8_t)s->number[cluster[i]];
+    i64 n_parts = connect(cells, n_cells, 0, rules->fine_side, s, s->part);
+    ClusterSizes parts = sizes_from(sizes, n);
+    measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
+
+    /* 3. Parts of oversized clusters, and those of a person's size, leave their clusters; the others stay, and are
+     * empty. */
+    for (i64 p = 0; p < n_parts; p++) {
+        i64 whole = cluster[parts.cell[p]];
+        parts.is_part[p] = sizes->extent_m[whole] >= rules->max_extent_m;
+        int fits = fits_person(person, parts.extent_m[p], parts.bottom_m[p], parts.top_m[p]);
+        int leaves = parts.is_part[p] || (fits && parts.points[p] >= rules->min_points);
+        s->number[p] = leaves ? (i32)(n + p) : NONE;
+        parts.points[p] = leaves ? parts.points[p] : 0;
+        sizes->points[whole] -= parts.points[p];
     }
     for (i64 i = 0; i < n_cells; i++)
-        if (part[i] != NONE && number[part[i]] != NONE)
-            cluster[i] = number[part[i]];
-    return n + parts;
+        if (s->part[i] != NONE && s->number[s->part[i]] != NONE)
+            cluster[i] = s->number[s->part[i]];
+    return n + n_parts;
 }
 
-/* view_bounds: bounds of n clusters of cells in direction, range, height and elevation, and their scale; `number` of a
- * cluster is its place among the n, or NONE. `height` is that of the points, of which those sampled are at `sample`. */
-EXPORT void modt_view_bounds(const Cells *cells, const Samples *sampled, const float *height, const i64 *sample,
-                             const i64 *cluster, i64 n_cells, const i64 *number, i64 n, float *const bounds[8],
-                             float *scale_m)
+/* ---------------------------------------------------------------------------------------------- strips of one car */
+
+enum { DIRECTION, RANGE, HEIGHT, ELEVATION, VIEW }; /* rows of the bounds, as in strips.py, and how many they are */
+
+/* ViewBounds of strips.py. */
+typedef struct {
+    float *min[4], *max[4]; /* (n,) each */
+    float *scale_m;         /* (n,) */
+} ViewBounds;
+
+/* view_bounds: bounds of n strips, given the number of each cluster among them, or NONE. `height` is that of the
+ * points, of which those sampled are at `sample`. */
+EXPORT void modt_view_bounds(const Cells *cells, const PointColumns *sampled, const float *height, const i64 *sample,
+                             const i64 *cluster_of_cell, i64 n_cells, const i64 *strip_of_cluster, i64 n,
+                             const ViewBounds *bounds)
 {
-    float *const *low = bounds, *const *high = bounds + 4;
-    for (int v = 0; v < 4; v++)
+    for (int v = 0; v < VIEW; v++)
         for (i64 g = 0; g < n; g++) {
-            low[v][g] = INFINITY;
-            high[v][g] = -INFINITY;
+            bounds->min[v][g] = INFINITY;
+            bounds->max[v][g] = -INFINITY;
         }
-    for (i64 i = n_cells - 1; i >= 0; i--) { /* backwards: the scale is that of the first cell */
-        i64 g = number[cluster[i]];
+    for (i64 i = n_cells - 1; i >= 0; i--) { /* backwards: the scale that stays is that of the first cell */
+        i64 g = strip_of_cluster[cluster_of_cell[i]];
         PROVEN(g >= NONE && g < n);
         if (g == NONE)
             continue;
-        float x = sampled->x[i], y = sampled->y[i], across = magnitude(x) + magnitude(y);
-        float turn = y / most(across, 1e-6f), range_m = sampled->sqrt_range[i] * sampled->sqrt_range[i];
-        float ground = sampled->z[i] - height[sample[i]];
-        float least_of[4] = {(x < 0.0f ? 2.0f - turn : turn) + 1.0f, range_m, cells->low[i],
-                             (cells->low[i] + ground) / range_m};
-        float most_of[4] = {least_of[0], range_m, cells->high[i], (cells->high[i] + ground) / range_m};
-        for (int v = 0; v < 4; v++) {
-            low[v][g] = least(least_of[v], low[v][g]);
-            high[v][g] = most(most_of[v], high[v][g]);
+        float x = sampled->x[i], y = sampled->y[i];
+        float direction = pseudo_angle(x, y), range_m = sampled->sqrt_range[i] * sampled->sqrt_range[i];
+        float ground = sampled->z[i] - height[sample[i]], low = cells->low[i], high = cells->high[i];
+        float least_of[VIEW] = {direction, range_m, low, (low + ground) / range_m};
+        float most_of[VIEW] = {direction, range_m, high, (high + ground) / range_m};
+        for (int v = 0; v < VIEW; v++) {
+            bounds->min[v][g] = least(least_of[v], bounds->min[v][g]);
+            bounds->max[v][g] = most(most_of[v], bounds->max[v][g]);
         }
-        scale_m[g] = across * across / range_m;
+        float across = magnitude(x) + magnitude(y);
+        bounds->scale_m[g] = across * across / range_m;
     }
 }
 
+/* StripTuning: values by the names that they have there. */
 typedef struct {
-    float max_gap_m, min_gap_beams, max_gap_beams, min_width_m, max_width_m, min_top_m, max_top_m, max_bottom_m;
-    float max_diagonal_m, max_person_width_m, min_person_top_m, min_person_height_m;
-} Strips;
+    float max_diagonal_m, min_width_m, max_width_m, min_top_m, max_top_m, max_bottom_m;
+    float max_gap_m, min_gap_beams, max_gap_beams;
+} StripRules;
 
-enum { DIRECTION, RANGE, HEIGHT, ELEVATION, VIEW }; /* rows of the least values, then of the greatest */
-
-/* ViewBounds.width_m and strips.fits, of one cluster or of two; `b` may be `a` */
-static inline float width_of(float *const bounds[8], const float *scale_m, i64 a, i64 b)
+/* ViewBounds.width_m of strips a and b together, at the scale of a; b may be a */
+static inline float width_of(const ViewBounds *bounds, i64 a, i64 b)
 {
-    float right = least(bounds[DIRECTION][a], bounds[DIRECTION][b]);
-    return (most(bounds[VIEW + DIRECTION][a], bounds[VIEW + DIRECTION][b]) - right) * scale_m[a];
+    float right = least(bounds->min[DIRECTION][a], bounds->min[DIRECTION][b]);
+    float left = most(bounds->max[DIRECTION][a], bounds->max[DIRECTION][b]);
+    return (left - right) * bounds->scale_m[a];
 }
 
-static inline int fits(const Strips *s, float *const bounds[8], const float *scale_m, i64 a, i64 b)
+/* strips.fits, of strips a and b together; b may be a */
+static inline int fits(const StripRules *r, const ViewBounds *bounds, i64 a, i64 b)
 {
-    float width = width_of(bounds, scale_m, a, b), near = least(bounds[RANGE][a], bounds[RANGE][b]);
-    float depth = most(bounds[VIEW + RANGE][a], bounds[VIEW + RANGE][b]) - near;
-    return width * width + depth * depth < s->max_diagonal_m * s->max_diagonal_m && width < s->max_width_m &&
-           most(bounds[VIEW + HEIGHT][a], bounds[VIEW + HEIGHT][b]) < s->max_top_m;
+    float width = width_of(bounds, a, b), near = least(bounds->min[RANGE][a], bounds->min[RANGE][b]);
+    float depth = most(bounds->max[RANGE][a], bounds->max[RANGE][b]) - near;
+    float top = most(bounds->max[HEIGHT][a], bounds->max[HEIGHT][b]);
+    return width * width + depth * depth < r->max_diagonal_m * r->max_diagonal_m && width < r->max_width_m &&
+           top < r->max_top_m;
 }
 
-static inline int person_like(const Strips *s, float *const bounds[8], const float *scale_m, i64 a)
+static inline int may_be_person(const PersonSize *person, const ViewBounds *bounds, i64 a)
 {
-    float top = bounds[VIEW + HEIGHT][a];
-    return width_of(bounds, scale_m, a, a) < s->max_person_width_m && top > s->min_person_top_m &&
-           top - bounds[HEIGHT][a] > s->min_person_height_m;
+    return fits_person(person, width_of(bounds, a, a), bounds->min[HEIGHT][a], bounds->max[HEIGHT][a]);
 }
 
-/* Of strips.pairs; `a` is not farther than `b` */
-static int one_car(const Strips *s, float *const bounds[8], const float *scale_m, const float *beam_rad, i64 a, i64 b)
+/* Whether two strips that overlap in direction are a pair of strips.pairs; `near` is not farther than `far` */
+static int one_car(const StripRules *r, const PersonSize *person, const ViewBounds *bounds, const float *beam_rad,
+                   i64 near, i64 far)
 {
-    float beams = (bounds[ELEVATION][b] - bounds[VIEW + ELEVATION][a]) / beam_rad[b];
-    return bounds[RANGE][b] - bounds[VIEW + RANGE][a] < s->max_gap_m && beams > s->min_gap_beams &&
-           beams < s->max_gap_beams && !person_like(s, bounds, scale_m, a) && !person_like(s, bounds, scale_m, b) &&
-           fits(s, bounds, scale_m, a, b) && width_of(bounds, scale_m, a, b) > s->min_width_m &&
-           most(bounds[VIEW + HEIGHT][a], bounds[VIEW + HEIGHT][b]) > s->min_top_m &&
-           least(bounds[HEIGHT][a], bounds[HEIGHT][b]) < s->max_bottom_m;
+    float gap_beams = (bounds->min[ELEVATION][far] - bounds->max[ELEVATION][near]) / beam_rad[far];
+    return bounds->min[RANGE][far] - bounds->max[RANGE][near] < r->max_gap_m && gap_beams > r->min_gap_beams &&
+           gap_beams < r->max_gap_beams && !may_be_person(person, bounds, near) &&
+           !may_be_person(person, bounds, far) && fits(r, bounds, near, far) &&
+           width_of(bounds, near, far) > r->min_width_m &&
+           most(bounds->max[HEIGHT][near], bounds->max[HEIGHT][far]) > r->min_top_m &&
+           least(bounds->min[HEIGHT][near], bounds->min[HEIGHT][far]) < r->max_bottom_m;
 }
 
-/* merge_strips: first of the clusters that make one car with each of n; `order` is that of their least directions.
- * Scratch: `parent`, and bounds of cars. */
-EXPORT void modt_merge_strips(const Strips *s, float *const bounds[8], const float *scale_m, const float *beam_rad,
-                              i64 n, const i64 *order, i32 *parent, float *const cars[8], i64 *target)
+/* merge_strips: first of the strips that make one car with each of n. `order` is that of their least directions,
+ * in which the strips that overlap one in direction follow it. Scratch: `parent`, and the bounds of the cars, each
+ * at its first. */
+EXPORT void modt_merge_strips(const StripRules *r, const PersonSize *person, const ViewBounds *bounds,
+                              const float *beam_rad, i64 n, const i64 *order, i32 *parent, const ViewBounds *cars,
+                              i64 *target)
 {
     for (i64 g = 0; g < n; g++)
         parent[g] = (i32)g;
     for (i64 k = 0; k < n; k++)
-        for (i64 other = k + 1; other < n; other++) {
-            i64 a = order[k], b = order[other], swap = bounds[RANGE][b] < bounds[RANGE][a];
-            if (!(bounds[DIRECTION][b] <= bounds[VIEW + DIRECTION][a]))
+        for (i64 later = k + 1; later < n; later++) {
+            i64 a = order[k], b = order[later];
+            if (!(bounds->min[DIRECTION][b] <= bounds->max[DIRECTION][a]))
                 break;
-            if (one_car(s, bounds, scale_m, beam_rad, swap ? b : a, swap ? a : b))
+            int swap = bounds->min[RANGE][b] < bounds->min[RANGE][a];
+            if (one_car(r, person, bounds, beam_rad, swap ? b : a, swap ? a : b))
                 join(parent, (i32)a, (i32)b);
         }
     for (i64 g = 0; g < n; g++) {
         i32 first = parent[g] = parent[parent[g]];
         for (int v = 0; v < VIEW; v++) {
-            cars[v][first] = first == g ? bounds[v][g] : least(bounds[v][g], cars[v][first]);
-            cars[VIEW + v][first] = first == g ? bounds[VIEW + v][g] : most(bounds[VIEW + v][g], cars[VIEW + v][first]);
+            cars->min[v][first] = first == g ? bounds->min[v][g] : least(bounds->min[v][g], cars->min[v][first]);
+            cars->max[v][first] = first == g ? bounds->max[v][g] : most(bounds->max[v][g], cars->max[v][first]);
         }
+        cars->scale_m[first] = bounds->scale_m[first];
     }
     for (i64 g = 0; g < n; g++)
-        target[g] = fits(s, cars, scale_m, parent[g], parent[g]) ? parent[g] : g;
+        target[g] = fits(r, cars, parent[g], parent[g]) ? parent[g] : g;
 }

@@ -1,65 +1,120 @@
-/* Points above the ground: GroundEstimator, with the columns and cells that it starts from. */
+/* Points above the ground: GroundEstimator, CeilingFinder.histogram and Kernels.above_ground in one go.
+ *
+ * Order of the passes of a sweep of n points:
+ *   1. place_points    columns of the points, and the cell of each on the polar grid
+ *   2. find_ends       lowest return of each cell that can be ground, and highest return of each cell
+ *   3. trace           which cells are ground, ring by ring from the sensor outwards, all rays at once
+ *   4. interpolate     surface of the ground, ring by ring inwards
+ *   5. smooth          medians across the rays: the ground under a vehicle is that beside it
+ *   6. keep_points     points within bounds, with their heights, and the histogram of those heights
+ * Passes 1, 2 and 6 go by blocks of points that stay in the first-level cache. A value a cell stands at
+ * ring * sectors + sector; the cell after the last stands for the points out of bounds of range.
+ */
 #include "kernels.h"
 
+/* GroundEstimator, GroundTuning, PolarGrid, CeilingTuning and Bounds: values by the names that they have there. */
 typedef struct {
-    i32 rings, sectors, sector_bits, flank_sectors, bonnet_ring;
-    float far_m, ring_scale, sector_scale;
-    float min_sqrt_range, max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
-    float upper_m, bin_m;
+    const float *range_m, *flat_m; /* (rings,) middle; height range of a cell above which something stands in it */
+    i32 rings, sectors, flank_sectors, bonnet_ring; /* sectors are a power of two */
+    float far_m;                                    /* points as far away have no position */
+    float rings_per_unit;                           /* of the square root of range */
+    float max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
+    float above_m, bin_m;                                            /* begin and width of the bins of heights */
+    float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
 } Ground;
 
-/* Scratch of the caller: rings * sectors each and one more, then one a point. */
+/* Scratch: a value a cell, a value a ray, and a value a point. */
 typedef struct {
-    float *lowest, *surface, *near, (*ends)[2];
-    uint8_t *kind;
-    float *z, *sqrt_range;
-    i32 *cell;
-} Scratch;
+    float *lowest, *surface, *range_before; /* (cells,) range_before: of the ground cell before each cell [m] */
+    float (*ends)[2];                       /* (cells,) lowest return, and the highest, negated, side by side */
+    uint8_t *kind;                          /* (cells,) flags of Kind */
+    float *rays;                            /* (4 * sectors,) */
+    float *z, *sqrt_range;                  /* (n,) */
+    i32 *cell;                              /* (n,) */
+} GroundScratch;
 
-enum { BLOCK = 512, GROUP = 8 }; /* points in the first-level cache, points kept or left out together */
+/* Places the scratch for n points at `memory`; returns its size in bytes. */
+static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
+{
+    uintptr_t end = (uintptr_t)memory;
+    i64 cells = (i64)g->rings * g->sectors + 1;
+    TAKE(s->lowest, cells);
+    TAKE(s->surface, cells);
+    TAKE(s->range_before, cells);
+    TAKE(s->ends, cells);
+    TAKE(s->kind, cells);
+    TAKE(s->rays, 4 * g->sectors);
+    TAKE(s->z, n);
+    TAKE(s->sqrt_range, n);
+    TAKE(s->cell, n);
+    return (i64)(end - (uintptr_t)memory);
+}
 
-/* x, y and z of n points. */
-static ALWAYS_INLINE void take_columns(const u4 *points, i64 n, float *restrict x, float *restrict y, float *restrict z)
+EXPORT i64 modt_ground_scratch(const Ground *g, i64 n)
+{
+    GroundScratch s;
+    return place_scratch(g, n, 0, &s);
+}
+
+typedef struct {
+    i64 *rows;      /* (room,) of the points kept; room for one more than there are points */
+    float *kept[5]; /* (room,) x, y, z, square root of range, and height above ground */
+    i64 *histogram; /* (bins,) of the heights */
+} AboveGround;
+
+enum { BLOCK = 512, GROUP = 8 }; /* points in the first-level cache; points kept or left out together */
+/* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */
+typedef enum { GROUND = 1, STEEP = 2, RAMP = 4 } Kind;
+
+/* The x, y and z of n points, four at a time: a 4x4 transposition without its last row. */
+static ALWAYS_INLINE void take_columns(const u4 *points, i64 n, float *restrict x, float *restrict y,
+                                       float *restrict z)
 {
     i64 i = 0;
     for (; i + 4 <= n; i += 4) {
-        const u4 *own = points + i;
-        __builtin_prefetch(own + BLOCK); /* the processor itself looks ahead within a page only */
-        u4 xy[2] = {MIXED(own[0], own[1], 0, 4, 1, 5), MIXED(own[2], own[3], 0, 4, 1, 5)};
-        *(u4 *)(x + i) = MIXED(xy[0], xy[1], 0, 1, 4, 5);
-        *(u4 *)(y + i) = MIXED(xy[0], xy[1], 2, 3, 6, 7);
-        *(u4 *)(z + i) = MIXED(MIXED(own[0], own[1], 2, 6, 2, 6), MIXED(own[2], own[3], 2, 6, 2, 6), 0, 1, 4, 5);
+        const u4 *four = points + i;
+        __builtin_prefetch(four + BLOCK); /* the processor itself looks ahead within a page only */
+        u4 xy01 = MIXED(four[0], four[1], 0, 4, 1, 5);
+        u4 xy23 = MIXED(four[2], four[3], 0, 4, 1, 5);
+        u4 z01 = MIXED(four[0], four[1], 2, 6, 2, 6);
+        u4 z23 = MIXED(four[2], four[3], 2, 6, 2, 6);
+        *(u4 *)(x + i) = MIXED(xy01, xy23, 0, 1, 4, 5);
+        *(u4 *)(y + i) = MIXED(xy01, xy23, 2, 3, 6, 7);
+        *(u4 *)(z + i) = MIXED(z01, z23, 0, 1, 4, 5);
     }
-    for (; i < n; i++)
-        x[i] = points[i][0], y[i] = points[i][1], z[i] = points[i][2];
+    for (; i < n; i++) {
+        x[i] = points[i][0];
+        y[i] = points[i][1];
+        z[i] = points[i][2];
+    }
 }
 
-/* PointColumns.from_array and PolarGrid.cell, of up to BLOCK points; those that are not finite, or as far as far_m,
- * are taken to the sensor. */
+/* PointColumns.from_array and PolarGrid.cell, of up to BLOCK points: z, square root of range, and cell of each.
+ * Points that are not finite, or as far as far_m, are taken to the sensor. */
 static void place_points(const Ground *g, const u4 *points, i64 n, float *restrict z, float *restrict sqrt_range,
                          i32 *restrict cell)
 {
     float x[BLOCK], y[BLOCK];
-    float last = (float)(g->rings - 1);
-    i32 bits = g->sector_bits, mask = (1 << bits) - 1;
+    float far_m = g->far_m, last_ring = (float)(g->rings - 1);
+    float sectors_per_unit = (float)g->sectors / 4.0f; /* of the pseudo-angle */
+    i32 bits = __builtin_ctz((unsigned)g->sectors), mask = g->sectors - 1;
     take_columns(points, n, x, y, z);
     for (i64 i = 0; i < n; i++) {
-        float far = g->far_m;
-        int near = (magnitude(x[i]) < far) & (magnitude(y[i]) < far) & (magnitude(z[i]) < far); /* not for NaN */
-        float here_x = near ? x[i] : 0.0f, here_y = near ? y[i] : 0.0f;
-        z[i] = near ? z[i] : 0.0f;
+        /* not a number is not below */
+        int known = (magnitude(x[i]) < far_m) & (magnitude(y[i]) < far_m) & (magnitude(z[i]) < far_m);
+        float here_x = known ? x[i] : 0.0f, here_y = known ? y[i] : 0.0f;
+        z[i] = known ? z[i] : 0.0f;
         sqrt_range[i] = __builtin_sqrtf(__builtin_sqrtf(here_x * here_x + here_y * here_y));
-        i32 ring = (i32)least(sqrt_range[i] * g->ring_scale, last);
-        float turn = here_y / most(magnitude(here_x) + magnitude(here_y), 1e-6f);
-        turn = (here_x < 0.0f ? 2.0f - turn : turn) + 1.0f;
-        cell[i] = (ring << bits) + ((i32)(turn * g->sector_scale) & mask);
+        i32 ring = (i32)least(sqrt_range[i] * g->rings_per_unit, last_ring);
+        i32 sector = (i32)(pseudo_angle(here_x, here_y) * sectors_per_unit) & mask;
+        cell[i] = (ring << bits) + sector;
     }
 }
 
-/* GroundEstimator._lowest, of up to BLOCK points, and the highest of all points, negated: side by side in memory. Then
- * the cell of points out of bounds of range is `outside`. */
-static void find_ends(const Ground *g, float height_m, const float bounds[4], i64 n, const float *z,
-                      const float *sqrt_range, i32 *cell, float (*ends)[2])
+/* GroundEstimator._lowest and the maxima of _stands, of up to BLOCK points. Afterwards the cell of points out of
+ * bounds of range is the one after the last. */
+static void find_ends(const Ground *g, float height_m, i64 n, const float *z, const float *sqrt_range, i32 *cell,
+                      float (*ends)[2])
 {
     enum { APART = BLOCK / 8 };
     float candidate[BLOCK][2];
@@ -73,36 +128,39 @@ static void find_ends(const Ground *g, float height_m, const float bounds[4], i6
     for (i64 k = 0; k < APART; k++) /* neighbours share cells: those far apart do not wait for one another */
         for (i64 i = k; i < n; i += APART) {
             PROVEN(cell[i] >= 0 && cell[i] < outside);
-            float *own = ends[cell[i]];
-            own[0] = least(candidate[i][0], own[0]);
-            own[1] = least(candidate[i][1], own[1]);
+            float *of_cell = ends[cell[i]];
+            of_cell[0] = least(candidate[i][0], of_cell[0]);
+            of_cell[1] = least(candidate[i][1], of_cell[1]);
         }
-    for (i64 i = 0; i < n; i++)
-        cell[i] = (sqrt_range[i] > bounds[2]) & (sqrt_range[i] < bounds[3]) ? cell[i] : outside;
+    for (i64 i = 0; i < n; i++) {
+        int used = (sqrt_range[i] > g->min_sqrt_range) & (sqrt_range[i] < g->max_sqrt_range);
+        cell[i] = used ? cell[i] : outside;
+    }
 }
 
-enum { GROUND = 1, STEEP = 2, RAMP = 4 }; /* of a cell: is ground, its ray rises or falls, so does one beside it */
-
-/* A ring of GroundEstimator.trace, with the cells of the ring and the last ground cell of each ray, whose height and range
- * are left in `surface` and `near`. Something stands in a cell if its highest return lies flat_m above the lowest. */
-static void trace_ring(const Ground *g, float range_m, float flat_m, float (*restrict ends)[2], float *restrict lowest,
-                       uint8_t *restrict kind, float *restrict height, float *restrict at, float *restrict slope,
-                       const float *restrict bend_m, float *restrict surface, float *restrict near)
+/* _Rays.advance for one ring, with the cells of the ring and the last ground cell of each ray. Height and range of
+ * that cell are left in `surface` and `range_before`. Something stands in a cell if its highest return lies flat_m
+ * above the lowest. */
+static void trace_ring(const Ground *g, float range_m, float flat_m, float (*restrict ends)[2],
+                       float *restrict lowest, uint8_t *restrict kind, float *restrict height, float *restrict range,
+                       float *restrict slope, const float *restrict rise_range_m, float *restrict surface,
+                       float *restrict range_before)
 {
-    const Ground c = *g;
+    const Ground c = *g; /* a copy, which no store through a pointer can change */
     for (i32 k = 0; k < c.sectors; k++) {
         lowest[k] = ends[k][0];
-        float gap = range_m - at[k], reach = least(gap, c.max_gap_m);
-        float rise = lowest[k] - height[k], off = rise - slope[k] * reach;
+        float gap = range_m - range[k];
+        float rise = lowest[k] - height[k];
+        float residual = rise - slope[k] * least(gap, c.max_gap_m);
         float flat = -ends[k][1] > lowest[k] + flat_m ? 0.0f : 1.0f;
-        float bound = least(gap, bend_m[k]) * c.max_slope * flat + c.noise_m;
-        int found = (off < bound) & (off > -(gap * c.max_slope + c.noise_m));
+        float bound = least(gap, rise_range_m[k]) * c.max_slope * flat + c.noise_m;
+        int found = (residual < bound) & (residual > -(gap * c.max_slope + c.noise_m));
         float newest = slope[k] + c.slope_gain * (rise / gap - slope[k]);
         newest = least(most(newest, -c.max_slope), c.max_slope);
         surface[k] = height[k] = found ? lowest[k] : height[k];
-        near[k] = at[k] = found ? range_m : at[k];
+        range_before[k] = range[k] = found ? range_m : range[k];
         slope[k] = found ? newest : slope[k];
-        kind[k] = (uint8_t)(found | (magnitude(slope[k]) > c.ramp_slope) << 1);
+        kind[k] = (uint8_t)(found | (magnitude(slope[k]) > c.ramp_slope) << 1); /* GROUND, STEEP */
     }
 }
 
@@ -114,64 +172,69 @@ static void close_round(const void *row, i64 step, i64 size, void *round)
     __builtin_memcpy((char *)round + step + size, row, step);
 }
 
-/* GroundEstimator.trace; `ray` holds height, range and slope of the last ground cell of each ray, and how far
- * from it the ground may rise by max_slope */
-static void trace(const Ground *g, float height_m, const float *range_m, const float *flat_m, Scratch *s, float *ray)
+/* GroundEstimator.trace. Height, range and slope of the last ground cell of each ray, and the range over which the
+ * ground may rise by max_slope from there, are the rows of `rays`. */
+static void trace(const Ground *g, float height_m, const GroundScratch *s)
 {
     i32 sectors = g->sectors, flank = g->flank_sectors;
-    float *height = ray, *at = ray + sectors, *slope = ray + 2 * sectors, *bend_m = ray + 3 * sectors;
+    float *height = s->rays, *range = height + sectors, *slope = range + sectors, *rise_range_m = slope + sectors;
     float near_m = g->near_m, max_gap_m = g->max_gap_m;
     for (i32 k = 0; k < sectors; k++) {
         height[k] = -height_m;
-        at[k] = slope[k] = 0.0f;
-        bend_m[k] = near_m;
+        range[k] = 0.0f;
+        slope[k] = 0.0f;
+        rise_range_m[k] = near_m;
     }
     for (i32 ring = 0; ring < g->rings; ring++) {
         i32 row = ring * sectors;
-        uint8_t *kind = s->kind + row, *round = (uint8_t *)(s->ends + row); /* the ends are needed no more */
-        trace_ring(g, range_m[ring], flat_m[ring], s->ends + row, s->lowest + row, kind, height, at, slope, bend_m,
-                   s->surface + row, s->near + row);
+        uint8_t *kind = s->kind + row;
+        uint8_t *round = (uint8_t *)(s->ends + row); /* the ends of this ring are needed no more */
+        trace_ring(g, g->range_m[ring], g->flat_m[ring], s->ends + row, s->lowest + row, kind, height, range, slope,
+                   rise_range_m, s->surface + row, s->range_before + row);
         close_round(kind, flank, sectors, round);
         for (i32 k = 0; k < sectors; k++) {
             i32 steep = (round[k] | round[k + flank] | round[k + 2 * flank]) & STEEP;
-            kind[k] = (uint8_t)(kind[k] | steep << 1);
-            bend_m[k] = steep ? max_gap_m : near_m;
+            kind[k] = (uint8_t)(kind[k] | steep << 1); /* RAMP */
+            rise_range_m[k] = steep ? max_gap_m : near_m;
         }
     }
 }
 
-/* A ring of GroundEstimator._interpolate, given the ground cell before each cell, whose height is in `surface`, the one
- * after the ring, at NONE without any, and the slope on which a ray goes on. */
-static void blend(const Ground *g, const float *range_of, i32 ring, const uint8_t *restrict kind, float *restrict value,
-                  float *restrict at, const float *restrict slope, const float *restrict lowest,
-                  float *restrict surface, const float *restrict near)
+/* A ring of GroundEstimator._interpolate. The ground cell before each cell is in `surface` and `range_before`; the
+ * one after it, in `height` and `range`, is updated with the cells of this ring. NONE as its range means that
+ * there is none, and the ray goes on with `slope`. */
+static void blend(const Ground *g, i32 ring, const uint8_t *restrict kind, float *restrict height,
+                  float *restrict range, const float *restrict slope, const float *restrict lowest,
+                  float *restrict surface, const float *restrict range_before)
 {
-    const Ground c = *g;
-    float range_m = range_of[ring], first_m = range_of[0];
+    const Ground c = *g; /* a copy, which no store through a pointer can change */
+    float range_m = c.range_m[ring], first_m = c.range_m[0];
     for (i32 k = 0; k < c.sectors; k++) {
-        float from = surface[k], from_at = most(near[k], first_m), since = range_m - from_at;
-        float after = value[k], after_at = at[k];
-        value[k] = after = kind[k] & GROUND ? from : after;
-        at[k] = after_at = kind[k] & GROUND ? range_m : after_at;
-        float between = from + (after - from) * (since / most(after_at - from_at, 1e-3f));
+        float from = surface[k], from_range = most(range_before[k], first_m);
+        float to = height[k], to_range = range[k];
+        height[k] = to = kind[k] & GROUND ? from : to;
+        range[k] = to_range = kind[k] & GROUND ? range_m : to_range;
+        float since = range_m - from_range;
+        float between = from + (to - from) * (since / most(to_range - from_range, 1e-3f));
         float ramp = from + slope[k] * least(since, c.max_gap_m);
-        surface[k] = after_at < 0.0f ? least(ramp, most(lowest[k], from)) : between; /* a ramp rises above no return */
+        float beyond = least(ramp, most(lowest[k], from)); /* a ramp rises above no return */
+        surface[k] = to_range < 0.0f ? beyond : between;
     }
 }
 
-/* GroundEstimator._interpolate: linear from the ground cell before each cell to the one after it, or on with the
- * slope of its ramp; `ray` comes from trace */
-static void interpolate(const Ground *g, const float *range_m, Scratch *s, float *ray)
+/* GroundEstimator._interpolate, from the last ring inwards: linear from the ground cell before each cell to the
+ * one after it, or on with the slope of its ramp. `rays` comes from trace. */
+static void interpolate(const Ground *g, const GroundScratch *s)
 {
     i32 sectors = g->sectors;
-    float *value = ray, *at = ray + sectors, *slope = ray + 2 * sectors;
+    float *height = s->rays, *range = height + sectors, *slope = range + sectors;
     for (i32 k = 0; k < sectors; k++) {
         s->kind[k] |= GROUND; /* the foot of the sensor */
-        at[k] = NONE;
+        range[k] = NONE;
         slope[k] = magnitude(slope[k]) > g->ramp_slope ? slope[k] : 0.0f;
     }
     for (i32 ring = g->rings - 1, row = ring * sectors; ring >= 0; ring--, row -= sectors)
-        blend(g, range_m, ring, s->kind + row, value, at, slope, s->lowest + row, s->surface + row, s->near + row);
+        blend(g, ring, s->kind + row, height, range, slope, s->lowest + row, s->surface + row, s->range_before + row);
 }
 
 /* _median_across, in a row of cells; `round` is scratch. */
@@ -179,80 +242,91 @@ static void median_across(i32 sectors, i32 step, const float *row, float *restri
 {
     close_round(row, step * sizeof *row, sectors * sizeof *row, round);
     for (i32 k = 0; k < sectors; k++) {
-        float left = round[k], own = round[k + step], right = round[k + 2 * step];
-        median[k] = most(least(left, own), least(most(left, own), right));
+        float left = round[k], here = round[k + step], right = round[k + 2 * step];
+        median[k] = most(least(left, here), least(most(left, here), right));
     }
 }
 
-/* Kernels.above_ground, of up to BLOCK points: the rows of those between bounds of height, their x, y, z, square root of
- * range, and height, written from `count` on, where there is room for one more; returns how many there are then. */
-static i64 keep_points(const Scratch *s, const u4 *points, i64 start, i64 n, const float bounds[4], i64 count,
-                       i64 *rows, float *const kept[5])
+/* The end of GroundEstimator.height_above: medians across the rays, and the ground beside what stands on it. */
+static void smooth(const Ground *g, const GroundScratch *s)
+{
+    i32 sectors = g->sectors, cells = g->rings * sectors;
+    float *median = s->rays, *beside = median + sectors, *round = beside + sectors; /* the last has two rows */
+    for (i32 row = 0; row < cells; row += sectors) {
+        float *surface = s->surface + row;
+        median_across(sectors, 1, surface, round, median);
+        median_across(sectors, g->flank_sectors, median, round, beside);
+        for (i32 k = 0; k < sectors; k++) {
+            int on_ramp = s->kind[row + k] & RAMP;
+            int hidden = on_ramp ? median[k] < beside[k] : median[k] - beside[k] > g->flank_m;
+            surface[k] = hidden ? beside[k] : median[k];
+        }
+    }
+}
+
+/* Kernels.above_ground, of up to BLOCK points from `start` on: those within bounds of height are written from
+ * `count` on, where there is room for one more. Returns how many there are then. */
+static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points, i64 start, i64 n, i64 count,
+                       const AboveGround *out)
 {
     const uint64_t all = 0x0101010101010101;
-    float height[BLOCK], low = bounds[0], high = bounds[1];
-    uint8_t kept_here[BLOCK + GROUP] = {0};
+    float height[BLOCK], low = g->min_height_m, high = g->max_height_m;
+    float *const *kept = out->kept;
+    uint8_t is_kept[BLOCK + GROUP] = {0};
     for (i64 i = 0; i < n; i++)
         height[i] = s->z[start + i] - s->surface[s->cell[start + i]];
     for (i64 i = 0; i < n; i++)
-        kept_here[i] = (height[i] > low) & (height[i] < high);
+        is_kept[i] = (height[i] > low) & (height[i] < high);
     for (i64 first = 0; first < n; first += GROUP) {
         i64 row = start + first;
         uint64_t group;
-        __builtin_memcpy(&group, kept_here + first, GROUP);
+        __builtin_memcpy(&group, is_kept + first, GROUP);
         if (group == all) {
             for (i64 i = 0; i < GROUP; i++)
-                rows[count + i] = row + i;
+                out->rows[count + i] = row + i;
             take_columns(points + row, GROUP, kept[0] + count, kept[1] + count, kept[2] + count);
             __builtin_memcpy(kept[3] + count, s->sqrt_range + row, GROUP * sizeof(float));
             __builtin_memcpy(kept[4] + count, height + first, GROUP * sizeof(float));
             count += GROUP;
         } else if (group) /* most often there is none: ground */
             for (i64 i = first; i < first + GROUP && i < n; i++, row++) {
-                rows[count] = row; /* overwritten by the next, unless it stays */
+                out->rows[count] = row; /* overwritten by the next, unless it stays */
                 for (int v = 0; v < 3; v++)
                     kept[v][count] = points[row][v];
                 kept[3][count] = s->sqrt_range[row];
                 kept[4][count] = height[i];
-                count += kept_here[i];
+                count += is_kept[i];
             }
     }
     return count;
 }
 
-/* Kernels.above_ground: of n points, those within bounds of height and of square root of range; returns how many. Their
- * rows are written, and x, y, z, square root of range, and height, and those from upper_m up are counted in bins of
- * height. `range_m` and `flat_m` are by ring; a ray has 4 * sectors floats. */
-EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float *flat_m, float height_m,
-                             const u4 *points, i64 n, Scratch *s, float *ray, const float bounds[4], i64 *rows,
-                             float *kept[5], i64 *bins)
+/* Kernels.above_ground: of n points, x, y, z and reflectance of each, those within bounds, and the histogram of their
+ * heights, which is 0 before. Returns how many points there are. `height_m` is that of the sensor above ground. */
+EXPORT i64 modt_above_ground(const Ground *g, const u4 *points, i64 n, float height_m, void *memory,
+                             const AboveGround *out)
 {
     i64 cells = g->rings * g->sectors, count = 0;
+    GroundScratch scratch, *s = &scratch;
+    place_scratch(g, n, memory, s);
     for (i64 k = 0; k < cells; k++)
         s->ends[k][0] = s->ends[k][1] = INFINITY;
     for (i64 i = 0; i < n; i += BLOCK) {
         i64 m = n - i < BLOCK ? n - i : BLOCK;
         place_points(g, points + i, m, s->z + i, s->sqrt_range + i, s->cell + i);
-        find_ends(g, height_m, bounds, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
+        find_ends(g, height_m, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
     }
-    for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* as _stands */
+    for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* far away, right behind it */
         s->ends[k][1] = least(s->ends[k][1], s->ends[k + g->sectors][1]);
-    trace(g, height_m, range_m, flat_m, s, ray);
-    interpolate(g, range_m, s, ray);
-    for (i64 first = 0; first < cells; first += g->sectors) {
-        float *row = s->surface + first, *beside = ray + g->sectors, *round = beside + g->sectors;
-        median_across(g->sectors, 1, row, round, ray);
-        median_across(g->sectors, g->flank_sectors, ray, round, beside);
-        for (i32 k = 0; k < g->sectors; k++) {
-            int hidden = s->kind[first + k] & RAMP ? ray[k] < beside[k] : ray[k] - beside[k] > g->flank_m;
-            row[k] = hidden ? beside[k] : ray[k];
-        }
-    }
+    trace(g, height_m, s);
+    interpolate(g, s);
+    smooth(g, s);
     s->surface[cells] = INFINITY; /* above all points out of bounds of range */
     for (i64 i = 0; i < n; i += BLOCK)
-        count = keep_points(s, points, i, n - i < BLOCK ? n - i : BLOCK, bounds, count, rows, kept);
+        count = keep_points(g, s, points, i, n - i < BLOCK ? n - i : BLOCK, count, out);
+    const float *height = out->kept[4];
     for (i64 k = 0; k < count; k++)
-        if (kept[4][k] > g->upper_m)
-            bins[(i32)((kept[4][k] - g->upper_m) / g->bin_m)]++;
+        if (height[k] > g->above_m)
+            out->histogram[(i32)((height[k] - g->above_m) / g->bin_m)]++;
     return count;
 }

@@ -24,9 +24,10 @@ EXPORT i64 modt_group(const i64 *labels, i64 n_rows, i64 n, i64 *rows, i64 *offs
     return offsets[n];
 }
 
+/* Members of proposals, with their coordinates. */
 typedef struct {
-    i64 *index;
-    float *xyz[3];
+    i64 *index;    /* (k,) row of the sweep */
+    float *xyz[3]; /* (k,) each [m] */
 } Rows;
 
 /* copy_runs: n runs of rows, from `begin` to before `end`, one after the other. */
@@ -41,33 +42,37 @@ EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i
         }
 }
 
-/* regrouped: rows of n_groups groups by label, below n, in their order within it, and the count of each. A group has a
- * label, but for the rows `moved`, ascending, which have their own. Scratch: `next` of n. */
+/* regrouped: rows of n_groups groups by label, below n, in their order within it, and the count of each label. A
+ * row has the label of its group, but for the n_moved rows `moved`, ascending, whose labels are `label_of_moved`.
+ * Scratch: `next` of n, the place of the next row of each label. */
 EXPORT void modt_regrouped(const Rows *rows, const i64 *offsets, i64 n_groups, const i64 *label, const i64 *moved,
-                           const i64 *own, i64 n_moved, i64 n, i64 *next, i64 *count, Rows *sorted)
+                           const i64 *label_of_moved, i64 n_moved, i64 n, i64 *next, i64 *count, Rows *sorted)
 {
+    /* 1. Rows of each label: those of its groups, less those that moved away, and those that moved to it. */
     i64 total = 0;
-    for (i64 g = 0; g < n; g++)
-        count[g] = 0;
+    for (i64 to = 0; to < n; to++)
+        count[to] = 0;
     for (i64 g = 0; g < n_groups; g++) {
         PROVEN(label[g] >= 0 && label[g] < n);
         count[label[g]] += offsets[g + 1] - offsets[g];
     }
     for (i64 m = 0, g = 0; m < n_moved; m++) {
-        PROVEN(own[m] >= 0 && own[m] < n);
+        PROVEN(label_of_moved[m] >= 0 && label_of_moved[m] < n);
         while (offsets[g + 1] <= moved[m])
             g++;
-        count[label[g]]--, count[own[m]]++;
+        count[label[g]]--;
+        count[label_of_moved[m]]++;
     }
-    for (i64 g = 0; g < n; total += count[g], g++)
-        next[g] = total;
+    for (i64 to = 0; to < n; total += count[to], to++)
+        next[to] = total;
+    /* 2. Rows of one label at a time: one that moved, or all up to the next that moved or the end of the group. */
     for (i64 g = 0, m = 0; g < n_groups; g++)
-        for (i64 i = offsets[g], end; i < offsets[g + 1]; i = end) { /* rows of one label at a time */
+        for (i64 i = offsets[g], end; i < offsets[g + 1]; i = end) {
             int moves = m < n_moved && moved[m] == i;
-            i64 *first = &next[moves ? own[m] : label[g]], to = *first;
+            i64 *place = &next[moves ? label_of_moved[m] : label[g]], to = *place;
             m += moves;
             end = moves ? i + 1 : m < n_moved && moved[m] < offsets[g + 1] ? moved[m] : offsets[g + 1];
-            *first += end - i;
+            *place += end - i;
             for (i64 k = i; k < end; k++)
                 sorted->index[to + k - i] = rows->index[k];
             for (int v = 0; v < 3; v++)
@@ -76,51 +81,54 @@ EXPORT void modt_regrouped(const Rows *rows, const i64 *offsets, i64 n_groups, c
         }
 }
 
+/* Members of cells.py: m points by cluster, where there is room for all points. */
 typedef struct {
-    const float *x, *y, *z, *height;
-    const i64 *index;
-} Points;
-
-typedef struct {
-    i64 *offsets, *index;
-    float *columns; /* x, y, z and z of the ground, of as many members as there are */
+    i64 *offsets, *index; /* (n + 1,) and (m,) */
+    float *columns;       /* (4, m) x, y, z, and z of the ground beneath */
 } Members;
 
 /* members_of: points by cluster, in input order within a cluster, given the cell of each point and the cluster of
- * each of C cells. */
-EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, const i64 *cluster, const i64 *entries,
-                         i64 n_cells, i64 n, Members *members)
+ * each of the cells. `index` holds the row of each point in the sweep. */
+EXPORT void modt_members(const PointColumns *points, const float *height, const i64 *index, const i64 *cell_of_point,
+                         i64 n_points, const i64 *cluster_of_cell, const i64 *entries, i64 n_cells, i64 n,
+                         const Members *members)
 {
-    i64 *next = members->offsets + 1; /* of each cluster, the place of its next point; its end, when all are placed */
+    /* 1. Sizes of the clusters, and from them where each begins. As its points are placed, `next` goes from the
+     * start of a cluster to its end, which is the offset that it shall hold. */
+    i64 *next = members->offsets + 1;
     i64 total = 0;
     for (i64 g = 0; g <= n; g++)
         members->offsets[g] = 0;
     for (i64 c = 0; c < n_cells; c++)
-        if (cluster[c] != NONE)
-            next[cluster[c]] += entries[c];
+        if (cluster_of_cell[c] != NONE)
+            next[cluster_of_cell[c]] += entries[c];
     for (i64 g = 0; g < n; g++) {
         i64 count = next[g];
         next[g] = total;
         total += count;
     }
-    float *x = members->columns, *y = x + total, *z = y + total, *ground_z = z + total;
+    /* 2. Points by cluster, then their rows and columns. Reads may wait for memory together, writes may not: they
+     * go in order. */
     for (i64 i = 0; i < n_points; i++) {
-        PROVEN(cell[i] >= 0 && cell[i] < n_cells && cluster[cell[i]] >= NONE && cluster[cell[i]] < n);
-        i64 g = cluster[cell[i]];
+        PROVEN(cell_of_point[i] >= 0 && cell_of_point[i] < n_cells);
+        i64 g = cluster_of_cell[cell_of_point[i]];
+        PROVEN(g >= NONE && g < n);
         if (g != NONE)
             members->index[next[g]++] = i;
     }
-    for (i64 at = 0; at < total; at++) { /* reads may wait for memory together, writes may not: they go in order */
-        i64 i = members->index[at];
-        members->index[at] = points->index[i];
-        x[at] = points->x[i];
-        y[at] = points->y[i];
-        z[at] = points->z[i];
-        ground_z[at] = points->z[i] - points->height[i];
+    float *x = members->columns, *y = x + total, *z = y + total, *ground_z = z + total;
+    for (i64 m = 0; m < total; m++) {
+        i64 i = members->index[m];
+        members->index[m] = index[i];
+        x[m] = points->x[i];
+        y[m] = points->y[i];
+        z[m] = points->z[i];
+        ground_z[m] = points->z[i] - height[i];
     }
 }
 
-/* Sums of the values from `first` to `end` of each of a fixed number of rows of k; they do not wait for one another. */
+/* Sums of the values from `first` to `end` of each of a fixed number of rows of k; they do not wait for one
+ * another. */
 static ALWAYS_INLINE void sum_rows(const float *values, int rows, i64 k, i64 first, i64 end, double *total)
 {
     for (int v = 0; v < rows; v++)
@@ -146,22 +154,35 @@ EXPORT void modt_group_sums(const float *values, i64 rows, i64 k, const i64 *off
             sum_rows(values, 1, k, offsets[g], offsets[g + 1], sums + g);
 }
 
-/* best_headings: index of the best of `headings` directions for at most `limit` of the points at `rows`; cosines and
- * sines are those of the directions, then of the ones across them. */
+enum { MOST_HEADINGS = 32, LANES = 8 }; /* room for headings, and how many are computed together */
+
+/* Least and greatest coordinate of a group along each heading, and along what lies across it. */
+typedef struct {
+    float low[2][MOST_HEADINGS], high[2][MOST_HEADINGS];
+} Extent;
+
+/* best_headings: index of the best heading of each of n groups, by at most `limit` of the points at its rows, at a
+ * constant stride. Cosines and sines are those of the headings, then of what lies across them.
+ *
+ * A first pass over the points of a group finds its sides at every heading, a second one the closeness of the
+ * points to them. Headings are padded to a multiple of LANES with directions of no length, so that both loops are
+ * vectorised. */
 EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, const i64 *offsets, i64 n, i64 limit,
                                const float *cosines, const float *sines, i32 headings, float noise_m, i64 *best)
 {
-    enum { MOST = 32, LANES = 8 }; /* directions, of which as many are done together */
-    float c[2][MOST] = {{0.0f}}, s[2][MOST] = {{0.0f}}, low[2][MOST], high[2][MOST];
-    double closeness[MOST];
+    float c[2][MOST_HEADINGS] = {{0.0f}}, s[2][MOST_HEADINGS] = {{0.0f}};
+    double closeness[MOST_HEADINGS];
+    Extent e;
     i32 padded = (headings + LANES - 1) / LANES * LANES;
-    PROVEN(padded <= MOST);
-    for (i32 a = 0; a < 2 * headings; a++)
-        c[a / headings][a % headings] = cosines[a], s[a / headings][a % headings] = sines[a];
+    PROVEN(padded <= MOST_HEADINGS);
+    for (i32 a = 0; a < 2 * headings; a++) {
+        c[a / headings][a % headings] = cosines[a];
+        s[a / headings][a % headings] = sines[a];
+    }
     for (i64 g = 0; g < n; g++) {
         for (i32 a = 0; a < padded; a++) {
-            low[0][a] = low[1][a] = INFINITY;
-            high[0][a] = high[1][a] = -INFINITY;
+            e.low[0][a] = e.low[1][a] = INFINITY;
+            e.high[0][a] = e.high[1][a] = -INFINITY;
             closeness[a] = 0.0;
         }
         i64 stride = (offsets[g + 1] - offsets[g] + limit - 1) / limit;
@@ -169,17 +190,18 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
             float here_x = x[rows[i]], here_y = y[rows[i]];
             for (int v = 0; v < 2; v++)
                 for (i32 a = 0; a < padded; a++) {
-                    float across = c[v][a] * here_x + s[v][a] * here_y;
-                    low[v][a] = least(across, low[v][a]);
-                    high[v][a] = most(across, high[v][a]);
+                    float along = c[v][a] * here_x + s[v][a] * here_y;
+                    e.low[v][a] = least(along, e.low[v][a]);
+                    e.high[v][a] = most(along, e.high[v][a]);
                 }
         }
         for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
             float here_x = x[rows[i]], here_y = y[rows[i]];
             for (i32 a = 0; a < padded; a++) {
                 float u = c[0][a] * here_x + s[0][a] * here_y, v = c[1][a] * here_x + s[1][a] * here_y;
-                float nearest = least(least(u - low[0][a], high[0][a] - u), least(v - low[1][a], high[1][a] - v));
-                closeness[a] += 1.0f / most(nearest, noise_m);
+                float to_u = least(u - e.low[0][a], e.high[0][a] - u);
+                float to_v = least(v - e.low[1][a], e.high[1][a] - v);
+                closeness[a] += 1.0f / most(least(to_u, to_v), noise_m);
             }
         }
         best[g] = 0;
@@ -189,31 +211,36 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
     }
 }
 
-/* reflectance_statistics: of the measured reflectances of each group; points are rows of `width`. */
+/* reflectance_statistics: mean, standard deviation, maximum, share of bright and share of dark ones of the
+ * measured reflectances of each of n groups; not a number without any. Points are rows of `width`, of which the
+ * fourth is it. */
 EXPORT void modt_reflectance_statistics(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
                                         float bright, float dark, double (*statistics)[5])
 {
     i64 last = offsets[n];
     for (i64 g = 0; g < n; g++) {
-        double total = 0.0, squares = 0.0, *own = statistics[g];
-        i64 number = 0, brights = 0, darks = 0;
-        float high = -INFINITY;
+        double total = 0.0, squares = 0.0;
+        i64 n_measured = 0, n_bright = 0, n_dark = 0;
+        float greatest = -INFINITY;
         for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
             __builtin_prefetch(&points[index[i + AHEAD < last ? i + AHEAD : i] * width + 3]);
             float r = points[index[i] * width + 3];
             if (r < 0.0f)
                 continue;
-            number++;
+            n_measured++;
             total += r;
             squares += r * r;
-            brights += r > bright;
-            darks += r < dark;
-            high = most(r, high);
+            n_bright += r > bright;
+            n_dark += r < dark;
+            greatest = most(r, greatest);
         }
-        double n_returns = (double)number, mean = total / n_returns; /* not a number without any */
-        double variance = squares / n_returns - mean * mean;
-        own[0] = mean, own[1] = __builtin_sqrt(variance < 0.0 ? 0.0 : variance);
-        own[2] = number ? (double)high : mean;
-        own[3] = (double)brights / n_returns, own[4] = (double)darks / n_returns;
+        double count = (double)n_measured, mean = total / count;
+        double variance = squares / count - mean * mean;
+        double *of_group = statistics[g];
+        of_group[0] = mean;
+        of_group[1] = __builtin_sqrt(variance < 0.0 ? 0.0 : variance);
+        of_group[2] = n_measured ? (double)greatest : mean;
+        of_group[3] = (double)n_bright / count;
+        of_group[4] = (double)n_dark / count;
     }
 }

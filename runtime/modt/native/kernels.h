@@ -11,6 +11,7 @@
 
 #ifdef MODT_CHECKED
 #include <assert.h>
+#include <stdlib.h>
 #define PROVEN(condition) assert(condition)
 #else
 #define PROVEN(condition) ((void)0)
@@ -42,5 +43,46 @@ static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less
 static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
 static inline f4 spread(float a) { return (f4){a, a, a, a}; }
 static inline float magnitude(float a) { return __builtin_fabsf(a); }
+
+/* PointColumns of grids.py: n points [m, sensor frame], and square roots of their ranges. */
+typedef struct {
+    float *x, *y, *z, *sqrt_range; /* (n,) */
+} PointColumns;
+
+/* pseudo_angle of grids.py: direction of a point as a number from 0 to 4 */
+static ALWAYS_INLINE float pseudo_angle(float x, float y)
+{
+    float turn = y / most(magnitude(x) + magnitude(y), 1e-6f);
+    return (x < 0.0f ? 2.0f - turn : turn) + 1.0f;
+}
+
+/* Takes an array of scratch of this many elements, after those taken before it, which end at `end`. A pass takes
+ * its arrays in one function: with the address of its memory that places them, and with 0 it tells the caller how
+ * much memory that is. In a checked build each array is allocated alone and never freed, so that AddressSanitizer
+ * sees where it ends. */
+#define TAKE(array, elements) array = take(&end, (elements) * sizeof *array)
+static inline void *take(uintptr_t *end, uintptr_t bytes)
+{
+    enum { CACHE_LINE = 64 };
+    void *start = (void *)*end;
+    *end += (bytes + CACHE_LINE - 1) / CACHE_LINE * CACHE_LINE;
+#ifdef MODT_CHECKED
+    if (start)
+        start = malloc(bytes);
+#endif
+    return start;
+}
+
+/* PersonSize of class_sizes.py, exclusive bounds [m]. */
+typedef struct {
+    float max_extent_m, min_height_m, min_top_m, max_top_m, min_extent_m;
+} PersonSize;
+
+/* PersonSize.fits */
+static inline int fits_person(const PersonSize *p, float extent, float bottom, float top)
+{
+    return extent > p->min_extent_m && extent < p->max_extent_m && top > p->min_top_m && top < p->max_top_m &&
+           top - bottom > p->min_height_m;
+}
 
 #endif

@@ -1,1 +1,1 @@
-"""Proposals from a sweep: ground removal, Euclidean clustering, minimum boxes (section III-A)."""
+"""Proposals from a sweep: ground removal, Euclidean clustering and boxes (section III-A)."""

@@ -1,61 +1,73 @@
-"""The ceiling of a room: nothing of it becomes a proposal, and it joins none."""
+"""The ceiling of a room: nothing of it becomes a proposal, and it joins no objects."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from modt.segmentation.tuning import DEFAULT, CeilingTuning
 from modt.types import Float32, Int
 
-ABOVE_M = 1.95
-"""Above ground: returns from here on are those of which a ceiling has its share."""
-LOWEST_M = 2.15
-"""Least height of a ceiling above ground; a lower surface is the lintel of a door."""
-BIN_M = 0.05
-"""Width of a bin of the histogram of heights; two neighbouring bins hold a ceiling."""
-MIN_RETURNS, MIN_SHARE = 50, 0.5
-"""Returns above ABOVE_M in a room, and share of them that are on the ceiling."""
-EDGE_SHARE, CLEARANCE_M = 0.05, 0.15
-"""Share of its returns from which the bin below belongs to it too; distance below it up to which objects reach."""
-SAMPLED = 8
-"""One return of so many is looked at for a ceiling that begins above the greatest height used."""
-GRAZED_M, GRAZED_CLEARANCE_M = (-0.1, 0.3), 0.2
-"""Bounds of such a ceiling above the greatest height used; distance below that height up to which objects reach."""
 
+class CeilingFinder:
+    """Height up to which objects reach under a ceiling, by the heights of the returns above people's heads.
 
-def bins_up_to(max_height_m: float) -> int:
-    """Bins of the histogram of heights up to the greatest height used [m]."""
-    return max(0, int((max_height_m - ABOVE_M) / BIN_M)) + 2
-
-
-def histogram(height: Float32, max_height_m: float) -> Int:
-    """Returns in each bin of height above ABOVE_M, by (K,) heights of returns above ground [m]."""
-    upper = height[height > np.float32(ABOVE_M)]
-    bin_ = ((upper - np.float32(ABOVE_M)) / np.float32(BIN_M)).astype(np.int64)
-    return np.bincount(bin_, minlength=bins_up_to(max_height_m))
-
-
-def below_ceiling_m(count: Int) -> float | None:
-    """Height [m] up to which objects reach under a ceiling, by the histogram of heights; None outdoors.
-
-    Most of the returns above people's heads are at one height there; on walls, trees and houses they spread.
+    Args:
+        max_height_m: greatest height above ground at which returns are used.
+        tuning: what a ceiling is.
     """
-    upper = int(count.sum())
-    if upper < MIN_RETURNS:
-        return None
-    pair = count[:-1] + count[1:]
-    pair[: round((LOWEST_M - ABOVE_M) / BIN_M)] = 0
-    first = int(pair.argmax())
-    if pair[first] < MIN_SHARE * upper:
-        return None
-    begins = first - 1 if first and count[first - 1] > EDGE_SHARE * pair[first] else first
-    return ABOVE_M + BIN_M * begins - CLEARANCE_M
 
+    def __init__(self, max_height_m: float, tuning: CeilingTuning = DEFAULT.ceiling) -> None:
+        self.max_height_m = max_height_m
+        self.tuning = tuning
+        self.bins = max(0, int((max_height_m - tuning.above_m) / tuning.bin_m)) + 2
 
-def below_grazed_m(z: Float32, sensor_height_m: float, max_height_m: float) -> float | None:
-    """The same for a ceiling about the greatest height used, by (N,) sampled heights relative to the sensor [m]."""
-    z = np.ascontiguousarray(z)
-    upper = z.compress(z > np.float32(ABOVE_M - sensor_height_m)) + np.float32(sensor_height_m)
-    on_ceiling = np.count_nonzero((upper > max_height_m + GRAZED_M[0]) & (upper < max_height_m + GRAZED_M[1]))
-    if SAMPLED * len(upper) < MIN_RETURNS or on_ceiling < MIN_SHARE * len(upper):
-        return None
-    return max_height_m - GRAZED_CLEARANCE_M
+    def histogram(self, height: Float32) -> Int:
+        """(bins,) returns in each bin of height from `above_m` on, by (K,) heights of returns above ground [m]."""
+        above = np.float32(self.tuning.above_m)
+        upper = height[height > above]
+        bin_ = ((upper - above) / np.float32(self.tuning.bin_m)).astype(np.int64)
+        return np.bincount(bin_, minlength=self.bins)
+
+    def limit_m(self, histogram: Int, z: Float32, sensor_height_m: float) -> float | None:
+        """Greatest height of objects above ground [m], None without a ceiling.
+
+        Args:
+            histogram: (bins,) returns used, by height.
+            z: (N,) coordinates of all returns [m, sensor frame], with those too high to be used.
+            sensor_height_m: height of the sensor above ground.
+        """
+        limit_m = self.within_m(histogram)
+        if limit_m is None:
+            limit_m = self.grazing_m(z[:: self.tuning.stride], sensor_height_m)
+        return limit_m
+
+    def within_m(self, histogram: Int) -> float | None:
+        """The limit under a ceiling that is wholly within the heights used.
+
+        Most of the returns above people's heads are at one height there; on walls, trees and houses they spread.
+        """
+        tuning = self.tuning
+        counted = int(histogram.sum())
+        if counted < tuning.min_returns:
+            return None
+        in_two_bins = histogram[:-1] + histogram[1:]
+        in_two_bins[: round((tuning.lowest_m - tuning.above_m) / tuning.bin_m)] = 0
+        first = int(in_two_bins.argmax())
+        if in_two_bins[first] < tuning.min_share * counted:
+            return None
+        if first and histogram[first - 1] > tuning.edge_share * in_two_bins[first]:
+            first -= 1
+        return tuning.above_m + tuning.bin_m * first - tuning.clearance_m
+
+    def grazing_m(self, z: Float32, sensor_height_m: float) -> float | None:
+        """The limit under a ceiling about the greatest height used, of which the lowest returns alone are used."""
+        tuning = self.tuning
+        z = np.ascontiguousarray(z)
+        upper = z.compress(z > np.float32(tuning.above_m - sensor_height_m)) + np.float32(sensor_height_m)
+        on_ceiling = upper > self.max_height_m - tuning.grazed_below_m
+        on_ceiling &= upper < self.max_height_m + tuning.grazed_above_m
+        if tuning.stride * len(upper) < tuning.min_returns:
+            return None
+        if np.count_nonzero(on_ceiling) < tuning.min_share * len(upper):
+            return None
+        return self.max_height_m - tuning.grazed_clearance_m

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.clusters import CellClusterer, Clusters, ClusterSizes
+from modt.segmentation.cells import CellClusterer, Clusters, ClusterSizes
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
-from modt.segmentation.strips import ELEVATION, MAX_BEAMS, MIN_POINTS, VISIBLE_M, CarLimits
+from modt.segmentation.strips import ELEVATION
+from modt.segmentation.tuning import DEFAULT, SegmentationTuning
 from modt.types import Bool, Float32, Int
-
-MIN_LINE_POINTS, MIN_LINE_TOP_M = 15, 0.5
-"""A cluster lower than `min_height_m` is kept from so many points and such a top on: one beam meets an object."""
-MIN_PART_POINTS, MIN_PART_TOP_M = 15, 0.9
-"""The same for a part of an oversized cluster."""
 
 
 class Clusterer:
@@ -29,24 +27,36 @@ class Clusterer:
         sensor: range and beam spacing.
         config: clustering distance and sizes of objects.
         kernels: passes over points and cells.
+        tuning: connected cells, split parts, merged strips and kept clusters.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig, kernels: Kernels = NUMPY) -> None:
+    def __init__(
+        self,
+        sensor: SensorConfig,
+        config: SegmentationConfig,
+        kernels: Kernels = NUMPY,
+        tuning: SegmentationTuning = DEFAULT,
+    ) -> None:
         self.kernels = kernels
-        self.config, self.beams = config, sensor.beams
-        self.cells = CellClusterer(sensor, config)
-        self.car = CarLimits(max_diagonal_m=min(CarLimits().max_diagonal_m, config.max_extent_m))
+        self.config = config
+        self.beams = sensor.beams
+        self.cells = CellClusterer(sensor, config, tuning.cells, tuning.split)
+        self.valid = tuning.clusters
+        max_diagonal_m = min(tuning.strips.max_diagonal_m, config.max_extent_m)
+        self.strips = replace(tuning.strips, max_diagonal_m=max_diagonal_m)
 
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
-        cells, sample, sampled, cell = self.kernels.occupied_cells(self.cells.fine, points, height)
+        cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.cells.fine, points, height)
         cluster, sizes = self.kernels.cluster(self.cells, cells, sampled, self._beam_m(sampled))
-        clusters = Clusters(points, height, cell, cells, sample, sampled, cluster, len(sizes))
-        strip = (self._valid(sizes) | ~sizes.is_part) & self.may_be_strips(sizes)
+        clusters = Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, len(sizes))
+        strip = (self._is_valid(sizes) | ~sizes.is_part) & self.may_be_strips(sizes)
         target = self._merged(clusters, strip)
-        valid = self._valid(sizes.merged(target))
-        of_cell, n = consecutive(valid)[target].take(cluster), int(np.count_nonzero(valid))
-        return Clusters(points, height, cell, cells, sample, sampled, of_cell, n)  # faster than to replace two fields
+        valid = self._is_valid(sizes.merged(target))
+        cluster_of_cell = consecutive(valid)[target].take(cluster)
+        n = int(np.count_nonzero(valid))
+        # `replace` of the two fields that differ takes longer.
+        return Clusters(points, height, cell_of_point, cells, sample, sampled, cluster_of_cell, n)
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""
@@ -56,8 +66,9 @@ class Clusterer:
 
     def may_be_strips(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters that can be a strip of a car."""
-        strip: Bool = (sizes.points >= MIN_POINTS) & (sizes.extent_m < self.car.max_diagonal_m)
-        strip &= (sizes.top_m < self.car.max_top_m) & (MAX_BEAMS * sizes.beam_m > VISIBLE_M)
+        strips = self.strips
+        strip: Bool = (sizes.points >= strips.min_points) & (sizes.extent_m < strips.max_diagonal_m)
+        strip &= (sizes.top_m < strips.max_top_m) & (strips.max_beams * sizes.beam_m > strips.visible_m)
         return strip
 
     def _merged(self, clusters: Clusters, strip: Bool) -> Int:
@@ -67,18 +78,21 @@ class Clusterer:
         the sensor, one begins where the other ends. A car across the negative y axis, the seam at which pseudo-angles
         begin anew, is not merged.
         """
-        target, rows = np.arange(clusters.n), strip.nonzero()[0]
-        if len(rows):
-            bounds = self.kernels.view_bounds(clusters, consecutive(strip), len(rows))
+        target = np.arange(clusters.n)
+        cluster_of_strip = strip.nonzero()[0]
+        if len(cluster_of_strip):
+            bounds = self.kernels.view_bounds(clusters, consecutive(strip), len(cluster_of_strip))
             beam_rad = np.full(len(bounds), self.beams.step_rad(bounds.min[ELEVATION]), np.float32)
-            target[rows] = rows[self.kernels.merge_strips(bounds, beam_rad, self.car)]
+            first_strip = self.kernels.merge_strips(bounds, beam_rad, self.strips)
+            target[cluster_of_strip] = cluster_of_strip[first_strip]
         return target
 
-    def _valid(self, sizes: ClusterSizes) -> Bool:
+    def _is_valid(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""
         config = self.config
         valid: Bool = (sizes.points >= config.min_points) & (sizes.extent_m < config.max_extent_m)
-        line = (sizes.points >= MIN_LINE_POINTS) & (sizes.top_m > MIN_LINE_TOP_M)
+        line = (sizes.points >= self.valid.min_line_points) & (sizes.top_m > self.valid.min_line_top_m)
         valid &= line | (sizes.top_m - sizes.bottom_m >= config.min_height_m)
-        valid &= ~sizes.is_part | ((sizes.top_m >= MIN_PART_TOP_M) & (sizes.points >= MIN_PART_POINTS))
+        stands_out = (sizes.top_m >= self.valid.min_part_top_m) & (sizes.points >= self.valid.min_part_points)
+        valid &= ~sizes.is_part | stands_out
         return valid

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import NONE, Float32, Int, Self
+from modt.segmentation.tuning import DEFAULT, PolarGridTuning
+from modt.types import NONE, Float32, Float64, Int, Self
 
 FAR_M = np.float32(1e6)
 """Farther than any return: cells of points nearer can be numbered."""
@@ -46,9 +47,7 @@ class PointColumns:
 Int32 = NDArray[np.int32]
 
 SECTORS = 128
-"""Sectors of the polar grid, a power of two."""
-RING_STEP = 0.15
-"""Width of a ring [sqrt(m)]: 0.9 m at 10 m, 1.9 m at 40 m."""
+"""Sectors of the polar grid, a power of two, so that the compiled passes number cells by shifts."""
 
 
 def pseudo_angle(x: Float32, y: Float32) -> Float32:
@@ -67,18 +66,22 @@ class PolarGrid:
 
     Args:
         max_range_m: outer edge; farther points belong to the last ring.
+        tuning: width of a ring, and what is flat in a cell.
     """
 
-    def __init__(self, max_range_m: float) -> None:
-        self.rings = int(np.sqrt(max_range_m) / RING_STEP) + 2
+    def __init__(self, max_range_m: float, tuning: PolarGridTuning = DEFAULT.polar) -> None:
+        self.rings_per_unit = 1 / tuning.ring_step  # [1/sqrt(m)]
+        self.rings = int(np.sqrt(max_range_m) / tuning.ring_step) + 2
         self.size = self.rings * SECTORS
-        edge = (np.arange(self.rings + 1) * RING_STEP) ** 2
-        self.range_m: Float32 = ((edge[1:] + edge[:-1]) / 2).astype(np.float32)
-        self.ring_width_m = np.diff(edge)
+        edge_m = (np.arange(self.rings + 1) * tuning.ring_step) ** 2
+        # (rings,) range of the middle of each ring [m].
+        self.range_m: Float32 = ((edge_m[1:] + edge_m[:-1]) / 2).astype(np.float32)
+        # (rings,) height range of the returns of a cell above which something stands in it [m].
+        self.flat_m: Float64 = tuning.flat_m + tuning.flat_slope * np.diff(edge_m)
 
     def cell(self, points: PointColumns) -> Int:
         """(N,) index of each point's cell: ring * SECTORS + sector."""
-        ring = (points.sqrt_range * np.float32(1 / RING_STEP)).astype(np.int32)
+        ring = (points.sqrt_range * np.float32(self.rings_per_unit)).astype(np.int32)
         np.minimum(ring, self.rings - 1, out=ring)
         turn = pseudo_angle(points.x, points.y)
         turn *= np.float32(SECTORS / 4)

@@ -1,4 +1,7 @@
-"""Ground as piece-wise planes (section III-A), one height a polar cell, traced outwards."""
+"""Ground as piece-wise planes (section III-A), one height a polar cell, traced outwards.
+
+Arrays of a value a cell have the shape (rings, SECTORS): a column of them is a ray from the sensor outwards.
+"""
 
 from __future__ import annotations
 
@@ -7,33 +10,8 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid
 from modt.segmentation.groups import label_max, label_min
+from modt.segmentation.tuning import DEFAULT, GroundTuning, PolarGridTuning, SensorHeightTuning
 from modt.types import Bool, Float32, Int
-
-DEFAULT_HEIGHT_M = 1.73
-"""Height of the sensor while no ground is in sight: that of KITTI's sensor."""
-HEIGHT_SWEEPS = 5
-"""First sweeps whose median is the estimate of the height."""
-HEIGHT_RANGE_M, HEIGHT_BIN_M, MIN_HEIGHT_CELLS = 15.0, 0.05, 12
-"""Farthest cell used for the height; width of a bin of depths; least number of ground cells in three bins."""
-HORIZON_BEAMS = 2.0
-"""Cells less than this many beams below the horizon say nothing of the height."""
-
-NOISE_M = 0.1
-"""Greatest residual of a lowest return on the plane of its ray."""
-NEAR_M = 1.5
-"""Greatest distance over which ground rises by `max_slope_deg`, from one ground cell of a ray to the next."""
-MAX_GAP_M = 6.0
-"""The same on and beside a ramp; distance over which the running slope of a ray is extrapolated."""
-RAMP_SHARE = 0.3
-"""A ray is on a ramp when its running slope exceeds this share of `max_slope_deg`."""
-SLOPE_GAIN = 0.2
-"""Weight of the newest slope in the running slope of a ray."""
-FLAT_M, FLAT_SLOPE = 0.1, 0.2
-"""Greatest height range of the returns of a flat cell, and its growth with the width of the cell."""
-BONNET_RANGE_M = 11.0
-"""From this range on, cells are as deep as a bonnet, 1 m: above a flank, the next return may lie in the next cell."""
-FLANK_SECTORS, FLANK_M = 3, 0.25
-"""A surface this far above the median of the rays so many sectors beside it is the side of a vehicle."""
 
 
 class HeightEstimator:
@@ -43,34 +21,48 @@ class HeightEstimator:
 
     Args:
         sensor: range and beam spacing.
+        tuning: which cells are used, and how many are a floor.
+        polar: cells of the polar grid.
     """
 
-    def __init__(self, sensor: SensorConfig) -> None:
-        max_range_m = min(HEIGHT_RANGE_M, sensor.max_range_m)
-        self.near, self.far = np.sqrt(sensor.min_range_m), np.sqrt(max_range_m)
-        self.grid = PolarGrid(max_range_m)
+    def __init__(
+        self,
+        sensor: SensorConfig,
+        tuning: SensorHeightTuning = DEFAULT.sensor_height,
+        polar: PolarGridTuning = DEFAULT.polar,
+    ) -> None:
+        self.tuning = tuning
+        max_range_m = min(tuning.max_range_m, sensor.max_range_m)
+        self.min_sqrt_range = np.sqrt(sensor.min_range_m)
+        self.max_sqrt_range = np.sqrt(max_range_m)
+        self.grid = PolarGrid(max_range_m, polar)
+        self.flat_m = np.repeat(self.grid.flat_m, SECTORS)
         range_m = np.repeat(self.grid.range_m, SECTORS).astype(np.float64)
-        self.flat_m = FLAT_M + FLAT_SLOPE * np.repeat(self.grid.ring_width_m, SECTORS)
-        self.horizon_m = HORIZON_BEAMS * float(sensor.beams.step_rad(np.zeros(1, np.float32)).item()) * range_m
+        level_step_rad = float(sensor.beams.step_rad(np.zeros(1, np.float32)).item())
+        self.horizon_m = tuning.horizon_beams * level_step_rad * range_m
         self.estimates_m: list[float] = []
 
     def height_m(self, points: Float32) -> float:
         """Median of the estimates of the first sweeps, this (N, 4) one included; the default before any [m]."""
-        if len(self.estimates_m) < HEIGHT_SWEEPS:
+        if len(self.estimates_m) < self.tuning.sweeps:
             estimate = self._estimate(PointColumns.from_array(points))
             if estimate is not None:
                 self.estimates_m.append(estimate)
-        return float(np.median(self.estimates_m)) if self.estimates_m else DEFAULT_HEIGHT_M
+        return float(np.median(self.estimates_m)) if self.estimates_m else self.tuning.default_m
 
     def _estimate(self, points: PointColumns) -> float | None:
-        around = points.take(np.flatnonzero((points.sqrt_range > self.near) & (points.sqrt_range < self.far)))
-        cell, bin_m = self.grid.cell(around), HEIGHT_BIN_M
-        lowest, highest = (reduce(around.z, cell, self.grid.size) for reduce in (label_min, label_max))
+        """Depth of the floor below the sensor in one sweep [m], None without one."""
+        bin_m = self.tuning.bin_m
+        used = (points.sqrt_range > self.min_sqrt_range) & (points.sqrt_range < self.max_sqrt_range)
+        around = points.take(np.flatnonzero(used))
+        cell = self.grid.cell(around)
+        lowest = label_min(around.z, cell, self.grid.size)
+        highest = label_max(around.z, cell, self.grid.size)
         flat = (highest - lowest < self.flat_m) & (-lowest > self.horizon_m)
         depth = -lowest[flat].astype(np.float64)
         cells = np.bincount((depth / bin_m).astype(np.int64), minlength=1)
         in_three_bins = np.convolve(cells, np.ones(3, np.int64), mode="same")
-        if in_three_bins.max() < MIN_HEIGHT_CELLS:
+        if in_three_bins.max() < self.tuning.min_cells:
             return None
         mode = (int(np.argmax(in_three_bins)) + 0.5) * bin_m
         return float(depth[np.abs(depth - mode) < 1.5 * bin_m].mean())
@@ -83,21 +75,29 @@ class GroundEstimator:
     short way, on and beside a ramp over a longer one. It may not rise at all where something stands in the cell or,
     far away, right behind it, since it may be a flank. It may lie lower by `max_slope_deg` all the way, since nothing
     else does. Cells without ground are interpolated along the ray; beyond its last one, the ground is level, but a
-    ramp goes on for MAX_GAP_M.
+    ramp goes on for `max_gap_m`.
 
     Args:
         sensor: range.
         max_slope_deg: steepest ground.
+        tuning: what continues the ground of a ray.
+        polar: cells of the polar grid.
     """
 
-    def __init__(self, sensor: SensorConfig, max_slope_deg: float) -> None:
-        self.grid = PolarGrid(sensor.max_range_m)
-        flat_m = FLAT_M + FLAT_SLOPE * self.grid.ring_width_m
-        self.flat_m: Float32 = flat_m[:, None].astype(np.float32)
-        self.bonnet_ring = int(np.searchsorted(self.grid.range_m, BONNET_RANGE_M))
+    def __init__(
+        self,
+        sensor: SensorConfig,
+        max_slope_deg: float,
+        tuning: GroundTuning = DEFAULT.ground,
+        polar: PolarGridTuning = DEFAULT.polar,
+    ) -> None:
+        self.tuning = tuning
+        self.grid = PolarGrid(sensor.max_range_m, polar)
+        self.flat_m: Float32 = self.grid.flat_m.astype(np.float32)
+        self.bonnet_ring = int(np.searchsorted(self.grid.range_m, tuning.bonnet_range_m))
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
         steepest_rad = np.deg2rad(max_slope_deg)
-        self.max_slope, self.ramp_slope = np.tan([steepest_rad, RAMP_SHARE * steepest_rad]).tolist()
+        self.max_slope, self.ramp_slope = np.tan([steepest_rad, tuning.ramp_share * steepest_rad]).tolist()
 
     def height_above(self, points: PointColumns, sensor_height_m: float) -> Float32:
         """(N,) height of each point above the ground [m]."""
@@ -105,27 +105,29 @@ class GroundEstimator:
         lowest = self._lowest(points, cell, sensor_height_m)
         is_ground, is_ramp, slope = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
         surface = _median_across(self._interpolate(lowest, is_ground, slope, sensor_height_m))
-        beside = _median_across(surface, FLANK_SECTORS)
-        flank = surface - beside > np.float32(FLANK_M)
-        np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))  # what stands on a ramp hides it
+        # The ground under a vehicle, and under what stands on a ramp, is that of the rays beside it.
+        beside = _median_across(surface, self.tuning.flank_sectors)
+        flank = surface - beside > self.tuning.flank_m
+        np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))
         height: Float32 = points.z - surface.ravel().take(cell)
         return height
 
     def _lowest(self, points: PointColumns, cell: Int, sensor_height_m: float) -> Float32:
         """(rings, SECTORS) lowest return of each cell that can be ground [m], infinite without any."""
         reach = points.sqrt_range * points.sqrt_range
-        reach *= np.float32(self.max_slope)
-        reach += np.float32(NOISE_M)
+        reach *= self.max_slope
+        reach += self.tuning.noise_m
         plausible = np.abs(points.z + np.float32(sensor_height_m)) < reach
         plausible &= points.sqrt_range > self.min_sqrt_range
-        z = np.where(plausible, points.z, np.float32(np.inf))
+        z = np.where(plausible, points.z, np.inf)
         return label_min(z, cell, self.grid.size).reshape(-1, SECTORS)
 
     def _stands(self, points: PointColumns, cell: Int, lowest: Float32) -> Bool:
         """(rings, SECTORS) cells in which, or right behind which, something stands: returns far above the lowest."""
-        highest, far = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS), self.bonnet_ring
+        highest = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS)
+        far = self.bonnet_ring
         highest[far:-1] = np.maximum(highest[far:-1], highest[far + 1 :])
-        stands: Bool = highest > lowest + self.flat_m
+        stands: Bool = highest > lowest + self.flat_m[:, None]
         return stands
 
     def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> tuple[Bool, Bool, Float32]:
@@ -134,57 +136,80 @@ class GroundEstimator:
         With them comes the (SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0.
         All rays advance together, ring by ring, from the foot of the sensor.
         """
-        max_slope, ramp = np.float32(self.max_slope), np.float32(self.ramp_slope)
-        gain, noise, max_gap, near = (np.float32(v) for v in (SLOPE_GAIN, NOISE_M, MAX_GAP_M, NEAR_M))
-        last = np.zeros((3, SECTORS), np.float32)  # ground cell of each ray
-        height, at, slope = last
-        height[:] = -sensor_height_m
-        step, bend_m = np.zeros_like(last), np.full(SECTORS, near)
-        flat = ~stands
-        is_ground, is_ramp = np.zeros((2, *lowest.shape), np.bool_)
-        for ring, (here, range_m) in enumerate(zip(lowest, self.grid.range_m, strict=True)):
-            gap = range_m - at
-            reach = np.minimum(gap, max_gap)
-            rise = here - height
-            off = rise - slope * reach
-            bound = np.minimum(gap, bend_m) * max_slope * flat[ring] + noise
-            found = np.less(off, bound, out=is_ground[ring])
-            found &= off > -(gap * max_slope + noise)
-            step[0], step[1] = here, range_m
-            step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -max_slope), max_slope)
-            np.copyto(last, step, where=found)
-            on = np.abs(slope) > ramp
-            is_ramp[ring] = on | np.roll(on, FLANK_SECTORS) | np.roll(on, -FLANK_SECTORS)
-            bend_m = np.where(is_ramp[ring], max_gap, near)
-        return is_ground, is_ramp, slope * on
+        rays = _Rays(self, sensor_height_m)
+        is_ground = np.zeros(lowest.shape, np.bool_)
+        is_ramp = np.zeros(lowest.shape, np.bool_)
+        for ring, range_m in enumerate(self.grid.range_m):
+            is_ground[ring] = rays.advance(range_m, lowest[ring], stands[ring])
+            is_ramp[ring] = rays.beside_ramp
+        return is_ground, is_ramp, rays.slope * rays.on_ramp
 
     def _interpolate(self, lowest: Float32, is_ground: Bool, slope: Float32, sensor_height_m: float) -> Float32:
         """(rings, SECTORS) surface, linear between the ground cells of a ray.
 
-        Beyond the last one it goes on with the (SECTORS,) slope for MAX_GAP_M, but rises above no return.
+        Beyond the last one it goes on with the (SECTORS,) slope for `max_gap_m`, but rises above no return.
         """
         ground = np.where(is_ground, lowest, np.float32(-sensor_height_m))
-        rings, sectors = ground.shape
         is_ground = is_ground.copy()
-        is_ground[0] = True
-        cell = np.arange(rings * sectors).reshape(rings, sectors)
+        is_ground[0] = True  # the foot of the sensor
+        cell = np.arange(is_ground.size).reshape(is_ground.shape)
         before = np.maximum.accumulate(np.where(is_ground, cell, 0), axis=0)
         after = np.minimum.accumulate(np.where(is_ground, cell, cell.size)[::-1], axis=0)[::-1]
         beyond = after == cell.size
         after = np.where(beyond, before, after)
-        range_of = np.repeat(self.grid.range_m, sectors)
-        low, near = ground.take(before), range_of.take(before)
-        high, far = ground.take(after), range_of.take(after)
-        since = self.grid.range_m[:, None] - near
-        ramp = low + slope * np.minimum(since, np.float32(MAX_GAP_M))
-        between = low + (high - low) * (since / np.maximum(far - near, np.float32(1e-3)))
-        surface: Float32 = np.where(beyond, np.minimum(ramp, np.maximum(lowest, low)), between)
+        range_m = np.repeat(self.grid.range_m, SECTORS)
+        range_before = range_m.take(before)
+        height_before = ground.take(before)
+        since = self.grid.range_m[:, None] - range_before
+        ramp = height_before + slope * np.minimum(since, self.tuning.max_gap_m)
+        share = since / np.maximum(range_m.take(after) - range_before, 1e-3)
+        between = height_before + (ground.take(after) - height_before) * share
+        surface: Float32 = np.where(beyond, np.minimum(ramp, np.maximum(lowest, height_before)), between)
         return surface
+
+
+class _Rays:
+    """Last ground cell of each of the SECTORS rays, as all of them advance ring by ring."""
+
+    def __init__(self, ground: GroundEstimator, sensor_height_m: float) -> None:
+        self.ground = ground
+        self.height_m = np.full(SECTORS, -sensor_height_m, np.float32)
+        self.range_m = np.zeros(SECTORS, np.float32)
+        self.slope = np.zeros(SECTORS, np.float32)  # running mean along the ray
+        self.on_ramp = np.zeros(SECTORS, np.bool_)
+        self.beside_ramp = self.on_ramp  # or on it
+
+    def advance(self, range_m: np.float32, lowest: Float32, stands: Bool) -> Bool:
+        """(SECTORS,) rays that find ground in the next ring.
+
+        Args:
+            range_m: range of the ring.
+            lowest: (SECTORS,) lowest return of each cell of the ring [m], infinite without any.
+            stands: (SECTORS,) cells in which something stands: the ground does not rise there.
+        """
+        tuning = self.ground.tuning
+        max_slope = self.ground.max_slope
+        gap = range_m - self.range_m
+        rise = lowest - self.height_m
+        residual = rise - self.slope * np.minimum(gap, tuning.max_gap_m)
+        rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
+        found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * ~stands + tuning.noise_m
+        found &= residual > -(gap * max_slope + tuning.noise_m)
+        slope = self.slope + tuning.slope_gain * (rise / gap - self.slope)
+        np.copyto(self.slope, np.minimum(np.maximum(slope, -max_slope), max_slope), where=found)
+        np.copyto(self.height_m, lowest, where=found)
+        np.copyto(self.range_m, range_m, where=found)
+        self.on_ramp = np.abs(self.slope) > self.ground.ramp_slope
+        left, right = (np.roll(self.on_ramp, step) for step in (tuning.flank_sectors, -tuning.flank_sectors))
+        self.beside_ramp = self.on_ramp | left | right
+        return found
 
 
 def _median_across(surface: Float32, step: int = 1) -> Float32:
     """(rings, SECTORS) median of each cell and the cells `step` sectors to its left and right."""
-    left, right = np.roll(surface, step, axis=1), np.roll(surface, -step, axis=1)
-    low, high = np.minimum(left, surface), np.maximum(left, surface)
+    left = np.roll(surface, step, axis=1)
+    right = np.roll(surface, -step, axis=1)
+    low = np.minimum(left, surface)
+    high = np.maximum(left, surface)
     median: Float32 = np.maximum(low, np.minimum(high, right))
     return median

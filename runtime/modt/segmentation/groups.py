@@ -18,7 +18,7 @@ class Groups:
     """Rows sorted by group; no group is empty."""
 
     rows: Int  # (K,) sorted by group, in input order within a group
-    offsets: Int  # (G + 1,) group i owns rows[offsets[i]:offsets[i + 1]]
+    offsets: Int  # (G + 1,) group i has rows[offsets[i]:offsets[i + 1]]
 
     @classmethod
     def from_labels(cls, labels: Int, n: int) -> Self:
@@ -26,9 +26,9 @@ class Groups:
         rows = np.flatnonzero(labels != NONE)
         # NumPy sorts 16-bit integers by radix: several times faster.
         kind: type[np.signedinteger[Any]] = np.int16 if n < np.iinfo(np.int16).max else np.int64
-        own = labels.astype(kind)[rows]
-        rows = rows[np.argsort(own, kind="stable")]
-        return cls(rows, np.append(0, np.cumsum(np.bincount(own, minlength=n))))
+        label_of_row = labels.astype(kind)[rows]
+        rows = rows[np.argsort(label_of_row, kind="stable")]
+        return cls(rows, np.append(0, np.cumsum(np.bincount(label_of_row, minlength=n))))
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -80,9 +80,9 @@ def label_max(values: Float32, labels: Int, n: int) -> Float32:
 
 
 HEADINGS = np.deg2rad(np.arange(0, 90, 5.0))
-"""Candidates [rad]."""
-_AXES = np.append(HEADINGS, HEADINGS + np.pi / 2)
-AXES: Float32 = np.stack([np.cos(_AXES), np.sin(_AXES)]).astype(np.float32)
+"""(H,) candidates for the heading of a box [rad]; the compiled pass has room for 32."""
+_SIDES = np.append(HEADINGS, HEADINGS + np.pi / 2)
+AXES: Float32 = np.stack([np.cos(_SIDES), np.sin(_SIDES)]).astype(np.float32)
 """(2, 2 H) cosines and sines of the headings, then of what lies across them."""
 
 
@@ -100,10 +100,11 @@ def best_headings(x: Float32, y: Float32, groups: Groups, limit: int, noise_m: f
         noise_m: distance within which a point lies on a side [m].
     """
     groups = groups.subsample(limit)
-    across = AXES[0][:, None] * x.take(groups.rows)
-    across += AXES[1][:, None] * y.take(groups.rows)
-    inward = across - groups.broadcast(groups.min(across))
-    np.minimum(inward, groups.broadcast(groups.max(across)) - across, out=inward)
+    # (2 H, K) coordinate of each point along each axis, then its distance to the nearer of the two sides across it.
+    along = AXES[0][:, None] * x.take(groups.rows)
+    along += AXES[1][:, None] * y.take(groups.rows)
+    inward = along - groups.broadcast(groups.min(along))
+    np.minimum(inward, groups.broadcast(groups.max(along)) - along, out=inward)
     nearest = np.minimum(inward[: len(HEADINGS)], inward[len(HEADINGS) :])
     closeness = 1 / np.maximum(nearest, np.float32(noise_m))
     best: Int = np.argmax(np.add.reduceat(closeness, groups.offsets[:-1], axis=1, dtype=np.float64), axis=0)
@@ -115,7 +116,7 @@ BRIGHT = 0.8
 DARK = 0.005
 """Below it a return is too weak to be measured."""
 SAMPLE = 1000
-"""Returns, about, by which a sweep is checked for reflectance."""
+"""Number of returns, about, by which a sweep is checked for reflectance."""
 
 
 def has_reflectance(reflectance: Float32) -> bool:
@@ -132,15 +133,16 @@ def reflectance_statistics(points: Float32, index: Int, offsets: Int) -> Float64
     without any is NaN.
     """
     reflectance = points[index, 3]
-    starts, measured = offsets[:-1], reflectance >= 0.0
-    greatest = np.maximum.reduceat(np.where(measured, reflectance, np.float32(-np.inf)), starts)
-    own = np.where(measured, reflectance, np.float32(0.0))
-    number, bright, dark = (
-        np.add.reduceat(mask.astype(np.float32), starts) for mask in (measured, own > BRIGHT, measured & (own < DARK))
+    starts = offsets[:-1]
+    is_measured = reflectance >= 0.0
+    value = np.where(is_measured, reflectance, np.float32(0.0))
+    n_measured, n_bright, n_dark = (
+        np.add.reduceat(mask.astype(np.float32), starts)
+        for mask in (is_measured, value > BRIGHT, is_measured & (value < DARK))
     )
-    total, squares = (np.add.reduceat(v, starts, dtype=np.float64) for v in (own, own * own))
-    count = np.where(number > 0, number.astype(np.float64), np.nan)
-    mean, square = total / count, squares / count
-    deviation = np.sqrt(np.maximum(square - mean * mean, 0.0))
-    maximum = np.where(number > 0, greatest, np.nan)
-    return np.stack([mean, deviation, maximum, bright / count, dark / count], axis=1)
+    count = np.where(n_measured > 0, n_measured.astype(np.float64), np.nan)
+    mean, mean_square = (np.add.reduceat(v, starts, dtype=np.float64) / count for v in (value, value * value))
+    deviation = np.sqrt(np.maximum(mean_square - mean * mean, 0.0))
+    greatest = np.maximum.reduceat(np.where(is_measured, reflectance, np.float32(-np.inf)), starts)
+    maximum = np.where(n_measured > 0, greatest, np.nan)
+    return np.stack([mean, deviation, maximum, n_bright / count, n_dark / count], axis=1)

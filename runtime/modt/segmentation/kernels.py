@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from modt.geometry.kernels import GeometryKernels
-from modt.segmentation.ceiling import histogram
-from modt.segmentation.clusters import CellClusterer, members_of, occupied_cells
+from modt.segmentation.ceiling import CeilingFinder
+from modt.segmentation.cells import CellClusterer, members_of, occupied_cells
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
 from modt.segmentation.strips import merge_strips, view_bounds
 from modt.types import Float32, Int
+
+
+class Bounds(NamedTuple):
+    """Exclusive bounds of the points that are used."""
+
+    min_height_m: float  # above ground
+    max_height_m: float
+    min_sqrt_range: float  # [sqrt(m)]
+    max_sqrt_range: float
 
 
 class Kernels(GeometryKernels):
@@ -28,21 +39,19 @@ class Kernels(GeometryKernels):
     reflectance_statistics = staticmethod(reflectance_statistics)
 
     def above_ground(
-        self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
+        self, ground: GroundEstimator, ceiling: CeilingFinder, points: Float32, sensor_height_m: float, bounds: Bounds
     ) -> tuple[Int, PointColumns, Float32, Int]:
         """(K,) rows of (N, 4) or wider points within bounds, those points, their (K,) heights above ground [m].
 
         With them comes the histogram of the heights in which a ceiling shows.
-        Bounds are the least and greatest height [m], and the least and greatest square root of range, exclusively.
         """
         sweep = PointColumns.from_array(points)
         height = ground.height_above(sweep, sensor_height_m)
-        low, high, near, far = bounds
-        mask = (height > low) & (height < high)
-        mask &= (sweep.sqrt_range > near) & (sweep.sqrt_range < far)
-        rows = np.flatnonzero(mask)
+        used = (height > bounds.min_height_m) & (height < bounds.max_height_m)
+        used &= (sweep.sqrt_range > bounds.min_sqrt_range) & (sweep.sqrt_range < bounds.max_sqrt_range)
+        rows = np.flatnonzero(used)
         height = height.take(rows)
-        return rows, sweep.take(rows), height, histogram(height, float(high))
+        return rows, sweep.take(rows), height, ceiling.histogram(height)
 
 
 NUMPY = Kernels()

@@ -3,84 +3,113 @@
 from __future__ import annotations
 
 import ctypes
-from array import array
-from operator import attrgetter
-from typing import Any
+from collections.abc import Callable, Hashable
+from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON
+from modt.class_sizes import PersonSize
 from modt.geometry.native_kernels import NativeGeometryKernels
-from modt.native.library import FLOAT32, INT32, INT64, Own, Signatures, declare, pointers, structure
-from modt.segmentation.ceiling import ABOVE_M, BIN_M, bins_up_to
-from modt.segmentation.clusters import (
-    MAX_CELL_GAP_BEAMS,
-    MAX_CELL_GAP_M,
-    MIN_PERSON_POINTS,
-    MIN_SPLIT_M,
-    CellClusterer,
-    Cells,
-    Clusters,
-    ClusterSizes,
-    Members,
-)
-from modt.segmentation.grids import FAR_M, RING_STEP, SECTORS, PointColumns, SqrtRangeGrid
-from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, NOISE_M, SLOPE_GAIN, GroundEstimator
+from modt.native.library import FLOAT32, INT64, Array, Filled, Layout, Member, Number, Own, Rows, Signatures, declare
+from modt.segmentation.ceiling import CeilingFinder
+from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, Members
+from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
+from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
-from modt.segmentation.kernels import Kernels
-from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
+from modt.segmentation.kernels import Bounds, Kernels
+from modt.segmentation.strips import DIRECTION, ViewBounds
+from modt.segmentation.tuning import StripTuning
 from modt.types import N_REFLECTANCE, Float32, Float64, Int
+
+T = TypeVar("T", Cells, PointColumns, ClusterSizes)
+_f32, _i32, _i64 = map(np.dtype, (np.float32, np.int32, np.int64))
+
+
+def _members(kind: Member, *names: str) -> dict[str, Member]:
+    """Members of one kind."""
+    return dict.fromkeys(names, kind)
+
+
+GROUND = Layout(
+    "Ground",
+    **_members(Array(_f32, "rings"), "range_m", "flat_m"),
+    **_members(Number(_i32), "rings", "sectors", "flank_sectors", "bonnet_ring"),
+    **_members(Number(_f32), "far_m", "rings_per_unit", "max_slope", "ramp_slope", "near_m", "slope_gain", "noise_m"),
+    **_members(Number(_f32), "max_gap_m", "flank_m", "above_m", "bin_m", *Bounds._fields),
+)
+ABOVE_GROUND = Layout(
+    "AboveGround", rows=Array(_i64, "room"), kept=Rows(_f32, 5, "room"), histogram=Array(_i64, "bins")
+)
+POINT_COLUMNS = Layout("PointColumns", **_members(Array(_f32, "n"), "x", "y", "z", "sqrt_range"))
+GRID = Layout(
+    "Grid", cells_per_unit=Number(_f32), **_members(Number(_i32), "centre", "side"), table=Array(_i32, "side", "side")
+)
+CELLS = Layout(
+    "Cells",
+    **_members(Array(_i32, "n"), "row", "column"),
+    **_members(Array(_f32, "n"), "low", "high"),
+    entries=Array(_i64, "n"),
+)
+PERSON_SIZE = Layout("PersonSize", **_members(Number(_f32), *(f.name for f in fields(PersonSize))))
+CLUSTER_RULES = Layout(
+    "ClusterRules",
+    **_members(Number(_i32), "coarse_side", "fine_side"),
+    **_members(Number(_f32), "max_gap_m", "max_gap_beams", "max_extent_m", "min_extent_m", "max_split_sqrt_range"),
+    min_points=Number(_i64),
+)
+CLUSTER_SIZES = Layout(
+    "ClusterSizes",
+    **_members(Array(_i64, "n"), "points", "cell"),
+    **_members(Array(_f32, "n"), "extent_m", "bottom_m", "top_m", "sqrt_range", "beam_m"),
+    is_part=Array(np.bool_, "n"),
+)
+VIEW_BOUNDS = Layout("ViewBounds", **_members(Rows(_f32, 4, "n"), "min", "max"), scale_m=Array(_f32, "n"))
+STRIP_RULES = Layout(
+    "StripRules",
+    **_members(
+        Number(_f32), "max_diagonal_m", "min_width_m", "max_width_m", "min_top_m", "max_top_m", "max_bottom_m"
+    ),
+    **_members(Number(_f32), "max_gap_m", "min_gap_beams", "max_gap_beams"),
+)
+MEMBERS = Layout("Members", offsets=Array(_i64, "ends"), index=Array(_i64, "room"), columns=Array(_f32, 4, "room"))
 
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_above_ground": (_L, (Own, FLOAT32, Own, _F, FLOAT32, _L, Own, Own, FLOAT32, *[Own] * 3)),
-    "modt_occupied_cells": (_L, (Own, FLOAT32, _L, _F, _I, _I, INT32, Own, Own, Own, Own)),
-    "modt_cluster": (_L, (Own, Own, Own, FLOAT32, _L, _I, _I, Own, Own, Own)),
-    "modt_view_bounds": (None, (Own, Own, FLOAT32, INT64, INT64, _L, INT64, _L, Own, Own)),
-    "modt_merge_strips": (None, (Own, Own, FLOAT32, FLOAT32, _L, INT64, Own, Own, Own)),
+    "modt_ground_scratch": (_L, (GROUND, _L)),
+    "modt_above_ground": (_L, (GROUND, FLOAT32, _L, _F, Own, ABOVE_GROUND)),
+    "modt_occupied_cells": (_L, (POINT_COLUMNS, FLOAT32, _L, GRID, Own, POINT_COLUMNS, Own, CELLS)),
+    "modt_cluster_scratch": (_L, (_L, _I)),
+    "modt_cluster": (_L, (CLUSTER_RULES, PERSON_SIZE, CELLS, POINT_COLUMNS, FLOAT32, _L, Own, Own, CLUSTER_SIZES)),
+    "modt_view_bounds": (None, (CELLS, POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, _L, VIEW_BOUNDS)),
+    "modt_merge_strips": (None, (STRIP_RULES, PERSON_SIZE, VIEW_BOUNDS, FLOAT32, _L, INT64, Own, VIEW_BOUNDS, Own)),
     "modt_group": (_L, (INT64, _L, _L, Own, Own)),
-    "modt_members": (None, (Own, INT64, _L, INT64, INT64, _L, _L, Own)),
+    "modt_members": (None, (POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, INT64, _L, _L, MEMBERS)),
     "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, Own)),
     "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, Own)),
 }
 
 
-class _Ground(ctypes.Structure):
-    """Ground of ground.c."""
-
-    _fields_ = (
-        *((name, _I) for name in ("rings", "sectors", "sector_bits", "flank_sectors", "bonnet_ring")),
-        *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope")),
-        *(
-            (name, _F)
-            for name in ("ramp_slope", "near_m", "slope_gain", "noise_m", "max_gap_m", "flank_m", "upper_m", "bin_m")
-        ),
-    )
+def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
+    """Structure of others, and of the attribute of each other name of the first source that has it."""
+    for name in layout.members.keys() - others:
+        others[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
+    return layout(**others)
 
 
-_STRIP_KEYS = (
-    *("max_gap_m", "min_gap_beams", "max_gap_beams", "min_width_m", "max_width_m", "min_top_m", "max_top_m"),
-    *("max_bottom_m", "max_diagonal_m"),
-)
-_PERSON_KEYS = "max_extent_m", "min_top_m", "min_height_m"
-"""Fields of CarLimits and of STRIP_PERSON, in the order of Strips of cells.c."""
-_PART_KEYS = "min_extent_m", "max_extent_m", "min_top_m", "max_top_m", "min_height_m"
-"""Fields of SPLIT_PERSON, in the order of Rules of cells.c."""
+def _ground(ground: GroundEstimator, ceiling: CeilingFinder, bounds: Bounds) -> Filled:
+    sources = bounds, ground, ground.tuning, ground.grid, ceiling.tuning
+    return _filled(GROUND, *sources, sectors=SECTORS, far_m=FAR_M)
 
 
-class _GroundBuffers:
-    """Constants and scratch of ground.c for one estimator."""
+def _grid(grid: SqrtRangeGrid) -> Filled:
+    return GRID.of(grid, cells_per_unit=1 / grid.step, table=np.empty((grid.side, grid.side), np.int32))
 
-    def __init__(self, ground: GroundEstimator) -> None:
-        grid = ground.grid
-        scales = FAR_M, 1 / RING_STEP, SECTORS / 4
-        slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
-        limits = NEAR_M, SLOPE_GAIN, NOISE_M, MAX_GAP_M, FLANK_M, ABOVE_M, BIN_M
-        sectors = SECTORS, SECTORS.bit_length() - 1, FLANK_SECTORS, ground.bonnet_ring
-        self.constants = _Ground(grid.rings, *sectors, *scales, *slopes, *limits)
-        self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
-        self.cells, self.kind = np.empty((5, grid.size + 1), np.float32), np.empty(grid.size, np.uint8)
-        self.points, self.rays = np.empty((3, 0), np.float32), np.empty((4, SECTORS), np.float32)
+
+def _cluster_rules(clusterer: CellClusterer) -> Filled:
+    sides = {"coarse_side": clusterer.coarse.side, "fine_side": clusterer.fine.side}
+    return _filled(CLUSTER_RULES, clusterer, clusterer.gap, clusterer.split, **sides)
 
 
 class NativeKernels(NativeGeometryKernels, Kernels):
@@ -95,122 +124,172 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         super().__init__(library)
         declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
-        self._last_cells: tuple[Cells | None, array[int]] = None, array("Q")
-        self._work, self._number = np.empty((2, 1), np.int32)
-        self._strips: dict[CarLimits, Any] = {}
-        self._ground: dict[GroundEstimator, _GroundBuffers] = {}
+        self._structures: dict[Hashable, Filled] = {}
+        self._scratch = np.empty(0, np.uint8)
 
     def above_ground(
-        self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
+        self, ground: GroundEstimator, ceiling: CeilingFinder, points: Float32, sensor_height_m: float, bounds: Bounds
     ) -> tuple[Int, PointColumns, Float32, Int]:
         """(K,) rows of the points within bounds, those points, their (K,) heights above ground [m] and histogram."""
-        buffers = self._ground.get(ground) or self._ground.setdefault(ground, _GroundBuffers(ground))
         if points.shape[1] < 4:
             raise ValueError(f"rows of x, y, z and reflectance are needed, not of shape {points.shape}")
-        points, n = np.ascontiguousarray(points[:, :4], np.float32), len(points)
-        rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
-        if n > buffers.points.shape[1]:
-            buffers.points = np.empty((3, n), np.float32)
-        scratch, out = pointers(buffers.cells[:4], buffers.kind, buffers.points), pointers(kept)
-        count = np.zeros(bins_up_to(float(bounds[1])), np.int64)
+        points = np.ascontiguousarray(points[:, :4], np.float32)
+        n = len(points)
+        structure = self._structure(_ground, ground, ceiling, bounds)
+        scratch = self._memory(self.library.modt_ground_scratch(structure, n))
+        rows = np.empty(n + 1, np.int64)
+        kept = np.empty((5, n + 1), np.float32)
+        histogram = np.zeros(ceiling.bins, np.int64)
         k = self.library.modt_above_ground(
-            buffers.constants, ground.grid.range_m, buffers.flat_m, sensor_height_m, points, n, scratch, buffers.rays,
-            bounds, rows, out, count,
-        )  # fmt: skip
-        x, y, z, sqrt_range, height = kept[:, :k]
-        return rows[:k], PointColumns(x, y, z, sqrt_range), height, count
+            structure, points, n, sensor_height_m, scratch, ABOVE_GROUND(rows=rows, kept=kept, histogram=histogram)
+        )
+        *columns, height = kept[:, :k]
+        return rows[:k], PointColumns(*columns), height, histogram
 
     def occupied_cells(
         self, grid: SqrtRangeGrid, points: PointColumns, height: Float32
     ) -> tuple[Cells, Int, PointColumns, Int]:
         """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
         k = len(points)
-        if len(self._number) < grid.side**2:
-            self._number = np.empty(grid.side**2, np.int32)
-        places, (entries, sample, cell) = np.empty((2, k), np.int32), np.empty((3, k), np.int64)
-        heights, sampled = np.empty((2, k), np.float32), np.empty((4, k), np.float32)
-        given, out, columns = self._columns(points), pointers(places, heights, entries), pointers(sampled)
+        row, column = np.empty((2, k), np.int32)
+        low, high, *columns = np.empty((6, k), np.float32)
+        entries, sample, cell_of_point = np.empty((3, k), np.int64)
+        cells = Cells(row, column, low, high, entries)
+        sampled = PointColumns(*columns)
         n = self.library.modt_occupied_cells(
-            given, height, k, 1 / grid.step, grid.centre, grid.side, self._number, sample, columns, cell, out,
-        )  # fmt: skip
-        (row, column), (low, high) = places[:, :n], heights[:, :n]
-        cells = Cells(row, column, low, high, entries[:n])
-        return cells, sample[:n], PointColumns(*sampled[:, :n]), cell
+            POINT_COLUMNS.of(points),
+            height,
+            k,
+            self._structure(_grid, grid),
+            sample,
+            POINT_COLUMNS.of(sampled),
+            cell_of_point,
+            CELLS.of(cells),
+        )
+        return _first(cells, n), sample[:n], _first(sampled, n), cell_of_point
 
     def cluster(
         self, clusterer: CellClusterer, cells: Cells, points: PointColumns, beam_m: Float32
     ) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
-        n, coarse, fine = len(cells), clusterer.coarse.side, clusterer.fine.side
-        if len(self._work) < (room := 2 * fine + 15 * n + 8):
-            self._work = np.empty(room, np.int32)
-        limits = clusterer.max_extent_m, MIN_SPLIT_M, clusterer.max_split_sqrt_range, MIN_PERSON_POINTS
-        rules = array("f", (MAX_CELL_GAP_M, MAX_CELL_GAP_BEAMS, *limits, *attrgetter(*_PART_KEYS)(SPLIT_PERSON)))
-        cluster, counts = np.empty(n, np.int64), np.empty((2, 2 * n), np.int64)
-        sizes, is_part = np.empty((5, 2 * n), np.float32), np.empty(2 * n, np.bool_)
-        given, out = self._columns(points), pointers(counts, sizes, is_part)
+        n = len(cells)
+        scratch = self._memory(self.library.modt_cluster_scratch(n, clusterer.fine.side))
+        cluster = np.empty(n, np.int64)
+        count, cell = np.empty((2, 2 * n), np.int64)
+        extent_m, bottom_m, top_m, sqrt_range, beam = np.empty((5, 2 * n), np.float32)
+        is_part = np.empty(2 * n, np.bool_)
+        sizes = ClusterSizes(count, cell, extent_m, bottom_m, top_m, sqrt_range, beam, is_part)
         g = self.library.modt_cluster(
-            rules, self._cells(cells), given, beam_m, n, coarse, fine, self._work, cluster, out
+            self._structure(_cluster_rules, clusterer),
+            self._structure(PERSON_SIZE.of, clusterer.split.person),
+            CELLS.of(cells),
+            POINT_COLUMNS.of(points),
+            beam_m,
+            n,
+            scratch,
+            cluster,
+            CLUSTER_SIZES.of(sizes),
         )
-        (count, cell), (extent_m, bottom_m, top_m, sqrt_range, beam_m) = counts[:, :g], sizes[:, :g]
-        return cluster, ClusterSizes(count, extent_m, bottom_m, top_m, sqrt_range, cell, beam_m, is_part[:g])
+        return cluster, _first(sizes, g)
 
-    def view_bounds(self, clusters: Clusters, number: Int, n: int) -> ViewBounds:
-        """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
-        bounds, scale_m = np.empty((8, n), np.float32), np.empty(n, np.float32)
-        cells, sampled, out = self._cells(clusters.cells), self._columns(clusters.sampled), pointers(bounds)
+    def view_bounds(self, clusters: Clusters, strip_of_cluster: Int, n: int) -> ViewBounds:
+        """Bounds of n strips in the view, given (G,) the number of each cluster among them, or NONE."""
+        bounds = _room_for_bounds(n)
         self.library.modt_view_bounds(
-            cells, sampled, clusters.height, clusters.sample, clusters.of_cell, len(clusters.sample), number, n, out,
-            scale_m,
-        )  # fmt: skip
-        return ViewBounds(bounds[:4], bounds[4:], scale_m)
+            CELLS.of(clusters.cells),
+            POINT_COLUMNS.of(clusters.sampled),
+            clusters.height,
+            clusters.sample,
+            clusters.cluster_of_cell,
+            len(clusters.cells),
+            strip_of_cluster,
+            n,
+            VIEW_BOUNDS.of(bounds),
+        )
+        return bounds
 
-    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> Int:
-        """(G,) first of the clusters that make one car with each, given (G,) the spacing of beams there [rad]."""
-        n, strips = len(bounds), self._strips.get(limits)
-        if strips is None:
-            values = *attrgetter(*_STRIP_KEYS)(limits), *attrgetter(*_PERSON_KEYS)(STRIP_PERSON)
-            strips = self._strips[limits] = (_F * len(values))(*values)
-        order, target = bounds.min[DIRECTION].argsort(kind="stable"), np.empty(n, np.int64)
-        parent, united = np.empty(n, np.int32), np.empty((8, n), np.float32)
-        given, out = pointers(bounds.min, bounds.max), pointers(united)
-        self.library.modt_merge_strips(strips, given, bounds.scale_m, beam_rad, n, order, parent, out, target)
+    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, tuning: StripTuning) -> Int:
+        """(G,) first of the strips that make one car with each, given (G,) the spacing of beams there [rad]."""
+        n = len(bounds)
+        target = np.empty(n, np.int64)
+        self.library.modt_merge_strips(
+            self._structure(STRIP_RULES.of, tuning),
+            self._structure(PERSON_SIZE.of, tuning.person),
+            VIEW_BOUNDS.of(bounds),
+            beam_rad,
+            n,
+            bounds.min[DIRECTION].argsort(kind="stable"),
+            np.empty(n, np.int32),
+            VIEW_BOUNDS.of(_room_for_bounds(n)),
+            target,
+        )
         return target
 
     def group(self, labels: Int, n: int) -> Groups:
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
-        rows, offsets = np.empty(len(labels), np.int64), np.empty(n + 1, np.int64)
+        rows = np.empty(len(labels), np.int64)
+        offsets = np.empty(n + 1, np.int64)
         return Groups(rows[: self.library.modt_group(labels, len(labels), n, rows, offsets)], offsets)
 
     def members_of(self, clusters: Clusters, index: Int) -> Members:
         """Points of each cluster, given (K,) the row of each point in the sweep."""
-        points, cells, of_cell = clusters.points, clusters.cells, clusters.of_cell
-        k, offsets = len(index), np.empty(clusters.n + 1, np.int64)
-        rows, own = np.empty(k, np.int64), np.empty(4 * k, np.float32)
-        given, out = structure(points.x, points.y, points.z, clusters.height, index), structure(offsets, rows, own)
-        self.library.modt_members(given, clusters.cell, k, of_cell, cells.entries, len(cells), clusters.n, out)
+        k = len(index)
+        offsets = np.empty(clusters.n + 1, np.int64)
+        rows = np.empty(k, np.int64)
+        columns = np.empty((4, k), np.float32)
+        self.library.modt_members(
+            POINT_COLUMNS.of(clusters.points),
+            clusters.height,
+            index,
+            clusters.cell_of_point,
+            k,
+            clusters.cluster_of_cell,
+            clusters.cells.entries,
+            len(clusters.cells),
+            clusters.n,
+            MEMBERS(offsets=offsets, index=rows, columns=columns),
+        )
         m = int(offsets[-1])
-        return Members(offsets, rows[:m], own[: 4 * m].reshape(4, m))
+        return Members(offsets, rows[:m], columns.ravel()[: 4 * m].reshape(4, m))
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
-        best = np.empty(len(groups), np.int64)
-        given = x, y, groups.rows, groups.offsets, len(groups), limit
-        self.library.modt_best_headings(*given, *AXES, len(HEADINGS), noise_m, best)
+        n = len(groups)
+        best = np.empty(n, np.int64)
+        self.library.modt_best_headings(
+            x, y, groups.rows, groups.offsets, n, limit, *AXES, len(HEADINGS), noise_m, best
+        )
         return best
 
     def reflectance_statistics(self, points: Float32, index: Int, offsets: Int) -> Float64:
         """(G, 5) mean, standard deviation, maximum, share of bright and share of dark returns of each group."""
-        points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
+        points = np.ascontiguousarray(points, np.float32)
+        n = len(offsets) - 1
         statistics = np.empty((n, N_REFLECTANCE))
         self.library.modt_reflectance_statistics(points, points.shape[1], index, offsets, n, BRIGHT, DARK, statistics)
         return statistics
 
-    @staticmethod
-    def _columns(points: PointColumns) -> array[int]:
-        return structure(points.x, points.y, points.z, points.sqrt_range)
+    def _structure(self, fill: Callable[..., Filled], *sources: Hashable) -> Filled:
+        """Structure filled from objects that do not change, once."""
+        key = (fill, *sources)
+        filled = self._structures.get(key)
+        if filled is None:
+            filled = self._structures[key] = fill(*sources)
+        return filled
 
-    def _cells(self, cells: Cells) -> array[int]:
-        if self._last_cells[0] is not cells:
-            self._last_cells = cells, structure(cells.row, cells.column, cells.low, cells.high, cells.entries)
-        return self._last_cells[1]
+    def _memory(self, size: int) -> NDArray[np.uint8]:
+        """Scratch of at least this size [bytes], kept between calls: new pages take longer than the passes."""
+        if len(self._scratch) < size:
+            self._scratch = np.empty(size, np.uint8)
+        return self._scratch
+
+
+def _first(columns: T, n: int) -> T:
+    """The first n rows of arrays that a dataclass holds."""
+    return type(columns)(*(getattr(columns, f.name)[:n] for f in fields(columns)))
+
+
+def _room_for_bounds(n: int) -> ViewBounds:
+    """Bounds of n strips, to be filled."""
+    bounds = np.empty((2, 4, n), np.float32)
+    return ViewBounds(bounds[0], bounds[1], np.empty(n, np.float32))

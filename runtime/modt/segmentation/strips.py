@@ -6,42 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.class_sizes import STRIP_PERSON
-from modt.segmentation.clusters import Clusters
+from modt.segmentation.cells import Clusters
 from modt.segmentation.grids import PointColumns, pseudo_angle
 from modt.segmentation.groups import Groups
+from modt.segmentation.tuning import StripTuning
 from modt.types import Bool, Float32, Int, Self
 
 DIRECTION, RANGE, HEIGHT, ELEVATION = range(4)
-MIN_POINTS = 2
-"""Least number of points of a strip."""
-VISIBLE_M, MAX_BEAMS = 1.5, 8.0
-"""Height of a car, and the beams on it from which a cluster is a whole car and no strip."""
-
-
-@dataclass(frozen=True, slots=True)
-class CarLimits:
-    """Bounds of strips that make one car, and of that car."""
-
-    max_diagonal_m: float = 6.0
-    """Greatest diagonal from above of a strip and of the car."""
-    min_width_m: float = 0.7
-    max_width_m: float = 5.2
-    """Width of the car across the ray."""
-    min_top_m: float = 0.8
-    max_top_m: float = 2.2
-    max_bottom_m: float = 0.8
-    """Top and bottom of the car above ground."""
-    max_gap_m: float = 1.8
-    """Greatest distance in range between two strips, the length of a bonnet."""
-    min_gap_beams: float = -1.0
-    max_gap_beams: float = 2.0
-    """Distance in elevation from the nearer strip to the farther one."""
+"""Rows of the bounds: pseudo-angle, range [m], height above ground [m], and tangent of the elevation."""
 
 
 @dataclass(frozen=True, slots=True)
 class ViewBounds:
-    """Bounds of groups of cells: direction [pseudo-angle], range [m], height above ground [m], elevation [tan]."""
+    """Bounds of groups of cells as the sensor sees them, in the rows DIRECTION, RANGE, HEIGHT and ELEVATION."""
 
     min: Float32  # (4, G)
     max: Float32  # (4, G)
@@ -53,7 +30,8 @@ class ViewBounds:
 
         Given are a point of each cell, the ground below it [m, sensor frame], and the bounds of its height above it.
         """
-        direction, range_m = pseudo_angle(points.x, points.y), np.square(points.sqrt_range)
+        direction = pseudo_angle(points.x, points.y)
+        range_m = np.square(points.sqrt_range)
         scale_m = np.square(np.abs(points.x) + np.abs(points.y)) / range_m
         return cls(
             groups.min(np.stack([direction, range_m, low, (low + ground) / range_m])),
@@ -69,9 +47,9 @@ class ViewBounds:
         return type(self)(self.min[:, rows], self.max[:, rows], self.scale_m[rows])
 
     def union(self, groups: Groups) -> Self:
-        """Common bounds of groups of these."""
-        own = self.take(groups.rows)
-        return type(self)(groups.min(own.min), groups.max(own.max), own.scale_m[groups.offsets[:-1]])
+        """Common bounds of groups of these, at the scale of the first of each."""
+        sorted_ = self.take(groups.rows)
+        return type(self)(groups.min(sorted_.min), groups.max(sorted_.max), sorted_.scale_m[groups.offsets[:-1]])
 
     @property
     def width_m(self) -> Float32:
@@ -86,57 +64,61 @@ class ViewBounds:
         return diagonal_m2
 
 
-def view_bounds(clusters: Clusters, number: Int, n: int) -> ViewBounds:
-    """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
-    groups = Groups.from_labels(number.take(clusters.of_cell), n)
-    points, cells = clusters.sampled.take(groups.rows), clusters.cells
+def view_bounds(clusters: Clusters, strip_of_cluster: Int, n: int) -> ViewBounds:
+    """Bounds of n strips in the view, given (G,) the number of each cluster among them, or NONE."""
+    groups = Groups.from_labels(strip_of_cluster.take(clusters.cluster_of_cell), n)
+    points = clusters.sampled.take(groups.rows)
+    cells = clusters.cells
     ground = points.z - clusters.height.take(clusters.sample.take(groups.rows))
     return ViewBounds.of_cells(points, ground, cells.low.take(groups.rows), cells.high.take(groups.rows), groups)
 
 
-def merge_strips(bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> Int:
-    """(G,) first of the clusters that make one car with each, itself where it is not merged.
+def merge_strips(bounds: ViewBounds, beam_rad: Float32, tuning: StripTuning) -> Int:
+    """(G,) first of the strips that make one car with each, itself where it is not merged.
+
+    Pairs of strips chain up to groups; a group larger than a car is not merged at all.
 
     Args:
-        bounds: bounds of the clusters.
+        bounds: bounds of the strips.
         beam_rad: (G,) spacing of the beams at the foot of each [rad].
-        limits: sizes of strips and cars.
+        tuning: sizes of strips and cars.
     """
-    self_index = np.arange(len(bounds))
-    representative = self_index.copy()
-    front, back = pairs(bounds, beam_rad, limits)
-    if len(front):
-        _propagate_min(representative, front, back)
-        car_id = (np.cumsum(representative == self_index) - 1)[representative]
-        cars = bounds.union(Groups.from_labels(car_id, int(car_id.max()) + 1))
-        representative = np.where(fits(cars, limits)[car_id], representative, self_index)
-    return representative
+    strip = np.arange(len(bounds))
+    near, far = pairs(bounds, beam_rad, tuning)
+    if not len(near):
+        return strip
+    first = strip.copy()
+    _propagate_min(first, near, far)
+    group_of_strip = (np.cumsum(first == strip) - 1)[first]
+    cars = bounds.union(Groups.from_labels(group_of_strip, int(group_of_strip.max()) + 1))
+    return np.where(fits(cars, tuning)[group_of_strip], first, strip)
 
 
-def pairs(bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> tuple[Int, Int]:
-    """Nearer and farther cluster of each pair of strips of one car."""
-    c = limits
+def pairs(bounds: ViewBounds, beam_rad: Float32, tuning: StripTuning) -> tuple[Int, Int]:
+    """Nearer and farther strip of each pair that makes one car."""
     one, other = _overlapping(bounds.min[DIRECTION], bounds.max[DIRECTION])
-    near = bounds.min[RANGE]
-    swap = near[other] < near[one]
-    front, back = np.where(swap, other, one), np.where(swap, one, other)
-    beams = (bounds.min[ELEVATION][back] - bounds.max[ELEVATION][front]) / beam_rad[back]
-    adjacent = near[back] - bounds.max[RANGE][front] < c.max_gap_m
-    adjacent &= (beams > c.min_gap_beams) & (beams < c.max_gap_beams)
-    person = STRIP_PERSON.fits(bounds.width_m, bounds.min[HEIGHT], bounds.max[HEIGHT])
-    adjacent &= ~(person[front] | person[back])
-    front, back = front[adjacent], back[adjacent]
-    a, b = bounds.take(front), bounds.take(back)
+    range_m = bounds.min[RANGE]
+    swap = range_m[other] < range_m[one]
+    near = np.where(swap, other, one)
+    far = np.where(swap, one, other)
+    gap_beams = (bounds.min[ELEVATION][far] - bounds.max[ELEVATION][near]) / beam_rad[far]
+    adjacent = range_m[far] - bounds.max[RANGE][near] < tuning.max_gap_m
+    adjacent &= (gap_beams > tuning.min_gap_beams) & (gap_beams < tuning.max_gap_beams)
+    person = tuning.person.fits(bounds.width_m, bounds.min[HEIGHT], bounds.max[HEIGHT])
+    adjacent &= ~(person[near] | person[far])
+    near, far = near[adjacent], far[adjacent]
+    a = bounds.take(near)
+    b = bounds.take(far)
     both = ViewBounds(np.minimum(a.min, b.min), np.maximum(a.max, b.max), a.scale_m)
-    car = fits(both, c) & (both.width_m > c.min_width_m)
-    car &= (both.max[HEIGHT] > c.min_top_m) & (both.min[HEIGHT] < c.max_bottom_m)
-    return front[car], back[car]
+    car = fits(both, tuning) & (both.width_m > tuning.min_width_m)
+    car &= (both.max[HEIGHT] > tuning.min_top_m) & (both.min[HEIGHT] < tuning.max_bottom_m)
+    return near[car], far[car]
 
 
-def fits(bounds: ViewBounds, limits: CarLimits) -> Bool:
+def fits(bounds: ViewBounds, tuning: StripTuning) -> Bool:
     """(G,) no larger than a car."""
-    fits: Bool = bounds.diagonal_m2 < np.square(np.float32(limits.max_diagonal_m))
-    fits &= (bounds.width_m < limits.max_width_m) & (bounds.max[HEIGHT] < limits.max_top_m)
+    fits: Bool = bounds.diagonal_m2 < np.square(np.float32(tuning.max_diagonal_m))
+    fits &= (bounds.width_m < tuning.max_width_m) & (bounds.max[HEIGHT] < tuning.max_top_m)
     return fits
 
 
@@ -151,9 +133,9 @@ def _propagate_min(label: Int, one: Int, other: Int) -> None:
 
 
 def _overlapping(start: Float32, end: Float32) -> tuple[Int, Int]:
-    """Pairs of overlapping intervals, each once."""
+    """Pairs of overlapping intervals, each once: each interval with those that start after it and before its end."""
     order = np.argsort(start, kind="stable")
-    following = np.searchsorted(start[order], end[order], side="right") - np.arange(1, len(order) + 1)
-    one = np.repeat(np.arange(len(order)), following)
-    rank = np.arange(len(one)) - np.repeat(np.cumsum(following) - following, following)
-    return order[one], order[one + 1 + rank]
+    followers = np.searchsorted(start[order], end[order], side="right") - np.arange(1, len(order) + 1)
+    place = np.repeat(np.arange(len(order)), followers)
+    rank = np.arange(len(place)) - np.repeat(np.cumsum(followers) - followers, followers)
+    return order[place], order[place + 1 + rank]

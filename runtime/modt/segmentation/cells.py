@@ -1,4 +1,8 @@
-"""Clusters of cells, and sizes of clusters."""
+"""Occupied cells, clusters of cells, sizes of clusters, and points by cluster.
+
+Index spaces: K points above ground, C occupied cells, and clusters, G of them while some may be empty or invalid,
+n at the end.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from modt.class_sizes import SPLIT_PERSON
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
+from modt.segmentation.tuning import DEFAULT, CellTuning, SplitTuning
 from modt.types import NONE, Bool, Float32, Int, Self
 
 
@@ -31,38 +35,46 @@ def occupied_cells(
     grid: SqrtRangeGrid, points: PointColumns, height: Float32
 ) -> tuple[Cells, Int, PointColumns, Int]:
     """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
-    cells, sample, cell = _occupied(grid, *grid.row_column(points), height, height)
-    return cells, sample, points.take(sample), cell
+    cells, sample, cell_of_point = _occupied(grid, *grid.row_column(points), height, height)
+    return cells, sample, points.take(sample), cell_of_point
 
 
 def _occupied(grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32) -> tuple[Cells, Int, Int]:
     """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
     sample, cell = grid.occupied(grid.flat_index(row, column))
     n = len(sample)
-    bounds = label_min(low, cell, n), label_max(high, cell, n)
-    return Cells(row[sample], column[sample], *bounds, np.bincount(cell, minlength=n)), sample, cell
+    cells = Cells(
+        row=row[sample],
+        column=column[sample],
+        low=label_min(low, cell, n),
+        high=label_max(high, cell, n),
+        entries=np.bincount(cell, minlength=n),
+    )
+    return cells, sample, cell
 
 
 def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
     """(C,) connected component of each cell of the (C,) used ones, NONE for the others.
 
-    Neighbours with a vertical gap below (C,) max_gap_m are connected. Components are numbered in the order of their
-    first cells.
+    Neighbours with a vertical gap below (C,) max_gap_m, taken at the first of both in the order of the grid, are
+    connected. Components are numbered in the order of their first cells.
     """
     from scipy.sparse import csr_array  # large, and the compiled kernels do without
     from scipy.sparse.csgraph import connected_components
 
-    rows = slice(None) if use.all() else np.flatnonzero(use)
-    low, high, gap_m = cells.low[rows], cells.high[rows], max_gap_m[rows]
-    one, other = grid.neighbour_pairs(grid.flat_index(cells.row[rows], cells.column[rows]))
-    gap = np.maximum(low.take(one), low.take(other))
-    gap -= np.minimum(high.take(one), high.take(other))
-    near = np.flatnonzero(gap < gap_m.take(one))
-    ends = np.zeros(len(low) + 1, np.int32)
-    np.cumsum(np.bincount(one.take(near), minlength=len(low)), out=ends[1:])
-    graph = csr_array((np.ones(len(near)), other.take(near), ends), shape=(len(low), len(low)))
+    used = slice(None) if use.all() else np.flatnonzero(use)
+    low = cells.low[used]
+    high = cells.high[used]
+    one, other = grid.neighbour_pairs(grid.flat_index(cells.row[used], cells.column[used]))
+    gap_m = np.maximum(low.take(one), low.take(other))
+    gap_m -= np.minimum(high.take(one), high.take(other))
+    near = np.flatnonzero(gap_m < max_gap_m[used].take(one))
+    # The pairs are sorted by their first cell, so their second cells are the rows of a sparse matrix as they stand.
+    row_ends = np.zeros(len(low) + 1, np.int32)
+    np.cumsum(np.bincount(one.take(near), minlength=len(low)), out=row_ends[1:])
+    graph = csr_array((np.ones(len(near)), other.take(near), row_ends), shape=(len(low), len(low)))
     component = np.full(len(cells), NONE)
-    component[rows] = connected_components(graph, directed=False)[1]
+    component[used] = connected_components(graph, directed=False)[1]
     return component
 
 
@@ -71,8 +83,8 @@ def connect_coarse(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int
 
     The gap of a wide cell is that of its last cell; wide cells are in the order of their last cells.
     """
-    wide, sample, place = _occupied(grid, cells.row >> 1, cells.column >> 1, cells.low, cells.high)
-    return connect(grid, wide, max_gap_m.take(sample), np.ones(len(wide), np.bool_)).take(place)
+    wide, sample, wide_of_cell = _occupied(grid, cells.row >> 1, cells.column >> 1, cells.low, cells.high)
+    return connect(grid, wide, max_gap_m.take(sample), np.ones(len(wide), np.bool_)).take(wide_of_cell)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +92,11 @@ class ClusterSizes:
     """Sizes of G clusters, some of them empty."""
 
     points: Int  # (G,) number of points
+    cell: Int  # (G,) last cell of each
     extent_m: Float32  # (G,) diagonal of the axis-parallel rectangle [m]
     bottom_m: Float32  # (G,) least height above ground [m]
     top_m: Float32  # (G,) greatest height above ground [m]
-    sqrt_range: Float32  # (G,) square root of the range of one cell [sqrt(m)]
-    cell: Int  # (G,) that cell
+    sqrt_range: Float32  # (G,) square root of the range of the last cell [sqrt(m)]
     beam_m: Float32  # (G,) vertical distance of neighbouring beams there [m]
     is_part: Bool  # (G,) part of an oversized cluster
 
@@ -94,19 +106,23 @@ class ClusterSizes:
     @classmethod
     def of_cells(cls, cells: Cells, points: PointColumns, beam_m: Float32, cluster: Int) -> Self:
         """Sizes of clusters by (C,) a point of each cell, the distance of beams there [m], its cluster or NONE."""
-        n, has = int(cluster.max(initial=NONE)) + 1, np.flatnonzero(cluster != NONE)
-        label, cell = cluster.take(has), np.zeros(n, np.int64)
-        cell[label] = has
-        x, y, low, high = (v.take(has) for v in (points.x, points.y, cells.low, cells.high))
+        n = int(cluster.max(initial=NONE)) + 1
+        used = np.flatnonzero(cluster != NONE)
+        label = cluster.take(used)
+        last = np.zeros(n, np.int64)
+        np.maximum.at(last, label, used)
+        low = cells.low.take(used)
+        high = cells.high.take(used)
+        x, y = (column.take(used) for column in (points.x, points.y))
         width, depth = (label_max(v, label, n) - label_min(v, label, n) for v in (x, y))
         return cls(
-            points=np.bincount(label, cells.entries.take(has), n).astype(np.int64),
+            points=np.bincount(label, cells.entries.take(used), n).astype(np.int64),
+            cell=last,
             extent_m=np.sqrt(np.square(width) + np.square(depth)),
             bottom_m=label_min(low, label, n),
             top_m=label_max(high, label, n),
-            sqrt_range=points.sqrt_range.take(cell),
-            cell=cell,
-            beam_m=beam_m.take(cell),
+            sqrt_range=points.sqrt_range.take(last),
+            beam_m=beam_m.take(last),
             is_part=np.zeros(n, np.bool_),
         )
 
@@ -120,9 +136,12 @@ class ClusterSizes:
 
         The extent stays that of the target: merging is limited to the size of an object.
         """
-        points, bottom_m, top_m = self.points.copy(), self.bottom_m.copy(), self.top_m.copy()
+        points = self.points.copy()
+        bottom_m = self.bottom_m.copy()
+        top_m = self.top_m.copy()
         moved = (target != np.arange(len(target))).nonzero()[0]  # few
-        into, points[moved] = target[moved], 0
+        into = target[moved]
+        points[moved] = 0
         np.add.at(points, into, self.points[moved])
         np.minimum.at(bottom_m, into, self.bottom_m[moved])
         np.maximum.at(top_m, into, self.top_m[moved])
@@ -135,27 +154,21 @@ class Clusters:
 
     points: PointColumns
     height: Float32  # (K,) above ground [m]
-    cell: Int  # (K,) cell of each point
+    cell_of_point: Int  # (K,)
     cells: Cells
     sample: Int  # (C,) last point of each cell
     sampled: PointColumns  # (C,) that point
-    of_cell: Int  # (C,) cluster of each cell, NONE where it cannot be an object
+    cluster_of_cell: Int  # (C,) NONE where it cannot be an object
     n: int
 
     def select(self, keep: Bool) -> Clusters:
         """The clusters of an (n,) mask, renumbered."""
         if keep.all():
             return self
-        number = np.append(consecutive(keep), NONE)  # the last entry is that of NONE
-        return replace(self, of_cell=number[self.of_cell], n=int(keep.sum()))
-
-
-MAX_CELL_GAP_M, MAX_CELL_GAP_BEAMS = 0.3, 2.0
-"""Neighbouring cells with a vertical gap below the sum, the beams taken at their range, are one cluster."""
-MIN_SPLIT_M, MIN_CELL_RETURNS = 0.8, 0.9
-"""A cluster of this extent may hold a person and more, where a fine cell is as wide as so many spacings of points."""
-MIN_PERSON_POINTS = 8
-"""Least number of points of a person that is split off."""
+        clustered = np.flatnonzero(self.cluster_of_cell != NONE)
+        cluster_of_cell = np.full(len(self.cells), NONE)
+        cluster_of_cell[clustered] = consecutive(keep)[self.cluster_of_cell[clustered]]
+        return replace(self, cluster_of_cell=cluster_of_cell, n=int(keep.sum()))
 
 
 class CellClusterer:
@@ -164,60 +177,78 @@ class CellClusterer:
     Args:
         sensor: range and spacing of points.
         config: clustering distance and sizes of objects.
+        cells: gap between neighbouring cells of one cluster.
+        split: parts that are a person.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
-        step = config.cell_m / np.sqrt(10.0)
+    def __init__(
+        self,
+        sensor: SensorConfig,
+        config: SegmentationConfig,
+        cells: CellTuning = DEFAULT.cells,
+        split: SplitTuning = DEFAULT.split,
+    ) -> None:
+        self.gap = cells
+        self.split = split
         self.max_extent_m = config.max_extent_m
+        step = config.cell_m / np.sqrt(10.0)
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
-        spacing = MIN_CELL_RETURNS * np.deg2rad(sensor.azimuth_step_deg)
-        self.max_split_sqrt_range = np.float32(self.fine.step / spacing)  # a cell is as wide as step * sqrt(range)
+        # A cell is step * sqrt(range) wide, and returns of a beam are range * azimuth_step apart.
+        spacing = split.min_cell_returns * np.deg2rad(sensor.azimuth_step_deg)
+        self.max_split_sqrt_range = np.float32(self.fine.step / spacing)
 
     def cluster(self, cells: Cells, points: PointColumns, beam_m: Float32) -> tuple[Int, ClusterSizes]:
-        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
-        max_gap_m = np.float32(MAX_CELL_GAP_M) + np.float32(MAX_CELL_GAP_BEAMS) * beam_m
+        """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes.
+
+        Every cell is in a cluster. The parts that were tried come after the clusters of the coarse grid; those that
+        are not split off are empty.
+        """
+        max_gap_m = np.float32(self.gap.max_gap_m) + np.float32(self.gap.max_gap_beams) * beam_m
         cluster = connect_coarse(self.coarse, cells, max_gap_m)
-        coarse = ClusterSizes.of_cells(cells, points, beam_m, cluster)
-        oversized = coarse.extent_m >= self.max_extent_m
-        again = (oversized | self._may_hold_person(coarse)).take(cluster)
-        part = connect(self.fine, cells, max_gap_m, again)
+        sizes = ClusterSizes.of_cells(cells, points, beam_m, cluster)
+        oversized = sizes.extent_m >= self.max_extent_m
+        divided = oversized | self._may_hold_person(sizes)
+
+        part = connect(self.fine, cells, max_gap_m, divided.take(cluster))
         parts = ClusterSizes.of_cells(cells, points, beam_m, part)
-        owner = cluster.take(parts.cell)
-        of_oversized = oversized.take(owner)
-        split = of_oversized | self._may_be_person(parts)
-        number = np.full(len(parts) + 1, NONE)  # the last is that of NONE
-        number[:-1][split] = len(coarse) + split.nonzero()[0]
-        cluster = np.maximum(number.take(part), cluster)  # parts follow the clusters
-        whole = np.bincount(owner, parts.points * split, len(coarse))
-        coarse, parts = (
-            replace(coarse, points=coarse.points - whole.astype(np.int64)),
-            replace(parts, points=parts.points * split, is_part=of_oversized),
-        )
-        return cluster, coarse.followed_by(parts)
+        cluster_of_part = cluster.take(parts.cell)
+        of_oversized = oversized.take(cluster_of_part)
+        is_split = of_oversized | self._may_be_person(parts)
+
+        split_points = parts.points * is_split
+        points_left = sizes.points - np.bincount(cluster_of_part, split_points, len(sizes)).astype(np.int64)
+        cell_in_part = np.flatnonzero(part != NONE)
+        split_cell = cell_in_part[is_split.take(part.take(cell_in_part))]
+        cluster[split_cell] = len(sizes) + part[split_cell]
+        parts = replace(parts, points=split_points, is_part=of_oversized)
+        return cluster, replace(sizes, points=points_left).followed_by(parts)
 
     def _may_hold_person(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters that may hold a person and more, near enough for the fine grid to hold an object together."""
-        may: Bool = (sizes.extent_m > MIN_SPLIT_M) & (sizes.top_m > SPLIT_PERSON.min_top_m)
-        may &= (sizes.points >= 2 * MIN_PERSON_POINTS) & (sizes.sqrt_range < self.max_split_sqrt_range)
+        split = self.split
+        may: Bool = (sizes.extent_m > split.min_extent_m) & (sizes.top_m > split.person.min_top_m)
+        may &= (sizes.points >= 2 * split.min_points) & (sizes.sqrt_range < self.max_split_sqrt_range)
         return may
 
     def _may_be_person(self, sizes: ClusterSizes) -> Bool:
         """(G,) parts of a person's size."""
-        return (sizes.points >= MIN_PERSON_POINTS) & SPLIT_PERSON.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
+        fits = self.split.person.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
+        return (sizes.points >= self.split.min_points) & fits
 
 
 @dataclass(frozen=True, slots=True)
 class Members:
     """M points by cluster, in the order of the sweep within a cluster."""
 
-    offsets: Int  # (n + 1,) cluster i owns the points from offsets[i] to offsets[i + 1]
+    offsets: Int  # (n + 1,) cluster i has the points from offsets[i] to offsets[i + 1]
     index: Int  # (M,) rows of the sweep
     columns: Float32  # (4, M) x, y, z, and z of the ground beneath [m, sensor frame]
 
 
 def members_of(clusters: Clusters, index: Int) -> Members:
     """Points of each cluster, given (K,) the row of each point in the sweep."""
-    groups, points = Groups.from_labels(clusters.of_cell.take(clusters.cell), clusters.n), clusters.points
+    groups = Groups.from_labels(clusters.cluster_of_cell.take(clusters.cell_of_point), clusters.n)
+    points = clusters.points
     x, y, z, height = (v.take(groups.rows) for v in (points.x, points.y, points.z, clusters.height))
     return Members(groups.offsets, index.take(groups.rows), np.stack([x, y, z, z - height]))

@@ -4,9 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
+from modt.segmentation.cells import connect, occupied_cells
 from modt.segmentation.clustering import Clusterer
-from modt.segmentation.clusters import MAX_CELL_GAP_BEAMS, MAX_CELL_GAP_M, connect, occupied_cells
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
+from modt.segmentation.tuning import DEFAULT
 from tests.segmentation import reference
 
 STEP = 0.03
@@ -29,7 +30,7 @@ def cells_of(grid, points, height):
 
 
 def components(grid, cells, beam_m):
-    gap_m = np.float32(MAX_CELL_GAP_M) + np.float32(MAX_CELL_GAP_BEAMS) * beam_m
+    gap_m = DEFAULT.cells.max_gap_m + DEFAULT.cells.max_gap_beams * beam_m
     return connect(grid, cells, gap_m, np.ones(len(cells), np.bool_))
 
 

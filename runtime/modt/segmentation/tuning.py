@@ -1,0 +1,234 @@
+"""Values of the segmentation that were chosen, by mechanism.
+
+*KITTI scans* below means labelled scans of KITTI's object benchmark and of its odometry sequences, with a check on
+drive 0005 and on simulated streets. *Sensor study* means the labelled and simulated sweeps of fourteen sensors that
+`tools.study.segmentation_recall` counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON, PersonSize
+
+
+@dataclass(frozen=True, slots=True)
+class PolarGridTuning:
+    """Cells of the polar grid on which the ground is found."""
+
+    ring_step: float = 0.15
+    """Width of a ring [sqrt(m)], 0.9 m at 10 m and 1.9 m at 40 m. Wider rings find fewer kerbs and hold more returns.
+    Chosen on: KITTI scans."""
+    flat_m: float = 0.1
+    """Height range of the returns of a cell above which something stands in it [m]. Chosen on: KITTI scans."""
+    flat_slope: float = 0.2
+    """Growth of that height range with the width of the cell [m/m], so that slopes stay flat.
+    Chosen on: KITTI scans."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorHeightTuning:
+    """Estimate of the sensor's height, where the profile has none."""
+
+    default_m: float = 1.73
+    """Height used until ground is in sight [m]. Chosen on: the mount of KITTI's sensor."""
+    sweeps: int = 5
+    """Number of first sweeps whose median is the estimate. Chosen on: judgement."""
+    max_range_m: float = 15.0
+    """Farthest cell used [m]: farther ground may be higher or lower. Chosen on: KITTI scans."""
+    bin_m: float = 0.05
+    """Width of a bin of depths below the sensor [m]; a bin and both neighbours must hold the floor.
+    Chosen on: KITTI scans."""
+    min_cells: int = 12
+    """Flat cells in three neighbouring bins below which there is no floor. Chosen on: KITTI scans."""
+    horizon_beams: float = 2.0
+    """Depth of the least deep cell used [beam spacings]. Higher cells may be shelves or tables.
+    Chosen on: simulated rooms."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroundTuning:
+    """Tracing of the ground along the rays of the polar grid."""
+
+    noise_m: float = 0.1
+    """Greatest residual of a ground return on the plane of its ray [m]. More lifts the ground onto low objects.
+    Chosen on: KITTI scans."""
+    near_m: float = 1.5
+    """Greatest distance over which ground may rise by `max_slope_deg` between two ground cells of a ray [m].
+    More takes flanks of cars for ground. Chosen on: KITTI scans."""
+    max_gap_m: float = 6.0
+    """The same on and beside a ramp, and the distance over which the slope of a ray is extrapolated [m].
+    Chosen on: simulated ramps."""
+    ramp_share: float = 0.3
+    """Share of `max_slope_deg` above which the running slope of a ray is a ramp. Chosen on: simulated ramps."""
+    slope_gain: float = 0.2
+    """Weight of the newest slope in the running slope of a ray. Chosen on: KITTI scans."""
+    bonnet_range_m: float = 11.0
+    """Range from which the next ring is looked at for what stands behind a low return [m]: cells are as deep as a
+    bonnet, 1 m, there. Chosen on: sensor study (far cars of a VLP-16)."""
+    flank_sectors: int = 3
+    """Sectors to the left and right of a ray whose median bounds its surface. Chosen on: KITTI scans."""
+    flank_m: float = 0.25
+    """Height above that median from which a surface is the side of a vehicle [m]. Chosen on: KITTI scans."""
+
+
+@dataclass(frozen=True, slots=True)
+class CeilingTuning:
+    """The ceiling of a room, below which objects end. Heights are above the ground."""
+
+    above_m: float = 1.95
+    """Height from which returns are counted [m]: above most people's heads. Chosen on: simulated halls."""
+    lowest_m: float = 2.15
+    """Least height of a ceiling [m]; a lower surface is the lintel of a door. Chosen on: simulated halls."""
+    bin_m: float = 0.05
+    """Width of a bin of heights [m]; two neighbouring bins hold a ceiling. Chosen on: simulated halls."""
+    min_returns: int = 50
+    """Counted returns below which there is no ceiling. Chosen on: judgement."""
+    min_share: float = 0.5
+    """Share of the counted returns at one height that makes it a ceiling. Less cuts trees and houses.
+    Chosen on: simulated halls and streets."""
+    edge_share: float = 0.05
+    """Share of a ceiling's returns from which the bin below it belongs to it too. Chosen on: simulated halls."""
+    clearance_m: float = 0.15
+    """Distance below a ceiling up to which objects reach [m]. Chosen on: simulated halls."""
+    stride: int = 8
+    """One return of so many is looked at for a ceiling near `max_height_m`. More costs less and misses small rooms.
+    Chosen on: judgement."""
+    grazed_below_m: float = 0.1
+    """Distance below `max_height_m` from which such a ceiling begins [m]. Chosen on: simulated halls."""
+    grazed_above_m: float = 0.3
+    """Distance above `max_height_m` up to which such a ceiling is looked for [m]. Chosen on: simulated halls."""
+    grazed_clearance_m: float = 0.2
+    """Distance below `max_height_m` up to which objects reach under it [m]. Chosen on: simulated halls."""
+
+
+@dataclass(frozen=True, slots=True)
+class CellTuning:
+    """Connection of neighbouring cells."""
+
+    max_gap_m: float = 0.3
+    """Vertical gap below which neighbouring cells are connected [m], added to the next. More joins people with what
+    hangs above them. Chosen on: KITTI scans."""
+    max_gap_beams: float = 2.0
+    """Growth of that gap [beam spacings at the range of the cell]. Less divides objects that few beams meet.
+    Chosen on: KITTI scans."""
+
+
+@dataclass(frozen=True, slots=True)
+class SplitTuning:
+    """Split of a person off a cluster that holds a person and more."""
+
+    person: PersonSize = SPLIT_PERSON
+    """Size of a part that is split off."""
+    min_extent_m: float = 0.8
+    """Extent above which a cluster may hold a person and more [m]. Less divides single people.
+    Chosen on: sensor study."""
+    min_cell_returns: float = 0.9
+    """Spacings of returns that a fine cell must be wide; on finer ones one object falls to pieces.
+    Chosen on: sensor study."""
+    min_points: int = 8
+    """Points below which a part is not split off. Chosen on: sensor study."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterTuning:
+    """Clusters that are kept although they are low, or parts of an oversized one."""
+
+    min_line_points: int = 15
+    """Points from which a cluster lower than `min_height_m` is kept: one beam meets an object.
+    Chosen on: sensor study."""
+    min_line_top_m: float = 0.5
+    """Height of the top of such a cluster above the ground [m]; lower ones are kerbs. Chosen on: sensor study."""
+    min_part_points: int = 15
+    """Points from which a part of an oversized cluster is kept. Chosen on: KITTI scans."""
+    min_part_top_m: float = 0.9
+    """Height of the top of such a part above the ground [m]; lower ones are pieces of hedges.
+    Chosen on: KITTI scans."""
+
+
+@dataclass(frozen=True, slots=True)
+class StripTuning:
+    """Strips that make one car, and that car. Few beams show a rear and, above and behind it, a strip of roof."""
+
+    person: PersonSize = STRIP_PERSON
+    """Size of a strip that may be a person and is not merged; its extent is the width across the ray."""
+    min_points: int = 2
+    """Least number of points of a strip. Chosen on: KITTI scans thinned to fewer beams, as the values below."""
+    visible_m: float = 1.5
+    """Height of a car [m], for the number of beams on it."""
+    max_beams: float = 8.0
+    """Beams on a car from which it is one cluster and no strip."""
+    max_diagonal_m: float = 6.0
+    """Greatest diagonal from above of a strip and of the car [m]. More merges two cars in a row."""
+    min_width_m: float = 0.7
+    """Least width of the car across the ray [m]. Less merges poles and people."""
+    max_width_m: float = 5.2
+    """Greatest width of the car across the ray [m]."""
+    min_top_m: float = 0.8
+    """Least height of the car's top above the ground [m]."""
+    max_top_m: float = 2.2
+    """Greatest height of a strip's and the car's top above the ground [m]. More merges walls."""
+    max_bottom_m: float = 0.8
+    """Greatest height of the car's bottom above the ground [m]."""
+    max_gap_m: float = 1.8
+    """Greatest distance in range between two strips [m], the length of a bonnet."""
+    min_gap_beams: float = -1.0
+    """Least distance in elevation from the nearer strip to the farther one [beam spacings]; below 0 they overlap."""
+    max_gap_beams: float = 2.0
+    """Greatest distance in elevation from the nearer strip to the farther one [beam spacings]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewTuning:
+    """Edge of a limited field of view. Chosen on: KITTI scans within the camera's view."""
+
+    margin_m: float = 6.0
+    """Distance outside the view up to which points are segmented [m], so that objects across the edge are whole."""
+    in_view_m: float = 1.0
+    """Distance outside the view up to which a proposal is kept [m]."""
+    truncation_m: float = 0.3
+    """Distance from the end of the margin within which a proposal is cut there [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeadingTuning:
+    """Heading of a box by the closeness of its sides to the cells."""
+
+    max_cells: int = 32
+    """Cells of a proposal that decide on its heading. More costs time. Chosen on: KITTI scans."""
+    side_noise_m: float = 0.1
+    """Distance within which a cell lies on a side [m]. Chosen on: KITTI scans; models are trained with this value."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewEndTuning:
+    """Sides of a proposal that end where the view of the sensor ends."""
+
+    beam_steps: float = 0.75
+    """Distance to the outermost beam within which a proposal is cut [beam spacings]. Chosen on: simulated people."""
+    near_m: float = 0.1
+    """Distance beyond `min_range_m` within which a proposal is cut at the nearest range [m]. Chosen on: judgement."""
+    tilted_m: float = 8.0
+    """Greatest distance at which a tilted sensor cuts [m]: the models of what is cut know nothing farther away.
+    Chosen on: the training data of those models."""
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentationTuning:
+    """All values of the stage."""
+
+    polar: PolarGridTuning = field(default_factory=PolarGridTuning)
+    sensor_height: SensorHeightTuning = field(default_factory=SensorHeightTuning)
+    ground: GroundTuning = field(default_factory=GroundTuning)
+    ceiling: CeilingTuning = field(default_factory=CeilingTuning)
+    cells: CellTuning = field(default_factory=CellTuning)
+    split: SplitTuning = field(default_factory=SplitTuning)
+    clusters: ClusterTuning = field(default_factory=ClusterTuning)
+    strips: StripTuning = field(default_factory=StripTuning)
+    view: ViewTuning = field(default_factory=ViewTuning)
+    heading: HeadingTuning = field(default_factory=HeadingTuning)
+    view_ends: ViewEndTuning = field(default_factory=ViewEndTuning)
+
+
+DEFAULT = SegmentationTuning()
+"""The values shipped: defaults of arguments alone."""
