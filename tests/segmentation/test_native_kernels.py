@@ -40,6 +40,8 @@ from tests.tracking.tracking_scenes import frame_of, tracks_at
 
 SANITIZED = "MODT_SANITIZED" in os.environ
 """Set by `python -m tools.sanitize`."""
+SENSOR = SensorConfig()
+FULL = FieldOfView()
 FRONT = FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))
 SEEDS = st.integers(0, 10_000)
 HOSTILE = [np.nan, np.inf, -np.inf, 1e-45, -1e-40, 3e38, -3e38, FAR_M, 999.0, 0.0, -0.0]
@@ -74,14 +76,13 @@ def same(one, other):
     return one == other
 
 
-def stages(kernels, sensor, fov=None):
-    return [Segmenter(SegmentationConfig(), sensor, fov or FieldOfView(), k) for k in (NUMPY, kernels)]
-
-
-def both(kernels, points, sensor=None, fov=None):
-    """Assert that the compiled kernels and NumPy's find the same proposals."""
-    numpy, native = stages(kernels, sensor or SensorConfig(), fov)
-    assert same(numpy.segment(points.copy()), native.segment(points.copy()))
+def both(kernels, points, sensor=SENSOR, fov=FULL, tuning=DEFAULT):
+    """Proposals of NumPy's kernels, which those of the compiled ones equal."""
+    numpy, native = (
+        Segmenter(SegmentationConfig(), sensor, fov, each, tuning).segment(points.copy()) for each in (NUMPY, kernels)
+    )
+    assert same(numpy, native)
+    return numpy
 
 
 def street(seed, n):
@@ -106,7 +107,7 @@ def test_random_sweeps_with_a_share_of_hostile_coordinates(kernels, seed, n, fro
     values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), (n, 3))]
     np.copyto(points[:, :3], values, where=rng.random((n, 3)) < share)
     with np.errstate(all="ignore"):
-        both(kernels, points, sensor, FRONT if front else None)
+        both(kernels, points, sensor, FRONT if front else FULL)
 
 
 @pytest.mark.slow
@@ -117,10 +118,22 @@ def test_a_million_points(kernels):
 def test_rows_of_any_width_and_order(kernels):
     points = street(3, 2000)
     wide = np.concatenate([points, points], axis=1)
-    assert same(*(stage.segment(p) for stage, p in zip(stages(kernels, SensorConfig()), (points, wide), strict=True)))
-    assert same(*(s.segment(p) for s, p in zip(stages(kernels, SensorConfig()), (points, wide[:, :4]), strict=True)))
+    assert same(both(kernels, points), both(kernels, wide))
+    assert same(both(kernels, points), both(kernels, wide[:, :4]))
     with pytest.raises(ValueError, match="x, y, z and reflectance"):
         both(kernels, np.ascontiguousarray(points[:, :3]))
+
+
+def test_every_value_of_the_tuning_reaches_both_kernels_alike(kernels):
+    points = street(5, 3000)
+    for part in dataclasses.fields(DEFAULT):
+        mechanism = getattr(DEFAULT, part.name)
+        for field in dataclasses.fields(mechanism):
+            value = getattr(mechanism, field.name)
+            if isinstance(value, int | float):
+                changed = {field.name: value + 1 if isinstance(value, int) else 1.2 * value}
+                tuning = dataclasses.replace(DEFAULT, **{part.name: dataclasses.replace(mechanism, **changed)})
+                both(kernels, points, tuning=tuning)
 
 
 @given(seed=SEEDS, n=st.integers(1, 400), sigma=st.floats(0.05, 3.0))
@@ -277,7 +290,7 @@ def test_observed_tracks(kernels, seed, n, dt_s):
     assert same(*tables)
 
 
-@pytest.mark.parametrize(("name", "fov"), [("vlp-16", FieldOfView()), ("hdl-64e", FieldOfView()), ("mid-360", FRONT)])
+@pytest.mark.parametrize(("name", "fov"), [("vlp-16", FULL), ("hdl-64e", FULL), ("mid-360", FRONT)])
 def test_tracks_of_simulated_sweeps(kernels, name, fov):
     config, runs = profile.load(name), []
     for each in (NUMPY, kernels):
