@@ -12,16 +12,19 @@ from modt_simulation import kinds, vehicles
 from modt_simulation.kinds import Kind
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
-from modt_simulation.people import People, Posture
+from modt_simulation.people import PERSON, Person, Posture
 from modt_simulation.solids import Solids, Triple, box
 from modt_simulation.terrain import Terrain
 from modt_simulation.world import Body, World
 
-STEP_S, MARGIN_M = 0.25, 0.1
+STEP_S = 0.25
+"""Interval at which moving bodies are tested for collisions [s]."""
+MARGIN_M = 0.1
+"""Margin around each body."""
 
 
 def without_collisions(paths: Sequence[Path], footprint: Float64, seconds: float) -> Bool:
-    """(n,) which bodies stay, by path and footprint (n, 2) [m]. Of two that collide, the first one stays.
+    """(n,) whether each body stays, by its path and its footprint (n, 2) [m]. Of two that collide, the first one stays.
 
     Bodies of zero footprint do not collide. Pairs at rest are tested once.
     """
@@ -34,27 +37,29 @@ def without_collisions(paths: Sequence[Path], footprint: Float64, seconds: float
     for step in range(int(seconds / STEP_S) + 2):
         for row in np.flatnonzero(moving & kept).tolist():
             boxes[row, [0, 1, 6]] = paths[row].at(step * STEP_S)
-        first = np.flatnonzero(kept & moving) if step else np.flatnonzero(kept)
-        pairs = _close_pairs(boxes, first, np.flatnonzero(kept))
+        tested = kept & moving if step else kept
+        pairs = _close_pairs(boxes, np.flatnonzero(tested), np.flatnonzero(kept))
         colliding = pairs[overlapping(boxes[pairs[:, 0]], boxes[pairs[:, 1]])]
-        for a, b in colliding[np.argsort(colliding[:, 0], kind="stable")].tolist():
-            kept[b] &= not kept[a]
+        # In ascending order of the first: a body that was removed removes no other one.
+        for first, second in colliding.tolist():
+            kept[second] &= not kept[first]
     return np.asarray(kept | ~solid)
 
 
 def overlapping(a: Float64, b: Float64) -> Bool:
     """(n,) whether boxes a (n, 7) and b (n, 7) overlap in the plane, by the separating axis theorem."""
-    ca, cb = corners(a), corners(b)
+    both = np.stack([corners(a), corners(b)])
     apart = np.zeros(len(a), np.bool_)
     for yaw in (a[:, 6], b[:, 6], a[:, 6] + np.pi / 2, b[:, 6] + np.pi / 2):
         axis = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
-        pa, pb = np.einsum("nkd,nd->nk", ca, axis), np.einsum("nkd,nd->nk", cb, axis)
-        apart |= (pa.max(axis=1) < pb.min(axis=1)) | (pb.max(axis=1) < pa.min(axis=1))
+        along = np.einsum("bnkd,nd->bnk", both, axis)
+        # apart along an axis: the greatest of the lower ends lies above the least of the upper ends
+        apart |= along.min(axis=2).max(axis=0) > along.max(axis=2).min(axis=0)
     return ~apart
 
 
 def _close_pairs(boxes: Float64, some: Int, others: Int) -> Int:
-    """(p, 2) ascending pairs of rows whose circumscribed circles overlap."""
+    """(p, 2) pairs of rows whose circumscribed circles overlap, each pair and the list of pairs ascending."""
     radius = np.hypot(boxes[:, 3], boxes[:, 4]) / 2
     gap = np.hypot(*(boxes[some, None, :2] - boxes[None, others, :2]).transpose(2, 0, 1))
     i, j = np.nonzero(gap < radius[some, None] + radius[others])
@@ -70,8 +75,12 @@ NONE_M = 1e-3
 """Size of the coat or backpack of a person without one."""
 POSTURES = {kinds.SITTER: Posture.SIT, kinds.CYCLIST: Posture.RIDE}
 """Postures of others than pedestrians."""
-STRIP_M, STRIP_SHARE, STRIP_SHARE_CYCLISTS = 0.07, 0.04, 0.1
-"""Height of a retroreflective strip, and the shares of pedestrians and of cyclists who wear one."""
+STRIP_M = 0.07
+"""Height of a retroreflective strip."""
+STRIP_SHARE = 0.04
+"""Share of the people who wear one, except cyclists."""
+STRIP_SHARE_CYCLISTS = 0.1
+"""Share of the cyclists who wear one."""
 PITCH_RAD = (0.007, 0.005)
 """Mean and standard deviation of the sensor's pitch: in KITTI's scans people 40 m ahead are 0.3 m too high."""
 
@@ -80,10 +89,11 @@ class SceneBuilder:
     """Collects the bodies of a scene that lasts some seconds."""
 
     def __init__(self, rng: np.random.Generator, seconds: float) -> None:
-        self.rng, self.seconds = rng, seconds
+        self.rng = rng
+        self.seconds = seconds
         self.bodies: list[Body] = []
-        self._people: list[tuple[float, ...]] = []
-        self._strip_rng = rng.spawn(1)[0]
+        self._people: list[Person] = []
+        (self._strip_rng,) = rng.spawn(1)
 
     def scenery(self, solids: Solids, x: float, y: float, heading_rad: float) -> None:
         """Add a body at rest without annotation."""
@@ -107,9 +117,13 @@ class SceneBuilder:
     def pedestrian(self, path: Path, speed_mps: float = 0.0, height: float | None = None) -> None:
         """Add a pedestrian, standing at speed zero."""
         height = height or self._height(1.74, 0.09, 1.15, 2.0)
-        stride = 0.24 * height * (0.6 + 0.3 * speed_mps) if speed_mps else 0.0
-        rate = np.pi * speed_mps / (2 * stride) if speed_mps else 0.0
-        size = (0.45 + 1.4 * stride if speed_mps else 0.5, float(self.rng.uniform(0.55, 0.7)), height)
+        length = 0.5
+        stride = rate = 0.0
+        if speed_mps:
+            stride = 0.24 * height * (0.6 + 0.3 * speed_mps)
+            rate = np.pi * speed_mps / (2 * stride)
+            length = 0.45 + 1.4 * stride
+        size = (length, float(self.rng.uniform(0.55, 0.7)), height)
         self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride)
 
     def sitter(self, path: Path) -> None:
@@ -143,11 +157,10 @@ class SceneBuilder:
         kept = without_collisions(paths, footprint, self.seconds)[1:]
         remaining = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(remaining)}
-        rows = [(number[int(p[0])], *p[1:]) for p in self._people if int(p[0]) in number]
-        columns: Float64 = np.array(rows).reshape(-1, 10).T
-        people = People(columns[0].astype(np.int64), columns[1].astype(np.int64), *columns[2:])
+        people = [p._replace(body=number[p.body]) for p in self._people if p.body in number]
         mount = float(self.rng.normal(0.0, 0.004)), float(self.rng.normal(*PITCH_RAD))
-        return World(terrain, [self.bodies[i] for i in remaining], people, ego, height_m, sway_rad, mount)
+        bodies = [self.bodies[i] for i in remaining]
+        return World(terrain, bodies, np.array(people, PERSON), ego, height_m, sway_rad, mount)
 
     def _height(self, mean: float, sigma: float, low: float, high: float) -> float:
         return float(np.clip(self.rng.normal(mean, sigma), low, high))
@@ -162,7 +175,8 @@ class SceneBuilder:
         pack = self.rng.uniform(0.08, 0.16) if self.rng.random() < 0.3 else NONE_M
         share = STRIP_SHARE_CYCLISTS if posture == Posture.RIDE else STRIP_SHARE
         strip = STRIP_M * (self._strip_rng.random() < share)
-        self._people.append((len(self.bodies), posture, height, girth, phase, rate, stride, coat, pack, strip))
+        body = len(self.bodies)
+        self._people.append(Person(body, posture, height, girth, phase, rate, stride, coat, pack, strip))
         self.bodies.append(Body(kind, size, path, rigid))
 
 

@@ -18,14 +18,16 @@ class Kind:
 
 
 def _of_class(object_class: ObjectClass, row: int = 0) -> Kind:
-    """The kind of a KITTI object type of the class table."""
+    """The kind of one of the KITTI object types that the class table lists for a class."""
     spec = CLASSES[object_class]
     semantic, moving = spec.semantic_kitti
     return Kind(spec.kitti[row], semantic, moving, object_class)
 
 
-CAR, VAN = (_of_class(ObjectClass.CAR, row) for row in (0, 1))
-PEDESTRIAN, SITTER = (_of_class(ObjectClass.PEDESTRIAN, row) for row in (0, 1))
+CAR = _of_class(ObjectClass.CAR)
+VAN = _of_class(ObjectClass.CAR, 1)
+PEDESTRIAN = _of_class(ObjectClass.PEDESTRIAN)
+SITTER = _of_class(ObjectClass.PEDESTRIAN, 1)
 CYCLIST = _of_class(ObjectClass.CYCLIST)
 TRUCK = Kind("Truck", 18, 258)
 BICYCLE = Kind("", 11, 11)

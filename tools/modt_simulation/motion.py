@@ -41,14 +41,15 @@ class Path:
         step = np.diff(self.xy, axis=0)
         length = np.linalg.norm(step, axis=1)
         along = np.append(0.0, np.cumsum(length))
-        return along, along[:-1] + length / 2, np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+        heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+        return along, along[:-1] + length / 2, heading
 
     def at(self, time_s: float) -> tuple[float, float, float]:
         """x, y [m] and heading [rad] at a time."""
         if self.at_rest:
             return float(self.xy[0, 0]), float(self.xy[0, 1]), self.heading_rad
         along, middle, heading = self._segments
-        s = float(np.interp(time_s, self.time_s, self.travelled_m))
+        s = np.interp(time_s, self.time_s, self.travelled_m)
         x, y = (float(np.interp(s, along, column)) for column in self.xy.T)
         return x, y, float(np.interp(s, middle, heading))
 
@@ -57,8 +58,8 @@ class Path:
         if self.at_rest:
             return 0.0
         travelled = np.interp([time_s - 0.05, time_s + 0.05], self.time_s, self.travelled_m)
-        s0, s1 = np.clip(travelled, 0.0, self._segments[0][-1])
-        return float(abs(s1 - s0) / 0.1)
+        along, *_ = self._segments
+        return float(np.ptp(np.clip(travelled, 0.0, along[-1])) / 0.1)
 
 
 def timetable(seconds: float, speed_mps: Float64, start_m: float = 0.0) -> tuple[Float64, Float64]:

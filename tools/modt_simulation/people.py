@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from modt.types import Bool, Float64, Int
+from modt.types import Float64, Int
 from modt_simulation.materials import Material
 from modt_simulation.solids import Solids
 
@@ -21,117 +22,172 @@ class Posture(IntEnum):
     SIT = 3
 
 
-SADDLE_M, CRANK_M = 0.93, np.array([0.08, 0.0, 0.3])
-"""Height of the saddle and position of the crank of a bicycle."""
+SADDLE_M = 0.93
+"""Height of the saddle of a bicycle."""
+CRANK_M = np.array([0.08, 0.0, 0.3])
+"""Position of its crank."""
 
 
-@dataclass(frozen=True)
-class People:
-    """n people."""
+class Person(NamedTuple):
+    """What stays the same of a person over a scene."""
 
-    body: Int  # (n,) index of the body
-    posture: Int  # (n,) Posture
-    height: Float64  # (n,) standing height [m]
-    girth: Float64  # (n,) breadth relative to the mean
-    phase: Float64  # (n,) of the gait at time 0 [rad]
-    rate: Float64  # (n,) of the gait [rad/s]
-    stride: Float64  # (n,) amplitude of a foot along the walk [m]
-    coat: Float64  # (n,) breadth of a coat or skirt at the hips [m]; about zero for none
-    pack: Float64  # (n,) depth of a backpack [m]; about zero for none
-    strip: Float64  # (n,) height of a retroreflective strip around the chest [m]; zero for none
+    body: int  # index of the body
+    posture: Posture  # standing, walking, cycling or sitting
+    height: float  # standing height [m]
+    girth: float  # breadth relative to the mean
+    phase: float  # phase of the gait at time 0 [rad]
+    rate: float  # rate of the gait [rad/s]
+    stride: float  # amplitude of a foot along the walk [m]
+    coat: float  # breadth of a coat or skirt at the hips [m]; about zero for none
+    pack: float  # depth of a backpack [m]; about zero for none
+    strip: float  # height of a retroreflective strip around the chest [m]; zero for none
 
-    def take(self, rows: Int | Bool) -> People:
-        """The people at some rows."""
-        return People(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
-    def solids(self, time_s: float) -> Solids:
-        """Their solids at a time, body frames (x ahead, z up, origin on the ground)."""
-        n = len(self.body)
-        if not n:
-            return Solids.none()
-        H, g = self.height, self.girth
-        swing = self.phase + self.rate * time_s
-        ride, walk, sit = (self.posture == p for p in (Posture.RIDE, Posture.WALK, Posture.SIT))
-        hip_z = np.where(ride, SADDLE_M, np.where(sit, 0.47, 0.52 * H))
-        hip_x = np.where(ride, -0.22, 0.0)
-        lean = np.where(ride, 0.55, np.where(walk, 0.06, 0.02))
-        spine = 0.30 * H
-        hips = _points(hip_x, 0.0, hip_z)
-        neck = hips + _points(spine * np.sin(lean), 0.0, spine * np.cos(lean))
-        head = neck + _points(0.02 + 0.3 * lean * 0.2, 0.0, 0.115 * H)
-        bars: list[tuple[Float64, Float64, Float64, Float64, int]] = []
-        for side in (1.0, -1.0):
-            turn = swing + (0.0 if side > 0 else np.pi)
-            hip = hips + _points(0.0, side * 0.085 * g, 0.0)
-            foot_walk = _points(self.stride * np.sin(turn), 0.0, 0.05 + 0.10 * np.maximum(np.cos(turn), 0))
-            foot_stand = _points(0.05 * np.sin(self.phase), 0.0, 0.05)
-            foot_ride = CRANK_M + 0.17 * _points(np.cos(turn), 0.0, -np.sin(turn))
-            foot_sit = _points(0.42, 0.0, 0.06)
-            foot = _choose(self.posture, foot_stand, foot_walk, foot_ride, foot_sit)
-            foot[:, 1] = side * 0.09 * g
-            knee, foot = _bend(hip, foot, 0.245 * H, 0.245 * H, +1.0)
-            shoulder = neck + _points(-0.01, side * 0.185 * g, -0.03 * H)
-            hand_walk = _points(0.10 - 0.75 * self.stride * np.sin(turn), 0.0, 0.47 * H)
-            hand_stand = _points(0.06 + 0.12 * np.sin(2 * self.phase), 0.0, 0.47 * H + 0.1 * np.cos(self.phase) ** 2)
-            hand_ride = _points(0.46, 0.0, 1.02)
-            hand_sit = _points(0.3, 0.0, 0.62)
-            hand = _choose(self.posture, hand_stand, hand_walk, hand_ride, hand_sit)
-            hand[:, 1] = side * np.where(ride | sit, 0.24, 0.25 * g)
-            elbow, hand = _bend(shoulder, hand, 0.175 * H, 0.16 * H, -1.0)
-            toe = foot + _points(0.17, 0.0, -0.01)
-            bars += [
-                (hip, knee, 0.085 * g, 0.085 * g, Material.CLOTH),
-                (knee, foot, 0.058 * g, 0.058 * g, Material.CLOTH),
-                (foot, toe, 0.045 + 0 * g, 0.045 + 0 * g, Material.RUBBER),
-                (shoulder, elbow, 0.052 * g, 0.052 * g, Material.CLOTH),
-                (elbow, hand, 0.04 * g, 0.04 * g, Material.SKIN),
-            ]
-        hem = hips + _points(np.where(ride | sit, 0.05, 0.0), 0.0, -0.22 * H * np.where(ride | sit, 0.3, 1.0))
-        back = (hips + 2 * neck) / 3 - _points(0.13 * g, 0.0, 0.0)
-        up = 0.2 * (neck - hips) / spine[:, None]
-        bars += [
-            (hips - _points(0.0, 0.0, 0.06), neck, 0.125 * g, 0.19 * g, Material.CLOTH),
-            (hem, hips + _points(0.02, 0.0, 0.1), 0.8 * self.coat, self.coat, Material.CLOTH),
-            (back - up, back + up, self.pack, np.minimum(1.6 * self.pack, 0.16), Material.CLOTH),
-            (neck - _points(0.0, 0.0, 0.02), head, 0.055 + 0 * g, 0.055 + 0 * g, Material.SKIN),
+PERSON = np.dtype([(name, int if name in ("body", "posture") else float) for name in Person._fields])
+People = NDArray[np.void]
+"""(n,) rows of PERSON."""
+
+
+def people_solids(people: People, time_s: float) -> Solids:
+    """The solids of n people at a time, body frames (x ahead, z up, origin on the ground)."""
+    if not len(people):
+        return Solids.none()
+    figure = _Figures(people)
+    bars = []
+    for side, lag in ((1.0, 0.0), (-1.0, np.pi)):
+        turn = people["phase"] + people["rate"] * time_s + lag
+        bars += [*figure.leg(side, turn), *figure.arm(side, turn)]
+    bars += figure.trunk()
+    skull = np.tile([0.1, 0.08, 0.12], (len(people), 1))
+    skulls = Solids.make(figure.head, skull, skull**-2.0, Material.SKIN, body=people["body"])
+    return Solids.join([*(bar.solids(people["body"]) for bar in bars), skulls, figure.strips()])
+
+
+class _Bar(NamedTuple):
+    """An elliptic cylinder between two points of each of n people."""
+
+    start: Float64  # (n, 3)
+    end: Float64  # (n, 3)
+    depth: Float64 | float  # (n,) semi-axis ahead [m]
+    breadth: Float64 | float  # (n,) semi-axis to the side [m]
+    material: Material = Material.CLOTH
+
+    def solids(self, body: Int) -> Solids:
+        """(n,) cylinders as parts of (n,) bodies."""
+        along = self.end - self.start
+        length = np.linalg.norm(along, axis=1)
+        z = along / length[:, None]
+        y = np.array([0.0, 1.0, 0.0]) - z[:, 1:2] * z
+        y /= np.linalg.norm(y, axis=1, keepdims=True)
+        half = _points(self.depth, self.breadth, length / 2)
+        quadric = half**-2.0 * [1.0, 1.0, 0.0]
+        rotation = np.stack([np.cross(y, z), y, z], axis=2)
+        return Solids.make((self.start + self.end) / 2, half, quadric, self.material, rotation, body)
+
+
+class _Figures:
+    """Joints of n people, in the middle of the body: (n, 3) points, body frames."""
+
+    def __init__(self, people: People) -> None:
+        self.people = people
+        self.height = people["height"]
+        self.girth = people["girth"]
+        self.posture = people["posture"]
+        ride = self.posture == Posture.RIDE
+        sit = self.posture == Posture.SIT
+        self.seated = ride | sit
+        hip_z = np.where(ride, SADDLE_M, np.where(sit, 0.47, 0.52 * self.height))
+        lean = np.where(ride, 0.55, np.where(self.posture == Posture.WALK, 0.06, 0.02))
+        self.spine = 0.30 * self.height
+        self.hips = _points(np.where(ride, -0.22, 0.0), 0.0, hip_z)
+        self.neck = self.hips + _points(self.spine * np.sin(lean), 0.0, self.spine * np.cos(lean))
+        self.head = self.neck + _points(0.02 + 0.3 * lean * 0.2, 0.0, 0.115 * self.height)
+
+    def leg(self, side: float, turn: Float64) -> list[_Bar]:
+        """Thigh, shank and foot of the left (1) or right (-1) leg, at (n,) phases of the gait [rad]."""
+        hip = self.hips + _points(0.0, side * 0.085 * self.girth, 0.0)
+        foot = self._of_posture(
+            stand=_points(0.05 * np.sin(self.people["phase"]), 0.0, 0.05),
+            walk=_points(self.people["stride"] * np.sin(turn), 0.0, 0.05 + 0.10 * np.maximum(np.cos(turn), 0)),
+            ride=CRANK_M + 0.17 * _points(np.cos(turn), 0.0, -np.sin(turn)),
+            sit=_points(0.42, 0.0, 0.06),
+        )
+        foot[:, 1] = side * 0.09 * self.girth
+        knee, foot = _bend(hip, foot, 0.245 * self.height, 0.245 * self.height, +1.0)
+        toe = foot + _points(0.17, 0.0, -0.01)
+        thigh = 0.085 * self.girth
+        shank = 0.058 * self.girth
+        return [
+            _Bar(hip, knee, thigh, thigh),
+            _Bar(knee, foot, shank, shank),
+            _Bar(foot, toe, 0.045, 0.045, Material.RUBBER),
         ]
-        skull = np.tile([0.1, 0.08, 0.12], (n, 1))
-        worn = self.strip > 0
-        chest, half = (0.45 * hips + 0.55 * neck)[worn], (2.5 * up * self.strip[:, None])[worn]
-        strip = _bars(chest - half, chest + half, 0.135 * g[worn], 0.2 * g[worn], Material.RETRO, self.body[worn])
-        skulls = Solids.make(head, skull, skull**-2.0, Material.SKIN, body=self.body)
-        return Solids.join([*(_bars(*bar, body=self.body) for bar in bars), skulls, strip])
+
+    def arm(self, side: float, turn: Float64) -> list[_Bar]:
+        """Upper arm and forearm of the left (1) or right (-1) side, at (n,) phases of the gait [rad]."""
+        phase = self.people["phase"]
+        hang = 0.47 * self.height
+        shoulder = self.neck + _points(-0.01, side * 0.185 * self.girth, -0.03 * self.height)
+        hand = self._of_posture(
+            stand=_points(0.06 + 0.12 * np.sin(2 * phase), 0.0, hang + 0.1 * np.cos(phase) ** 2),
+            walk=_points(0.10 - 0.75 * self.people["stride"] * np.sin(turn), 0.0, hang),
+            ride=_points(0.46, 0.0, 1.02),
+            sit=_points(0.3, 0.0, 0.62),
+        )
+        hand[:, 1] = side * np.where(self.seated, 0.24, 0.25 * self.girth)
+        elbow, hand = _bend(shoulder, hand, 0.175 * self.height, 0.16 * self.height, -1.0)
+        upper = 0.052 * self.girth
+        lower = 0.04 * self.girth
+        return [_Bar(shoulder, elbow, upper, upper), _Bar(elbow, hand, lower, lower, Material.SKIN)]
+
+    def trunk(self) -> list[_Bar]:
+        """Chest, coat, backpack and neck."""
+        coat = self.people["coat"]
+        pack = self.people["pack"]
+        fall = -0.22 * self.height * np.where(self.seated, 0.3, 1.0)
+        hem = self.hips + _points(np.where(self.seated, 0.05, 0.0), 0.0, fall)
+        back = (self.hips + 2 * self.neck) / 3 - _points(0.13 * self.girth, 0.0, 0.0)
+        up = self._up()
+        return [
+            _Bar(self.hips - _points(0.0, 0.0, 0.06), self.neck, 0.125 * self.girth, 0.19 * self.girth),
+            _Bar(hem, self.hips + _points(0.02, 0.0, 0.1), 0.8 * coat, coat),
+            _Bar(back - up, back + up, pack, np.minimum(1.6 * pack, 0.16)),
+            _Bar(self.neck - _points(0.0, 0.0, 0.02), self.head, 0.055, 0.055, Material.SKIN),
+        ]
+
+    def strips(self) -> Solids:
+        """Retroreflective strips around the chests of those who wear one."""
+        worn = self.people["strip"] > 0
+        girth = self.girth[worn]
+        chest = (0.45 * self.hips + 0.55 * self.neck)[worn]
+        half = (2.5 * self._up() * self.people["strip"][:, None])[worn]
+        strip = _Bar(chest - half, chest + half, 0.135 * girth, 0.2 * girth, Material.RETRO)
+        return strip.solids(self.people["body"][worn])
+
+    def _up(self) -> Float64:
+        """(n, 3) steps of 0.2 m along the spine."""
+        return np.asarray(0.2 * (self.neck - self.hips) / self.spine[:, None])
+
+    def _of_posture(self, **options: Float64) -> Float64:
+        """(n, 3) point of the posture of each person, by the points of all postures, (n, 3) or (1, 3)."""
+        full = np.stack([np.broadcast_to(options[p.name.lower()], self.hips.shape) for p in Posture])
+        return full[self.posture, np.arange(len(self.posture))]
 
 
 def _points(x: Float64 | float, y: Float64 | float, z: Float64 | float) -> Float64:
+    """(n, 3) points, of columns or single values."""
     return np.stack(np.broadcast_arrays(*np.atleast_1d(x, y, z)), axis=1)
-
-
-def _choose(posture: Int, *options: Float64) -> Float64:
-    full = np.stack([np.broadcast_to(o, (len(posture), 3)) for o in options])
-    return full[posture, np.arange(len(posture))]
 
 
 def _bend(root: Float64, tip: Float64, upper: Float64, lower: Float64, side: float) -> tuple[Float64, Float64]:
     """Middle joint of a limb of two bars, bent forward (+1) or backward (-1), and its tip limited to the reach."""
     along = tip - root
     length = np.linalg.norm(along, axis=1)
-    reach = np.minimum(length, 0.995 * (upper + lower))
     unit = along / length[:, None]
+    reach = np.minimum(length, 0.995 * (upper + lower))
+    # The joint lies `part` along the line to the tip and `rise` off it: a triangle with three known sides.
     part = (upper**2 - lower**2 + reach**2) / (2 * reach)
     rise = np.sqrt(np.maximum(upper**2 - part**2, 0.0))
     normal = np.cross([0.0, 1.0, 0.0], unit) * -side
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     return root + part[:, None] * unit + rise[:, None] * normal, root + reach[:, None] * unit
-
-
-def _bars(start: Float64, end: Float64, depth: Float64, breadth: Float64, material: int, body: Int) -> Solids:
-    """Elliptic cylinders between points."""
-    along = end - start
-    length = np.linalg.norm(along, axis=1)
-    z = along / length[:, None]
-    y = np.array([0.0, 1.0, 0.0]) - z[:, 1:2] * z
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
-    semi = np.stack([depth, breadth], axis=1)
-    half, quadric = np.column_stack([semi, length / 2]), np.column_stack([semi**-2.0, np.zeros(len(body))])
-    return Solids.make((start + end) / 2, half, quadric, material, np.stack([np.cross(y, z), y, z], axis=2), body)

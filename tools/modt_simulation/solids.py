@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,12 +44,13 @@ class Solids:
 
     def of(self, body: int) -> Self:
         """The same solids as parts of a body."""
-        return self._with(body=np.full(len(self), body, np.int64))
+        return replace(self, body=np.full(len(self), body, np.int64))
 
     def transformed(self, rotation: Float32 | Float64, translation: Float32 | Float64) -> Self:
         """The solids after a rigid transform, one for all or one each."""
-        R, t = np.asarray(rotation, np.float32), np.asarray(translation, np.float32)
-        return self._with(rotation=R @ self.rotation, centre=(R @ self.centre[:, :, None])[:, :, 0] + t)
+        R = np.asarray(rotation, np.float32)
+        centre = (R @ self.centre[:, :, None])[:, :, 0] + np.asarray(translation, np.float32)
+        return replace(self, rotation=R @ self.rotation, centre=centre)
 
     def widened_by_beam(self, radius_m: float, divergence_rad: float) -> Self:
         """Solids, sensor frame, with narrow opaque ones widened by the beam, which returns from their edges."""
@@ -61,10 +62,8 @@ class Solids:
         quadric = np.where(self.quadric > 0, 1 / np.square(semi + more), 0)
         cuts = self.cuts.copy()
         cuts[:, :, 3] += more
-        return self._with(half=(self.half + more).astype(np.float32), quadric=quadric.astype(np.float32), cuts=cuts)
-
-    def _with(self, **columns: Float32 | Int) -> Self:
-        return type(self)(*(columns.get(f.name, getattr(self, f.name)) for f in fields(self)))
+        half = (self.half + more).astype(np.float32)
+        return replace(self, half=half, quadric=quadric.astype(np.float32), cuts=cuts)
 
     @classmethod
     def join(cls, groups: Iterable[Self]) -> Self:
@@ -111,6 +110,11 @@ def box(centre: Triple, size: Triple, material: int, yaw: float = 0.0, density: 
     return Solids.make(np.array([centre]), np.array([size]) / 2, np.zeros((1, 3)), material, R, density=density)
 
 
+def block(size: Triple, material: int, x: float = 0.0, y: float = 0.0, density: float = np.inf) -> Solids:
+    """An upright box of (length, width, height) that stands on the ground at x, y [m]."""
+    return box((x, y, size[2] / 2), size, material, density=density)
+
+
 def wedge(centre: Triple, size: Triple, material: int, cuts: list[tuple[float, float, float, float]]) -> Solids:
     """A box cut by planes a u_x + b u_y + c u_z <= d in its frame."""
     solid = box(centre, size, material)
@@ -133,17 +137,19 @@ def ellipsoid(centre: Triple, semi: Triple, material: int, density: float = np.i
 
 def cylinder(centre: Triple, radius: float, length: float, material: int, axis: int = 2) -> Solids:
     """A round cylinder along an axis of the body."""
-    half, quadric = np.full((1, 3), radius), np.full((1, 3), radius**-2.0)
-    half[0, axis], quadric[0, axis] = length / 2, 0.0
+    half = np.full((1, 3), radius)
+    half[0, axis] = length / 2
+    quadric = np.full((1, 3), radius**-2.0)
+    quadric[0, axis] = 0.0  # unbounded along the axis, where the box ends it
     return Solids.make(np.array([centre]), half, quadric, material)
 
 
 def rod(start: Triple, end: Triple, radius: float, material: int) -> Solids:
     """A round cylinder between two points."""
-    a, b = np.array(start), np.array(end)
-    length = float(np.linalg.norm(b - a))
-    z = (b - a) / length
+    along = np.subtract(end, start)
+    length = float(np.linalg.norm(along))
+    z = along / length
     x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
     x /= np.linalg.norm(x)
     solid = cylinder((0.0, 0.0, 0.0), radius, length, material)
-    return solid.transformed(np.stack([x, np.cross(z, x), z], axis=1), (a + b) / 2)
+    return solid.transformed(np.stack([x, np.cross(z, x), z], axis=1), np.add(start, end) / 2)

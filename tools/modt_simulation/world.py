@@ -10,7 +10,7 @@ from modt.geometry import inverse, rotation_zyx, se3
 from modt.types import Float64
 from modt_simulation.kinds import Kind
 from modt_simulation.motion import Path
-from modt_simulation.people import People
+from modt_simulation.people import People, people_solids
 from modt_simulation.solids import Solids
 from modt_simulation.terrain import Terrain
 
@@ -34,26 +34,27 @@ class World:
 
     terrain: Terrain
     bodies: list[Body]
-    people: People  # articulated parts of the bodies that are people
+    people: People  # the bodies that are people, whose parts move
     ego: Path  # motion of the sensor's carrier
     height_m: float  # height of the sensor above the ground
     sway_rad: float  # amplitude of the carrier's roll and pitch
     mount_rad: tuple[float, float]  # roll and pitch of the sensor on its carrier
 
     def __post_init__(self) -> None:
-        bodies = self.bodies
-        self._moving = [i for i, b in enumerate(bodies) if not b.path.at_rest]
-        self._start = np.zeros((len(bodies), 5))
-        self._start[:, [0, 1, 3]] = np.array([b.path.at(0.0) for b in bodies]).reshape(-1, 3)
+        at_rest = np.array([body.path.at_rest for body in self.bodies], np.bool_)
+        self._moving = np.flatnonzero(~at_rest).tolist()
+        self._start = np.zeros((len(at_rest), 5))
+        self._start[:, [0, 1, 3]] = np.array([body.path.at(0.0) for body in self.bodies]).reshape(-1, 3)
         self._start[:, 2] = self.terrain.heights(self._start[:, 0], self._start[:, 1])
-        static = Solids.join(b.solids.of(i) for i, b in enumerate(bodies) if b.path.at_rest)
-        self._static = self._placed(static, self._start)
-        self._rigid = Solids.join(bodies[i].solids.of(i) for i in self._moving)
+        self._static = self._placed(self._rigid_parts(np.flatnonzero(at_rest).tolist()), self._start)
+        self._rigid = self._rigid_parts(self._moving)
 
     def ego_pose(self, time_s: float) -> Float64:
         """(4, 4) T_world_sensor."""
         x, y, yaw = self.ego.at(time_s)
-        c, s = np.cos(yaw), np.sin(yaw)
+        c = np.cos(yaw)
+        s = np.sin(yaw)
+        # slope of the ground under the carrier, between its axles and between its wheels
         rise = self._smooth(x + 1.3 * c, y + 1.3 * s) - self._smooth(x - 1.3 * c, y - 1.3 * s)
         bank = self._smooth(x - 0.8 * s, y + 0.8 * c) - self._smooth(x + 0.8 * s, y - 0.8 * c)
         pitch = self.mount_rad[1] - np.arctan2(rise, 2.6) + self.sway_rad * np.sin(2.9 * time_s)
@@ -65,7 +66,8 @@ class World:
         out = self._start.copy()
         for i in self._moving:
             path = self.bodies[i].path
-            out[i, [0, 1, 3]], out[i, 4] = path.at(time_s), path.speed(time_s)
+            out[i, [0, 1, 3]] = path.at(time_s)
+            out[i, 4] = path.speed(time_s)
         out[self._moving, 2] = self.terrain.heights(out[self._moving, 0], out[self._moving, 1])
         return out
 
@@ -78,11 +80,16 @@ class World:
     def solids(self, time_s: float, T_world_sensor: Float64, reach_m: float) -> Solids:
         """Solids within reach of the sensor at a time, sensor frame."""
         poses = self.poses(time_s)
-        distance = np.hypot(*(poses[self.people.body, :2] - T_world_sensor[:2, 3]).T)
-        moving = Solids.join([self._rigid, self.people.take(distance < reach_m).solids(time_s)])
-        near = [self._near(p, T_world_sensor, reach_m) for p in (self._static, self._placed(moving, poses))]
+        distance = np.hypot(*(poses[self.people["body"], :2] - T_world_sensor[:2, 3]).T)
+        people = people_solids(self.people[distance < reach_m], time_s)
+        moving = self._placed(Solids.join([self._rigid, people]), poses)
+        near = [self._near(solids, T_world_sensor, reach_m) for solids in (self._static, moving)]
         T = inverse(T_world_sensor)
         return Solids.join(near).transformed(T[:3, :3], T[:3, 3])
+
+    def _rigid_parts(self, which: list[int]) -> Solids:
+        """Rigid parts of some bodies, body frames."""
+        return Solids.join(self.bodies[i].solids.of(i) for i in which)
 
     def _near(self, solids: Solids, T_world_sensor: Float64, reach_m: float) -> Solids:
         distance = np.hypot(*(solids.centre[:, :2] - T_world_sensor[:2, 3].astype(np.float32)).T)
@@ -91,9 +98,13 @@ class World:
     @staticmethod
     def _placed(solids: Solids, poses: Float64) -> Solids:
         """Solids from their body frames to the world frame."""
-        c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])
+        c = np.cos(poses[:, 3])
+        s = np.sin(poses[:, 3])
         R = np.zeros((len(poses), 3, 3), np.float32)
-        R[:, 0, 0], R[:, 0, 1], R[:, 1, 0], R[:, 1, 1], R[:, 2, 2] = c, -s, s, c, 1
+        R[:, 0, 0] = R[:, 1, 1] = c
+        R[:, 0, 1] = -s
+        R[:, 1, 0] = s
+        R[:, 2, 2] = 1
         return solids.transformed(R[solids.body], poses[solids.body, :3])
 
     def _smooth(self, x: float, y: float) -> float:
