@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from modt_simulation.materials import Material
@@ -21,70 +23,115 @@ def car(rng: np.random.Generator, size: Triple) -> Solids:
     """A hatchback, saloon or estate car of (length, width, height)."""
     length, width = size[:2]
     height = size[2] - CLEARANCE_M
-    clear, belt = rng.uniform(0.17, 0.24), height * rng.uniform(0.58, 0.64)
+    clear = rng.uniform(0.17, 0.24)
+    belt = height * rng.uniform(0.58, 0.64)
     paint = (Material.CAR_PAINT, Material.CAR_DARK, Material.CAR_BLACK)[rng.choice(3, p=[0.5, 0.28, 0.22])]
     nose = belt - rng.uniform(0.12, 0.25)
     bonnet = rng.uniform(0.24, 0.3) * length
     boot = rng.choice([0.03, 0.1, 0.2], p=[0.6, 0.15, 0.25]) * length
-    body_height = belt - clear
-    middle = clear + body_height / 2
-    bumper = length / 2 + 0.35 * body_height * 0.2
-    hood = (belt - nose, 0.0, bonnet, (belt - nose) * (length / 2 - bonnet) + bonnet * body_height / 2)
-    cuts = [hood, (1.0, 0.0, -0.35, bumper), (-1.0, 0.0, -0.35, bumper)]
-    hull = wedge((0.0, 0.0, middle), (length, 0.97 * width, body_height), paint, cuts)
-    hull = rounded(hull, (0.515 * length, width * rng.uniform(0.95, 1.6), body_height * rng.uniform(1.4, 2.4)))
-    front, rear = length / 2 - bonnet + 0.1, -length / 2 + boot
-    cabin_height = height - belt + 0.02
-    half = cabin_height / 2
-    rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.15, 0.6), rng.uniform(0.28, 0.45)
-    long = front - rear
-    cuts = [
-        (cabin_height, 0.0, rake, cabin_height * long / 2 - rake * half),
-        (-cabin_height, 0.0, tail, cabin_height * long / 2 - tail * half),
-        *((0.0, side, tuck, 0.47 * width - tuck * half) for side in (1.0, -1.0)),
-    ]
-    centre = ((front + rear) / 2, 0.0, belt + half - 0.02)
-    glass = wedge(centre, (long, 0.94 * width, cabin_height), Material.GLASS, cuts)
-    glass = rounded(glass, (long * 0.52, width * rng.uniform(0.95, 1.6), np.inf))
-    glass.density[:] = rng.uniform(0.6, 2.0)
-    lid_length = max(long - rake - tail, 0.5)
-    size = (lid_length + 0.15, 0.94 * width - 2 * tuck * cabin_height + 0.04, 0.1)
-    lid = box(((front - rake + rear + tail) / 2, 0.0, height - 0.05), size, paint)
-    lid = rounded(lid, (lid_length * 0.62 + 0.1, 0.62 * width, 0.11))
-    seats = _seats(front - rake, rear + tail, belt, width)
-    pillars = _pillars(rng, (front, rear, rake, tail), (belt, height), width, tuck, paint)
+    hull = _car_hull(rng, (length, width, belt - clear), clear, belt - nose, bonnet, paint)
+    cabin = _Cabin(length / 2 - bonnet + 0.1, -length / 2 + boot, belt, height, width, paint)
+    cabin.rake = rng.uniform(0.65, 1.05)
+    cabin.tail = rng.uniform(0.15, 0.6)
+    cabin.tuck = rng.uniform(0.28, 0.45)
+    glasshouse = _glasshouse(rng, cabin)
+    seats = _seats(cabin.front - cabin.rake, cabin.rear + cabin.tail, belt, width)
+    pillars = _pillars(rng, cabin)
     wheels = _wheels(rng, length, width, rng.uniform(0.3, 0.34))
-    reflectors = [_plates(hull, 0.43, belt - 0.16), _tail_lamps(hull, belt - 0.12)]
-    return Solids.join([hull, glass, lid, seats, pillars, wheels, _mirrors(front, belt, width, paint), *reflectors])
+    mirrors = _mirrors(cabin.front, cabin)
+    return Solids.join([hull, *glasshouse, seats, pillars, wheels, mirrors, *_reflectors(hull, 0.43, belt - 0.16, belt - 0.12)])
+
+
+@dataclass
+class _Cabin:
+    """The part of a vehicle above its belt line."""
+
+    front: float  # lower end of the windscreen along x [m]
+    rear: float  # lower end of the rear window along x [m]
+    belt: float  # height of the lower edge of the windows [m]
+    height: float  # height of the roof [m]
+    width: float  # width of the vehicle [m]
+    paint: int  # Material of the vehicle
+    rake: float = 0.0  # distance by which the windscreen leans back [m]
+    tail: float = 0.05  # distance by which the rear window leans forward [m]
+    tuck: float = LEAN  # inward slope of the sides [m/m]
+
+
+def _car_hull(
+    rng: np.random.Generator, size: Triple, clear: float, drop: float, bonnet: float, paint: int
+) -> Solids:
+    """The body of a car below its windows, whose bonnet falls by a drop; the bumpers are rounded."""
+    length, width, height = size
+    bumper = length / 2 + 0.35 * height * 0.2
+    hood = (drop, 0.0, bonnet, drop * (length / 2 - bonnet) + bonnet * height / 2)
+    cuts = [hood, (1.0, 0.0, -0.35, bumper), (-1.0, 0.0, -0.35, bumper)]
+    hull = wedge((0.0, 0.0, clear + height / 2), (length, 0.97 * width, height), paint, cuts)
+    return rounded(hull, (0.515 * length, width * rng.uniform(0.95, 1.6), height * rng.uniform(1.4, 2.4)))
+
+
+def _glasshouse(rng: np.random.Generator, cabin: _Cabin) -> tuple[Solids, Solids]:
+    """The windows of a car, and its roof."""
+    width = cabin.width
+    length = cabin.front - cabin.rear
+    height = cabin.height - cabin.belt + 0.02
+    half = height / 2
+    cuts = [
+        (height, 0.0, cabin.rake, height * length / 2 - cabin.rake * half),
+        (-height, 0.0, cabin.tail, height * length / 2 - cabin.tail * half),
+        *((0.0, side, cabin.tuck, 0.47 * width - cabin.tuck * half) for side in (1.0, -1.0)),
+    ]
+    centre = ((cabin.front + cabin.rear) / 2, 0.0, cabin.belt + half - 0.02)
+    glass = wedge(centre, (length, 0.94 * width, height), Material.GLASS, cuts)
+    glass = rounded(glass, (length * 0.52, width * rng.uniform(0.95, 1.6), np.inf))
+    glass.density[:] = rng.uniform(0.6, 2.0)
+    lid_length = max(length - cabin.rake - cabin.tail, 0.5)
+    size = (lid_length + 0.15, 0.94 * width - 2 * cabin.tuck * height + 0.04, 0.1)
+    middle = (cabin.front - cabin.rake + cabin.rear + cabin.tail) / 2
+    lid = box((middle, 0.0, cabin.height - 0.05), size, cabin.paint)
+    return glass, rounded(lid, (lid_length * 0.62 + 0.1, 0.62 * width, 0.11))
 
 
 def van(rng: np.random.Generator, size: Triple) -> Solids:
     """A delivery van or a minibus of (length, width, height)."""
     length, width, height = size
-    clear, belt = rng.uniform(0.2, 0.3), height * rng.uniform(0.46, 0.55)
+    clear = rng.uniform(0.2, 0.3)
+    belt = height * rng.uniform(0.46, 0.55)
     paint = Material.CAR_PAINT if rng.random() < 0.8 else Material.CAR_DARK
-    low, upper = belt - clear, height - belt
-    bonnet, rake = rng.uniform(0.04, 0.19) * length, rng.uniform(0.4, 0.9)
-    drop, roof = rng.uniform(0.1, 0.3), rng.uniform(0.12, 0.2)
+    low = belt - clear
+    bonnet = rng.uniform(0.04, 0.19) * length
+    rake = rng.uniform(0.4, 0.9)
+    drop = rng.uniform(0.1, 0.3)
+    roof = rng.uniform(0.12, 0.2)
     hood = (drop, 0.0, bonnet, drop * (length / 2 - bonnet) + bonnet * low / 2)
     hull = wedge((0.0, 0.0, clear + low / 2), (length, 0.97 * width, low), paint, [hood])
     hull = rounded(hull, (0.515 * length, width * rng.uniform(1.2, 2.2), np.inf))
-    front, rear = length / 2 - bonnet, -length / 2 + rng.uniform(0.02, 0.2)
-    cab = rake + rng.uniform(0.9, 1.3)
+    cabin = _Cabin(length / 2 - bonnet, -length / 2 + rng.uniform(0.02, 0.2), belt, height, width, paint, rake)
+    windows = _van_windows(rng, cabin)
+    middle = (cabin.front - rake + cabin.rear) / 2
+    lid = box((middle, 0.0, height - roof / 2), (cabin.front - rake - cabin.rear, 0.9 * width, roof), paint)
+    seats = _seats(cabin.front - 0.7 * rake, cabin.rear + 0.3, belt, width)
+    pillars = _pillars(rng, cabin)
+    wheels = _wheels(rng, length, width, 0.34)
+    mirrors = _mirrors(cabin.front - 0.3, cabin)
+    return Solids.join([hull, *windows, lid, seats, pillars, wheels, mirrors, *_reflectors(hull, 0.45, 0.8, belt - 0.15)])
+
+
+def _van_windows(rng: np.random.Generator, cabin: _Cabin) -> tuple[Solids, Solids]:
+    """The glazed cab of a van, and its load space, which is glazed in a minibus."""
+    width = cabin.width
+    height = cabin.height - cabin.belt
+    length = cabin.rake + rng.uniform(0.9, 1.3)
     leaning = [(0.0, side, LEAN, 0.485 * width) for side in (1.0, -1.0)]
-    cuts = [(upper, 0.0, rake, upper * (cab / 2 - rake / 2)), *leaning]
-    glass = wedge((front - cab / 2, 0.0, belt + upper / 2), (cab, 0.95 * width, upper), Material.GLASS, cuts)
-    centre, size = ((front - cab + rear) / 2, 0.0, belt + upper / 2), (front - cab - rear, 0.97 * width, upper)
-    load = wedge(centre, size, Material.GLASS if rng.random() < 0.4 else paint, leaning)
-    for window in (glass, load):
+    cuts = [(height, 0.0, cabin.rake, height * (length / 2 - cabin.rake / 2)), *leaning]
+    middle_z = cabin.belt + height / 2
+    cab = wedge((cabin.front - length / 2, 0.0, middle_z), (length, 0.95 * width, height), Material.GLASS, cuts)
+    centre = ((cabin.front - length + cabin.rear) / 2, 0.0, middle_z)
+    size = (cabin.front - length - cabin.rear, 0.97 * width, height)
+    load = wedge(centre, size, Material.GLASS if rng.random() < 0.4 else cabin.paint, leaning)
+    for window in (cab, load):
         if window.material[0] == Material.GLASS:
             window.density[:] = rng.uniform(0.6, 2.0)
-    lid = box(((front - rake + rear) / 2, 0.0, height - roof / 2), (front - rake - rear, 0.9 * width, roof), paint)
-    seats = _seats(front - 0.7 * rake, rear + 0.3, belt, width)
-    pillars = _pillars(rng, (front, rear, rake, 0.05), (belt, height), width, LEAN, paint)
-    trim = [_wheels(rng, length, width, 0.34), _mirrors(front - 0.3, belt, width, paint)]
-    reflectors = [_plates(hull, 0.45, 0.8), _tail_lamps(hull, belt - 0.15)]
-    return Solids.join([hull, glass, load, lid, seats, pillars, *trim, *reflectors])
+    return cab, load
 
 
 def truck(rng: np.random.Generator, size: Triple) -> Solids:
@@ -93,9 +140,9 @@ def truck(rng: np.random.Generator, size: Triple) -> Solids:
     cab = rng.uniform(1.7, 2.2)
     cab_height = min(height, rng.uniform(2.5, 3.0))
     load = length - cab - 0.4
-    centre, size = (length / 2 - cab / 2, 0.0, 0.5 + (cab_height - 0.5) / 2), (cab, 0.96 * width, cab_height - 0.5)
+    centre = (length / 2 - cab / 2, 0.0, 0.5 + (cab_height - 0.5) / 2)
     parts = [
-        wedge(centre, size, Material.CAR_PAINT, [(1.0, 0.0, 0.15, cab / 2)]),
+        wedge(centre, (cab, 0.96 * width, cab_height - 0.5), Material.CAR_PAINT, [(1.0, 0.0, 0.15, cab / 2)]),
         box((-length / 2 + load / 2, 0.0, 1.0 + (height - 1.0) / 2), (load, width, height - 1.0), Material.CAR_PAINT),
         box((-0.2, 0.0, 0.8), (0.9 * length, 0.8, 0.3), Material.METAL),
     ]
@@ -104,16 +151,19 @@ def truck(rng: np.random.Generator, size: Triple) -> Solids:
 
 def bicycle(rng: np.random.Generator) -> Solids:
     """A bicycle; x ahead, origin on the ground between the wheels."""
-    radius, base = 0.34, rng.uniform(0.98, 1.08)
-    parts = []
-    for x in (-base / 2, base / 2):
-        parts.append(cylinder((x, 0.0, radius), radius, 0.04, Material.METAL, axis=1))
-        parts[-1].density[:] = 9.0  # spokes
-    seat, head, crank = (-0.22, 0.0, 0.9), (0.36, 0.0, 0.92), (0.02, 0.0, 0.3)
-    rear, front = (-base / 2, 0.0, radius), (base / 2, 0.0, radius)
+    radius = 0.34
+    base = rng.uniform(0.98, 1.08)
+    rear = (-base / 2, 0.0, radius)
+    front = (base / 2, 0.0, radius)
+    wheels = [cylinder(hub, radius, 0.04, Material.METAL, axis=1) for hub in (rear, front)]
+    for wheel in wheels:
+        wheel.density[:] = 9.0  # spokes
+    seat = (-0.22, 0.0, 0.9)
+    head = (0.36, 0.0, 0.92)
+    crank = (0.02, 0.0, 0.3)
     top = (-0.15, 0.0, 0.75)
     tubes = [(crank, seat), (crank, head), (top, head), (rear, crank), (rear, top), (head, front)]
-    parts += [rod(a, b, 0.025, Material.METAL) for a, b in tubes]
+    parts = wheels + [rod(a, b, 0.025, Material.METAL) for a, b in tubes]
     parts.append(rod((0.4, -0.28, 1.0), (0.4, 0.28, 1.0), 0.025, Material.RUBBER))
     parts.append(box((-0.24, 0.0, 0.93), (0.25, 0.15, 0.07), Material.RUBBER))
     if rng.random() < 0.35:
@@ -125,26 +175,26 @@ def bicycle(rng: np.random.Generator) -> Solids:
 def _end(hull: Solids, y: float, z: float, side: float) -> float:
     """Coordinate x of the surface of a hull ahead of (1) or behind (-1) a point inside it."""
     _, dy, dz = np.array([0.0, y, z]) - hull.centre[0]
-    half, quadric, cuts = hull.half[0], hull.quadric[0], hull.cuts[0]
-    reach = [half[0], np.sqrt(max(1 - quadric[1] * dy**2 - quadric[2] * dz**2, 0.0) / max(quadric[0], 1e-9))]
-    reach += [(d - b * dy - c * dz) / abs(a) for a, b, c, d in cuts if a * side > 0]
+    quadric = hull.quadric[0]
+    # along x, the nearest of the surfaces that bound the hull: box, quadric and cutting planes
+    reach = [hull.half[0, 0], np.sqrt(max(1 - quadric[1] * dy**2 - quadric[2] * dz**2, 0.0) / max(quadric[0], 1e-9))]
+    reach += [(d - b * dy - c * dz) / abs(a) for a, b, c, d in hull.cuts[0] if a * side > 0]
     return float(hull.centre[0, 0] + side * min(reach))
 
 
-def _plates(hull: Solids, front_z: float, rear_z: float) -> Solids:
-    """Retroreflective number plates."""
-    return Solids.join(
-        box((_end(hull, 0.0, z, side) - side * INSET_M, 0.0, z), (0.02, *PLATE_M), Material.RETRO)
-        for z, side in ((front_z, 1.0), (rear_z, -1.0))
-    )
-
-
-def _tail_lamps(hull: Solids, z: float) -> Solids:
-    """Reflectors of the tail lamps."""
+def _reflectors(hull: Solids, front_z: float, rear_z: float, lamp_z: float) -> list[Solids]:
+    """Retroreflective number plates at two heights, and the reflectors of the tail lamps."""
     y = 0.8 * float(hull.half[0, 1])
-    return Solids.join(
-        box((_end(hull, s * y, z, -1.0) + INSET_M, s * y, z), (0.02, 0.12, 0.14), Material.LAMP) for s in (-1.0, 1.0)
-    )
+    return [
+        *(
+            box((_end(hull, 0.0, z, side) - side * INSET_M, 0.0, z), (0.02, *PLATE_M), Material.RETRO)
+            for z, side in ((front_z, 1.0), (rear_z, -1.0))
+        ),
+        *(
+            box((_end(hull, side * y, lamp_z, -1.0) + INSET_M, side * y, lamp_z), (0.02, 0.12, 0.14), Material.LAMP)
+            for side in (-1.0, 1.0)
+        ),
+    ]
 
 
 def car_size(rng: np.random.Generator) -> Triple:
@@ -178,8 +228,9 @@ def _wheels(rng: np.random.Generator, length: float, width: float, radius: float
     return Solids.join(cylinder(place, radius, 0.22, Material.RUBBER, axis=1) for place in places)
 
 
-def _mirrors(x: float, z: float, width: float, paint: int) -> Solids:
-    return Solids.join(box((x - 0.35, s * (width / 2 + 0.05), z + 0.05), (0.12, 0.16, 0.14), paint) for s in (-1, 1))
+def _mirrors(x: float, cabin: _Cabin) -> Solids:
+    places = [(x - 0.35, side * (cabin.width / 2 + 0.05), cabin.belt + 0.05) for side in (-1, 1)]
+    return Solids.join(box(place, (0.12, 0.16, 0.14), cabin.paint) for place in places)
 
 
 def _seats(front: float, rear: float, belt: float, width: float) -> Solids:
@@ -189,17 +240,21 @@ def _seats(front: float, rear: float, belt: float, width: float) -> Solids:
     return Solids.join([*backs, box((front + 0.15, 0.0, belt - 0.02), (0.4, 0.8 * width, 0.16), Material.INTERIOR)])
 
 
-def _pillars(
-    rng: np.random.Generator, ends: tuple[float, ...], rise: tuple[float, ...], width: float, tuck: float, paint: int
-) -> Solids:
+def _pillars(rng: np.random.Generator, cabin: _Cabin) -> Solids:
     """Painted pillars beside the windscreen, between the doors and at the rear."""
-    front, rear, rake, tail = ends
-    belt, height = rise
-    bottom, top = 0.46 * width, 0.46 * width - tuck * (height - belt)
-    middle = (front - rake + rear + tail) / 2 + rng.uniform(-0.2, 0.2)
-    places = [(front - 0.1, front - rake), (middle, middle), (rear + 0.15, rear + tail)]
+    bottom = 0.46 * cabin.width
+    top = bottom - cabin.tuck * (cabin.height - cabin.belt)
+    roof_front = cabin.front - cabin.rake
+    roof_rear = cabin.rear + cabin.tail
+    middle = (cabin.front - cabin.rake + cabin.rear + cabin.tail) / 2 + rng.uniform(-0.2, 0.2)
+    # x of the lower and the upper end, and radius
+    places = [
+        (cabin.front - 0.1, roof_front, 0.035),
+        (middle, middle, 0.045),
+        (cabin.rear + 0.15, roof_rear, 0.1),
+    ]
     return Solids.join(
-        rod((a, s * bottom, belt), (b, s * top, height - 0.05), r, paint)
-        for s in (-1, 1)
-        for (a, b), r in zip(places, (0.035, 0.045, 0.1), strict=True)
+        rod((low, side * bottom, cabin.belt), (high, side * top, cabin.height - 0.05), radius, cabin.paint)
+        for side in (-1, 1)
+        for low, high, radius in places
     )
