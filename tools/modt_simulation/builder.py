@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike
 
 from modt.geometry import corners
 from modt.types import Bool, Float64, Int
@@ -17,6 +19,12 @@ from modt_simulation.solids import Solids, Triple, box
 from modt_simulation.terrain import Terrain
 from modt_simulation.world import Body, World
 
+
+def clipped_normal(rng: Generator, mean: float, sigma: float, low: float, high: float) -> float:
+    """A normally distributed number, limited to a range."""
+    return min(max(rng.normal(mean, sigma), low), high)
+
+
 STEP_S = 0.25
 """Interval at which moving bodies are tested for collisions [s]."""
 MARGIN_M = 0.1
@@ -24,9 +32,9 @@ MARGIN_M = 0.1
 
 
 def without_collisions(paths: Sequence[Path], footprint: Float64, seconds: float) -> Bool:
-    """(n,) whether each body stays, by its path and its footprint (n, 2) [m]. Of two that collide, the first one stays.
+    """(n,) whether each body stays, by its path and its footprint (n, 2) [m].
 
-    Bodies of zero footprint do not collide. Pairs at rest are tested once.
+    Of two that collide, the first one stays. Bodies of zero footprint do not collide. Pairs at rest are tested once.
     """
     solid = footprint.min(axis=1) > 0
     kept = solid.copy()
@@ -88,7 +96,7 @@ PITCH_RAD = (0.007, 0.005)
 class SceneBuilder:
     """Collects the bodies of a scene that lasts some seconds."""
 
-    def __init__(self, rng: np.random.Generator, seconds: float) -> None:
+    def __init__(self, rng: Generator, seconds: float) -> None:
         self.rng = rng
         self.seconds = seconds
         self.bodies: list[Body] = []
@@ -116,25 +124,29 @@ class SceneBuilder:
 
     def pedestrian(self, path: Path, speed_mps: float = 0.0, height: float | None = None) -> None:
         """Add a pedestrian, standing at speed zero."""
-        height = height or self._height(1.74, 0.09, 1.15, 2.0)
+        height = height or clipped_normal(self.rng, 1.74, 0.09, 1.15, 2.0)
         length = 0.5
         stride = rate = 0.0
         if speed_mps:
             stride = 0.24 * height * (0.6 + 0.3 * speed_mps)
             rate = np.pi * speed_mps / (2 * stride)
             length = 0.45 + 1.4 * stride
-        size = (length, float(self.rng.uniform(0.55, 0.7)), height)
+        size = (length, self.rng.uniform(0.55, 0.7), height)
         self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride)
+
+    def walker(self, line: ArrayLike, speed_mps: float, start_m: float = 0.0) -> None:
+        """Add a pedestrian who walks along a line of way points (n, 2) [m, world], from start_m along it."""
+        self.pedestrian(Path.steady(line, start_m, speed_mps, self.seconds), speed_mps)
 
     def sitter(self, path: Path) -> None:
         """Add a seated person."""
-        height = self._height(1.72, 0.08, 1.5, 1.95)
+        height = clipped_normal(self.rng, 1.72, 0.08, 1.5, 1.95)
         seat = box((-0.02, 0.0, 0.22), (0.42, 0.42, 0.44), Material.WOOD)
         self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, height, seat)
 
     def cyclist(self, path: Path, speed_mps: float, height: float | None = None) -> None:
         """Add a cyclist."""
-        height = height or self._height(1.74, 0.08, 1.5, 1.95)
+        height = height or clipped_normal(self.rng, 1.74, 0.08, 1.5, 1.95)
         size = (1.76, 0.6, 0.93 + 0.3 * height * np.cos(0.55) + 0.24 * height)
         bicycle = vehicles.bicycle(self.rng)
         self._person(kinds.CYCLIST, size, path, height, bicycle, 2 * np.pi * speed_mps / 4.5)
@@ -158,19 +170,16 @@ class SceneBuilder:
         remaining = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(remaining)}
         people = [p._replace(body=number[p.body]) for p in self._people if p.body in number]
-        mount = float(self.rng.normal(0.0, 0.004)), float(self.rng.normal(*PITCH_RAD))
+        mount = self.rng.normal(0.0, 0.004), self.rng.normal(*PITCH_RAD)
         bodies = [self.bodies[i] for i in remaining]
         return World(terrain, bodies, np.array(people, PERSON), ego, height_m, sway_rad, mount)
-
-    def _height(self, mean: float, sigma: float, low: float, high: float) -> float:
-        return float(np.clip(self.rng.normal(mean, sigma), low, high))
 
     def _person(
         self, kind: Kind, size: Triple, path: Path, height: float, rigid: Solids, rate: float = 0, stride: float = 0
     ) -> None:
         posture = POSTURES.get(kind, Posture.WALK if rate else Posture.STAND)
-        girth = float(np.clip(self.rng.normal(1.0, 0.12), 0.75, 1.35))
-        phase = float(self.rng.uniform(0, 2 * np.pi))
+        girth = clipped_normal(self.rng, 1.0, 0.12, 0.75, 1.35)
+        phase = self.rng.uniform(0, 2 * np.pi)
         coat = self.rng.uniform(0.16, 0.24) if self.rng.random() < 0.35 else NONE_M
         pack = self.rng.uniform(0.08, 0.16) if self.rng.random() < 0.3 else NONE_M
         share = STRIP_SHARE_CYCLISTS if posture == Posture.RIDE else STRIP_SHARE

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.random import Generator
 
 from modt_simulation import scenery
 from modt_simulation.builder import SceneBuilder
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
-from modt_simulation.solids import box
+from modt_simulation.solids import block, box
 from modt_simulation.world import World
 from modt_simulation.yard import ROBOT_M, enclose, floor, round_trip, walkers
 
@@ -17,7 +18,7 @@ OVER_SENSOR_M = 0.8
 SWAY_RAD = 0.003
 
 
-def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def hall(rng: Generator, seconds: float, height_m: float) -> World:
     """A hall with pillars, tables, shelves, glass, a ceiling and people."""
     half = (rng.uniform(9.0, 16.0), rng.uniform(7.0, 11.0))
     builder = SceneBuilder(rng, seconds)
@@ -26,7 +27,7 @@ def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     ceiling = max(rng.uniform(2.3, 3.5), height_m + OVER_SENSOR_M)
     for x in np.arange(-half[0] + 3, half[0], 6.0):
         for side in (-1, 1):
-            builder.scenery(box((0, 0, ceiling / 2), (0.4, 0.4, ceiling), Material.WALL), x, side * half[1] / 3, 0.0)
+            builder.scenery(block((0.4, 0.4, ceiling), Material.WALL), x, side * half[1] / 3, 0.0)
     _furnish(builder, half, 24)
     for _ in range(3):
         x, y = rng.uniform(-0.8, 0.8, 2) * half
@@ -34,16 +35,15 @@ def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     return _under(builder, half, ceiling, ego, height_m)
 
 
-def corridor(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def corridor(rng: Generator, seconds: float, height_m: float) -> World:
     """A corridor with doors and boxes along its walls; people walk along it and stand at the walls."""
     half = (22.0, rng.uniform(1.0, 1.4))
     ceiling = max(rng.uniform(2.3, 3.0), height_m + OVER_SENSOR_M)
     builder = SceneBuilder(rng, seconds)
     for side in (-1, 1):
-        pace = float(rng.uniform(0.8, 1.4))
-        start = float(rng.uniform(6.0, 16.0)) * side
-        line = np.array([[start, side * 0.45], [start - side * 40.0, side * 0.45]])
-        builder.pedestrian(Path.steady(line, 0.0, pace, seconds), pace)
+        pace = rng.uniform(0.8, 1.4)
+        start = rng.uniform(6.0, 16.0) * side
+        builder.walker([(start, side * 0.45), (start - side * 40.0, side * 0.45)], pace)
     for _ in range(4):
         x = rng.uniform(3.0, 18.0) * rng.choice([-1, 1])
         builder.pedestrian(Path.standing(x, rng.choice([-1, 1]) * (half[1] - 0.4), rng.uniform(-np.pi, np.pi)))
@@ -52,46 +52,48 @@ def corridor(rng: np.random.Generator, seconds: float, height_m: float) -> World
         if rng.random() < 0.3:
             builder.scenery(scenery.pane(rng, 2.1), x + 2.0, -half[1] + 0.04, 0.0)
         elif rng.random() < 0.4:
-            builder.scenery(box((0, 0, 0.4), (0.5, 0.4, 0.8), Material.WOOD), x + 2.0, -half[1] + 0.3, 0.0)
-    ego = Path.steady(np.array([[-3.0, -0.1], [12.0, -0.1]]), 0.0, 0.8, seconds)
+            builder.scenery(block((0.5, 0.4, 0.8), Material.WOOD), x + 2.0, -half[1] + 0.3, 0.0)
+    ego = Path.steady([(-3.0, -0.1), (12.0, -0.1)], 0.0, 0.8, seconds)
     return _under(builder, half, ceiling, ego, height_m)
 
 
-def lobby(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def lobby(rng: Generator, seconds: float, height_m: float) -> World:
     """An entrance with a glass front, a counter, seats and people."""
     half = (rng.uniform(6.0, 9.0), rng.uniform(5.0, 7.0))
     ceiling = max(rng.uniform(2.3, 3.5), height_m + OVER_SENSOR_M)
     builder = SceneBuilder(rng, seconds)
-    ego = Path.steady(np.array([[-half[0] + 2, 0.0], [half[0] - 2, 0.0]]), 0.0, 0.7, seconds)
+    ego = Path.steady([(-half[0] + 2, 0.0), (half[0] - 2, 0.0)], 0.0, 0.7, seconds)
     walkers(builder, half, 4)
     for x in np.arange(-half[0] + 1, half[0], 2.0):
         builder.scenery(scenery.pane(rng, ceiling), x, half[1] - 0.3, 0.0)
-    builder.scenery(box((0, 0, 0.55), (3.0, 0.7, 1.1), Material.WOOD), 0.0, -half[1] + 1.5, 0.0)
+    builder.scenery(block((3.0, 0.7, 1.1), Material.WOOD), 0.0, -half[1] + 1.5, 0.0)
     _furnish(builder, half, 8)
     return _under(builder, half, ceiling, ego, height_m)
 
 
-def lift(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def lift(rng: Generator, seconds: float, height_m: float) -> World:
     """The cabin of a lift with its door open to a lobby; the robot stands in it, people walk and wait outside."""
-    half, deep, wide = (6.0, 4.0), float(rng.uniform(0.8, 1.1)), float(rng.uniform(0.7, 0.9))
-    low, ceiling = max(2.3, height_m + OVER_SENSOR_M), max(rng.uniform(2.4, 3.0), height_m + OVER_SENSOR_M)
+    half = (6.0, 4.0)
+    deep = rng.uniform(0.8, 1.1)
+    wide = rng.uniform(0.7, 0.9)
+    low = max(2.3, height_m + OVER_SENSOR_M)
+    ceiling = max(rng.uniform(2.4, 3.0), height_m + OVER_SENSOR_M)
     builder = SceneBuilder(rng, seconds)
     back = -half[0] + deep
     for side in (-1, 1):
-        builder.scenery(box((0, 0, low / 2), (2 * deep, 0.1, low), Material.METAL), back, side * (wide + 0.05), 0.0)
-        beside_door = box((0, 0, low / 2), (0.1, half[1] - wide, low), Material.WALL)
+        builder.scenery(block((2 * deep, 0.1, low), Material.METAL), back, side * (wide + 0.05), 0.0)
+        beside_door = block((0.1, half[1] - wide, low), Material.WALL)
         builder.scenery(beside_door, back + deep, side * (half[1] + wide) / 2, 0.0)
     roof = box((0, 0, low + 0.05), (2 * deep, 2 * wide, 0.1), Material.METAL)
     builder.scenery(roof, back, 0.0, 0.0)
     for _ in range(3):
-        x, y = rng.uniform(back + deep + 1.0, half[0] - 0.5), rng.uniform(-2.0, 2.0)
-        builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)))
-    line = np.array([[half[0] - 0.5, 0.5], [back + deep + 0.5, -0.3]])
-    builder.pedestrian(Path.steady(line, 0.0, 0.8, seconds), 0.8)
+        x = rng.uniform(back + deep + 1.0, half[0] - 0.5)
+        builder.pedestrian(Path.standing(x, rng.uniform(-2.0, 2.0), rng.uniform(-np.pi, np.pi)))
+    builder.walker([(half[0] - 0.5, 0.5), (back + deep + 0.5, -0.3)], 0.8)
     return _under(builder, half, ceiling, Path.standing(back, 0.0, 0.0), height_m)
 
 
-def warehouse(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def warehouse(rng: Generator, seconds: float, height_m: float) -> World:
     """Aisles between tall racks under a high roof, pallets, a lorry's gate, and people who walk and pick."""
     half = (22.0, 14.0)
     builder = SceneBuilder(rng, seconds)
@@ -100,19 +102,21 @@ def warehouse(rng: np.random.Generator, seconds: float, height_m: float) -> Worl
         for x in np.arange(-16.0, 17.0, 4.0):
             builder.scenery(scenery.rack(rng), x, y, 0.0)
     for _ in range(4):
-        x, y = rng.uniform(-14.0, 14.0), rng.choice([-1, 1]) * rng.uniform(2.5, 3.8)
+        x = rng.uniform(-14.0, 14.0)
+        y = rng.choice([-1, 1]) * rng.uniform(2.5, 3.8)
         builder.pedestrian(Path.standing(x, y, rng.choice([-1, 1]) * np.pi / 2))
     for _ in range(8):
         builder.scenery(scenery.pallets(rng), rng.uniform(-18.0, 18.0), rng.choice([-1, 1]) * 3.0, rng.normal(0, 0.2))
-    ego = Path.steady(np.array([[-14.0, 0.0], [14.0, 0.0]]), 0.0, 1.0, seconds)
-    return _under(builder, half, float(rng.uniform(5.0, 8.0)), ego, height_m)
+    ego = Path.steady([(-14.0, 0.0), (14.0, 0.0)], 0.0, 1.0, seconds)
+    return _under(builder, half, rng.uniform(5.0, 8.0), ego, height_m)
 
 
 def _furnish(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
     rng = builder.rng
     makers = (scenery.table, scenery.chair, scenery.shelf, scenery.pallets)
     for _ in range(n):
-        x, y = rng.uniform(-half[0], half[0]), rng.uniform(-half[1], half[1])
+        x = rng.uniform(-half[0], half[0])
+        y = rng.uniform(-half[1], half[1])
         turn = rng.choice([0, np.pi / 2]) + rng.normal(0, 0.1)
         builder.scenery(makers[rng.choice(4)](rng), x, y, turn)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from modt.types import Float64
 
@@ -25,10 +26,10 @@ class Path:
         return cls(np.array([[x, y]]), np.zeros(1), np.zeros(1), heading_rad)
 
     @classmethod
-    def steady(cls, xy: Float64, start_m: float, speed_mps: float, seconds: float) -> Path:
+    def steady(cls, xy: ArrayLike, start_m: float, speed_mps: float, seconds: float) -> Path:
         """The path of a body at constant speed from start_m along the line."""
         time = np.array([0.0, seconds])
-        return cls(xy, time, start_m + speed_mps * time)
+        return cls(np.asarray(xy), time, start_m + speed_mps * time)
 
     @property
     def at_rest(self) -> bool:

@@ -90,9 +90,9 @@ class _Figures:
 
     def __init__(self, people: People) -> None:
         self.people = people
-        self.height = people["height"]
-        self.girth = people["girth"]
-        self.posture = people["posture"]
+        self.height: Float64 = people["height"]
+        self.girth: Float64 = people["girth"]
+        self.posture: Int = people["posture"]
         ride = self.posture == Posture.RIDE
         sit = self.posture == Posture.SIT
         self.seated = ride | sit

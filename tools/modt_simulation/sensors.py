@@ -11,8 +11,10 @@ from modt import profile
 from modt.errors import MisuseError
 from modt.types import Bool, Float32, Float64, Int
 
-COLUMN_STEP, SWEEP_STEP = (np.sqrt(5) - 1) / 2, np.sqrt(2) - 1
-"""Irrational steps of the fired ray of a non-repetitive sensor, by which columns and sweeps differ."""
+COLUMN_STEP = (np.sqrt(5) - 1) / 2
+"""Step of the fired ray of a non-repetitive sensor from column to column, a share of its rays; irrational."""
+SWEEP_STEP = np.sqrt(2) - 1
+"""The same from sweep to sweep."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,8 @@ class Response:
 
     def report(self, intensity: Float32, range_m: Float32) -> Float32:
         """(n,) reported intensities [0, most] of returns by their intensities in focus and their ranges."""
-        short, beyond = np.maximum(self.near_m - range_m, 0), np.maximum(range_m - self.far_m, 0)
-        left = intensity - self.near_loss * short - self.far_loss * beyond
+        near_loss = self.near_loss * np.maximum(self.near_m - range_m, 0)
+        left = intensity - near_loss - self.far_loss * np.maximum(range_m - self.far_m, 0)
         steps = np.rint(np.clip(left, 0, self.most) * self.steps)
         return np.asarray((steps / self.steps * (left >= self.least)).astype(np.float32))
 
@@ -99,30 +101,47 @@ def _rotating(
     name: str, elevation_rad: Float64, columns: int, height_m: float, range_m: tuple[float, float], **more: Any
 ) -> SensorModel:
     """A rotating sensor, its least and greatest range, and what differs from the defaults."""
-    least_m, most_m = range_m
-    grid: dict[str, Any] = {"elevation_rad": elevation_rad, "azimuth_rad": _columns(columns)}
-    return SensorModel(name=name, **grid, height_m=height_m, min_range_m=least_m, max_range_m=most_m, **more)
+    return SensorModel(
+        name=name,
+        elevation_rad=elevation_rad,
+        azimuth_rad=_columns(columns),
+        height_m=height_m,
+        min_range_m=range_m[0],
+        max_range_m=range_m[1],
+        **more,
+    )
 
 
-_HDL_64E: dict[str, Any] = {
-    "origin_m": np.append(np.linspace(0.209, 0.198, 32), np.linspace(0.126, 0.116, 32)),
-    "response": Response(12.0, 17.0, near_loss=0.012, far_loss=0.009, least=0.08, most=0.99, steps=100),
-}
-"""Two blocks of 32 lasers at different heights. The intensity is not corrected for range: half of it is 0 at 45 m."""
-_OUSTER: dict[str, Any] = {"range_sigma_m": 0.02, "beam_sigma_m": 0.01, "detect_m": 60.0}
-_HESAI: dict[str, Any] = {"range_sigma_m": 0.01, "beam_sigma_m": 0.005}
-_NO_SCALE = Response(most=0.0)
-"""Response of a sensor on whose scale the intensities of materials are unknown."""
 _MODELS = (
+    # Two blocks of 32 lasers at different heights. The intensity is not corrected for range: half of it is 0 at 45 m.
     _rotating(
-        "hdl-64e", np.append(_beams(1.94, -8.71, 32), _beams(-9.03, -25.0, 32)), 2083, 1.73, (2.0, 80.0), **_HDL_64E
+        "hdl-64e",
+        np.append(_beams(1.94, -8.71, 32), _beams(-9.03, -25.0, 32)),
+        2083,
+        1.73,
+        (2.0, 80.0),
+        origin_m=np.append(np.linspace(0.209, 0.198, 32), np.linspace(0.126, 0.116, 32)),
+        response=Response(12.0, 17.0, near_loss=0.012, far_loss=0.009, least=0.08, most=0.99, steps=100),
     ),
     _rotating("hdl-32e", _beams(10.67, -30.67, 32), 2170, 1.5, (0.9, 80.0)),
     _rotating("vlp-16", _beams(15.0, -15.0, 16), 1808, 0.8, (0.4, 90.0)),
     _rotating("vlp-32c", _beams_of("vlp-32c"), 1808, 1.5, (0.9, 100.0)),
-    _rotating("pandar64", _beams_of("pandar64"), 1800, 2.1, (0.9, 100.0), response=_NO_SCALE),
-    _rotating("xt-32", _beams(15.0, -16.0, 32), 2000, 0.8, (0.3, 100.0), **_HESAI),
-    *(_rotating(f"os1-{n}", _beams(22.5, -22.5, n), 1024, 1.0, (0.4, 100.0), **_OUSTER) for n in (32, 64, 128)),
+    # The intensities of materials are unknown on the scale of this sensor: it reports 0.
+    _rotating("pandar64", _beams_of("pandar64"), 1800, 2.1, (0.9, 100.0), response=Response(most=0.0)),
+    _rotating("xt-32", _beams(15.0, -16.0, 32), 2000, 0.8, (0.3, 100.0), range_sigma_m=0.01, beam_sigma_m=0.005),
+    *(
+        _rotating(
+            f"os1-{n}",
+            _beams(22.5, -22.5, n),
+            1024,
+            1.0,
+            (0.4, 100.0),
+            range_sigma_m=0.02,
+            beam_sigma_m=0.01,
+            detect_m=60.0,
+        )
+        for n in (32, 64, 128)
+    ),
     # 200,000 points a second. The grid is finer than the spacing of one sweep, which takes each 17th ray.
     SensorModel(
         name="mid-360",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from modt.geometry import inverse, transform, transform_boxes
 from modt.types import NONE, Bool, Float32, Float64, Frame, Int
@@ -30,20 +31,23 @@ GLOSSY = np.float32(0.25)
 class Receiver:
     """The receiver of a sensor; rng draws the constant errors of its beams."""
 
-    def __init__(self, sensor: SensorModel, rng: np.random.Generator) -> None:
+    def __init__(self, sensor: SensorModel, rng: Generator) -> None:
         self.sensor = sensor
         self.bias = rng.normal(0.0, sensor.beam_sigma_m, (sensor.shape[0], 1)).astype(np.float32)
         self.gain = rng.normal(1.0, 0.08, (sensor.shape[0], 1)).astype(np.float32)
         self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
 
     def receive(
-        self, distance: Float32, material: UInt8, solid: Int32, offset: Float32, rng: np.random.Generator
-    ) -> tuple[Float32, Float32, Int]:
-        """(B, A) measured horizontal distances [m], (n,) intensities [0, 1] and (n,) flat indices of the n returns.
+        self, distance: Float32, material: UInt8, solid: Int32, offset: Float32, rng: Generator
+    ) -> tuple[Float32, Float32, Int, Int]:
+        """Noisy returns of a sweep.
 
         Distance, material and solid are (B, A): the true horizontal distance [m] is infinite without a surface, the
         solid negative for the ground. `offset` (P + 1,) is the intensity of each surface relative to its material;
         the last is the ground's.
+
+        Returns:
+            (B, A) measured horizontal distances [m], and (n,) intensities [0, 1], rows and columns of the n returns.
         """
         sensor = self.sensor
         chance = rng.random(distance.shape, dtype=np.float32)
@@ -51,7 +55,7 @@ class Receiver:
         hit = np.isfinite(distance)
         near = np.where(hit, distance, np.float32(1e4))
         cosine = self._cos_incidence(near, solid)
-        grain = noise[:, ::-1]
+        grain = noise[:, ::-1]  # a second sequence of random numbers, for the surface
         reflectivity = REFLECTIVITY.take(material) * self.gain * (1 + np.float32(0.15) * grain)
         slant = near * self.secant
         signal = reflectivity * cosine * np.float32(10 * sensor.detect_m**2) / (slant * slant)
@@ -66,8 +70,7 @@ class Receiver:
         loss = GRAZING_LOSS.take(material)
         intensity -= loss * (1 - self._cos_glossy(near, solid, cosine, loss > GLOSSY))
         intensity += POINT_SIGMA.take(material) * grain
-        ray = np.flatnonzero(detected)
-        return measured, sensor.response.report(intensity.ravel().take(ray), slant.ravel().take(ray)), ray
+        return measured, sensor.response.report(intensity[detected], slant[detected]), *np.nonzero(detected)
 
     def _cos_incidence(self, near: Float32, solid: Int32) -> Float32:
         """(B, A) cosine of the angle of incidence, by the slope of the range image along a beam."""
@@ -83,26 +86,28 @@ class Receiver:
 
     def _cos_glossy(self, near: Float32, solid: Int32, cosine: Float32, glossy: Bool) -> Float32:
         """(B, A) cosine of incidence with the slope between beams, where the surface is glossy."""
-        here = np.flatnonzero(glossy[:-1])
-        below = here + near.shape[1]
-        s, part, out = near.ravel(), solid.ravel(), cosine.flatten()
-        fall = np.diff(self.sensor.tangent)[here // near.shape[1]]
-        slope = np.where(part[below] == part[here], (s[below] / s[here] - 1) / fall, 0)
-        out[here] /= np.sqrt(1 + np.square(slope * out[here]))
-        return out.reshape(near.shape)
+        row, column = np.nonzero(glossy[:-1])
+        distance = near[row, column]
+        fall = np.diff(self.sensor.tangent)[row]
+        same = solid[row + 1, column] == solid[row, column]
+        slope = np.where(same, (near[row + 1, column] / distance - 1) / fall, 0)
+        out = cosine.copy()
+        out[row, column] /= np.sqrt(1 + np.square(slope * out[row, column]))
+        return out
 
     def _mix_edges(self, measured: Float32, near: Float32, detected: Bool, chance: Float32) -> None:
         """Mix pixels at edges: some returns lie between the surfaces, some of the nearer surface are late."""
-        gap = near[:, 1:] - near[:, :-1]
-        share = np.float32(self.sensor.mixed_share)
-        split = np.flatnonzero((np.abs(gap) > 0.2) & detected[:, 1:] & detected[:, :-1])
-        row, column = np.divmod(split, gap.shape[1])
-        gap, luck = gap[row, column], chance[row, column + 1]
-        mixed = (np.abs(gap) < 2.5) & (luck > 1 - share)
-        mix = (luck[mixed] - (1 - share)) / share
+        step = near[:, 1:] - near[:, :-1]
+        unmixed = 1 - np.float32(self.sensor.mixed_share)
+        row, column = np.nonzero((np.abs(step) > 0.2) & detected[:, 1:] & detected[:, :-1])
+        gap = step[row, column]
+        luck = chance[row, column + 1]
+        mixed = (np.abs(gap) < 2.5) & (luck > unmixed)
+        mix = (luck[mixed] - unmixed) / np.float32(self.sensor.mixed_share)
         measured[row[mixed], column[mixed] + 1] -= mix * gap[mixed]
-        delayed = luck < 1 - share
-        row, front = row[delayed], (column + (gap < 0))[delayed]
+        delayed = luck < unmixed
+        row = row[delayed]
+        front = (column + (gap < 0))[delayed]  # column of the nearer surface
         delay = -np.log(np.maximum(1 - chance[row, front], np.float32(1e-3)))
         measured[row, front] += np.float32(self.sensor.edge_delay_m) * delay
 
@@ -137,15 +142,18 @@ class Simulator:
     """
 
     def __init__(self, world: World, sensor: SensorModel, seed: int, *, distort: bool = False) -> None:
-        self.world, self.sensor, self.seed = world, sensor, seed
+        self.world = world
+        self.sensor = sensor
+        self.seed = seed
         self.distort = distort and sensor.rotating
         self.caster = RayCaster(sensor)
         self.receiver = Receiver(sensor, np.random.default_rng([seed, 1]))
         normal = np.random.default_rng([seed, 3]).standard_normal((len(world.bodies), len(BODY_SIGMA)), np.float32)
         self._intensity_offset = normal * BODY_SIGMA
-        self._annotated = np.array([i for i, b in enumerate(world.bodies) if b.kind.name], np.int64)
-        self._kinds = tuple(world.bodies[i].kind for i in self._annotated.tolist())
-        self._labels = np.array([(b.kind.semantic, b.kind.moving) for b in world.bodies], np.int64).reshape(-1, 2)
+        kinds = [body.kind for body in world.bodies]
+        self._annotated = np.flatnonzero([bool(kind.name) for kind in kinds])
+        self._kinds = tuple(kind for kind in kinds if kind.name)
+        self._labels = np.array([(kind.semantic, kind.moving) for kind in kinds], np.int64).reshape(-1, 2)
 
     def sweep(self, index: int) -> tuple[Frame, Truth]:
         """Frame number index and its ground truth."""
@@ -159,25 +167,32 @@ class Simulator:
         of_solid = np.append(solids.material, 0).astype(np.uint8)
         material = np.where(image.solid != NO_SOLID, of_solid[image.solid], ground_material)
         offset = np.append(self._intensity_offset[solids.body, solids.material], np.float32(0))
-        distance, intensity, ray = self.receiver.receive(image.distance, material, image.solid, offset, rng)
-        row, column = np.divmod(ray, self.sensor.shape[1])
+        distance, intensity, row, column = self.receiver.receive(image.distance, material, image.solid, offset, rng)
         fired = self.sensor.fires(row, column, index)
-        ray, row, column, intensity = ray[fired], row[fired], column[fired], intensity[fired]
-        s = distance.ravel()[ray]
-        jitter = rng.standard_normal(len(s), np.float32) * np.float32(self.sensor.azimuth_sigma_rad)
-        rise = rng.standard_normal(len(s), np.float32) * np.float32(self.sensor.elevation_sigma_rad)
-        cos, sin = self.caster.cos[column], self.caster.sin[column]
-        points = np.empty((len(s), 4), np.float32)
-        points[:, 0] = s * (cos - jitter * sin)
-        points[:, 1] = s * (sin + jitter * cos)
-        points[:, 2] = s * (self.caster.tangent[row, 0] + rise) + self.caster.origin[row, 0]
-        points[:, 3] = intensity
-        instance = np.append(solids.body, NONE)[image.solid.ravel()[ray]]
+        row = row[fired]
+        column = column[fired]
+        points = self._points(distance[row, column], row, column, rng)
+        points[:, 3] = intensity[fired]
+        # the last solid stands for the ground, whose index is NO_SOLID
+        instance = np.append(solids.body, NONE)[image.solid[row, column]]
         if self.distort:
             self._distort(points, column, instance, time_s)
         turn_s = self.sensor.period_s if self.distort else 0.0
         frame = Frame(index, time_s, points, T_world_sensor, turn_s=turn_s)
-        return frame, self._truth(time_s, T_world_sensor, instance, material.ravel()[ray])
+        return frame, self._truth(time_s, T_world_sensor, instance, material[row, column])
+
+    def _points(self, distance: Float32, row: Int, column: Int, rng: Generator) -> Float32:
+        """(n, 4) points, whose intensities are blank, at (n,) horizontal distances along (n,) jittered rays."""
+        n = len(row)
+        jitter = rng.standard_normal(n, np.float32) * np.float32(self.sensor.azimuth_sigma_rad)
+        rise = rng.standard_normal(n, np.float32) * np.float32(self.sensor.elevation_sigma_rad)
+        cos = self.caster.cos[column]
+        sin = self.caster.sin[column]
+        points = np.empty((n, 4), np.float32)
+        points[:, 0] = distance * (cos - jitter * sin)
+        points[:, 1] = distance * (sin + jitter * cos)
+        points[:, 2] = distance * (self.caster.tangent[row, 0] + rise) + self.caster.origin[row, 0]
+        return points
 
     def _distort(self, points: Float32, column: Int, instance: Int, time_s: float) -> None:
         """Move the points of each sector to the sensor frame at the time of its measurement.
@@ -185,9 +200,10 @@ class Simulator:
         The sensor rotates clockwise, as Velodyne's and Ouster's do, and points straight ahead at the stamp.
         """
         T_world_start = self.world.ego_pose(time_s)
-        pose = np.vstack([self.world.poses(time_s), np.zeros(5)])
-        speed, heading = pose[instance, 4], pose[instance, 3]
-        velocity = speed[:, None] * np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
+        pose = np.vstack([self.world.poses(time_s), np.zeros(5)])  # the ground, instance NONE, is the last and rests
+        heading = pose[instance, 3]
+        direction = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
+        velocity = pose[instance, 4, None] * direction
         part = column * N_SLICES // self.sensor.shape[1]
         for k in range(N_SLICES):
             rows = np.flatnonzero(part == k)
@@ -203,14 +219,14 @@ class Simulator:
         return T @ inverse(self.world.ego_pose(time_s - delay_s)) @ T
 
     def _truth(self, time_s: float, T_world_sensor: Float64, instance: Int, material: Int) -> Truth:
-        world, shown = self.world, self._annotated
-        speed = world.poses(time_s)[:, 4]
-        label = np.append(np.where(speed > MOVING_MPS, self._labels[:, 1], self._labels[:, 0]), 0)[instance]
+        moving = self.world.poses(time_s)[:, 4] > MOVING_MPS
+        label = np.append(np.where(moving, self._labels[:, 1], self._labels[:, 0]), 0)[instance]
+        points = np.bincount(instance + 1, minlength=len(moving) + 1)[1:]
         return Truth(
             instance=instance,
             semantic=np.where(label > 0, label, SEMANTIC[material]).astype(np.int64),
-            bodies=shown,
+            bodies=self._annotated,
             kinds=self._kinds,
-            boxes=transform_boxes(inverse(T_world_sensor), world.boxes(time_s)[shown]),
-            points=np.bincount(instance + 1, minlength=len(world.bodies) + 1)[1:][shown],
+            boxes=transform_boxes(inverse(T_world_sensor), self.world.boxes(time_s)[self._annotated]),
+            points=points[self._annotated],
         )

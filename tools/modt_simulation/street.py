@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from numpy.random import Generator
 
 from modt.types import Float64
 from modt_simulation import roadside
@@ -17,7 +18,7 @@ LEAD_IN_M = 95.0
 """Length of the road behind the ego vehicle's start."""
 
 
-def street(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def street(rng: Generator, seconds: float, height_m: float) -> World:
     """A winding street with houses, gardens, trees, parked and moving traffic and pedestrians."""
     knots = rng.uniform(4.0, 8.0, max(3, round(seconds / 2.5) + 1))
     if seconds >= 8:
@@ -38,7 +39,7 @@ def street(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     return builder.world(terrain_along(rng, road), ego, height_m)
 
 
-def residential(rng: np.random.Generator, travelled_m: float) -> Road:
+def residential(rng: Generator, travelled_m: float) -> Road:
     """A road of random width and bend, with room ahead of travelled_m."""
     return Road(
         start_m=-LEAD_IN_M,
@@ -60,54 +61,56 @@ def furnish(builder: SceneBuilder, road: Road, vegetation: float = 1.0) -> None:
 
 
 REACH_M = 110.0
+"""Least length of each street from the crossing."""
 
 
-def crossing(rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def crossing(rng: Generator, seconds: float, height_m: float) -> World:
     """Two straight streets; the ego vehicle slows down, turns left or right and drives on."""
-    halves = rng.uniform(3.8, 5.5, 2)
-    pavement, front = rng.uniform(2.0, 3.2), rng.uniform(11.0, 15.0)
+    halves_m = rng.uniform(3.8, 5.5, 2).tolist()
+    pavement_m = rng.uniform(2.0, 3.2)
+    front_m = rng.uniform(11.0, 15.0)
     speed = rng.uniform(6.0, 9.0)
-    approach = min(0.5 * speed * seconds, 40.0)
+    approach_m = min(0.5 * speed * seconds, 40.0)
     reach = REACH_M + speed * seconds
     roads = []
-    for half, other, turn_rad in ((*halves, 0.0), (*halves[::-1], np.pi / 2)):
-        gap = (-other - pavement, other + pavement)
-        roads.append(Road(-reach, reach, float(half), pavement, front, turn_rad=turn_rad, gaps=(gap,)))
+    for half_m, other_m, turn_rad in zip(halves_m, halves_m[::-1], (0.0, np.pi / 2), strict=True):
+        gap = (-other_m - pavement_m, other_m + pavement_m)
+        roads.append(Road(-reach, reach, half_m, pavement_m, front_m, turn_rad=turn_rad, gaps=(gap,)))
     line, corner_m = _turn(rng, roads)
     builder = SceneBuilder(rng, seconds)
     for road in roads:
-        stop = float(road.gaps[0][1]) + 1.5
-        roadside.crossing_pedestrians(builder, road, -stop, int(rng.integers(2, 6)))
-        roadside.crossing_pedestrians(builder, road, stop, int(rng.integers(2, 6)))
-        roadside.cyclists(builder, road, 0.0, 2)
-        roadside.traffic(builder, road, 15.0, rng.uniform(4.0, 7.0))
-        share = rng.uniform(0.2, 0.6)
-        for side in (-1, 1):
-            roadside.pedestrians(builder, road, side, apart_m=14.0)
-            roadside.parked(builder, road, side, share)
-        furnish(builder, road, vegetation=0.5)
+        _populate(builder, road)
     pace = np.interp(np.linspace(0, 1, 200), [0.0, 0.35, 0.5, 0.65, 1.0], speed * np.array([1.0, 0.6, 0.4, 0.7, 1.0]))
-    ego = Path(line, *timetable(seconds, pace, max(corner_m - approach, 0.0)))
+    ego = Path(line, *timetable(seconds, pace, max(corner_m - approach_m, 0.0)))
     return builder.world(terrain(rng, roads, (-reach, -reach), (reach, reach)), ego, height_m)
 
 
-def _turn(rng: np.random.Generator, roads: list[Road]) -> tuple[Float64, float]:
+def _populate(builder: SceneBuilder, road: Road) -> None:
+    """Add what stands, walks and drives along one of two streets that cross."""
+    rng = builder.rng
+    stop = road.gaps[0][1] + 1.5
+    for x in (-stop, stop):
+        roadside.crossing_pedestrians(builder, road, x, int(rng.integers(2, 6)))
+    roadside.cyclists(builder, road, 0.0, 2)
+    roadside.traffic(builder, road, 15.0, rng.uniform(4.0, 7.0))
+    share = rng.uniform(0.2, 0.6)
+    for side in (-1, 1):
+        roadside.pedestrians(builder, road, side, apart_m=14.0)
+        roadside.parked(builder, road, side, share)
+    furnish(builder, road, vegetation=0.5)
+
+
+def _turn(rng: Generator, roads: list[Road]) -> tuple[Float64, float]:
     """Way points in along the first road and out along the second, and the distance to the corner [m]."""
-    right = bool(rng.random() < 0.5)
+    sign = -1.0 if rng.random() < 0.5 else 1.0  # right or left
     y_in = -roads[0].half_m * roadside.LANE
-    x_out = (-1 if right else 1) * roads[1].half_m * roadside.LANE
-    radius = rng.uniform(6.0, 7.0) if right else rng.uniform(9.0, 11.0)
+    x_out = sign * roads[1].half_m * roadside.LANE
+    radius = rng.uniform(6.0, 7.0) if sign < 0 else rng.uniform(9.0, 11.0)
     bend = np.linspace(0, np.pi / 2, 10)
-    sign = -1.0 if right else 1.0
-    x0, y0 = x_out - radius, y_in + sign * radius
+    x0 = x_out - radius
+    y0 = y_in + sign * radius
     arc = np.stack([x0 + radius * np.sin(bend), y0 - sign * radius * np.cos(bend)], axis=1)
-    start = np.array([[roads[0].start_m, y_in]])
-    end = np.array([[x_out, sign * roads[1].end_m]])
-    line = np.concatenate([start, arc, end])
-    return _densified(line), float(x0 - roads[0].start_m)
-
-
-def _densified(line: Float64) -> Float64:
-    """The line with a way point at least every 3 m: headings are interpolated between segments."""
+    line = np.array([(roads[0].start_m, y_in), *arc, (x_out, sign * roads[1].end_m)])
+    # a way point at least every 3 m, since headings are interpolated between segments
     parts = [np.linspace(a, b, max(2, int(np.linalg.norm(b - a) / 3) + 1))[:-1] for a, b in itertools.pairwise(line)]
-    return np.concatenate([*parts, line[-1:]])
+    return np.concatenate([*parts, line[-1:]]), x0 - roads[0].start_m

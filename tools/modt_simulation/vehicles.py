@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from modt_simulation.materials import Material
 from modt_simulation.solids import Solids, Triple, box, cylinder, rod, rounded, wedge
@@ -19,7 +20,7 @@ INSET_M = 0.03
 """Depth of the centres of plates and lamps below the surface, for which the width of the beam makes up."""
 
 
-def car(rng: np.random.Generator, size: Triple) -> Solids:
+def car(rng: Generator, size: Triple) -> Solids:
     """A hatchback, saloon or estate car of (length, width, height)."""
     length, width = size[:2]
     height = size[2] - CLEARANCE_M
@@ -39,7 +40,9 @@ def car(rng: np.random.Generator, size: Triple) -> Solids:
     pillars = _pillars(rng, cabin)
     wheels = _wheels(rng, length, width, rng.uniform(0.3, 0.34))
     mirrors = _mirrors(cabin.front, cabin)
-    return Solids.join([hull, *glasshouse, seats, pillars, wheels, mirrors, *_reflectors(hull, 0.43, belt - 0.16, belt - 0.12)])
+    return Solids.join(
+        [hull, *glasshouse, seats, pillars, wheels, mirrors, *_reflectors(hull, 0.43, belt - 0.16, belt - 0.12)]
+    )
 
 
 @dataclass
@@ -57,9 +60,7 @@ class _Cabin:
     tuck: float = LEAN  # inward slope of the sides [m/m]
 
 
-def _car_hull(
-    rng: np.random.Generator, size: Triple, clear: float, drop: float, bonnet: float, paint: int
-) -> Solids:
+def _car_hull(rng: Generator, size: Triple, clear: float, drop: float, bonnet: float, paint: int) -> Solids:
     """The body of a car below its windows, whose bonnet falls by a drop; the bumpers are rounded."""
     length, width, height = size
     bumper = length / 2 + 0.35 * height * 0.2
@@ -69,7 +70,7 @@ def _car_hull(
     return rounded(hull, (0.515 * length, width * rng.uniform(0.95, 1.6), height * rng.uniform(1.4, 2.4)))
 
 
-def _glasshouse(rng: np.random.Generator, cabin: _Cabin) -> tuple[Solids, Solids]:
+def _glasshouse(rng: Generator, cabin: _Cabin) -> tuple[Solids, Solids]:
     """The windows of a car, and its roof."""
     width = cabin.width
     length = cabin.front - cabin.rear
@@ -91,7 +92,7 @@ def _glasshouse(rng: np.random.Generator, cabin: _Cabin) -> tuple[Solids, Solids
     return glass, rounded(lid, (lid_length * 0.62 + 0.1, 0.62 * width, 0.11))
 
 
-def van(rng: np.random.Generator, size: Triple) -> Solids:
+def van(rng: Generator, size: Triple) -> Solids:
     """A delivery van or a minibus of (length, width, height)."""
     length, width, height = size
     clear = rng.uniform(0.2, 0.3)
@@ -113,10 +114,12 @@ def van(rng: np.random.Generator, size: Triple) -> Solids:
     pillars = _pillars(rng, cabin)
     wheels = _wheels(rng, length, width, 0.34)
     mirrors = _mirrors(cabin.front - 0.3, cabin)
-    return Solids.join([hull, *windows, lid, seats, pillars, wheels, mirrors, *_reflectors(hull, 0.45, 0.8, belt - 0.15)])
+    return Solids.join(
+        [hull, *windows, lid, seats, pillars, wheels, mirrors, *_reflectors(hull, 0.45, 0.8, belt - 0.15)]
+    )
 
 
-def _van_windows(rng: np.random.Generator, cabin: _Cabin) -> tuple[Solids, Solids]:
+def _van_windows(rng: Generator, cabin: _Cabin) -> tuple[Solids, Solids]:
     """The glazed cab of a van, and its load space, which is glazed in a minibus."""
     width = cabin.width
     height = cabin.height - cabin.belt
@@ -134,7 +137,7 @@ def _van_windows(rng: np.random.Generator, cabin: _Cabin) -> tuple[Solids, Solid
     return cab, load
 
 
-def truck(rng: np.random.Generator, size: Triple) -> Solids:
+def truck(rng: Generator, size: Triple) -> Solids:
     """A lorry of (length, width, height): cab, box and wheels."""
     length, width, height = size
     cab = rng.uniform(1.7, 2.2)
@@ -149,7 +152,7 @@ def truck(rng: np.random.Generator, size: Triple) -> Solids:
     return Solids.join([*parts, _wheels(rng, length, width, 0.48)])
 
 
-def bicycle(rng: np.random.Generator) -> Solids:
+def bicycle(rng: Generator) -> Solids:
     """A bicycle; x ahead, origin on the ground between the wheels."""
     radius = 0.34
     base = rng.uniform(0.98, 1.08)
@@ -197,32 +200,32 @@ def _reflectors(hull: Solids, front_z: float, rear_z: float, lamp_z: float) -> l
     ]
 
 
-def car_size(rng: np.random.Generator) -> Triple:
+def car_size(rng: Generator) -> Triple:
     """A random size of a car, as KITTI's object labels are distributed: 3.9 by 1.63 by 1.53 m, correlated."""
-    scale = rng.normal(0.0, 1.0)
+    scale = rng.normal()
     return (
-        float(np.clip(3.9 + 0.38 * scale + 0.15 * rng.normal(), 3.0, 5.0)),
-        float(np.clip(1.63 + 0.06 * scale + 0.06 * rng.normal(), 1.42, 1.9)),
-        float(np.clip(1.51 + 0.02 * scale + 0.1 * rng.normal(), 1.3, 1.9)),
+        min(max(3.9 + 0.38 * scale + 0.15 * rng.normal(), 3.0), 5.0),
+        min(max(1.63 + 0.06 * scale + 0.06 * rng.normal(), 1.42), 1.9),
+        min(max(1.51 + 0.02 * scale + 0.1 * rng.normal(), 1.3), 1.9),
     )
 
 
-def van_size(rng: np.random.Generator) -> Triple:
+def van_size(rng: Generator) -> Triple:
     """A random size of a van, about 5.1 by 1.9 by 2.2 m."""
-    scale = rng.normal(0.0, 1.0)
+    scale = rng.normal()
     return (
-        float(np.clip(5.0 + 0.6 * scale, 4.0, 7.0)),
-        float(np.clip(1.9 + 0.08 * scale + 0.08 * rng.normal(), 1.65, 2.2)),
-        float(np.clip(2.15 + 0.2 * scale + 0.15 * rng.normal(), 1.75, 2.8)),
+        min(max(5.0 + 0.6 * scale, 4.0), 7.0),
+        min(max(1.9 + 0.08 * scale + 0.08 * rng.normal(), 1.65), 2.2),
+        min(max(2.15 + 0.2 * scale + 0.15 * rng.normal(), 1.75), 2.8),
     )
 
 
-def truck_size(rng: np.random.Generator) -> Triple:
+def truck_size(rng: Generator) -> Triple:
     """A random size of a lorry, about 9 by 2.6 by 3.3 m."""
-    return float(rng.uniform(6.5, 12.0)), float(rng.uniform(2.3, 2.7)), float(rng.uniform(2.8, 3.8))
+    return rng.uniform(6.5, 12.0), rng.uniform(2.3, 2.7), rng.uniform(2.8, 3.8)
 
 
-def _wheels(rng: np.random.Generator, length: float, width: float, radius: float) -> Solids:
+def _wheels(rng: Generator, length: float, width: float, radius: float) -> Solids:
     x = length * rng.uniform(0.29, 0.32)
     places = [(i * x, j * (width / 2 - 0.1), radius) for i in (-1, 1) for j in (-1, 1)]
     return Solids.join(cylinder(place, radius, 0.22, Material.RUBBER, axis=1) for place in places)
@@ -240,7 +243,7 @@ def _seats(front: float, rear: float, belt: float, width: float) -> Solids:
     return Solids.join([*backs, box((front + 0.15, 0.0, belt - 0.02), (0.4, 0.8 * width, 0.16), Material.INTERIOR)])
 
 
-def _pillars(rng: np.random.Generator, cabin: _Cabin) -> Solids:
+def _pillars(rng: Generator, cabin: _Cabin) -> Solids:
     """Painted pillars beside the windscreen, between the doors and at the rear."""
     bottom = 0.46 * cabin.width
     top = bottom - cabin.tuck * (cabin.height - cabin.belt)
