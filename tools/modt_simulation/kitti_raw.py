@@ -20,17 +20,22 @@ HEADER = """<?xml version="1.0" encoding="UTF-8" standalone="yes" ?>
 <boost_serialization signature="serialization::archive" version="9">
 <tracklets class_id="0" tracking_level="0" version="0">
 """
-VISIBLE, LARGELY_OCCLUDED = 0, 2
+VISIBLE = 0
+"""Tracklet code of occlusion of a body of enough points."""
+LARGELY_OCCLUDED = 2
+"""The same of the others."""
 MIN_VISIBLE_POINTS = 20
 """Bodies of fewer points are annotated as largely occluded."""
 
 
 @dataclass
 class _Track:
-    kind: str
-    size: tuple[float, float, float]
+    """A tracklet: its poses by frame begin with the first in view and may go beyond the last."""
+
+    kind: str  # KITTI object type
+    size: tuple[float, float, float]  # length, width, height [m]
     poses: dict[int, tuple[float, float, float, float, int, int]] = field(default_factory=dict)
-    last_seen: int = 0
+    last_seen: int = 0  # last frame with points in view
 
 
 class Tracklets:
@@ -42,18 +47,17 @@ class Tracklets:
 
     def add(self, frame: int, truth: Truth) -> None:
         """Add the truth of one frame."""
-        inside = self.fov.depth(truth.boxes[:, :3])
-        for row, (body, kind) in enumerate(zip(truth.bodies.tolist(), truth.kinds, strict=True)):
-            x, y, z, length, width, height, yaw = truth.boxes[row].tolist()
-            shown = inside[row] > 0 and truth.points[row] > 0
+        columns = (truth.bodies, truth.boxes, truth.points, self.fov.depth(truth.boxes[:, :3]))
+        for kind, body, box, points, depth in zip(truth.kinds, *(column.tolist() for column in columns), strict=True):
+            x, y, z, length, width, height, yaw = box
+            shown = depth > 0 and points > 0
+            if shown and body not in self._tracks:
+                self._tracks[body] = _Track(kind.name, (length, width, height))
             if body not in self._tracks:
-                if not shown:
-                    continue
-                self._tracks[body] = _Track(kind.name, (height, width, length))
+                continue
             track = self._tracks[body]
-            hidden = LARGELY_OCCLUDED if truth.points[row] < MIN_VISIBLE_POINTS else VISIBLE
-            truncated = 1 if abs(inside[row]) < length / 2 else 0
-            track.poses[frame] = (x, y, z - height / 2, yaw, hidden, truncated)
+            hidden = LARGELY_OCCLUDED if points < MIN_VISIBLE_POINTS else VISIBLE
+            track.poses[frame] = (x, y, z - height / 2, yaw, hidden, int(abs(depth) < length / 2))
             if shown:
                 track.last_seen = frame
 
@@ -66,7 +70,7 @@ class Tracklets:
         yield _elements(1, count=len(self._tracks), item_version=1)
         for track in self._tracks.values():
             poses = [(f, p) for f, p in sorted(track.poses.items()) if f <= track.last_seen]
-            height, width, length = track.size
+            length, width, height = track.size
             yield "\t<item>\n"
             yield _elements(2, objectType=track.kind, h=f"{height:.6f}", w=f"{width:.6f}", l=f"{length:.6f}")
             yield _elements(2, first_frame=poses[0][0]) + "\t\t<poses>\n"
@@ -87,9 +91,13 @@ def _elements(depth: int, **texts: object) -> str:
     return "".join("\t" * depth + f"<{name}>{text}</{name}>\n" for name, text in texts.items())
 
 
-DATE, START = "2020_01_01", datetime(2020, 1, 1, 12)
-ORIGIN_DEG, EARTH_RADIUS_M = (49.0, 8.4), 6378137.0
+DATE = "2020_01_01"
+START = datetime(2020, 1, 1, 12)
+ORIGIN_DEG = (49.0, 8.4)
+"""Latitude and longitude of the origin of the world."""
+EARTH_RADIUS_M = 6378137.0
 T_SENSOR_IMU = se3(np.eye(3), np.array([-0.81, 0.32, -0.8]))
+"""Mount of the inertial unit, as in KITTI's car."""
 OXTS_FIELDS = 30
 UInt32 = NDArray[np.uint32]
 
@@ -107,7 +115,8 @@ class DriveWriter:
     def __init__(self, folder: Path, camera: Camera, *, all_around: bool = False) -> None:
         self.drive = folder / DATE / f"{DATE}_drive_0000_sync"
         self.sequence = folder / "sequences" / "00"
-        self._scans, self._oxts = self.drive / "velodyne_points", self.drive / "oxts"
+        self._scans = self.drive / "velodyne_points"
+        self._oxts = self.drive / "oxts"
         for made in (self._scans / "data", self._oxts / "data", self.sequence / "velodyne", self.sequence / "labels"):
             made.mkdir(parents=True, exist_ok=True)
         _write_calibration(folder / DATE, camera)
@@ -138,7 +147,8 @@ class DriveWriter:
 
     def close(self) -> None:
         """Write poses, times and tracklets."""
-        stamp_s, half_s = np.array(self._stamps), np.array(self._turns) / 2
+        stamp_s = np.array(self._stamps)
+        half_s = np.array(self._turns) / 2
         for path, times_s in (
             (self._scans / "timestamps.txt", stamp_s),
             (self._scans / "timestamps_start.txt", stamp_s - half_s),
@@ -169,20 +179,25 @@ def oxts_records(T_world_sensor: Float64, stamp_s: Float64) -> Float64:
     """(n, 30) OXTS records of sensor poses (n, 4, 4): position, attitude and velocities; other fields are zero."""
     T = T_world_sensor @ T_SENSOR_IMU
     lat0, lon0 = np.deg2rad(ORIGIN_DEG)
-    north0, scale = np.log(np.tan(np.pi / 4 + lat0 / 2)), np.cos(lat0)
+    north0 = np.log(np.tan(np.pi / 4 + lat0 / 2))
+    scale = np.cos(lat0)
     for _ in range(4):  # readers scale by the latitude of the first record, not by that of the origin
         lat = 2 * np.arctan(np.exp(north0 + T[:, 1, 3] / (scale * EARTH_RADIUS_M))) - np.pi / 2
         scale = np.cos(lat[0])
     lon = lon0 + T[:, 0, 3] / (scale * EARTH_RADIUS_M)
     yaw = np.arctan2(T[:, 1, 0], T[:, 0, 0])
     out = np.zeros((len(T), OXTS_FIELDS))
-    out[:, 0], out[:, 1], out[:, 2] = np.rad2deg(lat), np.rad2deg(lon), T[:, 2, 3] + 115.0
+    out[:, 0] = np.rad2deg(lat)
+    out[:, 1] = np.rad2deg(lon)
+    out[:, 2] = T[:, 2, 3] + 115.0
     out[:, 3] = np.arctan2(T[:, 2, 1], T[:, 2, 2])
     out[:, 4] = np.arcsin(np.clip(-T[:, 2, 0], -1, 1))
     out[:, 5] = yaw
     if len(T) > 1:
         east, north, up = np.gradient(T[:, :3, 3], stamp_s, axis=0).T
-        out[:, 6], out[:, 7], out[:, 10] = north, east, up
+        out[:, 6] = north
+        out[:, 7] = east
+        out[:, 10] = up
         out[:, 8] = np.cos(yaw) * east + np.sin(yaw) * north
         out[:, 9] = np.cos(yaw) * north - np.sin(yaw) * east
         out[:, 19] = out[:, 22] = np.gradient(np.unwrap(yaw), stamp_s)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import Bool, Float32, Int
+from modt.types import Bool, Float32, Float64, Int
 from modt_simulation.sensors import SensorModel
 from modt_simulation.solids import Solids
 
@@ -19,8 +18,11 @@ Int32 = NDArray[np.int32]
 NO_SOLID = -1
 """Index of the solid hit by a ray that hits none."""
 NEAREST_M = np.float32(0.05)
-BATCH_RAYS, CHUNK_RAYS = 1000, 16_384
-"""Largest window that is cast in a batch, and rays of a batch that fit the cache."""
+"""Least horizontal distance of a hit."""
+BATCH_RAYS = 1000
+"""Most rays of a window that is cast in a batch; a larger one is cast by itself."""
+CHUNK_RAYS = 16_384
+"""Rays of a batch, which fit the cache."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,19 +82,20 @@ class Shape:
         """
         enter: Float32 = np.full(1, -np.inf, np.float32)
         leave: Float32 = -enter
-        middle: NDArray[Any]
+        spans = []  # middle of the part of the ray inside a pair of surfaces, and half its length
         if self.code & 1:
             for i in range(3):
                 inverse = 1 / direction[i]
-                middle, reach = start[i] * -inverse, half[i] * np.abs(inverse)
-                enter, leave = np.maximum(enter, middle - reach), np.minimum(leave, middle + reach)
+                spans.append((start[i] * -inverse, half[i] * np.abs(inverse)))
         if self.code & 2:
             a = _sum(quadric[i] * direction[i] * direction[i] for i in range(3))
             middle = -_sum(quadric[i] * direction[i] * start[i] for i in range(3)) / a
             # Squared distance of the ray's nearest point: float32 holds it where b^2 - ac would cancel.
-            outside: Float32 = _sum(quadric[i] * np.square(start[i] + middle * direction[i]) for i in range(3))
-            reach = np.sqrt((1 - outside) / a)  # NaN where the ray misses
-            enter, leave = np.maximum(enter, middle - reach), np.minimum(leave, middle + reach)
+            outside = _sum(quadric[i] * np.square(start[i] + middle * direction[i]) for i in range(3))
+            spans.append((middle, np.sqrt((1 - outside) / a)))  # NaN where the ray misses
+        for middle, reach in spans:
+            enter = np.maximum(enter, middle - reach)
+            leave = np.minimum(leave, middle + reach)
         for cut, _ in zip(cuts, range(self.cuts), strict=False):
             slope = cut[0] * direction[0] + cut[1] * direction[1] + cut[2] * direction[2]
             at = (cut[3] - (cut[0] * start[0] + cut[1] * start[1] + cut[2] * start[2])) / slope
@@ -113,7 +116,8 @@ class _Columns:
         self.shift: Float32 = np.ascontiguousarray(-np.einsum("nji,nj->in", solids.rotation, solids.centre))
         self.half: Float32 = np.ascontiguousarray(solids.half.T)
         self.quadric: Float32 = np.ascontiguousarray(solids.quadric.T)
-        self.cuts, self.density = solids.cuts, solids.density
+        self.cuts = solids.cuts
+        self.density = solids.density
 
 
 class RayCaster:
@@ -124,7 +128,8 @@ class RayCaster:
     """
 
     def __init__(self, sensor: SensorModel, batch_rays: int = BATCH_RAYS) -> None:
-        self.sensor, self.batch_rays = sensor, batch_rays
+        self.sensor = sensor
+        self.batch_rays = batch_rays
         self.cos = np.cos(sensor.azimuth_rad).astype(np.float32)
         self.sin = np.sin(sensor.azimuth_rad).astype(np.float32)
         self.tangent = sensor.tangent[:, None]
@@ -140,20 +145,23 @@ class RayCaster:
         image = RangeImage(ground.copy(), np.full(ground.shape, NO_SOLID, np.int32))
         windows = self.windows(solids)
         large = windows.area > self.batch_rays
-        codes = Shape.codes(solids)
+        codes = Shape.codes(solids)[windows.solid]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             for w in np.flatnonzero(large).tolist():
-                self._cast_window(solids, Shape(int(codes[windows.solid[w]])), windows, w, depth, image)
-            self._cast_rays(solids, codes, windows, np.flatnonzero(~large), depth, image)
+                self._cast_window(solids, Shape(int(codes[w])), windows, w, depth, image)
+            self._cast_rays(_Columns(solids), codes, windows, np.flatnonzero(~large), depth, image)
         return image
 
     def _cast_window(
         self, solids: Solids, shape: Shape, windows: Windows, w: int, depth: Float32, image: RangeImage
     ) -> None:
-        k, rows, columns = int(windows.solid[w]), slice(*windows.rows[w]), slice(*windows.columns[w])
+        """Cast the rays of one window."""
+        rows = slice(*windows.rows[w])
+        columns = slice(*windows.columns[w])
         nearest = image.distance[rows, columns]
         if windows.near[w] > nearest.max():
             return
+        k = int(windows.solid[w])
         R = solids.rotation[k]
         across = R[0][:, None] * self.cos[columns] + R[1][:, None] * self.sin[columns]
         direction = [across[i] + R[2, i] * self.tangent[rows] for i in range(3)]
@@ -166,24 +174,25 @@ class RayCaster:
         np.copyto(image.solid[rows, columns], k, where=hit)
 
     def _cast_rays(
-        self, solids: Solids, codes: Int, windows: Windows, which: Int, depth: Float32, image: RangeImage
+        self, table: _Columns, codes: Int, windows: Windows, which: Int, depth: Float32, image: RangeImage
     ) -> None:
-        """Cast windows in batches of the same shape."""
-        table = _Columns(solids)
-        shape_of, area = codes[windows.solid[which]], windows.area[which]
-        for code in np.unique(shape_of).tolist():
-            mine = shape_of == code
-            group = which[mine]
-            part = np.cumsum(area[mine]) // CHUNK_RAYS
+        """Cast some windows in batches of the same shape, by the (W,) codes of all."""
+        for code in np.unique(codes[which]).tolist():
+            group = which[codes[which] == code]
+            part = np.cumsum(windows.area[group]) // CHUNK_RAYS
             for chunk in np.split(group, np.flatnonzero(np.diff(part)) + 1):
                 self._cast_chunk(table, Shape(code), windows, chunk, depth, image)
 
     def _cast_chunk(
         self, table: _Columns, shape: Shape, windows: Windows, chunk: Int, depth: Float32, image: RangeImage
     ) -> None:
-        nearest, solid = image.distance.reshape(-1), image.solid.reshape(-1)
+        """Cast the rays of the windows of a chunk, which have one shape."""
+        nearest = image.distance.reshape(-1)
         ray, row, column, k = self._pairs(windows, chunk, nearest)
-        cos, sin, tangent, origin = self.cos[column], self.sin[column], self.tangent[row, 0], self.origin[row, 0]
+        cos = self.cos[column]
+        sin = self.sin[column]
+        tangent = self.tangent[row, 0]
+        origin = self.origin[row, 0]
         R = table.rotation
         up = [R[2][i][k] for i in range(3)]
         direction = [R[0][i][k] * cos + R[1][i][k] * sin + up[i] * tangent for i in range(3)]
@@ -193,59 +202,54 @@ class RayCaster:
         if shape.foliage:
             enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / table.density[k]
         hit = np.flatnonzero((enter < leave) & (enter > NEAREST_M) & (enter < nearest[ray]))
-        at, enter = ray[hit], enter[hit]
-        np.minimum.at(nearest, at, enter)
-        first = np.flatnonzero(enter == nearest[at])
-        solid[at[first]] = k[hit[first]]
+        # Several solids may hit one ray: first the distance of the nearest, then the solid that is there.
+        ray = ray[hit]
+        np.minimum.at(nearest, ray, enter[hit])
+        first = enter[hit] == nearest[ray]
+        image.solid.reshape(-1)[ray[first]] = k[hit[first]]
 
     def _pairs(self, windows: Windows, chunk: Int, nearest: Float32) -> tuple[Int, Int, Int, Int]:
         """Ray, row, column and solid of every pair in some windows that is not occluded by an earlier hit."""
-        area, n_columns = windows.area[chunk], np.diff(windows.columns[chunk], axis=1)[:, 0]
-        which = np.repeat(np.arange(len(chunk)), area)
-        step = np.arange(len(which)) - (np.cumsum(area) - area)[which]
-        down = step // n_columns[which]
-        row = windows.rows[chunk, 0][which] + down
-        column = windows.columns[chunk, 0][which] + step - down * n_columns[which]
+        area = windows.area[chunk]
+        window = np.repeat(chunk, area)
+        # number of each pair in its window, which is counted row by row
+        number = np.arange(len(window)) - np.repeat(np.cumsum(area) - area, area)
+        down, along = np.divmod(number, np.diff(windows.columns, axis=1)[window, 0])
+        row = windows.rows[window, 0] + down
+        column = windows.columns[window, 0] + along
         ray = row * self.sensor.shape[1] + column
-        open_ = np.flatnonzero(windows.near[chunk][which] < nearest[ray])
-        return ray[open_], row[open_], column[open_], windows.solid[chunk][which[open_]]
+        open_ = np.flatnonzero(windows.near[window] < nearest[ray])
+        return ray[open_], row[open_], column[open_], windows.solid[window[open_]]
 
     def windows(self, solids: Solids) -> Windows:
         """Windows of the solids within range and field of view."""
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], np.float32)
         arm = (signs * solids.half[:, None]) @ solids.rotation.transpose(0, 2, 1)
-        corner = (solids.centre[:, None] + arm).astype(np.float32, copy=False)
-        far = np.hypot(corner[..., 0], corner[..., 1]).max(axis=1)
+        corners = (solids.centre[:, None] + arm).astype(np.float32, copy=False)
         near = self._nearest(solids)
-        azimuth = np.arctan2(solids.centre[:, 1], solids.centre[:, 0]).astype(np.float64)
-        c, s = np.cos(azimuth)[:, None], np.sin(azimuth)[:, None]
-        x = c * corner[..., 0] + s * corner[..., 1]
-        y = c * corner[..., 1] - s * corner[..., 0]
-        off = np.arctan2(y, x)
-        low, high = azimuth + off.min(axis=1), azimuth + off.max(axis=1)
-        around = near < NEAREST_M
-        low[around], high[around] = azimuth[around] - np.pi, azimuth[around] + np.pi
-        bottom, top = corner[..., 2].min(axis=1), corner[..., 2].max(axis=1)
-        inside = near < self.sensor.max_range_m
-        r0, r1 = self._row_range(bottom, top, np.maximum(near, NEAREST_M), far)
+        rows = self._row_range(corners, near)
+        low, high = _azimuth_range(solids, corners, near < NEAREST_M)
+        inside = (near < self.sensor.max_range_m) & (rows[:, 1] > rows[:, 0])
         parts = []
         for turn in (-2 * np.pi, 0.0, 2 * np.pi):
-            c0 = np.searchsorted(self.sensor.azimuth_rad, low + turn)
-            c1 = np.searchsorted(self.sensor.azimuth_rad, high + turn)
-            which = np.flatnonzero(inside & (c1 > c0) & (r1 > r0))
-            parts.append(np.stack([which, r0[which], r1[which], c0[which], c1[which]], axis=1))
-        part = np.concatenate(parts)
-        part = part[np.argsort(near[part[:, 0]], kind="stable")]
-        return Windows(part[:, 0], part[:, 1:3], part[:, 3:5], near[part[:, 0]])
+            columns = np.searchsorted(self.sensor.azimuth_rad, np.stack([low, high], axis=1) + turn)
+            solid = np.flatnonzero(inside & (columns[:, 1] > columns[:, 0]))
+            parts.append(np.column_stack([solid, rows[solid], columns[solid]]))
+        window = np.concatenate(parts)
+        window = window[np.argsort(near[window[:, 0]], kind="stable")]
+        return Windows(window[:, 0], window[:, 1:3], window[:, 3:5], near[window[:, 0]])
 
-    def _row_range(self, bottom: Float32, top: Float32, near: Float32, far: Float32) -> tuple[Int, Int]:
-        """First row, and one past the last, whose beams pass between two heights at some distances."""
-        lowest, highest = self.origin.min(), self.origin.max()
-        rise, fall = top - lowest, bottom - highest
+    def _row_range(self, corners: Float32, near: Float32) -> Int:
+        """(n, 2) first row, and one past the last, whose beams may meet solids of (n, 8, 3) corners."""
+        near = np.maximum(near, NEAREST_M)
+        far = np.hypot(corners[..., 0], corners[..., 1]).max(axis=1)
+        rise = corners[..., 2].max(axis=1) - self.origin.min()
+        fall = corners[..., 2].min(axis=1) - self.origin.max()
         steepest = np.where(rise > 0, rise / near, rise / far)
         deepest = np.where(fall < 0, fall / near, fall / far)
         falling = -self.tangent[:, 0]
-        return np.searchsorted(falling, -steepest), np.searchsorted(falling, -deepest, side="right")
+        first = np.searchsorted(falling, -steepest)
+        return np.stack([first, np.searchsorted(falling, -deepest, side="right")], axis=1)
 
     def _nearest(self, solids: Solids) -> Float32:
         """(n,) least horizontal distance [m], a lower bound for tilted solids."""
@@ -257,3 +261,16 @@ class RayCaster:
         radius = np.linalg.norm(solids.half, axis=1)
         loose = np.maximum(np.hypot(solids.centre[:, 0], solids.centre[:, 1]) - radius, 0)
         return np.asarray(np.where(upright, exact, loose).astype(np.float32))
+
+
+def _azimuth_range(solids: Solids, corners: Float32, around: Bool) -> tuple[Float64, Float64]:
+    """(n,) least and greatest azimuth of (n, 8, 3) corners, about that of the centre; `around` the sensor, all."""
+    azimuth = np.arctan2(solids.centre[:, 1], solids.centre[:, 0]).astype(np.float64)
+    c = np.cos(azimuth)[:, None]
+    s = np.sin(azimuth)[:, None]
+    ahead = c * corners[..., 0] + s * corners[..., 1]
+    left = c * corners[..., 1] - s * corners[..., 0]
+    off = np.arctan2(left, ahead)
+    low = azimuth + np.where(around, -np.pi, off.min(axis=1))
+    high = azimuth + np.where(around, np.pi, off.max(axis=1))
+    return low, high

@@ -60,9 +60,8 @@ class SyntheticStream:
             raise MisuseError(seed, "no seed", "give an integer of at least 0")
         model = sensor_model(sensor)
         world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, height_m or model.height_m)
-        roll, pitch = np.deg2rad(mount_deg) + world.mount_rad
-        world = replace(world, mount_rad=(float(roll), float(pitch)))
-        self.simulator = Simulator(world, model, seed, distort=distort)
+        roll, pitch = (np.deg2rad(mount_deg) + world.mount_rad).tolist()
+        self.simulator = Simulator(replace(world, mount_rad=(roll, pitch)), model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults = Faults()
         self.info = StreamInfo(
@@ -86,9 +85,10 @@ class SyntheticStream:
 
     def between(self, first: int, last: int | None) -> Self:
         """The frames with first <= index < last; others are not rendered."""
-        part, indices = copy.copy(self), self._indices
+        part = copy.copy(self)
         part.faults = Faults()
-        part._indices = range(max(first, indices.start), indices.stop if last is None else min(last, indices.stop))
+        stop = self._indices.stop if last is None else min(last, self._indices.stop)
+        part._indices = range(max(first, self._indices.start), stop)
         part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
         return part
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +13,10 @@ from modt_simulation.raycast import RayCaster
 
 UInt8 = NDArray[np.uint8]
 
-NEAREST_M, N_DISTANCES = 0.5, 90
-"""Nearest distance along a ray, and number of distances, each 6 % longer than the one before."""
+NEAREST_M = 0.5
+"""Nearest distance along a ray at which it is compared with the ground."""
+N_DISTANCES = 90
+"""Number of these distances, each 6 % longer than the one before."""
 N_HALVINGS = 6
 """Number of bisections of the interval in which a ray meets the ground."""
 STEEPEST = 0.1
@@ -54,26 +57,34 @@ class Terrain:
         if not len(low):
             return distance, surface
         rows = slice(int(low[0]), int(low[-1]) + 1)
-        R, t = T_world_sensor[:3, :3].astype(np.float32), T_world_sensor[:3, 3].astype(np.float32)
+        R = T_world_sensor[:3, :3].astype(np.float32)
+        t = T_world_sensor[:3, 3].astype(np.float32)
+        # components of the rays in the world: of their horizontal parts, and whole
         across = [R[i, 0] * caster.cos + R[i, 1] * caster.sin for i in range(3)]
         direction = [across[i] + R[i, 2] * caster.tangent[rows] for i in range(3)]
         start = [t[i] + R[i, 2] * caster.origin[rows] for i in range(3)]
-        flat = self.height.ravel()
-        # a tilted sensor: wherever a ray meets the ground, it has fallen about as far as the sensor is high
-        foot = R[:, 2] * (flat[self.cells(t[:1], t[1:2])] - t[2])
+        # A tilted sensor: wherever a ray meets the ground, it has fallen about as far as the sensor is high. The rays of
+        # a column, which start together, share the cell beneath.
+        height = self.height.ravel()
+        foot = t + R[:, 2] * (height[self.cells(t[:1], t[1:2])] - t[2])
         series = np.geomspace(NEAREST_M, sensor.max_range_m, N_DISTANCES, dtype=np.float32)
         first_below = np.full(direction[2].shape, N_DISTANCES)
         for k in reversed(range(N_DISTANCES)):
-            x, y = (t[i] + foot[i] + series[k] * across[i] for i in range(2))
-            np.copyto(first_below, k, where=start[2] + series[k] * direction[2] < flat[self.cells(x, y)])
-        met = first_below < N_DISTANCES
+            ground = height[self._cells_along(foot, across, series[k])]
+            np.copyto(first_below, k, where=start[2] + series[k] * direction[2] < ground)
+        # The ray meets the ground between the first distance at which it is below and the one before.
         ends = np.concatenate([np.zeros(1, np.float32), series, series[-1:]])
-        near, far = ends[first_below], ends[first_below + 1]
+        near = ends[first_below]
+        far = ends[first_below + 1]
         for _ in range(N_HALVINGS):
             middle = (near + far) / 2
-            cell = self.cells(start[0] + middle * direction[0], start[1] + middle * direction[1])
-            below = start[2] + middle * direction[2] < flat[cell]
-            near, far = np.where(below, near, middle), np.where(below, middle, far)
-        distance[rows] = np.where(met, far, np.inf)
-        surface[rows] = self.surface.ravel()[cell]
+            below = start[2] + middle * direction[2] < height[self._cells_along(start, direction, middle)]
+            near = np.where(below, near, middle)
+            far = np.where(below, middle, far)
+        distance[rows] = np.where(first_below < N_DISTANCES, far, np.inf)
+        surface[rows] = self.surface.ravel()[self._cells_along(start, direction, middle)]
         return distance, surface
+
+    def _cells_along(self, start: Sequence[Float32], direction: Sequence[Float32], s: Float32) -> Int:
+        """Flat index of the cell under the points at distances s along rays."""
+        return self.cells(start[0] + s * direction[0], start[1] + s * direction[1])
