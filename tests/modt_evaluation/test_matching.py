@@ -55,7 +55,7 @@ def test_points_near_the_ground_are_of_the_box_but_not_of_the_object():
     objects, proposals = judged(cars(10.0), [(blob(40, 10), 0), (low, 1)], TWO)
     assert objects["outcome"].tolist() == [Outcome.DETECTED]
     assert proposals["label"].tolist() == [CAR, BACKGROUND]
-    assert proposals["owner"].tolist() == [CAR, CAR]
+    assert proposals["box_class"].tolist() == [CAR, CAR]
 
 
 @pytest.mark.parametrize(("rules", "label"), [(KITTI_RULES, CAR), (CUBOID_RULES, BACKGROUND)])
@@ -121,7 +121,7 @@ def test_roles_of_labelled_types(types, name, judgement, of_proposal, owner):
     objects, proposals = judged(truth, [(blob(30, 10), 0)], rules=CUBOID_RULES)
     assert objects[OBJECT].tolist() == [judgement]
     assert proposals[PROPOSAL].tolist() == [of_proposal]
-    assert proposals["owner"][0] == owner
+    assert proposals["box_class"][0] == owner
 
 
 @pytest.mark.parametrize(("rules", "counts"), [(CUBOID_RULES, False), (KITTI_RULES, True)])
@@ -161,6 +161,6 @@ def test_points_of_objects_are_those_inside(seed, n, tilted):
     world = transform(T, points[:, :3].astype(np.float64)) if tilted else points
     for i, box in enumerate(boxes):
         clear = np.flatnonzero(inside(world, box))
-        assert sorted(overlap.own[i].tolist()) == clear.tolist()
+        assert sorted(overlap.clear[i].tolist()) == clear.tolist()
         whole = inside(world, box, foot_m=-0.15)
         assert overlap.held[i].tolist() == [*np.bincount(proposal[whole] + 1, minlength=6)[1:], 0]

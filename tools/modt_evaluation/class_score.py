@@ -34,29 +34,36 @@ class ClassScore:
 
 def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
     """The score of each class."""
-    judged, reporting = proposals[proposals["to_classify"]], proposals[proposals["to_report"]]
+    judged = proposals[proposals["to_classify"]]
+    reporting = proposals[proposals["to_report"]]
     scores = {}
     for c, name in enumerate(CLASS_NAMES[1:], 1):
         of_class = objects[(objects["class"] == c) & np.isin(objects["role"], CLASSIFIED)]
         wanted = of_class[of_class["to_segment"]]
         counted = of_class[of_class["to_classify"]]
-        n, correct = len(counted), int((wanted["reported"] == c).sum())
-        as_class = reporting["reported"] == c
-        score, hit = judged["posterior"][:, c], judged["label"] == c
+        n = len(counted)
+        correct = _count(wanted["reported"] == c)
+        called = reporting[reporting["reported"] == c]
+        score = judged["posterior"][:, c]
+        hit = judged["label"] == c
         curve = precision_recall(score, hit, n)
         scores[name] = ClassScore(
             objects=n,
             average_precision=_area(*curve[1:]) if n else None,
             curve=_sampled(*curve) if n else (),
-            called=int(as_class.sum()),
-            precision=ratio(int((as_class & (reporting["owner"] == c)).sum()), int(as_class.sum())),
-            objects_called=ratio(int((counted["reported_by_match"] == c).sum()), n),
+            called=len(called),
+            precision=ratio(_count(called["box_class"] == c), len(called)),
+            objects_called=ratio(_count(counted["reported_by_match"] == c), n),
             segmentable=len(wanted),
             recall=ratio(correct, len(wanted)),
-            recall_of_found=ratio(correct, int((wanted["outcome"] == Outcome.DETECTED).sum())),
+            recall_of_found=ratio(correct, _count(wanted["outcome"] == Outcome.DETECTED)),
             calibration_error=expected_calibration_error(score, hit),
         )
     return scores
+
+
+def _count(which: Bool) -> int:
+    return int(np.count_nonzero(which))
 
 
 def precision_recall(score: Float64, hit: Bool, n: int) -> tuple[Float64, Float64, Float64]:

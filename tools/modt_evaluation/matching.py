@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import CLASS_NAMES, N_CLASSES
+from modt.classes import N_CLASSES
 from modt.types import NONE, Bool, Float32, Int
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
@@ -27,45 +27,50 @@ def judge(
     `points` are the points of the labelled objects, where they are known.
     """
     overlap = Overlap.of(frame, points)
-    row = np.full(len(overlap.size), NONE, np.int64)
-    row[frame.of_track] = np.arange(len(frame.track))
-    track, reported = (np.append(column, NONE)[row] for column in (frame.track, frame.reported))
     objects = _objects(frame, overlap, rules)
+    # (n,) whether the best proposal of each object stands for it
     pairs = overlap.iou > 0.5 if rules.by_iou else overlap.most_of_object & overlap.most_of_proposal
     proposals = _proposals(frame, overlap, objects, pairs, rules)
+    proposals["track"] = NONE
+    proposals["reported"] = NONE
+    proposals["track"][frame.of_track] = frame.track
+    proposals["reported"][frame.of_track] = frame.reported
+    proposals["posterior"][frame.of_track] = frame.posterior
     objects["drive"] = proposals["drive"] = drive
     objects["frame"] = proposals["frame"] = frame.index
-    objects["reported"] = np.where(objects["outcome"] == Outcome.DETECTED, reported[overlap.best], NONE)
-    objects["reported_by_match"] = np.where(pairs, reported[overlap.best], NONE)
-    objects["track"] = np.where(overlap.most > 0, track[overlap.best], NONE)
-    proposals["track"], proposals["reported"] = track, reported
-    proposals["posterior"] = np.append(frame.posterior, np.zeros((1, N_CLASSES)), axis=0)[row]
-    associations = []
-    for c in range(1, len(CLASS_NAMES)):
+    best = proposals[overlap.best]
+    objects["reported"] = np.where(objects["outcome"] == Outcome.DETECTED, best["reported"], NONE)
+    objects["reported_by_match"] = np.where(pairs, best["reported"], NONE)
+    objects["track"] = np.where(overlap.most > 0, best["track"], NONE)
+    tracked = np.isin(np.arange(len(proposals)), frame.of_track)
+    return objects, proposals[tracked], _associations(overlap, objects, proposals)
+
+
+def _associations(overlap: Overlap, objects: Rows, proposals: Rows) -> tuple[Association, ...]:
+    """The associations of each class, by the rows of all objects and proposals."""
+    made = []
+    for c in range(1, N_CLASSES):
         i = np.flatnonzero(objects["to_classify"] & objects["to_follow"] & (objects["class"] == c))
-        k = np.flatnonzero(proposals["to_associate"] & (reported == c))
+        k = np.flatnonzero(proposals["to_associate"] & (proposals["reported"] == c))
         shared = overlap.shared[np.ix_(i, k)]
         union = overlap.count[i, None] + overlap.size[k] - shared
-        associations.append(Association(objects["id"][i], track[k], shared / np.maximum(union, 1)))
-    return objects, proposals[row != NONE], tuple(associations)
+        made.append(Association(objects["id"][i], proposals["track"][k], shared / np.maximum(union, 1)))
+    return tuple(made)
 
 
 def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
-    truth, cut_counts = frame.truth, "cut" not in rules.ignored
+    """The rows of all objects; columns that depend on tracks are blank."""
+    truth = frame.truth
     range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
-    shown = frame.points[np.concatenate([np.zeros(0, np.int64), *overlap.own])]
-    of = np.repeat(np.arange(len(overlap.own)), overlap.count)
-
-    def most(which: Bool) -> Bool:
-        """(n,) whether most points of each object satisfy it; true for an object without points."""
-        times = np.bincount(of[which], minlength=len(overlap.own))
-        return np.asarray((times > 0.5 * overlap.count) | (overlap.count == 0))
-
-    in_view, in_sector = most(frame.fov.depth(shown) > 0), most(_in_sector(shown, rules))
+    object_of_point = np.repeat(np.arange(len(overlap.count)), overlap.count)
+    points = frame.points[np.concatenate([np.zeros(0, np.int64), *overlap.clear])]
+    empty = overlap.count == 0
+    in_view = _most(object_of_point, frame.fov.depth(points) > 0, overlap.count) | empty
+    in_sector = _most(object_of_point, _in_sector(points, rules), overlap.count) | empty
+    cut_counts = "cut" not in rules.ignored
     near = range_m <= rules.max_range_m
     wanted = np.isin(truth.role, LABELLED) & near
     of_class = (truth.object_class > 0) & _has_points(frame, overlap, rules)
-    whole = cut_counts | (in_view & in_sector)
     return table(
         OBJECT,
         len(truth.id),
@@ -73,7 +78,7 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
         range_m=range_m,
         in_view=in_view,
         to_segment=wanted & (overlap.count >= rules.min_points) & (in_view | cut_counts),
-        to_classify=of_class & whole & near & np.isin(truth.role, CLASSIFIED),
+        to_classify=of_class & (cut_counts | (in_view & in_sector)) & near & np.isin(truth.role, CLASSIFIED),
         to_follow=of_class & wanted,
         outcome=_outcome(overlap),
     )
@@ -98,59 +103,77 @@ def _outcome(overlap: Overlap) -> Int:
 
 def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool, rules: Rules) -> Rows:
     """The rows of all proposals, by (n,) whether the best proposal of each object stands for it."""
-    truth, size, best = frame.truth, overlap.size, overlap.best
+    truth = frame.truth
+    size = overlap.size
     members = np.flatnonzero(frame.proposal >= 0)
-    of, points = frame.proposal[members], frame.points[members]
+    proposal_of_point = frame.proposal[members]
+    points = frame.points[members]
 
-    def most(which: Bool) -> Bool:
-        """(P,) whether more than half of each proposal's points satisfy it."""
-        return np.asarray(np.bincount(of[which], minlength=len(size)) > 0.5 * size)
-
-    # The object that a proposal stands for, and the one in whose box it lies.
     matched = objects["to_classify"] & pairs
-    label, owner = np.zeros((2, len(size)), np.int64)
-    label[best[matched]] = truth.object_class[matched]
-    range_m = np.bincount(of, np.hypot(points[:, 0], points[:, 1]), len(size)) / np.maximum(size, 1)
+    standing_for = overlap.best[matched]
+    label = np.zeros(len(size), np.int64)
+    label[standing_for] = truth.object_class[matched]
+    range_m = np.bincount(proposal_of_point, np.hypot(points[:, 0], points[:, 1]), len(size)) / np.maximum(size, 1)
     judged = most_in_sector(frame, size, rules) & (range_m <= rules.max_range_m)
-    range_m[best[matched]] = objects["range_m"][matched]
-    held = overlap.held > 0.5 * size
-    role = np.full(len(size), Role.COUNTED, np.int64)
-    for i, k in zip(*np.nonzero(held & (truth.object_class > 0)[:, None]), strict=True):
-        owner[k], role[k] = truth.object_class[i], truth.role[i]
+    range_m[standing_for] = objects["range_m"][matched]
 
-    # Neutral proposals lie on objects that are not judged for their class, unknown ones where nothing is labelled.
-    excused = (truth.object_class > 0) & ~objects["to_classify"] & (objects["range_m"] <= rules.max_range_m)
-    if "few" not in rules.ignored:
-        excused &= _has_points(frame, overlap, rules) | ~np.isin(truth.role, CLASSIFIED)
-    neutral, further = ~np.isin(role, CLASSIFIED), role == Role.FURTHER
-    further[best[matched & (truth.role == Role.FURTHER)]] = True
-    neutral[best[excused & overlap.most_of_proposal]] = True
-    unknown = np.zeros(len(size), np.bool_)
-    if "parked" in rules.ignored:
-        placed = in_box_frame(points, truth) if len(truth.parked) else points
-        for box in truth.parked:
-            unknown |= most(inside(placed, box, PARKED_PAD_M))
-    if "dontcare" in rules.ignored and truth.regions is not None:
-        unknown |= most(truth.regions.contains(points))
-    to_report = judged & ~(unknown & (owner == 0)) & (role != Role.IGNORED)
+    # The object in whose box a proposal lies, the last one of several.
+    box_class = np.zeros(len(size), np.int64)
+    role = np.full(len(size), Role.COUNTED, np.int64)
+    held = overlap.held > 0.5 * size
+    for i in np.flatnonzero(truth.object_class):
+        box_class[held[i]] = truth.object_class[i]
+        role[held[i]] = truth.role[i]
+
+    further = role == Role.FURTHER
+    further[overlap.best[matched & (truth.role == Role.FURTHER)]] = True
+    neutral = ~np.isin(role, CLASSIFIED)
+    neutral[overlap.best[_excused(frame, overlap, objects, rules) & overlap.most_of_proposal]] = True
+    unknown = _unknown(frame, proposal_of_point, points, size, rules)
+    to_report = judged & ~(unknown & (box_class == 0)) & (role != Role.IGNORED)
     no_object = label == 0
     return table(
         PROPOSAL,
         len(size),
         range_m=range_m,
         label=label,
-        owner=owner,
+        box_class=box_class,
         to_classify=judged & ~((unknown | neutral) & no_object),
         to_report=to_report,
         to_associate=to_report & ~(neutral & no_object) & ~further,
     )
 
 
+def _excused(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules) -> Bool:
+    """(n,) objects of a class that are not judged for it: a proposal on one is neutral, neither true nor false."""
+    excused = (objects["class"] > 0) & ~objects["to_classify"] & (objects["range_m"] <= rules.max_range_m)
+    if "few" not in rules.ignored:
+        excused &= _has_points(frame, overlap, rules) | ~np.isin(objects["role"], CLASSIFIED)
+    return np.asarray(excused)
+
+
+def _unknown(frame: JudgedFrame, proposal_of_point: Int, points: Float32, size: Int, rules: Rules) -> Bool:
+    """(P,) proposals where nothing is labelled, by the points of all proposals."""
+    truth = frame.truth
+    unknown = np.zeros(len(size), np.bool_)
+    if "parked" in rules.ignored and len(truth.parked):
+        placed = in_box_frame(points, truth)
+        for box in truth.parked:
+            unknown |= _most(proposal_of_point, inside(placed, box, PARKED_PAD_M), size)
+    if "dontcare" in rules.ignored and truth.regions is not None:
+        unknown |= _most(proposal_of_point, truth.regions.contains(points), size)
+    return unknown
+
+
 def most_in_sector(frame: JudgedFrame, size: Int, rules: Rules) -> Bool:
     """(P,) whether more than half of the points of each proposal, (P,) in number, lie in the labelled sector."""
     members = frame.proposal >= 0
-    inside_sector = frame.proposal[members][_in_sector(frame.points[members], rules)]
-    return np.asarray(np.bincount(inside_sector, minlength=len(size)) > 0.5 * size)
+    return _most(frame.proposal[members], _in_sector(frame.points[members], rules), size)
+
+
+def _most(group: Int, which: Bool, size: Int) -> Bool:
+    """(g,) whether more than half of each group's points, (g,) in number, are chosen, by the group of each point."""
+    return np.asarray(np.bincount(group[which], minlength=len(size)) > 0.5 * size)
 
 
 def _in_sector(points: Float32, rules: Rules) -> Bool:

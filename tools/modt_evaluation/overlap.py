@@ -13,15 +13,17 @@ from modt.types import NONE, Bool, Float32, Float64, Int, Self
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.truth import FrameTruth
 
-PAD_M, FOOT_M = 0.15, 0.25
-"""Points of an object: up to PAD_M beyond its box, and FOOT_M above its foot."""
+PAD_M = 0.15
+"""Points of an object lie up to this distance beyond its box."""
+FOOT_M = 0.25
+"""They lie this distance or more above its foot."""
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectPoints:
     """Indices of the points of each of n labelled objects: clear of the ground, and all in its box."""
 
-    own: list[Int]
+    clear: list[Int]
     whole: list[Int]
 
     @classmethod
@@ -31,22 +33,22 @@ class ObjectPoints:
         reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
         reach += 0.05 * truth.box[:, 5]  # sensors are tilted by a few degrees at most
         across = np.ascontiguousarray(points[:, :2].T)
-        own, whole = [], []
+        found = cls([], [])
         for box, (x, y), r in zip(truth.box, centre[:, :2].tolist(), reach.tolist(), strict=True):
             k = np.flatnonzero((np.abs(across[0] - x) < r) & (np.abs(across[1] - y) < r))
             moved = in_box_frame(points[k], truth)
             within = inside(moved, box, foot_m=-PAD_M)
             clear = within & (moved[:, 2] > float(box[2] - box[5] / 2) + FOOT_M)
-            own.append(k[clear])
-            whole.append(k[within])
-        return cls(own, whole)
+            found.clear.append(k[clear])
+            found.whole.append(k[within])
+        return found
 
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
     """Points that n objects and P proposals of a frame share. The last proposal is empty and stands for none."""
 
-    own: list[Int]  # points of each object, clear of the ground
+    clear: list[Int]  # points of each object, clear of the ground
     count: Int  # (n,) points of each object
     size: Int  # (P,) points of each proposal
     shared: Int  # (n, P) points of an object in a proposal
@@ -63,21 +65,32 @@ class Overlap:
         p = max(frame.n_proposals, int(frame.proposal.max(initial=NONE)) + 1) + 1
         size = np.bincount(frame.proposal + 1, minlength=p + 1)[1:]
         objects = objects or ObjectPoints.of(frame.points, frame.truth)
-        own = objects.own
-        shared, held = (_shared(points, frame.proposal, p) for points in (own, objects.whole))
-        count = np.array([len(points) for points in own], np.int64)
-        best, most = shared.argmax(axis=1), shared.max(axis=1)
-        iou = most / np.maximum(size[best] + count - most, 1)
-        return cls(own, count, size, shared, held, best, most, iou, most > 0.5 * count, most > 0.5 * size[best])
+        count = np.array([len(points) for points in objects.clear], np.int64)
+        shared = _shared(objects.clear, frame.proposal, p)
+        best = shared.argmax(axis=1)
+        most = shared.max(axis=1)
+        return cls(
+            clear=objects.clear,
+            count=count,
+            size=size,
+            shared=shared,
+            held=_shared(objects.whole, frame.proposal, p),
+            best=best,
+            most=most,
+            iou=most / np.maximum(size[best] + count - most, 1),
+            most_of_object=most > 0.5 * count,
+            most_of_proposal=most > 0.5 * size[best],
+        )
 
 
 def inside(points: NDArray[Any], box: Float64, pad_m: float = PAD_M, foot_m: float = FOOT_M) -> Bool:
     """(N,) whether (N, 3 or more) points lie in a (7,) box grown by pad_m, and foot_m or more above its foot."""
     x, y, z = (points[:, k] - float(box[k]) for k in range(3))
-    c, s = float(np.cos(box[6])), float(np.sin(box[6]))
+    c = float(np.cos(box[6]))
+    s = float(np.sin(box[6]))
     length, width, height = (box[3:6] / 2).tolist()
-    along, across = np.abs(c * x + s * y), np.abs(c * y - s * x)
-    within: Bool = (along < length + pad_m) & (across < width + pad_m) & (z > foot_m - height) & (z < height + pad_m)
+    within: Bool = (np.abs(c * x + s * y) < length + pad_m) & (np.abs(c * y - s * x) < width + pad_m)
+    within &= (z > foot_m - height) & (z < height + pad_m)
     return within
 
 

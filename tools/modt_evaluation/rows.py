@@ -55,7 +55,7 @@ PROPOSAL = np.dtype(
         ("posterior", float, N_CLASSES),
         ("reported", int),  # reported class
         ("label", int),  # class of the object that it stands for, BACKGROUND for none
-        ("owner", int),  # class of the object in whose box most of its points lie, BACKGROUND for none
+        ("box_class", int),  # class of the object in whose box most of its points lie, BACKGROUND for none
         ("to_classify", bool),  # judged for average precision
         ("to_report", bool),  # judged for the reported class
         ("to_associate", bool),  # judged for HOTA, CLEAR and Identity

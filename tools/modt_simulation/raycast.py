@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ class Shape:
         """
         enter: Float32 = np.full(1, -np.inf, np.float32)
         leave: Float32 = -enter
-        spans = []  # middle of the part of the ray inside a pair of surfaces, and half its length
+        spans: list[tuple[Any, Any]] = []  # middle of the stretch of a ray between two surfaces, and half its length
         if self.code & 1:
             for i in range(3):
                 inverse = 1 / direction[i]

@@ -70,7 +70,8 @@ class Receiver:
         loss = GRAZING_LOSS.take(material)
         intensity -= loss * (1 - self._cos_glossy(near, solid, cosine, loss > GLOSSY))
         intensity += POINT_SIGMA.take(material) * grain
-        return measured, sensor.response.report(intensity[detected], slant[detected]), *np.nonzero(detected)
+        row, column = np.nonzero(detected)
+        return measured, sensor.response.report(intensity[detected], slant[detected]), row, column
 
     def _cos_incidence(self, near: Float32, solid: Int32) -> Float32:
         """(B, A) cosine of the angle of incidence, by the slope of the range image along a beam."""

@@ -63,8 +63,8 @@ class Terrain:
         across = [R[i, 0] * caster.cos + R[i, 1] * caster.sin for i in range(3)]
         direction = [across[i] + R[i, 2] * caster.tangent[rows] for i in range(3)]
         start = [t[i] + R[i, 2] * caster.origin[rows] for i in range(3)]
-        # A tilted sensor: wherever a ray meets the ground, it has fallen about as far as the sensor is high. The rays of
-        # a column, which start together, share the cell beneath.
+        # Where the rays of a column would start if the sensor were level: wherever a ray meets the ground, it has
+        # fallen about as far as the sensor is high.
         height = self.height.ravel()
         foot = t + R[:, 2] * (height[self.cells(t[:1], t[1:2])] - t[2])
         series = np.geomspace(NEAREST_M, sensor.max_range_m, N_DISTANCES, dtype=np.float32)

@@ -47,7 +47,7 @@ def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int
     for frame in run.frames(truth, None if exact else points_in_boxes, stream, labelled):
         objects, proposals, _ = judge(frame, truth.rules)
         called = proposals[proposals["to_report"] & (proposals["reported"] > 0)]
-        false = called["track"][called["reported"] != called["owner"]]
+        false = called["track"][called["reported"] != called["box_class"]]
         marks[frame.index] = {"truth": _objects(frame.truth, objects), "false": false.tolist()}
     if not marks:
         cause = f"none of its frames is in the truth, which has {len(truth.frames)}"

@@ -75,7 +75,7 @@ def shares(drives: Sequence[DriveRows], kind: ObjectClass, band_m: tuple[float, 
     )
     wanted = objects[(objects["class"] == kind) & (objects["role"] == Role.COUNTED) & objects["to_segment"]]
     reported = proposals[proposals["to_report"] & (proposals["reported"] == kind)]
-    of_class = (wanted["outcome"] == Outcome.DETECTED, wanted["reported"] == kind, reported["owner"] == kind)
+    of_class = (wanted["outcome"] == Outcome.DETECTED, wanted["reported"] == kind, reported["box_class"] == kind)
     percent = (f"{100 * np.mean(of):.0f}" if len(of) else "-" for of in of_class)
     return f"{len(wanted)}: {' / '.join(percent)}"
 

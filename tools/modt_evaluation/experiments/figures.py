@@ -226,7 +226,7 @@ class TrackWork:
         rows = judged.proposals
         names, unit = np.unique(rows[["drive", "track"]], return_inverse=True)
         frames = np.bincount(unit, minlength=len(names))
-        on_object = 2 * np.bincount(unit[rows["owner"] > 0], minlength=len(names)) > frames
+        on_object = 2 * np.bincount(unit[rows["box_class"] > 0], minlength=len(names)) > frames
         number = {name: k for k, name in enumerate(names.tolist())}
         own = np.array([number[name] for name in judged.calls[["drive", "track"]].tolist()], np.int64)
         return cls(frames, on_object, np.bincount(own, minlength=len(names)))
