@@ -21,7 +21,7 @@ from modt_evaluation.truth import LABELLED, Role
 
 @dataclass(frozen=True, slots=True)
 class SegmentationScore:
-    """Counts of one kind of object, one for each object and frame. `Outcome` explains merged to missed."""
+    """Counts of one kind of object, one for each object and frame; merged to missed in the order of `Outcome`."""
 
     objects: int  # judged
     recall: float | None  # share of them that is detected
@@ -37,11 +37,10 @@ def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
     scores = {}
     for name, which in kinds(objects).items():
         judged = objects["outcome"][which & objects["to_segment"]]
-        found, merged, split, partial, missed = np.bincount(judged, minlength=len(Outcome)).tolist()
+        detected, *failed = np.bincount(judged, minlength=len(Outcome)).tolist()
         cut = int((which & ~objects["in_view"] & np.isin(objects["role"], LABELLED)).sum())
         if len(judged) or cut:
-            recall = ratio(found, len(judged))
-            scores[name] = SegmentationScore(len(judged), recall, merged, split, partial, missed, cut)
+            scores[name] = SegmentationScore(len(judged), ratio(detected, len(judged)), *failed, cut)
     return scores
 
 
@@ -97,22 +96,26 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Driv
     Raises:
         ValueError: there are no frames.
     """
-    judged, n_proposals, classified = [], 0, 0
+    judged = []
+    n_proposals = classified = 0
     for frame in frames:
         judged.append(judge(frame, rules, drive))
-        n_proposals, classified = n_proposals + frame.n_proposals, classified + frame.classified
+        n_proposals += frame.n_proposals
+        classified += frame.classified
     if not judged:
         raise ValueError("no frames")
     objects, proposals, associations = zip(*judged, strict=True)
-    tables = np.concatenate(objects), np.concatenate(proposals)
-    return DriveRows(rules, len(judged), n_proposals, classified, *tables, tuple(zip(*associations, strict=True)))
+    by_class = tuple(zip(*associations, strict=True))
+    rows = np.concatenate(objects), np.concatenate(proposals)
+    return DriveRows(rules, len(judged), n_proposals, classified, *rows, by_class)
 
 
 def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
     """Every figure over all drives together."""
     objects = np.concatenate([drive.objects for drive in drives])
     proposals = np.concatenate([drive.proposals for drive in drives])
-    n_proposals, judged = sum(drive.n_proposals for drive in drives), proposals[proposals["to_classify"]]
+    n_proposals = sum(drive.n_proposals for drive in drives)
+    judged = proposals[proposals["to_classify"]]
     further = objects[objects["role"] == Role.FURTHER]
     on_objects = judged[judged["label"] > 0]
     return Evaluation(
@@ -133,13 +136,15 @@ def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
 
 
 def _in_range(objects: Rows, proposals: Rows, low_m: float, high_m: float) -> RangeScore:
-    seen, found = (rows[(rows["range_m"] >= low_m) & (rows["range_m"] < high_m)] for rows in (objects, proposals))
-    return RangeScore(segmentation(seen), class_scores(seen, found))
+    """The scores of the objects and proposals in one band of range."""
+    objects, proposals = (t[(t["range_m"] >= low_m) & (t["range_m"] < high_m)] for t in (objects, proposals))
+    return RangeScore(segmentation(objects), class_scores(objects, proposals))
 
 
 def _metrics(drives: Sequence[DriveRows]) -> dict[str, dict[str, float]] | None:
+    """HOTA, CLEAR and Identity of all classes and of each; None without trackeval."""
     if find_spec("trackeval") is None:
         return None
-    by_class = {name: [drive.associations[k] for drive in drives] for k, name in enumerate(CLASS_NAMES[1:])}
-    groups = {ALL: [frames for drive in drives for frames in drive.associations], **by_class}
+    groups = {ALL: [frames for drive in drives for frames in drive.associations]}
+    groups |= {name: [drive.associations[k] for drive in drives] for k, name in enumerate(CLASS_NAMES[1:])}
     return {name: found for name, sequences in groups.items() if (found := track_metrics(sequences))}

@@ -58,7 +58,8 @@ def track_rows(record: dict[str, Any]) -> str:
 
 def _cells(track: dict[str, Any]) -> list[Any]:
     plain = [int(track[key]) if isinstance(track[key], bool) else track[key] for key in PLAIN]
-    box, world = track["box"] or NO_BOX, track["world"]
+    box = track["box"] or NO_BOX
+    world = track["world"]
     return [*plain, *track["posterior"], *(box[key] for key in BOX_KEYS), *(world[key] for key in WORLD_KEYS)]
 
 
@@ -99,8 +100,11 @@ class Export:
     def __init__(
         self, run: RunRecord, frames: Frames = (0, None), capture: Capture = (), *, points: bool = True
     ) -> None:
-        self.run, self.points, self.n_frames = run, points, 0
-        self.frames, self.capture = frames, capture
+        self.run = run
+        self.frames = frames
+        self.capture = capture
+        self.points = points
+        self.n_frames = 0
 
     def results(self) -> Iterator[FrameResult]:
         """The results without points."""

@@ -104,7 +104,8 @@ def _label(fields: dict[str, str]) -> Label:
     Raises:
         ValueError, TypeError or OverflowError: it is no label.
     """
-    frame, number = int(fields["frame"]), int(fields["object"])
+    frame = int(fields["frame"])
+    number = int(fields["object"])
     x, y, foot, length, width, height, yaw = values = [float(fields[name]) for name in NUMBERS]
     box = np.array([x, y, foot + height / 2, length, width, height, yaw])
     possible = 0 <= frame <= MAX_FRAME and 0 <= number <= MAX_ID and (np.abs(values) <= MAX_NUMBER).all()

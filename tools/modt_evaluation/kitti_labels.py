@@ -47,7 +47,8 @@ def read_tracklets(path: Path) -> list[Label]:
     for number, item in enumerate(root.iterfind("tracklets/item")):
         try:
             height, width, length = (float(item.findtext(key, "")) for key in "hwl")
-            first, type_ = int(item.findtext("first_frame", "")), item.findtext("objectType", "")
+            first = int(item.findtext("first_frame", ""))
+            type_ = item.findtext("objectType", "")
             for frame, pose in enumerate(item.iterfind("poses/item"), first):
                 x, y, foot, yaw = (float(pose.findtext(key, "")) for key in ("tx", "ty", "tz", "rz"))
                 box = np.array([x, y, foot + height / 2, length, width, height, yaw])

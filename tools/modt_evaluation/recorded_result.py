@@ -30,23 +30,23 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     Raises:
         one of modt.sinks.records.BROKEN: the record lacks something.
     """
-    rows, T_world_sensor = record["tracks"], recorded_pose(record)
+    rows = record["tracks"]
+    T_world_sensor = recorded_pose(record)
     names = tuple(sorted({row["state"] for row in rows}))
     tracks = Tracks.blank(len(rows))
-    tracks.id[:] = [row["id"] for row in rows]
+    same = {"id": tracks.id, "viewed": tracks.key_points, "final": tracks.final, "points": tracks.points}
+    same |= {"age": tracks.age, "missed": tracks.missed}
+    for key, column in same.items():
+        column[:] = [row[key] for row in rows]
     tracks.state[:] = [names.index(row["state"]) for row in rows]
     tracks.object_class[:] = [CLASS_NAMES.index(row["class"]) for row in rows]
     tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
     silent = [0.0] * len(CLASS_NAMES)  # runs of earlier versions have no witness
     tracks.witness[:] = np.array([row.get("witness", silent) for row in rows]).reshape(tracks.witness.shape)
     tracks.size_m[:] = np.array([row.get("size", [0.0] * 3) for row in rows]).reshape(tracks.size_m.shape)
-    tracks.key_points[:] = [row["viewed"] for row in rows]
-    tracks.final[:] = [row["final"] for row in rows]
     tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]
     if (tracks.proposal < NONE).any():
         raise ValueError("a track's proposal is none of the frame's")
-    for key, column in (("points", tracks.points), ("age", tracks.age), ("missed", tracks.missed)):
-        column[:] = [row[key] for row in rows]
     tracks.x[:] = _table([row["world"] for row in rows], WORLD_KEYS)
     seen = np.flatnonzero(tracks.proposal != NONE)
     boxes = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
@@ -66,8 +66,10 @@ def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:
 
 
 def _proposals(n: int) -> Proposals:
+    """N proposals without points."""
     none = np.zeros(0, np.int64)
-    offsets, coordinates = np.zeros(n + 1, np.int64), np.zeros((3, 0), np.float32)
+    offsets = np.zeros(n + 1, np.int64)
+    coordinates = np.zeros((3, 0), np.float32)
     return Proposals(none, offsets, coordinates, np.zeros((n, 3)), np.zeros((n, 7)), np.zeros(n, np.int64))
 
 
@@ -79,7 +81,8 @@ def semantic_labels(tracks: Tracks, proposals: Int) -> NDArray[np.uint32]:
     """
     code = np.zeros(max(proposals.max(initial=NONE), tracks.proposal.max(initial=NONE)) + 2, np.uint32)
     seen = np.flatnonzero(tracks.proposal != NONE)
-    label, instance = SEMANTIC[tracks.object_class[seen]], tracks.id[seen] % MAX_INSTANCE + 1
+    label = SEMANTIC[tracks.object_class[seen]]
+    instance = tracks.id[seen] % MAX_INSTANCE + 1
     code[tracks.proposal[seen]] = np.where(label > 0, instance << 16 | label, 0)
     return code[proposals]  # index -1, NONE, is the last one
 

@@ -36,36 +36,52 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
     size = f"{drives}, {e.frames} frames, {e.proposals} proposals"
     yield f"{name}: {size}, beta {_percent(e.beta)} %, judged {_sector(e)}"
     yield f"  Truth: {_completeness(e)}."
-    bands, whole = e.ranges.values(), e.ranges[ALL]
+    yield from _segmentation(e)
+    yield from _classes(e)
+    yield from _tracks(e)
+
+
+def _segmentation(e: Evaluation) -> Iterator[str]:
+    kinds = e.ranges[ALL].segmentation
     rows = []
-    for kind, s in whole.segmentation.items():
-        found = [band.segmentation.get(kind) for band in bands]
-        recall = [_percent(score.recall if score else None) for score in found]
-        rows.append([kind, *recall, s.objects, *(getattr(s, failure) for failure in FAILURES)])
-    if not whole.segmentation.keys() <= set(CLASS_NAMES):
+    for kind, score in kinds.items():
+        found = [band.segmentation.get(kind) for band in e.ranges.values()]
+        recall = [_percent(in_band and in_band.recall) for in_band in found]
+        rows.append([kind, *recall, score.objects, *(getattr(score, failure) for failure in FAILURES)])
+    if not kinds.keys() <= set(CLASS_NAMES):
         yield LEGEND
     yield from _table("segmentation: recall [%] by range [m], and counts", [*e.ranges, "objects", *FAILURES], rows)
+
+
+def _classes(e: Evaluation) -> Iterator[str]:
+    whole = e.ranges[ALL].classification
     for title, key, count in CLASS_TABLES:
-        shares = {c: [_percent(getattr(band.classification[c], key)) for band in bands] for c in whole.classification}
-        rows = [[c, *shares[c], getattr(score, count)] for c, score in whole.classification.items()]
+        rows = []
+        for name, score in whole.items():
+            shares = [_percent(getattr(band.classification[name], key)) for band in e.ranges.values()]
+            rows.append([name, *shares, getattr(score, count)])
         yield from _table(title, [*e.ranges, count], rows)
     errors = {"proposals": e.calibration_error, "objects": e.calibration_error_of_objects}
-    errors |= {c: score.calibration_error for c, score in whole.classification.items()}
+    errors |= {name: score.calibration_error for name, score in whole.items()}
     yield from _table("calibration error [%]", [*errors], [["", *map(_percent, errors.values())]])
+
+
+def _tracks(e: Evaluation) -> Iterator[str]:
+    if not e.tracks:
+        return
     rows = []
     for kind, t in e.tracks.items():
-        figures = (t.life.life, t.life.ideal, t.life_as_seen.life, t.life_as_seen.ideal, t.labelled.ideal)
-        length, ideal, *others = (_number(value) for value in figures)
-        counts = (t.discontinuities, t.taken_over, t.mis_associations)
-        rows.append([kind, t.life.objects, length, ideal, _number(t.life.ratio, 2), *others, *counts])
-    if rows:
-        yield from _table("tracks: mean length [frames], and counts", TRACKS, [row for row in rows if row[1]])
-        measured = (e.metrics or {}).items()
+        if t.life.objects:
+            lengths = [_number(t.life.life), _number(t.life.ideal), _number(t.life.ratio, 2)]
+            lengths += map(_number, (t.life_as_seen.life, t.life_as_seen.ideal, t.labelled.ideal))
+            rows.append([kind, t.life.objects, *lengths, t.discontinuities, t.taken_over, t.mis_associations])
+    yield from _table("tracks: mean length [frames], and counts", TRACKS, rows)
+    if e.metrics is None:
+        yield f"\n  {', '.join(METRICS)}, {' and '.join(EVENTS)} need trackeval: {install('evaluate')}"
+    elif e.metrics:
+        measured = e.metrics.items()
         rows = [[k, *(_percent(m[n]) for n in METRICS), *(_number(m[n], 0) for n in EVENTS)] for k, m in measured]
-        if rows:
-            yield from _table("metrics [%], and counts", [*METRICS, *EVENTS], rows)
-        elif e.metrics is None:
-            yield f"\n  {', '.join(METRICS)}, {' and '.join(EVENTS)} need trackeval: {install('evaluate')}"
+        yield from _table("metrics [%], and counts", [*METRICS, *EVENTS], rows)
 
 
 def _sector(e: Evaluation) -> str:

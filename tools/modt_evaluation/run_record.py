@@ -18,7 +18,7 @@ from modt.placement import Mount
 from modt.sinks.records import BROKEN
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
-from modt.sources.stream import Faults, Stream, StreamInfo
+from modt.sources.stream import Stream
 from modt.types import Float32, Frame, Int, Self
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.recorded_result import recorded_result
@@ -31,10 +31,11 @@ class LevelStream:
     """The frames of a stream, and its camera, for level points."""
 
     def __init__(self, stream: Stream, mount: Mount) -> None:
-        self._stream, self._mount = stream, mount
+        self._stream = stream
+        self._mount = mount
         camera = stream.info.camera
-        self.info: StreamInfo = replace(stream.info, camera=camera and mount.camera(camera))
-        self.faults: Faults = stream.faults
+        self.info = replace(stream.info, camera=camera and mount.camera(camera))
+        self.faults = stream.faults
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames."""
@@ -90,7 +91,8 @@ class RunRecord:
         facts = run_facts(path)
         try:
             _ = facts["mode"], facts["fov"], facts["stream"]["name"]
-            stream, sensor = facts["stream"]["path"], Path(facts["recognition"]["used"]).stem
+            stream = facts["stream"]["path"]
+            sensor = Path(facts["recognition"]["used"]).stem
             placed = facts["profile"]["sensor"]
             mount = Mount.of(placed["roll_deg"], placed["pitch_deg"])
             return cls(path, facts, Path(stream) if stream else None, sensor, mount)
@@ -130,7 +132,8 @@ class RunRecord:
 
     def ledger_lines(self) -> dict[int, list[dict[str, Any]]]:
         """The lines of the ledger by the frame after which each was written; none where no ledger was kept."""
-        path, lines = self.path / LEDGER, defaultdict[int, list[dict[str, Any]]](list)
+        path = self.path / LEDGER
+        lines = defaultdict[int, list[dict[str, Any]]](list)
         if path.exists():
             for line in read_records(path, ledger.SCHEMA, {windows.SCHEMA}):
                 lines[line["frame"]].append(line)
@@ -159,14 +162,12 @@ class RunRecord:
         stream = truth.scans if stream is None else stream
         if stream is None:
             raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
-        camera = stream.info.camera
-        if self.facts["fov"] == "camera" and camera is None:
-            raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
-        fov = FieldOfView.of_camera(camera) if self.facts["fov"] == "camera" and camera is not None else FieldOfView()
+        fov = self._fov(stream)
         sweeps = FramesByNumber(stream)
         for place, record in self.records() if records is None else records:
             try:
-                result, n_classified = recorded_result(record), int(record["classifications"])
+                result = recorded_result(record)
+                n_classified = int(record["classifications"])
             except BROKEN as error:
                 raise broken(place, error) from None
             index = result.frame.index
@@ -185,6 +186,18 @@ class RunRecord:
                 raise MisuseError(self._labels(index), cause, "give the truth of the run's own recording")
             judged = JudgedFrame.of_result(result, labels, fov)
             yield replace(judged, points=points, proposal=proposals, classified=n_classified)
+
+    def _fov(self, stream: Stream) -> FieldOfView:
+        """The field of view of the run.
+
+        Raises:
+            MisuseError: it is that of a camera, which is not found.
+        """
+        if self.facts["fov"] != "camera":
+            return FieldOfView()
+        if stream.info.camera is None:
+            raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
+        return FieldOfView.of_camera(stream.info.camera)
 
     def proposals(self, index: int) -> Int:
         """(N,) proposal of each point of a frame, NONE where it belongs to none.

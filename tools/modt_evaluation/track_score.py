@@ -16,8 +16,8 @@ from modt_evaluation.truth import LABELLED
 
 SIMILARITY_THRESHOLD = 0.25
 """Similarity from which CLEAR and Identity count a match."""
-MIN_FRAMES_OWNED = 3
-"""Frames for which a track must follow an object to own it; one that owns several is a mis-association."""
+MIN_FRAMES_FOLLOWED = 3
+"""A track that follows each of several objects for this many frames or more is a mis-association."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,8 @@ class Length:
 
 
 def _length(objects: int, frames: int, followed: int, discontinuities: int) -> Length:
-    length, ideal = ratio(followed, objects + discontinuities), ratio(frames, objects)
+    length = ratio(followed, objects + discontinuities)
+    ideal = ratio(frames, objects)
     return Length(objects, frames, length, ideal, ratio(length or 0.0, ideal or 0.0))
 
 
@@ -51,7 +52,7 @@ class TrackScore:
     discontinuities: int  # times that another track than before follows an object
     taken_over: int  # number of these by an existing track of something else
     returned: int  # number of these by a track that had followed the object before
-    mis_associations: int  # tracks that follow more than one object for MIN_FRAMES_OWNED frames or more each
+    mis_associations: int  # tracks that follow more than one object for MIN_FRAMES_FOLLOWED frames or more each
 
 
 def track_scores(objects: Rows, proposals: Rows) -> dict[str, TrackScore]:
@@ -79,7 +80,7 @@ def _score(all_rows: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
             returned += track != before and track in past
             taken += track not in past and first_seen[drive, track] < frame
     frames_of = Counter(seen[["drive", "track", "id"]].tolist())
-    owned = Counter((drive, track) for (drive, track, _), n in frames_of.items() if n >= MIN_FRAMES_OWNED)
+    objects_of = Counter((drive, track) for (drive, track, _), n in frames_of.items() if n >= MIN_FRAMES_FOLLOWED)
     return TrackScore(
         life=_length(_count(rows), len(rows), len(seen), breaks),
         life_as_seen=_length(len(histories), len(seen), len(seen), breaks),
@@ -88,7 +89,7 @@ def _score(all_rows: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
         discontinuities=breaks,
         taken_over=taken,
         returned=returned,
-        mis_associations=sum(n > 1 for n in owned.values()),
+        mis_associations=sum(n > 1 for n in objects_of.values()),
     )
 
 
@@ -131,4 +132,4 @@ def _trackeval_data(frames: Sequence[Association]) -> dict[str, Any]:
 def _renumbered(ids: Sequence[Int]) -> tuple[int, list[Int]]:
     """Number of identities, and the identities of each frame renumbered without gaps."""
     names, number = np.unique(np.concatenate([np.zeros(0, np.int64), *ids]), return_inverse=True)
-    return len(names), np.split(number, np.cumsum([len(own) for own in ids])[:-1])
+    return len(names), np.split(number, np.cumsum(list(map(len, ids)))[:-1])

@@ -17,8 +17,10 @@ from modt.types import NONE, Bool, Float32, Float64, Int
 from modt_evaluation.kitti_labels import Label
 from modt_evaluation.rules import Rules
 
-STILL_M, LEAST_FRAMES = 1.0, 3
-"""A car is parked if its centre stays within STILL_M, in x and in y, over LEAST_FRAMES or more."""
+STILL_M = 1.0
+"""Size of the square within which the centre of a parked car stays."""
+LEAST_FRAMES = 3
+"""Least number of labelled frames by which a car is known to be parked."""
 
 
 class Role(IntEnum):
@@ -70,8 +72,8 @@ class Regions:
         P = self.camera.P_image_sensor
         uvw = points[:, :3] @ P[:, :3].T + P[:, 3]
         uv = uvw[:, :2] / np.maximum(uvw[:, 2:], 1e-6)
-        low, high = self.edges[:, None, :2], self.edges[:, None, 2:]
-        return np.asarray(((uv > low) & (uv < high)).all(axis=2).any(axis=0) & (uvw[:, 2] > 1))
+        within = ((uv > self.edges[:, None, :2]) & (uv < self.edges[:, None, 2:])).all(axis=2)
+        return np.asarray(within.any(axis=0) & (uvw[:, 2] > 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,14 +140,16 @@ def by_stamp(truth: Truth, stamps_s: Mapping[int, float]) -> Truth:
     """
     if truth.scans is None or not truth.scans.scans:
         return truth
-    scans, info = truth.scans.scans, truth.scans.info
-    run_s, scans_s = np.array([*stamps_s.values()]), np.array([scan.stamp_s for scan in scans])
-    scan = _nearest(scans_s, run_s, info.period_s / 2)
-    if (scan == NONE).all():
-        scan = _nearest(scans_s - scans_s[0], run_s - run_s[0], info.period_s / 2)
-    found = {number: scans[k] for number, k in zip(stamps_s, scan.tolist(), strict=True) if k != NONE}
-    frames = {number: truth.frames[own.index] for number, own in found.items() if own.index in truth.frames}
-    numbered = [replace(own, index=number) for number, own in found.items()]
+    scans = truth.scans.scans
+    info = truth.scans.info
+    run_s = np.array([*stamps_s.values()])
+    scans_s = np.array([scan.stamp_s for scan in scans])
+    nearest = _nearest(scans_s, run_s, info.period_s / 2)
+    if (nearest == NONE).all():
+        nearest = _nearest(scans_s - scans_s[0], run_s - run_s[0], info.period_s / 2)
+    scan_of = {number: scans[k] for number, k in zip(stamps_s, nearest.tolist(), strict=True) if k != NONE}
+    frames = {number: truth.frames[scan.index] for number, scan in scan_of.items() if scan.index in truth.frames}
+    numbered = [replace(scan, index=number) for number, scan in scan_of.items()]
     return replace(truth, frames=frames, scans=ScanStream(info, numbered))
 
 

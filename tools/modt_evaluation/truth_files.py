@@ -32,7 +32,10 @@ from modt_evaluation.truth import (
     parked_outside,
 )
 
-TRACKLETS, CUBOIDS, POSES, SCANS = "tracklet_labels.xml", "truth.csv", "poses.txt", "scans"
+TRACKLETS = "tracklet_labels.xml"
+CUBOIDS = "truth.csv"
+POSES = "poses.txt"
+SCANS = "scans"
 BOX_COLUMNS = (("x",), ("y",), ("z",), ("l", "length"), ("w", "width"), ("h", "height"), ("yaw",))
 GIVE = "give a raw drive with tracklets, label_02/NNNN.txt, object/training, or a folder with truth.csv and poses.txt"
 
@@ -101,7 +104,8 @@ def _followed(labels: list[Label], types: Types, scans: ScanStream | None, camer
     """Truth of a drive's objects; every frame up to the last labelled or recorded one is labelled."""
     recorded = scans.scans if scans else []
     poses = {scan.index: scan.T_world_sensor for scan in recorded if scan.T_world_sensor is not None}
-    parked, by_frame = parked_outside(labels, types, poses), _by_frame(labels)
+    parked = parked_outside(labels, types, poses)
+    by_frame = _by_frame(labels)
     end = max([*by_frame, *(scan.index for scan in recorded)], default=NONE) + 1
     none = np.zeros((0, 7))
     frames = {f: _frame(types, by_frame[f], camera, parked=parked.get(f, none)) for f in range(end)}
@@ -121,7 +125,8 @@ def _object_frame(path: Path, types: Types) -> FrameTruth:
 
 def _cuboids(folder: Path) -> Mapping[int, FrameTruth]:
     """Cuboids in the world, and the sensor's poses in it, a line a frame."""
-    poses, by_frame = read_poses(folder / POSES), _by_frame(_rows(folder / CUBOIDS))
+    poses = read_poses(folder / POSES)
+    by_frame = _by_frame(_rows(folder / CUBOIDS))
     if max(by_frame, default=0) >= len(poses):
         raise MisuseError(folder / POSES, f"{len(poses)} poses, none for frame {max(by_frame)}", "give one a frame")
     return {f: _frame(PANDASET_TYPES, by_frame[f], T_box_sensor=T) for f, T in enumerate(poses)}
@@ -155,7 +160,8 @@ def _rows(path: Path) -> Iterator[Label]:
             for number, row in enumerate(csv.DictReader(lines), 2):
                 try:
                     box = [float(next(row[name] for name in names if name in row)) for names in BOX_COLUMNS]
-                    frame, track = int(row.get("frame", 0)), int(row.get("track", NONE))
+                    frame = int(row.get("frame", 0))
+                    track = int(row.get("track", NONE))
                     if abs(track) > MAX_ID or not np.isfinite(box).all():
                         raise ValueError(box)
                 except (StopIteration, ValueError, TypeError):

@@ -40,8 +40,12 @@ MIN_SCATTER_M = 0.05
 """Least scatter of an outline."""
 STEP_S = 0.5
 """Time step of the path whose straightness is computed."""
-CAR_LENGTH_M, CAR_WIDTH_M, RIDING_MPS = 2.6, 1.3, 2.5
-"""A longer or wider mover is taken for a car; of the others, a faster one for a cyclist."""
+CAR_LENGTH_M = 2.6
+"""A longer mover is taken for a car."""
+CAR_WIDTH_M = 1.3
+"""So is a wider one."""
+RIDING_MPS = 2.5
+"""Of the others, a faster one is taken for a cyclist."""
 
 
 Sighting = tuple[int, float, list[float], Float64, str]
@@ -93,7 +97,8 @@ def listing(movers: Sequence[Mover]) -> Iterator[str]:
     """A heading and a line for each mover."""
     yield "track   frames      gone m  straight  m/s  l x w x h m       looks like  reported"
     for m in movers:
-        span, size = f"{m.frame[0]} to {m.frame[-1]}", " x ".join(f"{side:.1f}" for side in m.box[0, 3:6].tolist())
+        span = f"{m.frame[0]} to {m.frame[-1]}"
+        size = " x ".join(f"{side:.1f}" for side in m.box[0, 3:6].tolist())
         motion = f"{m.gone_m:6.1f}  {m.straightness:8.2f}  {m.speed_mps:3.1f}"
         yield f"{m.track:5}   {span:11} {motion}  {size:16}  {m.type_:10}  {m.reported}"
 
@@ -141,7 +146,8 @@ def _sightings(run: RunRecord, truth: Truth) -> dict[int, list[Sighting]]:
         labelled = ((overlap.held > 0.5 * overlap.size) | (overlap.shared > 0.5 * overlap.size)).any(axis=0)
         free = most_in_sector(frame, overlap.size, truth.rules) & ~labelled
         try:
-            stamp_s, pose = float(record["stamp_s"]), recorded_pose(record)
+            stamp_s = float(record["stamp_s"])
+            pose = recorded_pose(record)
             for track in record["tracks"]:
                 if track["proposal"] is not None and free[track["proposal"]]:
                     box = [float(track["box"][key]) for key in BOX_KEYS]
@@ -159,7 +165,8 @@ def _mover(track: int, sightings: list[Sighting], T_sensor_level: Float64) -> Mo
     if not len(rows):
         return None
     part = slice(rows[0], rows[-1] + 1)
-    stamp_s, world = stamp_s[part], world[part]
+    stamp_s = stamp_s[part]
+    world = world[part]
     frames, _, boxes, poses, classes = zip(*sightings[part], strict=True)
     step = ((stamp_s - stamp_s[0]) // STEP_S).astype(np.int64)
     path = np.array([world[step == k, :2].mean(axis=0) for k in np.unique(step)])
