@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from modt.classes import ObjectClass
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt_evaluation.box_tracking.detections import T_LEVEL_CAMERA, Detections, boxes_to_kitti, read
-from modt_evaluation.box_tracking.sequences import follow
+from modt_evaluation.box_tracking.sequences import track_sequence
 from tests.cli.commands import here, refusal
 
 
@@ -66,9 +66,9 @@ def test_online_the_results_of_a_frame_do_not_depend_on_later_frames(scene, data
     score = np.array([s for _, _, s in rows], np.float64)
     whole = Detections("a", frame, np.full(len(rows), ObjectClass.CAR), np.zeros((len(rows), 4)), score, box)
     until = data.draw(st.integers(0, len(scene) - 1))
-    online = follow(whole, None, 0.1, online=True)[0].splitlines()
+    online = track_sequence(whole, None, 0.1, online=True)[0].splitlines()
     early = [line for line in online if int(line.split()[0]) <= until]
-    assert follow(whole.take(frame <= until), None, 0.1, online=True)[0].splitlines() == early
+    assert track_sequence(whole.take(frame <= until), None, 0.1, online=True)[0].splitlines() == early
 
 
 def test_tracks_of_low_confidence_are_written_on_request(tmp_path, caplog):

@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from modt.sinks.output import LineFile, writing
     from modt_evaluation.box_tracking.detections import files, merge, read
-    from modt_evaluation.box_tracking.sequences import camera_poses, follow
+    from modt_evaluation.box_tracking.sequences import camera_poses, track_sequence
 
     sequences = merge([read(files(path)) for path in arguments.detections])
     motions = [camera_poses(arguments.poses, arguments.oxts, sequence, len(sequences)) for sequence in sequences]
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     frames, ids, spent_s = 0, 0, 0.0
     for sequence, poses in zip(sequences, motions, strict=True):
         began = time.process_time()
-        text, n = follow(sequence, poses, arguments.period, arguments.sure, online=arguments.online)
+        text, n = track_sequence(sequence, poses, arguments.period, arguments.sure, online=arguments.online)
         spent_s += time.process_time() - began
         frames, ids = frames + sequence.n_frames, ids + n
         lines = LineFile[str](arguments.out / f"{sequence.name}.txt")

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from modt.classes import ObjectClass
@@ -39,26 +40,36 @@ def update(x: Float64, P: Float64, z: Float64, variance: Float64) -> tuple[Float
     return updated, P - np.stack([gain[:, 0] * P[:, 0], gain[:, 0] * P[:, 1], gain[:, 1] * P[:, 1]], axis=1)
 
 
-POSITION_SIGMA_M, SCORE_SCALE = 0.2, 10.0
-"""Standard deviation of a detected centre of score zero, and the increase of the score that divides it by e."""
+POSITION_SIGMA_M = 0.2
+"""Standard deviation of a detected centre of score zero."""
+SCORE_SCALE = 10.0
+"""Increase of the score that divides that deviation by e."""
 ACCELERATION_SIGMA_MPS2 = 10.0
 """Process noise, which covers the sensor's own motion where no poses are given."""
 INITIAL_SPEED_SIGMA_MPS = 10.0
 """Standard deviation of the speed of a new track along each axis."""
-SIZE_GAIN, HEIGHT_GAIN = 0.3, 0.7
-"""Least weights of a new size and of a new height of the centre; more follows a detector faster."""
+SIZE_GAIN = 0.3
+"""Least weight of a new size; more adapts to a detector faster."""
+HEIGHT_GAIN = 0.7
+"""Weight of a new height of the centre."""
 MAX_COST = 1.0
 """Cost of a pair at the edge of the gate."""
-GATE, LENGTH_SHARE = 13.8, 0.7
-"""Squared Mahalanobis distance at the edge (0.999 quantile of chi2(2)); share of the length added to its radius."""
-HEIGHT_WEIGHT_PER_M, YAW_WEIGHT = 0.2, 0.1
-"""Cost of a difference of height, and of the absolute sine of a difference of yaw."""
+GATE = 13.8
+"""Squared Mahalanobis distance at the edge: the 0.999 quantile of chi2(2)."""
+LENGTH_SHARE = 0.7
+"""Share of the length of the box that is added to the radius of the gate."""
+HEIGHT_WEIGHT_PER_M = 0.2
+"""Cost of a difference of height."""
+YAW_WEIGHT = 0.1
+"""Cost of the absolute sine of a difference of yaw."""
 MIN_BIRTH_SCORE = 0.0
 """Least score of a detection that starts a track."""
 MAX_MISSED = 30
 """Frames without a detection after which a track is deleted."""
-SCORE_GAIN, AGE_BONUS = 0.5, 0.5
-"""Least weight of a new score in the confidence, and what it gains per unit of the logarithm of the detections."""
+SCORE_GAIN = 0.5
+"""Least weight of a new score in the confidence."""
+AGE_BONUS = 0.5
+"""Increase of the confidence per unit of the logarithm of the number of detections."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,16 +108,29 @@ def assign(cost: Float64) -> tuple[Int, Int]:
     return rows[allowed], columns[allowed]
 
 
+TRACK = np.dtype(
+    [
+        ("id", int),
+        ("hits", int),  # number of its detections
+        ("missed", int),  # frames since the last one
+        ("source", int),  # index of the detection in this frame, NONE without one
+        ("x", float, 4),  # state
+        ("P", float, 3),  # covariance
+        ("box", float, 7),  # smoothed; the position is that of the state
+        ("score", float),  # smoothed score
+        ("reach", float),  # variance of the position when it was last detected, by which the gate is sized
+    ]
+)
+
+
 class BoxTracker:
     """Tracks the boxes of one class."""
 
     def __init__(self, config: BoxClass) -> None:
         self.config = config
+        self._tracks = np.zeros(0, TRACK)
         self._next_id = 0
         self._stamp_s: float | None = None
-        self._id, self._hits, self._missed, self._source = (np.zeros(0, np.int64) for _ in range(4))
-        self._x, self._P = np.zeros((0, 4)), np.zeros((0, 3))
-        self._box, self._score, self._reach = np.zeros((0, 7)), np.zeros(0), np.zeros(0)
 
     def step(self, stamp_s: float, boxes: Float64, score: Float64, range_m: Float64) -> BoxTracks:
         """Update the tracks with the detections of a frame: boxes (D, 7) in the world frame.
@@ -118,84 +142,79 @@ class BoxTracker:
         self._predict(stamp_s)
         strong = score >= MIN_BIRTH_SCORE
         rows, columns = self._match(boxes, variance, strong)
-        self._source[:] = NONE
-        self._missed += 1
-        if len(rows):
-            self._update(rows, columns, boxes, variance, ranged_score)
+        self._tracks["source"] = NONE
+        self._tracks["missed"] += 1
+        self._update(rows, columns, boxes, variance, ranged_score)
         unmatched = strong.copy()
         unmatched[columns] = False
-        keep = self._missed <= MAX_MISSED
-        if not keep.all() or unmatched.any():
-            self._delete_and_create(keep, np.flatnonzero(unmatched), boxes, variance, ranged_score)
+        kept = self._tracks[self._tracks["missed"] <= MAX_MISSED]
+        self._tracks = np.concatenate([kept, self._born(np.flatnonzero(unmatched), boxes, variance, ranged_score)])
         return self._report()
 
     def _predict(self, stamp_s: float) -> None:
+        tracks = self._tracks
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
-        self._x, self._P = predict(self._x, self._P, ACCELERATION_SIGMA_MPS2, dt_s)
+        tracks["x"], tracks["P"] = predict(tracks["x"], tracks["P"], ACCELERATION_SIGMA_MPS2, dt_s)
         # A gate that widens while a track is missed would in the end accept the detection of another object.
-        np.copyto(self._reach, self._P[:, 0], where=self._missed == 0)
+        np.copyto(tracks["reach"], tracks["P"][:, 0], where=tracks["missed"] == 0)
 
     def _match(self, boxes: Float64, variance: Float64, strong: Bool) -> tuple[Int, Int]:
         """Rows and detections of the pairs: strong detections first, the others with the remaining tracks."""
-        if not len(self._id) or not len(boxes):
-            return np.zeros(0, np.int64), np.zeros(0, np.int64)
         cost = self._cost(boxes, variance)
-        if strong.all():
-            return assign(cost)
         rows, columns = assign(np.where(strong, cost, MAX_COST))
-        cost[rows], cost[:, strong] = MAX_COST, MAX_COST
+        cost[rows] = MAX_COST
+        cost[:, strong] = MAX_COST
         more_rows, more_columns = assign(cost)
         return np.concatenate([rows, more_rows]), np.concatenate([columns, more_columns])
 
     def _cost(self, boxes: Float64, variance: Float64) -> Float64:
         """(T, D) cost of each pair."""
-        dx, dy = boxes[:, 0] - self._x[:, 0, None], boxes[:, 1] - self._x[:, 1, None]
-        gate_m2 = GATE * (self._reach[:, None] + variance) + np.square(LENGTH_SHARE * self._box[:, 3:4])
-        dz = np.abs(boxes[:, 2] - self._box[:, 2, None])
-        turn = np.abs(np.sin(boxes[:, 6] - self._box[:, 6, None]))
+        box = self._tracks["box"][:, None]
+        dx, dy = (boxes[:, :2] - self._tracks["x"][:, None, :2]).transpose(2, 0, 1)
+        gate_m2 = GATE * (self._tracks["reach"][:, None] + variance) + np.square(LENGTH_SHARE * box[..., 3])
+        dz = np.abs(boxes[:, 2] - box[..., 2])
+        turn = np.abs(np.sin(boxes[:, 6] - box[..., 6]))
         return np.asarray((dx * dx + dy * dy) / gate_m2 + HEIGHT_WEIGHT_PER_M * dz + YAW_WEIGHT * turn)
 
     def _update(self, rows: Int, columns: Int, boxes: Float64, variance: Float64, score: Float64) -> None:
-        measured = boxes.take(columns, axis=0)
-        x, P = self._x.take(rows, axis=0), self._P.take(rows, axis=0)
-        self._x[rows], self._P[rows] = update(x, P, measured[:, :2], variance[columns])
-        self._missed[rows] = 0
-        self._source[rows] = columns
-        hits = self._hits[rows] + 1
-        box = self._box.take(rows, axis=0)
-        gain = np.maximum(1.0 / hits, SIZE_GAIN)
+        """Correct the tracks of some rows by their detections."""
+        tracks = self._tracks[rows]
+        measured = boxes[columns]
+        tracks["x"], tracks["P"] = update(tracks["x"], tracks["P"], measured[:, :2], variance[columns])
+        tracks["missed"] = 0
+        tracks["source"] = columns
+        tracks["hits"] += 1
+        box = tracks["box"]
+        gain = np.maximum(1.0 / tracks["hits"], SIZE_GAIN)
         box[:, 3:6] += gain[:, None] * (measured[:, 3:6] - box[:, 3:6])
         box[:, 2] += HEIGHT_GAIN * (measured[:, 2] - box[:, 2])
         turn = wrap(measured[:, 6] - box[:, 6])
         turn = np.where(np.abs(turn) > np.pi / 2, wrap(turn + np.pi), turn)  # yaw is ambiguous by pi
         box[:, 6] = wrap(box[:, 6] + self.config.yaw_gain * turn)
-        self._hits[rows], self._box[rows] = hits, box
-        gain = np.maximum(1.0 / hits, SCORE_GAIN)
-        self._score[rows] += gain * (score[columns] - self._score[rows])
+        gain = np.maximum(1.0 / tracks["hits"], SCORE_GAIN)
+        tracks["score"] += gain * (score[columns] - tracks["score"])
+        self._tracks[rows] = tracks
 
-    def _delete_and_create(self, keep: Bool, new: Int, boxes: Float64, variance: Float64, score: Float64) -> None:
-        n = len(new)
-        x, P = np.zeros((n, 4)), np.zeros((n, 3))
-        x[:, :2] = boxes[new, :2]
-        P[:, 0], P[:, 2] = variance[new], np.square(INITIAL_SPEED_SIGMA_MPS)
-        join = np.concatenate
-        self._id = join([self._id[keep], self._next_id + np.arange(n)])
-        self._next_id += n
-        self._hits = join([self._hits[keep], np.ones(n, np.int64)])
-        self._missed = join([self._missed[keep], np.zeros(n, np.int64)])
-        self._source = join([self._source[keep], new])
-        self._x = join([self._x[keep], x])
-        self._P = join([self._P[keep], P])
-        self._box = join([self._box[keep], boxes[new]])
-        self._score = join([self._score[keep], score[new]])
-        self._reach = join([self._reach[keep], np.zeros(n)])
+    def _born(self, new: Int, boxes: Float64, variance: Float64, score: Float64) -> NDArray[np.void]:
+        """New tracks of some detections."""
+        tracks = np.zeros(len(new), TRACK)
+        tracks["id"] = self._next_id + np.arange(len(new))
+        self._next_id += len(new)
+        tracks["hits"] = 1
+        tracks["source"] = new
+        tracks["x"][:, :2] = boxes[new, :2]
+        tracks["P"][:, 0] = variance[new]
+        tracks["P"][:, 2] = INITIAL_SPEED_SIGMA_MPS**2
+        tracks["box"] = boxes[new]
+        tracks["score"] = score[new]
+        return tracks
 
     def _report(self) -> BoxTracks:
-        rows = np.flatnonzero(self._source != NONE)
-        confidence = self._score[rows] + AGE_BONUS * np.log(self._hits[rows])
+        """The tracks that are detected in this frame, if the confidence suffices."""
+        tracks = self._tracks[self._tracks["source"] != NONE]
+        confidence = tracks["score"] + AGE_BONUS * np.log(tracks["hits"])
         reported = confidence >= self.config.report_above
-        rows = rows[reported]
-        box = self._box[rows]
-        box[:, :2] = self._x[rows, :2]
-        return BoxTracks(self._id[rows], box, confidence[reported], self._source[rows])
+        tracks = tracks[reported]
+        tracks["box"][:, :2] = tracks["x"][:, :2]
+        return BoxTracks(tracks["id"], tracks["box"], confidence[reported], tracks["source"])

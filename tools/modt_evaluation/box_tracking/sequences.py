@@ -5,11 +5,11 @@ After the last frame whole tracks are judged: by their confidence, by rival clas
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from modt.classes import CLASSES
@@ -17,7 +17,7 @@ from modt.errors import MisuseError
 from modt.geometry import corners, inverse, transform_boxes, wrap
 from modt.sources import kitti_calibration
 from modt.sources.pose_source import read_poses
-from modt.types import Bool, Float64, Int
+from modt.types import Float64, Int
 from modt_evaluation.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
 from modt_evaluation.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, Detections, box_lines, boxes_to_kitti
 
@@ -58,51 +58,35 @@ MIN_IOU = 0.25
 """Overlap of boxes of two classes from which both are of one object."""
 REACH_M = 3.0
 """Distance of centres up to which the overlap is tested."""
-
-
-@dataclass(frozen=True, slots=True)
-class TrackedBoxes:
-    """The n boxes of tracks, in the world frame."""
-
-    frame: Int  # (n,) index of the frame
-    id: Int  # (n,) identity of the track
-    image_box: Float64  # (n, 4) left, top, right, bottom [pixel]
-    box: Float64  # (n, 7)
-    confidence: Float64  # (n,) confidence in the track, at that frame
-
-    def take(self, rows: Bool | Int) -> TrackedBoxes:
-        """The boxes at some rows."""
-        return TrackedBoxes(
-            self.frame[rows], self.id[rows], self.image_box[rows], self.box[rows], self.confidence[rows]
-        )
-
-    @classmethod
-    def none(cls) -> TrackedBoxes:
-        """No boxes."""
-        return cls(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 7)), np.zeros(0))
-
-    @classmethod
-    def join(cls, parts: Iterable[TrackedBoxes]) -> TrackedBoxes:
-        """The boxes of all parts."""
-        whole = list(parts)
-        return cls(*(np.concatenate([getattr(part, f.name) for part in whole]) for f in fields(cls)))
+BOX = np.dtype(
+    [
+        ("frame", int),  # index of the frame
+        ("id", int),  # identity of the track
+        ("image_box", float, 4),  # left, top, right, bottom [pixel]
+        ("box", float, 7),  # world frame
+        ("confidence", float),  # confidence in the track, at that frame
+    ]
+)
+TrackedBoxes = NDArray[np.void]
+"""(n,) boxes of tracks, rows of BOX."""
 
 
 def confident(found: TrackedBoxes, least: float) -> TrackedBoxes:
     """Keep the tracks whose mean confidence reaches `least`."""
-    return found.take(_mean(found.id, found.confidence) >= least)
+    return found[_mean(found["id"], found["confidence"]) >= least]
 
 
 def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
     """Remove tracks whose boxes mostly lie on a more confident track of another class; classes are (n,)."""
-    mean = _mean(found.id, found.confidence)
-    place = np.column_stack([found.box[:, :2], 2 * REACH_M * found.frame])
+    mean = _mean(found["id"], found["confidence"])
+    box = found["box"]
+    # Frames are set so far apart that only boxes of one frame are neighbours.
+    place = np.column_stack([box[:, :2], 2 * REACH_M * found["frame"]])
     a, b = cKDTree(place).query_pairs(REACH_M, output_type="ndarray").T
-    rivals = (object_class[a] != object_class[b]) & (iou_3d(found.box[a], found.box[b]) > MIN_IOU)
-    a, b = a[rivals], b[rivals]
+    rivals = (object_class[a] != object_class[b]) & (iou_3d(box[a], box[b]) > MIN_IOU)
     beaten = np.zeros(len(mean))
-    beaten[np.where(mean[a] < mean[b], a, b)] = 1.0
-    return found.take(_mean(found.id, beaten) <= 0.5)
+    beaten[np.where(mean[a] < mean[b], a, b)[rivals]] = 1.0
+    return found[_mean(found["id"], beaten) <= 0.5]
 
 
 def _mean(ids: Int, values: Float64) -> Float64:
@@ -113,27 +97,26 @@ def _mean(ids: Int, values: Float64) -> Float64:
 
 def bridged(found: TrackedBoxes, max_gap: int) -> TrackedBoxes:
     """The boxes, ordered by frame, with those interpolated where a track is missing for max_gap frames at most."""
-    found = found.take(np.lexsort((found.frame, found.id)))
-    gap = np.diff(found.frame) - 1
-    before = np.flatnonzero((np.diff(found.id) == 0) & (gap > 0) & (gap <= max_gap))
+    found = np.sort(found, order=["id", "frame"])
+    gap = np.diff(found["frame"]) - 1
+    before = np.flatnonzero((np.diff(found["id"]) == 0) & (gap > 0) & (gap <= max_gap))
     missing = gap[before]
+    # Each missing frame is one row: its place in the gap, and the row before the gap.
     step = 1 + np.arange(missing.sum()) - np.repeat(np.cumsum(missing) - missing, missing)
     row = np.repeat(before, missing)
     share = (step / (1 + gap[row]))[:, None]
-    change = found.box[row + 1] - found.box[row]
+    filled = found[row]
+    after = found[row + 1]
+    filled["frame"] += step
+    change = after["box"] - filled["box"]
     change[:, 6] = wrap(change[:, 6])
-    filled = TrackedBoxes(
-        frame=found.frame[row] + step,
-        id=found.id[row],
-        image_box=found.image_box[row] + share * (found.image_box[row + 1] - found.image_box[row]),
-        box=found.box[row] + share * change,
-        confidence=found.confidence[row] + share[:, 0] * (found.confidence[row + 1] - found.confidence[row]),
-    )
-    both = TrackedBoxes.join([found, filled])
-    return both.take(np.lexsort((both.id, both.frame)))
+    filled["box"] += share * change
+    filled["image_box"] += share * (after["image_box"] - filled["image_box"])
+    filled["confidence"] += share[:, 0] * (after["confidence"] - filled["confidence"])
+    return np.sort(np.concatenate([found, filled]), order=["frame", "id"])
 
 
-def follow(
+def track_sequence(
     detections: Detections,
     poses: Float64 | None,
     period_s: float,
@@ -155,35 +138,39 @@ def follow(
         least = config.keep_above if least_confidence is None else least_confidence
         tracker = BoxTracker(replace(config, report_above=least if online else min(least, config.report_above)))
         found = _reports(tracker, detections.take(detections.object_class == object_class), T, period_s)
-        found = replace(found, id=found.id * len(DETECTED) + number)
+        found["id"] = found["id"] * len(DETECTED) + number
         classes.append(found if online else bridged(confident(found, least), config.max_gap))
-    found = TrackedBoxes.join(classes)
+    found = np.concatenate(classes)
     if not online:
-        found = of_one_class(found, found.id % len(DETECTED))
-    found = found.take(np.argsort(found.frame, kind="stable"))
-    box = found.box
+        found = of_one_class(found, found["id"] % len(DETECTED))
+    found = found[np.argsort(found["frame"], kind="stable")]
+    box = found["box"]
     if T is not None:
-        ends = np.searchsorted(found.frame, np.arange(len(T) + 1))
+        ends = np.searchsorted(found["frame"], np.arange(len(T) + 1))
         box = np.concatenate([transform_boxes(inverse(T[i]), box[ends[i] : ends[i + 1]]) for i in range(len(T))])
-    names = [CLASSES[DETECTED[k]].kitti[0] for k in found.id % len(DETECTED)]
-    lines = box_lines(found.frame, names, found.id, found.image_box, boxes_to_kitti(box), found.confidence)
-    return "".join(lines), len(np.unique(found.id))
+    names = [CLASSES[DETECTED[k]].kitti[0] for k in found["id"] % len(DETECTED)]
+    boxes = boxes_to_kitti(box)
+    lines = box_lines(found["frame"], names, found["id"], found["image_box"], boxes, found["confidence"])
+    return "".join(lines), len(np.unique(found["id"]))
 
 
 def _reports(
     tracker: BoxTracker, detections: Detections, T_world_level: Float64 | None, period_s: float
 ) -> TrackedBoxes:
     """Reports of all frames, in the world frame."""
-    reports = [TrackedBoxes.none()]
+    reports = [np.zeros(0, BOX)]
     for frame, rows in detections.frames():
         seen = detections.box[rows]
         boxes = seen if T_world_level is None else transform_boxes(T_world_level[frame], seen)
-        found = tracker.step(frame * period_s, boxes, detections.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
-        if len(found.id):
-            image_box = detections.image_box[rows][found.source]
-            frames = np.full(len(found.id), frame)
-            reports.append(TrackedBoxes(frames, found.id, image_box, found.box, found.confidence))
-    return TrackedBoxes.join(reports)
+        tracks = tracker.step(frame * period_s, boxes, detections.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
+        found = np.zeros(len(tracks.id), BOX)
+        found["frame"] = frame
+        found["id"] = tracks.id
+        found["image_box"] = detections.image_box[rows][tracks.source]
+        found["box"] = tracks.box
+        found["confidence"] = tracks.confidence
+        reports.append(found)
+    return np.concatenate(reports)
 
 
 def camera_poses(
