@@ -41,7 +41,7 @@ def judged(n_objects: int, n_frames: int, seed: int = 0) -> Judged:
 
 def estimate(made):
     """Average precision of cars."""
-    return next(f for f in precisions(made, "x") if f.quantity == "AP car").estimate
+    return next(f for f in precisions(made) if f.quantity == "AP car").estimate
 
 
 def test_average_precision_is_that_of_the_judgement():
@@ -87,7 +87,7 @@ def test_further_objects_count_for_precision_alone():
 
 
 def test_a_curve_falls_from_the_most_probable_to_the_last_detected():
-    found = [(f.at, f.estimate.value) for f in curves(judged(5, 30), "x") if f.quantity == "precision car"]
+    found = [(f.at, f.estimate.value) for f in curves(judged(5, 30)) if f.quantity == "precision car"]
     recalls, values = zip(*found, strict=True)
     assert list(recalls) == sorted(recalls)
     assert list(values) == sorted(values, reverse=True)

@@ -25,8 +25,10 @@ from modt_evaluation.experiments.judged import Judged, LabelReplay, NetworkRepla
 
 Label = tuple[str, float | None]
 """Variant, and the swept value."""
-DETECTION, TRACKING = "det_only", "with_trk"
-"""Each view by itself, and views fused along a track, by the paper's names."""
+DETECTION = "det_only"
+"""Each view by itself, by the paper's name."""
+TRACKING = "with_trk"
+"""Views fused along a track, by the paper's name."""
 IDEAL = "ideal detector, ideal tracker"
 ALPHAS = tuple(k / 50 for k in range(26))
 START_FRAMES = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60)
@@ -42,7 +44,7 @@ class Experiment:
         name: name on the command line.
         title: the table or figure of the paper, and what it shows.
         replays: function of the profile of a drive that returns replays by label.
-        figures: function of the outcome of a replay (of one drive or several pooled) and its label.
+        figures: function of the outcome of a replay (of one drive or several pooled) and the swept value.
         swept: name and unit of the value that is swept.
         scans: whether sweeps are needed, not labels alone.
         note: facts that a reader needs.
@@ -51,7 +53,7 @@ class Experiment:
     name: str
     title: str
     replays: Callable[[ProfileConfig], Mapping[Label, Replay]]
-    figures: Callable[[Judged, str, float | None], Iterator[Figure]]
+    figures: Callable[[Judged, float | None], Iterator[Figure]]
     swept: str = ""
     scans: bool = True
     note: str = ""
@@ -91,27 +93,27 @@ def _tracked(config: ProfileConfig) -> dict[Label, Replay]:
     return {(mode, None): NetworkReplay(config, mode) for mode in ("accurate", "efficient")}
 
 
-def _ideal_lengths(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
+def _ideal_lengths(judged: Judged, at: float | None) -> Iterator[Figure]:
     wanted = ObjectLengths.of(judged).wanted
-    yield Figure(variant, at, "objects", Estimate(len(wanted)))
-    yield Figure(variant, at, "N_go", ratio(wanted, np.ones(len(wanted))))
+    yield Figure(at, "objects", Estimate(len(wanted)))
+    yield Figure(at, "N_go", ratio(wanted, np.ones(len(wanted))))
 
 
-def _betas_of_labels(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
+def _betas_of_labels(judged: Judged, at: float | None) -> Iterator[Figure]:
     for range_m in RANGES_M:
         wanted = ObjectLengths.of(judged.within(range_m)).wanted
-        yield Figure(variant, range_m, "beta", ratio(np.ones(len(wanted)), wanted))
+        yield Figure(range_m, "beta", ratio(np.ones(len(wanted)), wanted))
 
 
-def _swept(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
-    yield from precisions(judged, variant, at)
+def _swept(judged: Judged, at: float | None) -> Iterator[Figure]:
+    yield from precisions(judged, at)
     if at is not None:
-        yield from efficiencies(judged, variant, at)
+        yield from efficiencies(judged, at)
 
 
-def _followed(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
-    yield from track_lengths(judged, variant, at)
-    yield from efficiencies(judged, variant, at)
+def _followed(judged: Judged, at: float | None) -> Iterator[Figure]:
+    yield from track_lengths(judged, at)
+    yield from efficiencies(judged, at)
 
 
 _ALL = (

@@ -23,8 +23,10 @@ from modt_evaluation.truth_files import TRACKLETS, open_truth
 from modt_simulation.kinds import TRUCK
 from modt_simulation.synthetic_stream import SyntheticStream
 
-KITTI, SIMULATED = "KITTI", "simulated"
-"""Kinds of drives."""
+KITTI = "KITTI"
+"""Kind of a recorded drive."""
+SIMULATED = "simulated"
+"""Kind of a simulated drive."""
 DRIVE_OF_SEQUENCE = dict(
     enumerate(("0005", "0009", "0011", "0013", "0014", "0015", "0018", "0022", "0032", "0036", "0056", "0059"))
 )
@@ -150,13 +152,14 @@ def completed(drives: Sequence[KittiDrive], further: Path) -> KittiDrive:
     Raises:
         MisuseError: there is not one such drive, or the table is broken or of another drive.
     """
-    own = [drive for drive in drives if drive.scans]
-    if len(own) != 1:
-        cause = f"is the table of one drive, and {len(own)} have their sweeps"
+    swept = [drive for drive in drives if drive.scans]
+    if len(swept) != 1:
+        cause = f"is the table of one drive, and {len(swept)} have their sweeps"
         raise MisuseError("--further", cause, "give a folder with the sweeps of that drive alone")
-    found = replace(own[0], name=f"{own[0].name}, complete", further=further)
-    found.labels()
-    return found
+    (drive,) = swept
+    complete = replace(drive, name=f"{drive.name}, complete", further=further)
+    complete.labels()  # refuses a table that is broken or of another drive
+    return complete
 
 
 def simulated_drives(n: int, seconds: float) -> list[SimulatedDrive]:

@@ -5,6 +5,7 @@ The frames of one object are not independent: whole objects and tracks are resam
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,10 +19,15 @@ from modt_evaluation.rows import Rows
 from modt_evaluation.track_score import track_scores
 from modt_evaluation.truth import CLASSIFIED, Role
 
-RESAMPLES, SEED, LEVEL = 200, 0, (2.5, 97.5)
+RESAMPLES = 200
+"""Number of resamples of an interval."""
+SEED = 0
+LEVEL = (2.5, 97.5)
+"""Percentiles of the resamples that bound an interval."""
 _TOGETHER = 8
 """Number of resamples ranked at a time, so that they stay in the cache."""
 RECALLS = np.arange(1, 20) / 20
+"""Recalls at which a curve is given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +42,18 @@ class Estimate:
 
 def ratio(part: ArrayLike, whole: ArrayLike) -> Estimate:
     """Sum of the parts (n,) of each object over that of their wholes (n,)."""
-    a, b = np.asarray(part, np.float64), np.asarray(whole, np.float64)
+    a = np.asarray(part, np.float64)
+    b = np.asarray(whole, np.float64)
     n = len(b)
     if not b.sum():
         return Estimate(None, n=n)
+    value = float(a.sum() / b.sum())
     if n < 2:
-        return Estimate(float(a.sum() / b.sum()), n=n)
+        return Estimate(value, n=n)
     weight = _weights(n)
     below = weight @ b
     resampled = (weight @ a)[below > 0] / below[below > 0]
-    low, high = np.percentile(resampled, LEVEL).tolist()
-    return Estimate(float(a.sum() / b.sum()), low, high, n)
+    return Estimate(value, *np.percentile(resampled, LEVEL).tolist(), n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +76,22 @@ class Ranking:
     def of(cls, objects: Rows, proposals: Rows, object_class: int, counted: Bool) -> Ranking:
         """The ranking for one class; `counted` are the rows of its objects."""
         seen = objects[counted]
-        names, of_row = np.unique(seen[["drive", "id"]], return_inverse=True)
+        names, object_of_row = np.unique(seen[["drive", "id"]], return_inverse=True)
         proposals = proposals[proposals["to_classify"]]
-        score, hit = proposals["posterior"][:, object_class], proposals["label"] == object_class
-        order = np.argsort(-score, kind="stable")
-        order = order[: np.flatnonzero(hit[order]).max(initial=-1) + 1]
-        proposals, hit = proposals[order], hit[order]
-        tracks, of_track = np.unique(proposals[["drive", "track"]], return_inverse=True)
-        unit = len(names) + of_track
-        object_at = dict(zip(seen[["drive", "frame", "track"]].tolist(), of_row.tolist(), strict=True))
-        places = proposals[hit][["drive", "frame", "track"]].tolist()
-        unit[hit] = [object_at.get(place, u) for place, u in zip(places, unit[hit].tolist(), strict=True)]
-        return cls(hit, unit, np.bincount(of_row, minlength=len(names)).astype(np.float64), len(tracks))
+        proposals = proposals[np.argsort(-proposals["posterior"][:, object_class], kind="stable")]
+        hit = proposals["label"] == object_class
+        end = np.flatnonzero(hit).max(initial=-1) + 1
+        proposals = proposals[:end]
+        hit = hit[:end]
+        tracks, track_of_proposal = np.unique(proposals[["drive", "track"]], return_inverse=True)
+        unit = len(names) + track_of_proposal
+        # A correct proposal stands for the object that its track follows in that frame.
+        place = ["drive", "frame", "track"]
+        object_at = dict(zip(seen[place].tolist(), object_of_row.tolist(), strict=True))
+        unit[hit] = [
+            object_at.get(at, u) for at, u in zip(proposals[hit][place].tolist(), unit[hit].tolist(), strict=True)
+        ]
+        return cls(hit, unit, np.bincount(object_of_row, minlength=len(names)).astype(np.float64), len(tracks))
 
     def average_precision(self) -> Estimate:
         """Area under the envelope of precision over recall."""
@@ -93,8 +104,7 @@ class Ranking:
             return Estimate(value, n=n)
         weights = self._weights()
         parts = [_areas(*self._curves(weights[k : k + _TOGETHER])) for k in range(0, RESAMPLES, _TOGETHER)]
-        low, high = np.percentile(np.concatenate(parts), LEVEL).tolist()
-        return Estimate(value, low, high, n)
+        return Estimate(value, *np.percentile(np.concatenate(parts), LEVEL).tolist(), n)
 
     def precision_at_recalls(self) -> list[tuple[float, float]]:
         """Each of RECALLS that is reached, with the precision there."""
@@ -125,14 +135,12 @@ def _areas(precision: Float64, recall: Float64) -> Float64:
 
 def _weights(n: int) -> Float64:
     """(RESAMPLES, n) times that each of n is drawn; the same for the same n."""
-    random, weight = np.random.default_rng([SEED, n]), np.empty((RESAMPLES, n))
-    for times in weight:
-        times[:] = np.bincount(random.integers(n, size=n), minlength=n)
-    return weight
+    random = np.random.default_rng([SEED, n])
+    drawn = [np.bincount(random.integers(n, size=n), minlength=n) for _ in range(RESAMPLES)]
+    return np.array(drawn, np.float64)
 
 
 OBJECTS = CLASS_NAMES[1:]
-NOTHING = Estimate(None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,13 +148,11 @@ class Figure:
     """A figure of an experiment.
 
     Attributes:
-        variant: variant that is compared.
         at: value that is swept, None of a single one.
         quantity: its name, with its unit.
         estimate: the figure.
     """
 
-    variant: str
     at: float | None
     quantity: str
     estimate: Estimate
@@ -160,20 +166,20 @@ def rankings(judged: Judged) -> Iterator[tuple[str, Ranking]]:
         yield name, Ranking.of(objects, judged.proposals, c, counted)
 
 
-def precisions(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
+def precisions(judged: Judged, at: float | None = None) -> Iterator[Figure]:
     """Average precision by class, and their mean."""
     found = [(name, ranking.average_precision()) for name, ranking in rankings(judged)]
     for name, estimate in found:
-        yield Figure(variant, at, f"AP {name}", estimate)
+        yield Figure(at, f"AP {name}", estimate)
     values = [estimate.value for _, estimate in found if estimate.value is not None]
-    yield Figure(variant, at, "AP mean", Estimate(float(np.mean(values))) if values else NOTHING)
+    yield Figure(at, "AP mean", Estimate(float(np.mean(values)) if values else None))
 
 
-def curves(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
+def curves(judged: Judged, at: float | None = None) -> Iterator[Figure]:
     """Precision over recall by class."""
     for name, ranking in rankings(judged):
         for recall, precision in ranking.precision_at_recalls():
-            yield Figure(variant, recall, f"precision {name}", Estimate(precision))
+            yield Figure(recall, f"precision {name}", Estimate(precision))
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,24 +198,25 @@ class ObjectLengths:
         rows = np.sort(rows, order=["drive", "id", "frame"])
         names, unit = np.unique(rows[["drive", "id"]], return_inverse=True)
         seen = rows["track"] != NONE
-        own, track = unit[seen], rows["track"][seen]
-        broken = own[1:][(own[1:] == own[:-1]) & (track[1:] != track[:-1])]
-        return cls(*(np.bincount(which, minlength=len(names)) for which in (unit, own, broken)))
+        followed = unit[seen]
+        changed = np.diff(rows["track"][seen]) != 0
+        broken = followed[1:][(np.diff(followed) == 0) & changed]
+        return cls(*(np.bincount(which, minlength=len(names)) for which in (unit, followed, broken)))
 
 
-def track_lengths(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
+def track_lengths(judged: Judged, at: float | None = None) -> Iterator[Figure]:
     """Lengths of the tracks of objects, and the events that end them early."""
     found = ObjectLengths.of(judged)
     if not len(found.wanted):
         return
     scores = track_scores(judged.objects, judged.proposals)["all"]
     once = np.ones(len(found.wanted))
-    yield Figure(variant, at, "objects", Estimate(len(found.wanted)))
-    yield Figure(variant, at, "frames", Estimate(len(judged.frames)))
-    yield Figure(variant, at, "mis-associations", Estimate(scores.mis_associations))
-    yield Figure(variant, at, "discontinuities", Estimate(int(found.breaks.sum())))
-    yield Figure(variant, at, "N_go of objects", ratio(found.followed, once + found.breaks))
-    yield Figure(variant, at, "ideal N_go", ratio(found.wanted, once))
+    yield Figure(at, "objects", Estimate(len(found.wanted)))
+    yield Figure(at, "frames", Estimate(len(judged.frames)))
+    yield Figure(at, "mis-associations", Estimate(scores.mis_associations))
+    yield Figure(at, "discontinuities", Estimate(int(found.breaks.sum())))
+    yield Figure(at, "N_go of objects", ratio(found.followed, once + found.breaks))
+    yield Figure(at, "ideal N_go", ratio(found.wanted, once))
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,14 +234,13 @@ class TrackWork:
         names, unit = np.unique(rows[["drive", "track"]], return_inverse=True)
         frames = np.bincount(unit, minlength=len(names))
         on_object = 2 * np.bincount(unit[rows["box_class"] > 0], minlength=len(names)) > frames
-        number = {name: k for k, name in enumerate(names.tolist())}
-        own = np.array([number[name] for name in judged.calls[["drive", "track"]].tolist()], np.int64)
-        return cls(frames, on_object, np.bincount(own, minlength=len(names)))
+        calls = Counter(judged.calls[["drive", "track"]].tolist())
+        return cls(frames, on_object, np.array([calls[name] for name in names.tolist()], np.int64))
 
 
-def efficiencies(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
+def efficiencies(judged: Judged, at: float | None = None) -> Iterator[Figure]:
     """Beta of all proposals, and of those on objects."""
     tracks = TrackWork.of(judged)
-    of = tracks.on_object
-    yield Figure(variant, at, "beta", ratio(tracks.calls, tracks.frames))
-    yield Figure(variant, at, "beta of objects", ratio(tracks.calls[of], tracks.frames[of]))
+    on_object = tracks.on_object
+    yield Figure(at, "beta", ratio(tracks.calls, tracks.frames))
+    yield Figure(at, "beta of objects", ratio(tracks.calls[on_object], tracks.frames[on_object]))

@@ -35,12 +35,17 @@ class Judged:
     calls: Rows
 
     @classmethod
+    def joined(cls, parts: Sequence[Judged]) -> Self:
+        """The tables of several parts in one."""
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
+    @classmethod
     def pooled(cls, drives: Sequence[Judged]) -> Self:
         """Several drives, numbered in their tables."""
-        tables = {f.name: [getattr(drive, f.name) for drive in drives] for f in fields(cls)}
-        pooled = cls(**{name: np.concatenate(parts) for name, parts in tables.items()})
-        for name, parts in tables.items():
-            getattr(pooled, name)["drive"] = np.repeat(np.arange(len(parts)), [len(rows) for rows in parts])
+        pooled = cls.joined(drives)
+        for f in fields(cls):
+            lengths = [len(getattr(drive, f.name)) for drive in drives]
+            getattr(pooled, f.name)["drive"] = np.repeat(np.arange(len(drives)), lengths)
         return pooled
 
     def within(self, range_m: float) -> Judged:
@@ -83,20 +88,21 @@ class NetworkReplay:
     def judged(self, drive: Drive) -> Judged:
         """Tables of the drive, replayed frame by frame and judged by its labels."""
         known = segmented(drive, self.config)
-        pipeline, budget = self._pipeline(known), assembly.MODES[self.mode].budget(self.config)
-        frames, objects, proposals, calls = [], [np.zeros(0, OBJECT)], [np.zeros(0, PROPOSAL)], [np.zeros(0, CALL)]
+        pipeline = self._pipeline(known)
+        budget = replace(assembly.MODES[self.mode].budget(self.config), mean_ms=None)
+        frames = [Judged(*(np.zeros(0, rows) for rows in (FRAME, OBJECT, PROPOSAL, CALL)))]
         for made in known.frames:
-            result = pipeline.step(made.frame, replace(budget, mean_ms=None))
+            result = pipeline.step(made.frame, budget)
             frame = JudgedFrame.of_result(result, made.truth, known.fov)
-            seen, tracked, _ = judge(frame, known.rules, points=made.objects)
-            frames.append((0, len(result.proposals)))
-            objects.append(seen)
-            proposals.append(tracked)
-            calls.append(table(CALL, len(result.classified), track=result.classified))
-        return Judged(np.array(frames, FRAME), *map(np.concatenate, (objects, proposals, calls)))
+            objects, proposals, _ = judge(frame, known.rules, points=made.objects)
+            calls = table(CALL, len(result.classified), track=result.classified)
+            frames.append(Judged(table(FRAME, 1, proposals=len(result.proposals)), objects, proposals, calls))
+        return Judged.joined(frames)
 
     def _pipeline(self, known: SegmentedDrive) -> Pipeline:
-        config, limits, mode = self.config, self.config.classification, assembly.MODES[self.mode]
+        config = self.config
+        limits = config.classification
+        mode = assembly.MODES[self.mode]
         cost = LinearCost(limits.max_points, padded_size(limits))
         kernels = assembly.chosen_kernels(config.segmentation.kernels)
         ideal = IdealTracking(known, config, self.range_m) if self.ideal else None

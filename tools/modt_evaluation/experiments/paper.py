@@ -34,8 +34,8 @@ _OF_RANGE = {("fig8", 10.0, "beta"): 0.1, ("fig8", 70.0, "beta"): 0.02}
 
 def figure(experiment: str, streams: str, variant: str, at: float | None, quantity: str) -> tuple[float, str] | None:
     """The paper's value of a figure, and the drives that it is taken over. None where the paper does not state it."""
-    drive, pooled = streams[:4], streams.endswith("drives")
-    if at is not None and pooled:
+    drive = streams[:4]
+    if at is not None and streams.endswith("drives"):
         found = _OF_RANGE.get((experiment, at, quantity))
     elif (experiment, drive, quantity) in _OF_DRIVE:
         return _OF_DRIVE[experiment, drive, quantity], drive

@@ -33,7 +33,8 @@ class Row:
         kind: KITTI or simulated.
         profile: names of the profiles on top of that of the sensor, DEFAULT for none.
         development: whether a choice of this project was confirmed on sweeps of one of them.
-        variant, at, quantity: as in Figure.
+        variant: variant that is compared.
+        at, quantity: as in Figure.
         value, low, high: the figure and its 95 % interval, None where there is none.
         n: objects or tracks that were resampled.
         paper, paper_over: figures of the paper, and the drives they are taken over.
@@ -88,11 +89,11 @@ class Study:
             outcomes[task] = judged
             tick(task[0].name)
         return [
-            _row(e, streams, drives, names, figure)
+            _row(e, streams, drives, names, variant, figure)
             for e in self.experiments
             for streams, drives in self._streams(e)
             for names in self._compared(e)
-            for figure in _figures(e, drives, names, outcomes)
+            for variant, figure in _figures(e, drives, names, outcomes)
         ]
 
     def _compared(self, experiment: Experiment) -> Sequence[Profiles]:
@@ -120,13 +121,15 @@ class Study:
 
 def _figures(
     experiment: Experiment, drives: Sequence[Drive], names: Profiles, outcomes: Mapping[Task, Judged]
-) -> Iterator[Figure]:
+) -> Iterator[tuple[str, Figure]]:
+    """Variant and figure of an experiment on pooled drives."""
     found: dict[Label, list[Judged]] = {}
     for drive in drives:
         for label, replay in _replays(experiment, drive, names).items():
             found.setdefault(label, []).append(outcomes[drive, replay])
-    for label, judged in found.items():
-        yield from experiment.figures(Judged.pooled(judged), *label)
+    for (variant, at), judged in found.items():
+        for figure in experiment.figures(Judged.pooled(judged), at):
+            yield variant, figure
 
 
 def _replays(experiment: Experiment, drive: Drive, names: Profiles) -> Mapping[Label, Replay]:
@@ -147,18 +150,20 @@ def _replay(task: Task) -> Judged:
     return replay.judged(drive)
 
 
-def _row(experiment: Experiment, streams: str, drives: Sequence[Drive], names: Profiles, figure: Figure) -> Row:
-    estimate, kind = figure.estimate, drives[0].kind
-    stated = paper.figure(experiment.name, streams, figure.variant, figure.at, figure.quantity)
+def _row(
+    experiment: Experiment, streams: str, drives: Sequence[Drive], names: Profiles, variant: str, figure: Figure
+) -> Row:
+    estimate = figure.estimate
+    stated = paper.figure(experiment.name, streams, variant, figure.at, figure.quantity)
     as_labelled = isinstance(drives[0], KittiDrive) and drives[0].further is None
     paper_value, paper_over = stated if stated and as_labelled else (None, None)
     return Row(
         experiment=experiment.name,
         streams=streams,
-        kind=kind,
+        kind=drives[0].kind,
         profile=" + ".join(names) or DEFAULT,
         development=experiment.scans and any(drive.development for drive in drives),
-        variant=figure.variant,
+        variant=variant,
         at=figure.at,
         quantity=figure.quantity,
         value=_rounded(estimate.value),
