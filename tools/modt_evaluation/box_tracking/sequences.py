@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from modt.classes import CLASSES
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 from modt.geometry import corners, inverse, transform_boxes, wrap
 from modt.sources import kitti_calibration
 from modt.sources.pose_source import read_poses
@@ -24,32 +24,20 @@ from modt_evaluation.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, De
 TINY = 1e-9
 
 
-def birds_eye_intersection(a: Float64, b: Float64) -> Float64:
-    """(n,) bird's-eye area that boxes a (n, 7) share with boxes b (n, 7), row by row [m2]."""
-    origin = a[:, None, :2]  # near the boxes: far from it, cross products cancel
-    return np.array([_shared_m2(p, q) for p, q in zip(corners(a) - origin, corners(b) - origin, strict=True)])
-
-
-def _shared_m2(polygon: Float64, other: Float64) -> float:
-    """Area that two convex, counter-clockwise polygons share: each edge of the other one clips the first."""
-    for begin, end in zip(other, np.roll(other, -1, axis=0), strict=True):
-        (dx, dy), (x, y) = end - begin, (polygon - begin).T
-        side = dx * y - dy * x
-        change = side - np.roll(side, -1)
-        inside = side >= 0
-        leaves = inside != np.roll(inside, -1)
-        share = np.divide(side, change, out=np.zeros(len(side)), where=leaves)[:, None]
-        crossing = polygon + share * (np.roll(polygon, -1, axis=0) - polygon)
-        polygon = np.stack([polygon, crossing], axis=1)[np.stack([inside, leaves], axis=1)]
-    (x, y), (after_x, after_y) = polygon.T, np.roll(polygon, -1, axis=0).T
-    return float(x @ after_y - after_x @ y) / 2
-
-
 def iou_3d(a: Float64, b: Float64) -> Float64:
-    """(n,) intersection over union of the boxes' volumes, row by row."""
+    """(n,) intersection over union of the volumes of boxes a (n, 7) and b (n, 7), row by row.
+
+    Raises:
+        MisuseError: shapely is not installed.
+    """
+    try:
+        import shapely
+    except ModuleNotFoundError:
+        raise MisuseError("modt track", "needs shapely", f"{install('track')}; or give --online") from None
+    ground = shapely.intersection(shapely.polygons(corners(a)), shapely.polygons(corners(b)))
     top = np.minimum(a[:, 2] + a[:, 5] / 2, b[:, 2] + b[:, 5] / 2)
     foot = np.maximum(a[:, 2] - a[:, 5] / 2, b[:, 2] - b[:, 5] / 2)
-    shared = birds_eye_intersection(a, b) * np.maximum(top - foot, 0.0)
+    shared = shapely.area(ground) * np.maximum(top - foot, 0.0)
     union = np.prod(a[:, 3:6], axis=1) + np.prod(b[:, 3:6], axis=1) - shared
     return np.asarray(shared / np.maximum(union, TINY))
 
