@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
 
 from modt import profile
@@ -70,18 +69,3 @@ def test_a_part_of_drive_0005(drive_0005, camera):
     frames = list(judged(stream, lambda index: truth.frames[index], fov))
     assert len(frames) == 30
     agree(frames)
-
-
-@pytest.mark.kitti
-def test_the_objects_of_drive_0005_as_the_paper_counts_them(kitti_root):
-    truth = open_truth(kitti_root / "tracking" / "label_02" / "0000.txt", paper=True)
-    assert len(truth.frames) == 154
-    nothing = np.zeros((0, 4), np.float32)
-    none = np.zeros(0, np.int64)
-    frames = (
-        JudgedFrame(index, nothing, none, 0, 0, none, none, none, np.zeros((0, 4)), labels)
-        for index, labels in truth.frames.items()
-    )
-    found = score(frames).tracks
-    assert sum(found[name].labelled.objects for name in ("Car", "Pedestrian", "Cyclist")) == 12
-    assert (found["all"].labelled.objects, round(found["all"].labelled.ideal, 1)) == (12, 34.9)  # Table III

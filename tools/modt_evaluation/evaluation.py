@@ -37,10 +37,11 @@ def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
     scores = {}
     for name, which in kinds(objects).items():
         judged = objects["outcome"][which & objects["to_segment"]]
-        detected, *failed = np.bincount(judged, minlength=len(Outcome)).tolist()
+        detected, merged, split, partial, missed = np.bincount(judged, minlength=len(Outcome)).tolist()
         cut = int((which & ~objects["in_view"] & np.isin(objects["role"], LABELLED)).sum())
         if len(judged) or cut:
-            scores[name] = SegmentationScore(len(judged), ratio(detected, len(judged)), *failed, cut)
+            recall = ratio(detected, len(judged))
+            scores[name] = SegmentationScore(len(judged), recall, merged, split, partial, missed, cut)
     return scores
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from modt.classes import N_CLASSES
 from modt.geometry import FieldOfView
 from modt.types import NONE, Float32, Float64, FrameResult, Int, Self
 from modt_evaluation.truth import FrameTruth
@@ -30,13 +31,13 @@ class JudgedFrame:
     @classmethod
     def of_result(cls, result: FrameResult, truth: FrameTruth, fov: FieldOfView | None = None) -> Self:
         """From a result of the pipeline in memory."""
-        tracks, proposals = result.tracks, result.proposals
+        tracks = result.tracks
         seen = np.flatnonzero(tracks.proposal != NONE)
         return cls(
             index=result.frame.index,
             points=result.frame.points,
-            proposal=proposals.label(len(result.frame.points)),
-            n_proposals=len(proposals),
+            proposal=result.proposals.label(len(result.frame.points)),
+            n_proposals=len(result.proposals),
             classified=len(result.classified),
             track=tracks.id[seen],
             of_track=tracks.proposal[seen],
@@ -45,3 +46,9 @@ class JudgedFrame:
             truth=truth,
             fov=FieldOfView() if fov is None else fov,
         )
+
+    @classmethod
+    def without_tracks(cls, index: int, points: Float32, proposal: Int, n_proposals: int, truth: FrameTruth) -> Self:
+        """A frame in which nothing is tracked."""
+        none = np.zeros(0, np.int64)
+        return cls(index, points, proposal, n_proposals, 0, none, none, none, np.zeros((0, N_CLASSES)), truth)

@@ -51,10 +51,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     seen = np.flatnonzero(tracks.proposal != NONE)
     boxes = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
     tracks.box[seen] = transform_boxes(T_world_sensor, boxes)
-    n_proposals = int(record["proposals"])
-    if n_proposals > MOST_PROPOSALS:
-        raise ValueError(f"{n_proposals} proposals")
-    proposals = _proposals(n_proposals)
+    proposals = _proposals(int(record["proposals"]))
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
     classified = np.array(record.get("classified", []), np.int64)
@@ -66,7 +63,13 @@ def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:
 
 
 def _proposals(n: int) -> Proposals:
-    """N proposals without points."""
+    """N proposals without points.
+
+    Raises:
+        ValueError: these are too many.
+    """
+    if n > MOST_PROPOSALS:
+        raise ValueError(f"{n} proposals")
     none = np.zeros(0, np.int64)
     offsets = np.zeros(n + 1, np.int64)
     coordinates = np.zeros((3, 0), np.float32)

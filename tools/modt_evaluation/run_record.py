@@ -65,6 +65,8 @@ class FramesByNumber:
 
 
 LABELS = "labels"
+"""Folder of the labels that replay --labels writes."""
+WRONG_TRUTH = "give the truth of the run's own recording"
 Record = tuple[str, dict[str, Any]]
 """File and line of a record, and the record of a frame."""
 Proposed = Callable[[dict[str, Any], Float32], Int]
@@ -174,18 +176,17 @@ class RunRecord:
             labels = truth.frames.get(index)
             if labels is None:
                 cause = f"frame {index} is not in the truth, which has {len(truth.frames)} frames"
-                raise MisuseError(place, cause, "give the truth of the run's own recording")
+                raise MisuseError(place, cause, WRONG_TRUTH)
             sweep = sweeps.get(index)
             if sweep is None:
                 cause = f"{stream.info.name} has no sweep {index} that can be read"
-                raise MisuseError(place, cause, "restore it, or give the truth of the run's own recording")
-            points = sweep.points
-            proposals = self.proposals(index) if proposed is None else proposed(record, points)
-            if len(proposals) != len(points):
-                cause = f"{len(proposals)} labels for a scan of {len(points)} points"
-                raise MisuseError(self._labels(index), cause, "give the truth of the run's own recording")
+                raise MisuseError(place, cause, f"restore it, or {WRONG_TRUTH}")
+            proposals = self.proposals(index) if proposed is None else proposed(record, sweep.points)
+            if len(proposals) != len(sweep.points):
+                cause = f"{len(proposals)} labels for a scan of {len(sweep.points)} points"
+                raise MisuseError(self._labels(index), cause, WRONG_TRUTH)
             judged = JudgedFrame.of_result(result, labels, fov)
-            yield replace(judged, points=points, proposal=proposals, classified=n_classified)
+            yield replace(judged, points=sweep.points, proposal=proposals, classified=n_classified)
 
     def _fov(self, stream: Stream) -> FieldOfView:
         """The field of view of the run.

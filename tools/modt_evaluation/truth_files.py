@@ -72,9 +72,7 @@ def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False)
     if (path / CUBOIDS).is_file():
         return Truth(_cuboids(path), scans, CUBOID_RULES)
     if scans and (path / SCANS).is_dir():
-        tables = {scan.index: path / f"{scan.path.stem}.csv" for scan in scans.scans}
-        found = {frame: _frame(PANDASET_TYPES, _rows(table)) for frame, table in tables.items() if table.is_file()}
-        return Truth(found, scans, CUBOID_RULES)
+        return Truth(_tables_by_scan(path, scans), scans, CUBOID_RULES)
     cause = "holds no labels that are recognised" if path.exists() else "no such file or directory"
     raise MisuseError(path, cause, GIVE)
 
@@ -130,6 +128,12 @@ def _cuboids(folder: Path) -> Mapping[int, FrameTruth]:
     if max(by_frame, default=0) >= len(poses):
         raise MisuseError(folder / POSES, f"{len(poses)} poses, none for frame {max(by_frame)}", "give one a frame")
     return {f: _frame(PANDASET_TYPES, by_frame[f], T_box_sensor=T) for f, T in enumerate(poses)}
+
+
+def _tables_by_scan(folder: Path, scans: ScanStream) -> Mapping[int, FrameTruth]:
+    """Cuboids of the scans that have a table of their name."""
+    tables = {scan.index: folder / f"{scan.path.stem}.csv" for scan in scans.scans}
+    return {frame: _frame(PANDASET_TYPES, _rows(table)) for frame, table in tables.items() if table.is_file()}
 
 
 def _by_frame(labels: Iterable[Label]) -> dict[int, list[Label]]:

@@ -42,8 +42,8 @@ def _head(command: str, sources: str, rows: Sequence[Row]) -> Iterator[str]:
 
 def _body(experiments: Sequence[Experiment], rows: Sequence[Row]) -> Iterator[str]:
     for experiment in experiments:
-        own = (row for row in rows if row.experiment == experiment.name)
-        listed = [row for row in own if not row.quantity.startswith(_CURVES)]
+        made = (row for row in rows if row.experiment == experiment.name)
+        listed = [row for row in made if not row.quantity.startswith(_CURVES)]
         if not listed:
             continue
         yield from ("", f"## {experiment.title}", "", *([experiment.note, ""] if experiment.note else []))

@@ -54,10 +54,10 @@ class SegmentedDrive:
 
 def segmented(drive: Drive, config: ProfileConfig) -> SegmentedDrive:
     """The drive, segmented and classified as configured; the last one is kept for the next setting."""
-    return _segmented(
-        drive,
-        ProfileConfig(sensor=config.sensor, segmentation=config.segmentation, classification=config.classification),
+    needed = ProfileConfig(
+        sensor=config.sensor, segmentation=config.segmentation, classification=config.classification
     )
+    return _segmented(drive, needed)
 
 
 @lru_cache(maxsize=1)
@@ -77,17 +77,18 @@ def _frames(drive: Drive, config: ProfileConfig, network: PointNet) -> Iterator[
         whole = segmenter.segment(frame.points)
         kept = _of_objects(frame.points, truth)
         kept[whole.members] = True
-        points, row = frame.points[kept], np.cumsum(kept) - 1
+        points = frame.points[kept]
+        row = np.cumsum(kept) - 1  # of each point that is kept, among these
         proposals = replace(whole, members=row[whole.members])
         likelihood = network.classify(points, proposals, np.arange(len(proposals)))
-        yield SegmentedFrame(
-            replace(frame, points=points), proposals, likelihood, truth, ObjectPoints.of(points, truth)
-        )
+        objects = ObjectPoints.of(points, truth)
+        yield SegmentedFrame(replace(frame, points=points), proposals, likelihood, truth, objects)
 
 
 def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
     """(N,) points in or near the box of a labelled object."""
-    kept, moved = np.zeros(len(points), np.bool_), in_box_frame(points, truth)
+    kept = np.zeros(len(points), np.bool_)
+    moved = in_box_frame(points, truth)
     for box in truth.box:
         kept |= inside(moved, box, pad_m=2 * PAD_M, foot_m=-2 * PAD_M)
     return kept
@@ -120,25 +121,23 @@ def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: PoseEstimator) ->
         tracks = tracker.follow(frame.stamp_s, proposals, located).tracks
         own = tracks.id[tracks.row_of_proposal(len(proposals))].tolist()
         keys = [
-            ("object", owner) if owner != NONE else ("other", i) for owner, i in zip(_owner(made), own, strict=True)
+            ("object", owner) if owner != NONE else ("other", i)
+            for owner, i in zip(_object_of_proposal(made), own, strict=True)
         ]
         yield np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
 
 
-def _owner(made: SegmentedFrame) -> list[int]:
+def _object_of_proposal(made: SegmentedFrame) -> list[int]:
     """(P,) identity of the object that each proposal stands for, NONE for none."""
-    truth, n = made.truth, len(made.proposals)
-    none = np.zeros(0, np.int64)
-    of_points = made.proposals.label(len(made.frame.points))
-    blank = JudgedFrame(
-        made.frame.index, made.frame.points, of_points, n, 0, none, none, none, np.zeros((0, 4)), truth
-    )
+    n = len(made.proposals)
+    proposal = made.proposals.label(len(made.frame.points))
+    blank = JudgedFrame.without_tracks(made.frame.index, made.frame.points, proposal, n, made.truth)
     overlap = Overlap.of(blank, made.objects)
     found = np.flatnonzero((overlap.most > 0) & overlap.most_of_proposal)
-    owner = np.full(n + 1, NONE, np.int64)
-    owner[overlap.best[found]] = truth.id[found]
-    owners: list[int] = owner[:n].tolist()
-    return owners
+    object_of_proposal = np.full(n + 1, NONE, np.int64)
+    object_of_proposal[overlap.best[found]] = made.truth.id[found]
+    identities: list[int] = object_of_proposal[:n].tolist()
+    return identities
 
 
 class PlayedBack:
@@ -150,7 +149,8 @@ class PlayedBack:
     """
 
     def __init__(self, drive: SegmentedDrive, range_m: float = np.inf) -> None:
-        self._frames, self._range_m = iter(drive.frames), range_m
+        self._frames = iter(drive.frames)
+        self._range_m = range_m
         self._network = drive.network
 
     def segment(self, points: Float32) -> Proposals:
