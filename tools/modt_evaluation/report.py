@@ -46,7 +46,7 @@ def _segmentation(e: Evaluation) -> Iterator[str]:
     rows = []
     for kind, score in kinds.items():
         found = [band.segmentation.get(kind) for band in e.ranges.values()]
-        recall = [_percent(in_band and in_band.recall) for in_band in found]
+        recall = [_percent(in_band.recall if in_band else None) for in_band in found]
         rows.append([kind, *recall, score.objects, *(getattr(score, failure) for failure in FAILURES)])
     if not kinds.keys() <= set(CLASS_NAMES):
         yield LEGEND

@@ -120,10 +120,8 @@ def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: PoseEstimator) ->
         located = odometry.locate(frame, proposals, tracker.static_tracks)
         tracks = tracker.follow(frame.stamp_s, proposals, located).tracks
         own = tracks.id[tracks.row_of_proposal(len(proposals))].tolist()
-        keys = [
-            ("object", owner) if owner != NONE else ("other", i)
-            for owner, i in zip(_object_of_proposal(made), own, strict=True)
-        ]
+        objects = _object_of_proposal(made)
+        keys = [("object", k) if k != NONE else ("other", i) for k, i in zip(objects, own, strict=True)]
         yield np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
 
 
