@@ -53,7 +53,8 @@ def ratio(part: ArrayLike, whole: ArrayLike) -> Estimate:
     weight = _weights(n)
     below = weight @ b
     resampled = (weight @ a)[below > 0] / below[below > 0]
-    return Estimate(value, *np.percentile(resampled, LEVEL).tolist(), n)
+    low, high = np.percentile(resampled, LEVEL).tolist()
+    return Estimate(value, low, high, n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +105,8 @@ class Ranking:
             return Estimate(value, n=n)
         weights = self._weights()
         parts = [_areas(*self._curves(weights[k : k + _TOGETHER])) for k in range(0, RESAMPLES, _TOGETHER)]
-        return Estimate(value, *np.percentile(np.concatenate(parts), LEVEL).tolist(), n)
+        low, high = np.percentile(np.concatenate(parts), LEVEL).tolist()
+        return Estimate(value, low, high, n)
 
     def precision_at_recalls(self) -> list[tuple[float, float]]:
         """Each of RECALLS that is reached, with the precision there."""
