@@ -15,7 +15,7 @@ from modt_simulation.kinds import Kind
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
 from modt_simulation.people import PERSON, Person, Posture
-from modt_simulation.solids import Solids, Triple, box
+from modt_simulation.solids import Pair, Solids, Triple, box
 from modt_simulation.terrain import Terrain
 from modt_simulation.world import Body, World
 
@@ -103,7 +103,7 @@ class SceneBuilder:
         self._people: list[Person] = []
         (self._strip_rng,) = rng.spawn(1)
 
-    def scenery(self, solids: Solids, x: float, y: float, heading_rad: float) -> None:
+    def scenery(self, solids: Solids, x: float, y: float, heading_rad: float = 0.0) -> None:
         """Add a body at rest without annotation."""
         self.bodies.append(Body(kinds.SCENERY, _extent(solids), Path.standing(x, y, heading_rad), solids))
 
@@ -134,6 +134,10 @@ class SceneBuilder:
         size = (length, self.rng.uniform(0.55, 0.7), height)
         self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride)
 
+    def bystander(self, x: float, y: float) -> None:
+        """Add a pedestrian who stands and looks anywhere."""
+        self.pedestrian(Path.standing(x, y, self.rng.uniform(-np.pi, np.pi)))
+
     def walker(self, line: ArrayLike, speed_mps: float, start_m: float = 0.0) -> None:
         """Add a pedestrian who walks along a line of way points (n, 2) [m, world], from start_m along it."""
         self.pedestrian(Path.steady(line, start_m, speed_mps, self.seconds), speed_mps)
@@ -157,7 +161,7 @@ class SceneBuilder:
         ego: Path,
         height_m: float,
         sway_rad: float = 0.003,
-        ego_m: tuple[float, float] = EGO_M,
+        ego_m: Pair = EGO_M,
     ) -> World:
         """The world of the bodies that collide neither with the ego vehicle nor with one another.
 

@@ -9,7 +9,7 @@ from modt_simulation import scenery
 from modt_simulation.builder import SceneBuilder
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
-from modt_simulation.solids import block, box
+from modt_simulation.solids import Pair, block, box
 from modt_simulation.world import World
 from modt_simulation.yard import ROBOT_M, enclose, floor, round_trip, walkers
 
@@ -27,7 +27,7 @@ def hall(rng: Generator, seconds: float, height_m: float) -> World:
     ceiling = max(rng.uniform(2.3, 3.5), height_m + OVER_SENSOR_M)
     for x in np.arange(-half[0] + 3, half[0], 6.0):
         for side in (-1, 1):
-            builder.scenery(block((0.4, 0.4, ceiling), Material.WALL), x, side * half[1] / 3, 0.0)
+            builder.scenery(block((0.4, 0.4, ceiling), Material.WALL), x, side * half[1] / 3)
     _furnish(builder, half, 24)
     for _ in range(3):
         x, y = rng.uniform(-0.8, 0.8, 2) * half
@@ -46,13 +46,13 @@ def corridor(rng: Generator, seconds: float, height_m: float) -> World:
         builder.walker([(start, side * 0.45), (start - side * 40.0, side * 0.45)], pace)
     for _ in range(4):
         x = rng.uniform(3.0, 18.0) * rng.choice([-1, 1])
-        builder.pedestrian(Path.standing(x, rng.choice([-1, 1]) * (half[1] - 0.4), rng.uniform(-np.pi, np.pi)))
+        builder.bystander(x, rng.choice([-1, 1]) * (half[1] - 0.4))
     for x in np.arange(-20.0, 20.0, 4.0):
-        builder.scenery(scenery.door(), x, half[1] - 0.04, 0.0)
+        builder.scenery(scenery.door(), x, half[1] - 0.04)
         if rng.random() < 0.3:
-            builder.scenery(scenery.pane(rng, 2.1), x + 2.0, -half[1] + 0.04, 0.0)
+            builder.scenery(scenery.pane(rng, 2.1), x + 2.0, -half[1] + 0.04)
         elif rng.random() < 0.4:
-            builder.scenery(block((0.5, 0.4, 0.8), Material.WOOD), x + 2.0, -half[1] + 0.3, 0.0)
+            builder.scenery(block((0.5, 0.4, 0.8), Material.WOOD), x + 2.0, -half[1] + 0.3)
     ego = Path.steady([(-3.0, -0.1), (12.0, -0.1)], 0.0, 0.8, seconds)
     return _under(builder, half, ceiling, ego, height_m)
 
@@ -65,8 +65,8 @@ def lobby(rng: Generator, seconds: float, height_m: float) -> World:
     ego = Path.steady([(-half[0] + 2, 0.0), (half[0] - 2, 0.0)], 0.0, 0.7, seconds)
     walkers(builder, half, 4)
     for x in np.arange(-half[0] + 1, half[0], 2.0):
-        builder.scenery(scenery.pane(rng, ceiling), x, half[1] - 0.3, 0.0)
-    builder.scenery(block((3.0, 0.7, 1.1), Material.WOOD), 0.0, -half[1] + 1.5, 0.0)
+        builder.scenery(scenery.pane(rng, ceiling), x, half[1] - 0.3)
+    builder.scenery(block((3.0, 0.7, 1.1), Material.WOOD), 0.0, -half[1] + 1.5)
     _furnish(builder, half, 8)
     return _under(builder, half, ceiling, ego, height_m)
 
@@ -81,14 +81,14 @@ def lift(rng: Generator, seconds: float, height_m: float) -> World:
     builder = SceneBuilder(rng, seconds)
     back = -half[0] + deep
     for side in (-1, 1):
-        builder.scenery(block((2 * deep, 0.1, low), Material.METAL), back, side * (wide + 0.05), 0.0)
+        builder.scenery(block((2 * deep, 0.1, low), Material.METAL), back, side * (wide + 0.05))
         beside_door = block((0.1, half[1] - wide, low), Material.WALL)
-        builder.scenery(beside_door, back + deep, side * (half[1] + wide) / 2, 0.0)
+        builder.scenery(beside_door, back + deep, side * (half[1] + wide) / 2)
     roof = box((0, 0, low + 0.05), (2 * deep, 2 * wide, 0.1), Material.METAL)
-    builder.scenery(roof, back, 0.0, 0.0)
+    builder.scenery(roof, back, 0.0)
     for _ in range(3):
         x = rng.uniform(back + deep + 1.0, half[0] - 0.5)
-        builder.pedestrian(Path.standing(x, rng.uniform(-2.0, 2.0), rng.uniform(-np.pi, np.pi)))
+        builder.bystander(x, rng.uniform(-2.0, 2.0))
     builder.walker([(half[0] - 0.5, 0.5), (back + deep + 0.5, -0.3)], 0.8)
     return _under(builder, half, ceiling, Path.standing(back, 0.0, 0.0), height_m)
 
@@ -100,7 +100,7 @@ def warehouse(rng: Generator, seconds: float, height_m: float) -> World:
     walkers(builder, (20.0, 2.0), 4)
     for y in (-11.0, -5.0, 5.0, 11.0):
         for x in np.arange(-16.0, 17.0, 4.0):
-            builder.scenery(scenery.rack(rng), x, y, 0.0)
+            builder.scenery(scenery.rack(rng), x, y)
     for _ in range(4):
         x = rng.uniform(-14.0, 14.0)
         y = rng.choice([-1, 1]) * rng.uniform(2.5, 3.8)
@@ -111,7 +111,7 @@ def warehouse(rng: Generator, seconds: float, height_m: float) -> World:
     return _under(builder, half, rng.uniform(5.0, 8.0), ego, height_m)
 
 
-def _furnish(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
+def _furnish(builder: SceneBuilder, half: Pair, n: int) -> None:
     rng = builder.rng
     makers = (scenery.table, scenery.chair, scenery.shelf, scenery.pallets)
     for _ in range(n):
@@ -121,10 +121,10 @@ def _furnish(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
         builder.scenery(makers[rng.choice(4)](rng), x, y, turn)
 
 
-def _under(builder: SceneBuilder, half: tuple[float, float], ceiling_m: float, ego: Path, height_m: float) -> World:
+def _under(builder: SceneBuilder, half: Pair, ceiling_m: float, ego: Path, height_m: float) -> World:
     """The world of a room with four walls, a floor and a ceiling."""
     enclose(builder, half, ceiling_m)
     roof = box((0, 0, ceiling_m + 0.1), (2 * half[0] + 0.8, 2 * half[1] + 0.8, 0.2), Material.WALL)
-    builder.scenery(roof, 0.0, 0.0, 0.0)
+    builder.scenery(roof, 0.0, 0.0)
     ground = floor(builder.rng, half, Material.FLOOR, 0.002)
     return builder.world(ground, ego, height_m, sway_rad=SWAY_RAD, ego_m=ROBOT_M)

@@ -187,17 +187,13 @@ def oxts_records(T_world_sensor: Float64, stamp_s: Float64) -> Float64:
     lon = lon0 + T[:, 0, 3] / (scale * EARTH_RADIUS_M)
     yaw = np.arctan2(T[:, 1, 0], T[:, 0, 0])
     out = np.zeros((len(T), OXTS_FIELDS))
-    out[:, 0] = np.rad2deg(lat)
-    out[:, 1] = np.rad2deg(lon)
-    out[:, 2] = T[:, 2, 3] + 115.0
+    out[:, :3] = np.stack([np.rad2deg(lat), np.rad2deg(lon), T[:, 2, 3] + 115.0], axis=1)
     out[:, 3] = np.arctan2(T[:, 2, 1], T[:, 2, 2])
     out[:, 4] = np.arcsin(np.clip(-T[:, 2, 0], -1, 1))
     out[:, 5] = yaw
     if len(T) > 1:
         east, north, up = np.gradient(T[:, :3, 3], stamp_s, axis=0).T
-        out[:, 6] = north
-        out[:, 7] = east
-        out[:, 10] = up
+        out[:, [6, 7, 10]] = np.stack([north, east, up], axis=1)
         out[:, 8] = np.cos(yaw) * east + np.sin(yaw) * north
         out[:, 9] = np.cos(yaw) * north - np.sin(yaw) * east
         out[:, 19] = out[:, 22] = np.gradient(np.unwrap(yaw), stamp_s)

@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from modt.types import Float32, Float64
 from modt_simulation.materials import Material
+from modt_simulation.solids import Pair, Triple
 from modt_simulation.terrain import Terrain
 
 CELL_M = 0.25
@@ -36,7 +37,7 @@ class Road:
     bend_m: float = 0.0  # amplitude of the centre line
     wave_m: float = 200.0  # wavelength of the centre line
     turn_rad: float = 0.0  # direction of x in the world
-    gaps: tuple[tuple[float, float], ...] = ()  # stretches (from, to) along x occupied by other roads
+    gaps: tuple[Pair, ...] = ()  # stretches (from, to) along x occupied by other roads
 
     def free(self, x: float) -> bool:
         """Whether no other road occupies x [m]."""
@@ -50,7 +51,7 @@ class Road:
         """Direction of the centre line at x, from the x axis [rad]."""
         return np.asarray(np.arctan(self.bend_m * 2 * np.pi / self.wave_m * np.cos(2 * np.pi * x / self.wave_m)))
 
-    def place(self, x: float, left_m: float, turn: float = 0.0) -> tuple[float, float, float]:
+    def place(self, x: float, left_m: float, turn: float = 0.0) -> Triple:
         """World x, y and heading of a place left of the centre line, turned from its direction."""
         along = np.array([x])
         spot = self._left_of_centre(along, left_m)
@@ -88,7 +89,7 @@ def terrain_along(rng: Generator, road: Road) -> Terrain:
     return terrain(rng, [road], (road.start_m, -MARGIN_M), (road.end_m, MARGIN_M))
 
 
-def terrain(rng: Generator, roads: list[Road], low: tuple[float, float], high: tuple[float, float]) -> Terrain:
+def terrain(rng: Generator, roads: list[Road], low: Pair, high: Pair) -> Terrain:
     """Cambered carriageways, kerbs, pavements and rough ground behind, between two corners [m, world]."""
     x = np.arange(low[0], high[0], CELL_M, dtype=np.float32)
     y = np.arange(low[1], high[1], CELL_M, dtype=np.float32)

@@ -101,6 +101,7 @@ class Solids:
         )
 
 
+Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
 

@@ -74,16 +74,22 @@ class Terrain:
             np.copyto(first_below, k, where=start[2] + series[k] * direction[2] < ground)
         # The ray meets the ground between the first distance at which it is below and the one before.
         ends = np.concatenate([np.zeros(1, np.float32), series, series[-1:]])
-        near = ends[first_below]
-        far = ends[first_below + 1]
+        met, cell = self._bisected(start, direction, ends[first_below], ends[first_below + 1])
+        distance[rows] = np.where(first_below < N_DISTANCES, met, np.inf)
+        surface[rows] = self.surface.ravel()[cell]
+        return distance, surface
+
+    def _bisected(
+        self, start: Sequence[Float32], direction: Sequence[Float32], near: Float32, far: Float32
+    ) -> tuple[Float32, Int]:
+        """Distances at which rays meet the ground between two distances each, and the cells."""
         for _ in range(N_HALVINGS):
             middle = (near + far) / 2
-            below = start[2] + middle * direction[2] < height[self._cells_along(start, direction, middle)]
+            cell = self._cells_along(start, direction, middle)
+            below = start[2] + middle * direction[2] < self.height.ravel()[cell]
             near = np.where(below, near, middle)
             far = np.where(below, middle, far)
-        distance[rows] = np.where(first_below < N_DISTANCES, far, np.inf)
-        surface[rows] = self.surface.ravel()[self._cells_along(start, direction, middle)]
-        return distance, surface
+        return far, cell
 
     def _cells_along(self, start: Sequence[Float32], direction: Sequence[Float32], s: Float32) -> Int:
         """Flat index of the cell under the points at distances s along rays."""

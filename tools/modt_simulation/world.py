@@ -11,7 +11,7 @@ from modt.types import Float64
 from modt_simulation.kinds import Kind
 from modt_simulation.motion import Path
 from modt_simulation.people import People, people_solids
-from modt_simulation.solids import Solids
+from modt_simulation.solids import Pair, Solids, Triple
 from modt_simulation.terrain import Terrain
 
 MOVING_MPS = 0.3
@@ -23,7 +23,7 @@ class Body:
     """One object or piece of scenery."""
 
     kind: Kind  # kind of the body
-    size: tuple[float, float, float]  # length, width, height of its box [m]
+    size: Triple  # length, width, height of its box [m]
     path: Path  # motion of the body
     solids: Solids  # its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre)
 
@@ -38,7 +38,7 @@ class World:
     ego: Path  # motion of the sensor's carrier
     height_m: float  # height of the sensor above the ground
     sway_rad: float  # amplitude of the carrier's roll and pitch
-    mount_rad: tuple[float, float]  # roll and pitch of the sensor on its carrier
+    mount_rad: Pair  # roll and pitch of the sensor on its carrier
 
     def __post_init__(self) -> None:
         at_rest = np.array([body.path.at_rest for body in self.bodies], np.bool_)

@@ -11,7 +11,7 @@ from modt_simulation.builder import SceneBuilder, clipped_normal
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path, timetable
 from modt_simulation.road import CELL_M
-from modt_simulation.solids import block
+from modt_simulation.solids import Pair, block
 from modt_simulation.terrain import Terrain
 from modt_simulation.world import World
 
@@ -63,7 +63,7 @@ def yard(rng: Generator, seconds: float, height_m: float) -> World:
     return builder.world(floor(rng, half, Material.ASPHALT, 0.01), ego, height_m, sway_rad=0.006)
 
 
-def round_trip(rng: Generator, seconds: float, half: tuple[float, float]) -> Path:
+def round_trip(rng: Generator, seconds: float, half: Pair) -> Path:
     """Round trips of the robot with one stop."""
     angle = np.linspace(0, 2 * np.pi, 60) + rng.uniform(0, 2 * np.pi)
     line = np.stack([half[0] * 0.8 * np.cos(angle), half[1] * 0.8 * np.sin(angle)], axis=1)
@@ -74,7 +74,7 @@ def round_trip(rng: Generator, seconds: float, half: tuple[float, float]) -> Pat
     return Path(np.concatenate([line[:1], *([line[1:]] * laps)]), *timetable(seconds, speed))
 
 
-def walkers(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
+def walkers(builder: SceneBuilder, half: Pair, n: int) -> None:
     """Add n people who walk about, and half as many who stand."""
     rng = builder.rng
     for _ in range(n):
@@ -82,20 +82,20 @@ def walkers(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
         builder.walker(rng.uniform(-1, 1, (6, 2)) * (half[0] - 1, half[1] - 1), speed)
     for _ in range(n // 2):
         x, y = rng.uniform(-1, 1, 2) * (half[0] - 1, half[1] - 1)
-        builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)))
+        builder.bystander(x, y)
 
 
-def enclose(builder: SceneBuilder, half: tuple[float, float], height: float) -> None:
+def enclose(builder: SceneBuilder, half: Pair, height: float) -> None:
     """Add four walls."""
     along_x = block((2 * half[0] + 0.6, 0.3, height), Material.WALL)
     along_y = block((2 * half[1] + 0.6, 0.3, height), Material.WALL)
     for side in (-1, 1):
-        builder.scenery(along_x, 0.0, side * (half[1] + 0.2), 0.0)
+        builder.scenery(along_x, 0.0, side * (half[1] + 0.2))
     for side in (-1, 1):
         builder.scenery(along_y, side * (half[0] + 0.2), 0.0, np.pi / 2)
 
 
-def floor(rng: Generator, half: tuple[float, float], material: int, roughness_m: float) -> Terrain:
+def floor(rng: Generator, half: Pair, material: int, roughness_m: float) -> Terrain:
     """Level ground of one material."""
     shape = (int(2 * (half[0] + 5) / CELL_M), int(2 * (half[1] + 5) / CELL_M))
     height = rng.standard_normal(shape, np.float32) * np.float32(roughness_m)
@@ -125,7 +125,7 @@ def ramp(rng: Generator, seconds: float, height_m: float) -> World:
     builder = SceneBuilder(rng, seconds)
     for nearest, farthest, way in ((2.5, 4.0, 1), (5.0, 7.0, 1), (7.0, 10.0, 1), (10.0, 13.5, 1), (5.0, 12.0, -1)):
         at = rng.uniform(nearest, farthest) * way
-        builder.pedestrian(Path.standing(at, rng.uniform(0.8, 4.0) * rng.choice([-1, 1]), rng.uniform(-np.pi, np.pi)))
+        builder.bystander(at, rng.uniform(0.8, 4.0) * rng.choice([-1, 1]))
     builder.walker([(13.0, 2.0), (-10.0, 2.0)], 1.0)
     ego = Path.steady([(-3.0, 0.0), (3.5, 0.0)], 0.0, 1.0, seconds)
     return builder.world(_sloping(rng, height), ego, height_m, ego_m=ROBOT_M)
@@ -139,7 +139,7 @@ def dock(rng: Generator, seconds: float, height_m: float) -> World:
     builder = SceneBuilder(rng, seconds)
     for place in ((4.0, 1.0), (8.0, -1.0), (7.0, 4.0), (5.0, -5.0), (-6.0, 3.0)):
         at, left = place + rng.uniform(-0.5, 0.5, 2)
-        builder.pedestrian(Path.standing(at, left, rng.uniform(-np.pi, np.pi)))
+        builder.bystander(at, left)
     ego = Path.steady([(-5.0, 0.0), (9.5, 0.0)], 0.0, 1.0, seconds)
     return builder.world(_sloping(rng, height), ego, height_m, ego_m=ROBOT_M)
 
