@@ -22,7 +22,8 @@ def shares(frame):
 
 def recall(frames):
     """Found and all objects of 20 points or more, by type."""
-    hit, total = Counter(), Counter()
+    hit = Counter()
+    total = Counter()
     for frame in frames:
         size = Counter(frame.proposal.tolist())
         for name, _, n, shared in shares(frame):
@@ -35,7 +36,9 @@ def recall(frames):
 
 def life(frames):
     """Life as seen, labelled frames of 10 points or more, discontinuities, mis-associations."""
-    seen, owned, labelled = defaultdict(list), defaultdict(Counter), 0
+    seen = defaultdict(list)
+    owned = defaultdict(Counter)
+    labelled = 0
     for frame in frames:
         track = dict(zip(frame.of_track.tolist(), frame.track.tolist(), strict=True))
         for _, id_, n, shared in shares(frame):
@@ -51,7 +54,8 @@ def life(frames):
 
 def precision_of_ranking(frames):
     """Average precision by class; nothing is ignored but what lies beyond 40 degrees of x, and parked cars."""
-    rows, positives = [], Counter()
+    rows = []
+    positives = Counter()
     for frame in frames:
         label = {}
         for name, _, n, shared in shares(frame):

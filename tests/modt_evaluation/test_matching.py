@@ -15,7 +15,8 @@ from modt_evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt_evaluation.truth import KITTI_TYPES, PANDASET_TYPES, PAPER_TYPES, FrameTruth, Regions
 from tests.modt_evaluation.scenes import blob, car, cars, frame
 
-CAR, BACKGROUND = ObjectClass.CAR, ObjectClass.BACKGROUND
+CAR = ObjectClass.CAR
+BACKGROUND = ObjectClass.BACKGROUND
 AHEAD_CAMERA = Camera(np.array([[500.0, -700, 0, 0], [180, 0, -700, 0], [1, 0, 0, 0]]), np.eye(4), 1000.0, 360.0)
 
 
@@ -23,8 +24,10 @@ def counting(*what):
     return dataclasses.replace(KITTI_RULES, ignored=KITTI_RULES.ignored - set(what))
 
 
-ONE, TWO = [(7, 0, "car")], [(7, 0, "car"), (8, 1, "car")]
-OBJECT, PROPOSAL = ["to_segment", "to_classify", "to_follow"], ["to_classify", "to_report", "to_associate"]
+ONE = [(7, 0, "car")]
+TWO = [(7, 0, "car"), (8, 1, "car")]
+OBJECT = ["to_segment", "to_classify", "to_follow"]
+PROPOSAL = ["to_classify", "to_report", "to_associate"]
 
 
 def judged(truth, blobs, tracks=ONE, rules=KITTI_RULES, **more):

@@ -17,6 +17,7 @@ def test_a_recorded_frame_has_the_record_and_the_boxes_of_the_result():
         assert frame_record(again) == frame_record(one)
         assert (again.frame.index, len(again.tracks)) == (one.frame.index, len(one.tracks))
         seen = one.tracks.proposal != NONE
-        box, expected = again.tracks.box[seen], one.tracks.box[seen]
+        box = again.tracks.box[seen]
+        expected = one.tracks.box[seen]
         np.testing.assert_allclose(box[:, :6], expected[:, :6], rtol=0, atol=2e-3)
         assert np.abs(wrap(box[:, 6] - expected[:, 6])).max(initial=0.0) < 1e-3

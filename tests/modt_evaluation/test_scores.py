@@ -105,7 +105,8 @@ def test_objects_without_identity_have_no_life():
 
 
 def test_drives_are_pooled_and_their_identities_kept_apart():
-    one, two = followed([1, 1, 1], ["-"] * 3), followed([2, 2, 2], ["-"] * 3)
+    one = followed([1, 1, 1], ["-"] * 3)
+    two = followed([2, 2, 2], ["-"] * 3)
     found = evaluation([collect(f, KITTI_RULES, k) for k, f in enumerate((one, two))])
     assert (found.drives, found.frames, found.tracks["all"].life.objects) == (2, 6, 2)
     assert found.tracks["all"].discontinuities == 0

@@ -28,7 +28,8 @@ def test_raw_drive(tmp_path):
     drive = tracklets(layouts.raw_drive(tmp_path), ("Car", 1, [8, 9]), ("Tram", 0, [30]), ("Van", 3, [5]))
     truth = open_truth(drive)
     assert (list(truth.frames), truth.rules, len(truth.scans.scans)) == ([0, 1, 2, 3], KITTI_RULES, 4)
-    first, second = truth.frames[0], truth.frames[1]
+    first = truth.frames[0]
+    second = truth.frames[1]
     assert (first.type_, first.object_class.tolist(), first.id.tolist()) == (("Tram",), [0], [1])
     assert second.box[0] == pytest.approx([10, 8, -0.95, 4, 2, 1.5, 0.5])
     assert truth.frames[3].role.tolist() == [Role.COUNTED]
@@ -56,7 +57,8 @@ def test_tracking_labels(tmp_path):
     scans = layouts.tracking(tmp_path)
     folder = scans.parents[1] / "label_02"
     folder.mkdir()
-    car, nothing = LABEL.format(type="Car", edges="0 0 9 9"), LABEL.format(type="DontCare", edges="5 6 7 8")
+    car = LABEL.format(type="Car", edges="0 0 9 9")
+    nothing = LABEL.format(type="DontCare", edges="5 6 7 8")
     (folder / "0003.txt").write_text(f"0 4 {car}0 -1 {nothing}2 4 {car}")
     for path in (folder / "0003.txt", scans.parents[1]):
         truth = open_truth(path, run_path=scans)

@@ -17,7 +17,8 @@ RNG = np.random.default_rng(3)
 def boxes(x, length=0.6, scatter_m=0.02):
     """(30, 7) boxes along x, seen with some scatter."""
     out = np.tile([0.0, 5.0, 1.0, 0.0, 0.5, 1.7, 0.0], (len(STAMPS_S), 1))
-    out[:, 0], out[:, 3] = x, length
+    out[:, 0] = x
+    out[:, 3] = length
     out[:, :2] += RNG.normal(0, scatter_m, (len(out), 2))
     return out
 
@@ -66,7 +67,8 @@ def test_a_label_that_is_left_out_is_found_and_put_back(tmp_path, capsys):
     rows = [row for row in listed("after") if row["object"] not in before]
     ((track, type_),) = {(row["object"], row["type"]) for row in rows}
     assert type_ == "Pedestrian"
-    begin, poses = int(removed.findtext("first_frame")), removed.findall("poses/item")
+    begin = int(removed.findtext("first_frame"))
+    poses = removed.findall("poses/item")
     for row in rows:
         pose = poses[int(row["frame"]) - begin]
         off = [float(row[axis]) - float(pose.findtext(f"t{axis}")) for axis in "xy"]

@@ -25,7 +25,8 @@ def test_points_times_poses_and_camera_are_read_back(drive, layout):
     read = open_stream(getattr(writer, layout))
     frames = list(read)
     assert [f.index for f in frames] == [f.index for f, _ in sweeps]
-    first_read, first = frames[0], sweeps[0][0]
+    first_read = frames[0]
+    first = sweeps[0][0]
     for mine, (frame, _) in zip(frames, sweeps, strict=True):
         np.testing.assert_array_equal(mine.points, frame.points)
         assert mine.stamp_s == pytest.approx(frame.stamp_s, abs=1e-6)

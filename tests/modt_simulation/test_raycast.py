@@ -27,7 +27,9 @@ def scene(seed, n=40):
             rod((0, 0, 0), size, 0.1, Material.CLOTH),
             wedge((0, 0, 0), size, Material.GLASS, [(1, 0, 0.5, size[0] / 3), (0, 1, 1, size[1] / 3)]),
         )[rng.integers(5)]
-        yaw, away, bearing = rng.uniform(0, 7), rng.uniform(6, 60), rng.uniform(0, 7)
+        yaw = rng.uniform(0, 7)
+        away = rng.uniform(6, 60)
+        bearing = rng.uniform(0, 7)
         R = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
         made.append(solid.transformed(R, away * np.array([np.cos(bearing), np.sin(bearing), rng.uniform(-0.1, 0.1)])))
     return Solids.join(made)
@@ -36,7 +38,8 @@ def scene(seed, n=40):
 @settings(max_examples=25)
 @given(st.integers(0, 1000))
 def test_batches_and_single_windows_hit_the_same_solids(seed):
-    solids, depth = scene(seed), np.ones_like(NO_GROUND)
+    solids = scene(seed)
+    depth = np.ones_like(NO_GROUND)
     single = RayCaster(sensor("vlp-16"), batch_rays=0).cast(solids, NO_GROUND, depth)
     batched = RayCaster(sensor("vlp-16"), batch_rays=10**9).cast(solids, NO_GROUND, depth)
     same = single.solid == batched.solid
@@ -55,7 +58,8 @@ def test_windows_contain_every_ray_that_hits(seed):
             whole = np.tile([0, 16], (n, 1)), np.tile([0, 1808], (n, 1))
             return type(near)(np.arange(n), *whole, np.zeros(n, np.float32))
 
-    solids, depth = scene(seed, n=6), np.ones_like(NO_GROUND)
+    solids = scene(seed, n=6)
+    depth = np.ones_like(NO_GROUND)
     found, whole = (
         make(sensor("vlp-16")).cast(solids, NO_GROUND, depth).distance for make in (RayCaster, Everywhere)
     )
@@ -82,7 +86,8 @@ def test_foliage_transmits_by_its_density():
     assert np.mean(window == NO_SOLID) == pytest.approx(np.exp(-1.5), abs=0.06)
 
 
-CELL_M, SIDE = 0.25, 800
+CELL_M = 0.25
+SIDE = 800
 HEIGHT_M = 1.7
 NOISE_M = 0.02
 
@@ -106,7 +111,8 @@ def hills(lift_m, length_m, phase) -> Terrain:
     name=st.sampled_from(["vlp-16", "pandar64", "mid-360"]),
 )
 def test_rays_end_on_the_first_ground_they_meet(lift_m, length_m, phase, turn_rad, name):
-    terrain, caster = hills(lift_m, length_m, phase), RayCaster(sensor(name))
+    terrain = hills(lift_m, length_m, phase)
+    caster = RayCaster(sensor(name))
     T_world_sensor = se3(rotation_zyx(*turn_rad), np.array([0.0, 0.0, HEIGHT_M]))
     distance, _ = terrain.cast(caster, T_world_sensor)
     row, column = np.nonzero(np.isfinite(distance))

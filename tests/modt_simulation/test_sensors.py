@@ -13,7 +13,8 @@ from modt_simulation.sensors import SENSORS, sensor
 def test_a_sensor_agrees_with_its_profile(model):
     config = profile.load(model.name).sensor
     elevation_deg = np.rad2deg(model.elevation_rad)
-    span_deg, around_deg = np.ptp(elevation_deg), len(model.azimuth_rad) * np.rad2deg(np.ptp(model.azimuth_rad[:2]))
+    span_deg = np.ptp(elevation_deg)
+    around_deg = len(model.azimuth_rad) * np.rad2deg(np.ptp(model.azimuth_rad[:2]))
     if config.elevations_deg is not None:
         assert np.sort(config.elevations_deg) == pytest.approx(elevation_deg[::-1])
     elif model.sweeps_a_ray == 1:

@@ -37,7 +37,8 @@ def test_points_of_a_body_lie_in_its_box(scene):
     for frame, truth in stream.sweeps():
         for body, box in zip(truth.bodies, truth.boxes, strict=True):
             p = frame.points[truth.instance == body, :3] - box[:3]
-            c, s = np.cos(box[6]), np.sin(box[6])
+            c = np.cos(box[6])
+            s = np.sin(box[6])
             u = np.stack([c * p[:, 0] + s * p[:, 1], c * p[:, 1] - s * p[:, 0], p[:, 2]], axis=1)
             inside += int((np.abs(u) < box[3:6] / 2 + 0.2).all(axis=1).sum())
             total += len(p)
@@ -57,8 +58,10 @@ def test_bodies_at_rest_stay_where_they_are_in_the_world():
 
 def test_distorted_scans_are_restored_by_the_motion_during_the_sweep():
     plain, distorted = (SyntheticStream(seconds=1.0, seed=2, distort=d) for d in (False, True))
-    (a, truth), (b, _) = plain.simulator.sweep(5), distorted.simulator.sweep(5)
-    world, sensor = plain.simulator.world, plain.simulator.sensor
+    a, truth = plain.simulator.sweep(5)
+    b, _ = distorted.simulator.sweep(5)
+    world = plain.simulator.world
+    sensor = plain.simulator.sensor
     transformed = np.linalg.norm(a.points[:, :3] - b.points[:, :3], axis=1)
     still = truth.instance == NONE
     assert transformed[still].max() > 0.2

@@ -88,13 +88,19 @@ def test_each_detection_has_exactly_one_track(scene):
 @given(st.integers(0, 2**32 - 1))
 def test_prediction_and_update_equal_the_full_kalman_filter(seed):
     rng = np.random.default_rng(seed)
-    x, z, variance = rng.uniform(-50, 50, (1, 4)), rng.uniform(-50, 50, (1, 2)), rng.uniform(0.01, 4, 1)
-    dt_s, acceleration, A = rng.uniform(0, 2), rng.uniform(0.1, 20), rng.uniform(-2, 2, (2, 2))
+    x = rng.uniform(-50, 50, (1, 4))
+    z = rng.uniform(-50, 50, (1, 2))
+    variance = rng.uniform(0.01, 4, 1)
+    dt_s = rng.uniform(0, 2)
+    acceleration = rng.uniform(0.1, 20)
+    A = rng.uniform(-2, 2, (2, 2))
     P = A @ A.T + 0.01 * np.eye(2)
-    packed, full = np.array([[P[0, 0], P[0, 1], P[1, 1]]]), np.kron(P, np.eye(2))  # of x, y, vx, vy
+    packed = np.array([[P[0, 0], P[0, 1], P[1, 1]]])
+    full = np.kron(P, np.eye(2))  # of x, y, vx, vy
     moved, grown = box_tracker.predict(x, packed, acceleration, dt_s)
     after, squeezed = box_tracker.update(x, packed, z, variance)
-    F, H = np.kron([[1, dt_s], [0, 1]], np.eye(2)), np.eye(2, 4)
+    F = np.kron([[1, dt_s], [0, 1]], np.eye(2))
+    H = np.eye(2, 4)
     push = acceleration * np.kron([[dt_s**2 / 2], [dt_s]], np.eye(2))
     K = full @ H.T @ np.linalg.inv(H @ full @ H.T + variance * np.eye(2))
     np.testing.assert_allclose(moved[0], F @ x[0], atol=1e-9)

@@ -22,7 +22,8 @@ def one(path):
 
 
 def test_both_formats_give_the_same_detections(tmp_path):
-    a, b = one(write(tmp_path, AB3DMOT)), one(write(tmp_path, LABEL))
+    a = one(write(tmp_path, AB3DMOT))
+    b = one(write(tmp_path, LABEL))
     np.testing.assert_allclose(a.box, b.box)
     np.testing.assert_allclose(a.score, b.score)
     np.testing.assert_allclose(a.image_box, b.image_box)
@@ -72,7 +73,8 @@ def test_probabilities_are_converted_to_log_odds(tmp_path):
 
 
 def test_all_files_of_a_detector_share_a_scale(tmp_path):
-    quiet, busy = scored(tmp_path / "0.txt", 0.25), scored(tmp_path / "1.txt", 0.5, 7.0)
+    quiet = scored(tmp_path / "0.txt", 0.25)
+    busy = scored(tmp_path / "1.txt", 0.5, 7.0)
     assert one(quiet).score.tolist() != [0.25]
     assert [d.score.tolist() for d in read([quiet, busy])] == [[0.25], [0.5, 7.0]]
     assert [d.name for d in read([quiet, busy])] == ["0", "1"]

@@ -26,7 +26,8 @@ def test_further_objects_make_another_drive_of_the_one_that_has_its_sweeps(tmp_p
     table.write_text(f"{head}\n0,0,Pedestrian,9,0,-1.7,0.6,0.6,1.7,0\n")
     drives = kitti_drives(tmp_path)
     whole = completed(drives, table)
-    before, after = drives[0].labels()[0], whole.labels()[0]
+    before = drives[0].labels()[0]
+    after = whole.labels()[0]
     added = after.role == Role.FURTHER
     assert added.sum() == 1
     assert [frame.index for frame, _ in whole.sweeps()] == [0, 1]
@@ -97,7 +98,8 @@ def test_beyond_the_range_of_interest_there_is_nothing():
 
 
 def test_a_replay_that_experiments_share_is_made_once():
-    names, drives = ["table5", "fig14", "table6"], simulated_drives(1, 0.4)
+    names = ["table5", "fig14", "table6"]
+    drives = simulated_drives(1, 0.4)
     apart = [Study([EXPERIMENTS[name]], drives, [()]).tasks() for name in names]
     assert [len(tasks) for tasks in apart] == [2, 2, 2]
     assert len(Study(chosen(names), drives, [()]).tasks()) == 3, "conventional, accurate and efficient"
