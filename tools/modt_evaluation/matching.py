@@ -13,7 +13,7 @@ from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
 from modt_evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
 from modt_evaluation.rules import Rules
-from modt_evaluation.truth import CLASSIFIED, LABELLED, Role
+from modt_evaluation.truth import CLASSIFIED, LABELLED, FrameTruth, Role
 
 PARKED_PAD_M = 0.4
 """Margin of the box of a parked car [m]. A proposal mostly within it is part of that car."""
@@ -117,14 +117,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
     judged = most_in_sector(frame, size, rules) & (range_m <= rules.max_range_m)
     range_m[standing_for] = objects["range_m"][matched]
 
-    # The object in whose box a proposal lies, the last one of several.
-    box_class = np.zeros(len(size), np.int64)
-    role = np.full(len(size), Role.COUNTED, np.int64)
-    held = overlap.held > 0.5 * size
-    for i in np.flatnonzero(truth.object_class):
-        box_class[held[i]] = truth.object_class[i]
-        role[held[i]] = truth.role[i]
-
+    box_class, role = _in_boxes(truth, overlap)
     further = role == Role.FURTHER
     further[overlap.best[matched & (truth.role == Role.FURTHER)]] = True
     neutral = ~np.isin(role, CLASSIFIED)
@@ -142,6 +135,17 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
         to_report=to_report,
         to_associate=to_report & ~(neutral & no_object) & ~further,
     )
+
+
+def _in_boxes(truth: FrameTruth, overlap: Overlap) -> tuple[Int, Int]:
+    """(P,) class and role of the object in whose box each proposal lies, the last one of several."""
+    box_class = np.zeros(len(overlap.size), np.int64)
+    role = np.full(len(overlap.size), Role.COUNTED, np.int64)
+    held = overlap.held > 0.5 * overlap.size
+    for i in np.flatnonzero(truth.object_class):
+        box_class[held[i]] = truth.object_class[i]
+        role[held[i]] = truth.role[i]
+    return box_class, role
 
 
 def _excused(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules) -> Bool:

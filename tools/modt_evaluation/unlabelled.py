@@ -7,6 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,8 +49,14 @@ RIDING_MPS = 2.5
 """Of the others, a faster one is taken for a cyclist."""
 
 
-Sighting = tuple[int, float, list[float], Float64, str]
-"""Frame, stamp [s], (7,) box in the level frame, T_world_sensor and reported class of a track without a label."""
+class Sighting(NamedTuple):
+    """A frame of a track that has no label there."""
+
+    frame: int
+    stamp_s: float
+    box: list[float]  # (7,) level frame
+    T_world_sensor: Float64  # (4, 4)
+    reported: str  # class
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +158,7 @@ def _sightings(run: RunRecord, truth: Truth) -> dict[int, list[Sighting]]:
             for track in record["tracks"]:
                 if track["proposal"] is not None and free[track["proposal"]]:
                     box = [float(track["box"][key]) for key in BOX_KEYS]
-                    rows[track["id"]].append((frame.index, stamp_s, box, pose, track["class"]))
+                    rows[track["id"]].append(Sighting(frame.index, stamp_s, box, pose, track["class"]))
         except BROKEN as error:
             raise broken(place, error) from None
     return rows
@@ -159,8 +166,8 @@ def _sightings(run: RunRecord, truth: Truth) -> dict[int, list[Sighting]]:
 
 def _mover(track: int, sightings: list[Sighting], T_sensor_level: Float64) -> Mover | None:
     """The track from where it starts to move to where it ends; None if it does not move."""
-    stamp_s = np.array([sighting[1] for sighting in sightings])
-    world = np.array([transform_boxes(T, np.array([box]))[0] for _, _, box, T, _ in sightings])
+    stamp_s = np.array([sighting.stamp_s for sighting in sightings])
+    world = np.array([transform_boxes(s.T_world_sensor, np.array([s.box]))[0] for s in sightings])
     rows = np.flatnonzero(moving(stamp_s, world))
     if not len(rows):
         return None

@@ -162,6 +162,8 @@ class BoxTracker:
     def _match(self, boxes: Float64, variance: Float64, strong: Bool) -> tuple[Int, Int]:
         """Rows and detections of the pairs: strong detections first, the others with the remaining tracks."""
         cost = self._cost(boxes, variance)
+        if strong.all():
+            return assign(cost)
         rows, columns = assign(np.where(strong, cost, MAX_COST))
         cost[rows] = MAX_COST
         cost[:, strong] = MAX_COST
