@@ -84,7 +84,7 @@ class Terrain:
     ) -> tuple[Float32, Int]:
         """Distances at which rays meet the ground between two distances each, and the cells."""
         for _ in range(N_HALVINGS):
-            middle = (near + far) / 2
+            middle = ((near + far) / 2).astype(np.float32, copy=False)
             cell = self._cells_along(start, direction, middle)
             below = start[2] + middle * direction[2] < self.height.ravel()[cell]
             near = np.where(below, near, middle)
