@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from array import array
 from dataclasses import fields
+from functools import lru_cache
 
 import numpy as np
 from numpy import float32, float64, int64
@@ -75,6 +76,7 @@ class NativeGeometryKernels(GeometryKernels):
         declare(library, _SIGNATURES)
         self.library: ctypes.CDLL = library
         self._tuning = _TUNING.of(tuning)
+        self._weights = lru_cache(_WEIGHTS.of)
 
     def upright_boxes(self, xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
         """(G, 7) boxes at (G,) headings, or across them, about groups of (3, K) points."""
@@ -156,7 +158,7 @@ class NativeGeometryKernels(GeometryKernels):
         shapes_a = _SHAPES.of(a, n=len(a))
         shapes_b = _SHAPES.of(b, n=len(b))
         self.library.modt_pair_costs(
-            shapes_a, shapes_b, covariance, variance, rows, columns, len(rows), _WEIGHTS.of(weights), self._tuning,
+            shapes_a, shapes_b, covariance, variance, rows, columns, len(rows), self._weights(weights), self._tuning,
             spread, cost, coverage,
         )  # fmt: skip
         return cost + np.log(spread) / 2, coverage

@@ -180,6 +180,7 @@ class Layout:
             for axis, size in enumerate(members[array_name].shape):
                 if isinstance(size, str):
                     self._places.setdefault(size, (size, None) if size in members else (array_name, axis))
+        self._where = list(self._places.values())
         self._shapes = lru_cache(maxsize=256)(self._shapes_of)
         alignment = "0q"
         self._pack = struct.Struct("".join(member.format for member in members.values()) + alignment).pack
@@ -194,9 +195,7 @@ class Layout:
         # Lists are compared whole, since this runs several times a frame. _refusal finds what differs.
         try:
             arrays = [values[name] for name in self._arrays]
-            sizes = tuple(
-                [values[name] if axis is None else values[name].shape[axis] for name, axis in self._places.values()]
-            )
+            sizes = tuple([values[name] if axis is None else values[name].shape[axis] for name, axis in self._where])
             if (
                 [numbers.shape for numbers in arrays] == self._shapes(sizes)
                 and [numbers.dtype for numbers in arrays] == self._dtypes
@@ -214,8 +213,8 @@ class Layout:
     def room(self, **numbers: int) -> Filled:
         """Fill a structure with arrays that hold nothing yet; its numbers are given, and are all sizes of arrays."""
         shapes = self._shapes_of(tuple(numbers[size] for size in self._places))
-        arrays = map(np.empty, shapes, self._dtypes)
-        return self(**numbers, **dict(zip(self._arrays, arrays, strict=True)))
+        arrays = list(map(np.empty, shapes, self._dtypes))
+        return self._filled(numbers | dict(zip(self._arrays, arrays, strict=True)), arrays)
 
     def from_param(self, filled: Filled) -> Any:
         """The structure as ctypes passes it."""
