@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from modt.class_sizes import PersonSize
 from modt.geometry.native_kernels import NativeGeometryKernels
+from modt.geometry.tuning import ShapeTuning
 from modt.native.library import FLOAT32, INT64, Array, Filled, Layout, Member, Number, Own, Rows, Signatures, declare
 from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, Members
@@ -118,10 +119,11 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     Args:
         library: the compiled library (`modt.native.library`).
         instructions: the set that it is compiled for.
+        tuning: how k-DOPs are compared.
     """
 
-    def __init__(self, library: ctypes.CDLL, instructions: str) -> None:
-        super().__init__(library)
+    def __init__(self, library: ctypes.CDLL, instructions: str, tuning: ShapeTuning = ShapeTuning()) -> None:
+        super().__init__(library, tuning)
         declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
         self._structures: dict[Hashable, Filled] = {}
