@@ -8,7 +8,7 @@ import pytest
 from modt.address import Scheme
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.schemes import POSES, SENSORS, SINKS, open_poses, open_sensor, open_sink
+from modt.schemes import POSES, SINKS, open_poses, open_sensor, open_sink
 
 
 def parts(address, *arguments):
@@ -18,11 +18,10 @@ def parts(address, *arguments):
 @pytest.mark.parametrize(
     ("table", "opened", "arguments"),
     [
-        (SENSORS, open_sensor, [frozenset({1})]),
         (SINKS, open_sink, []),
         (POSES, open_poses, [OdometryConfig()]),
     ],
-    ids=["sensor", "sink", "poses"],
+    ids=["sink", "poses"],
 )
 def test_the_opener_of_the_scheme_has_the_address_and_what_goes_with_it(table, opened, arguments, monkeypatch):
     monkeypatch.setitem(table, "echo", Scheme("echo://", parts, frozenset({"a"})))

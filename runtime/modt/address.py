@@ -35,8 +35,8 @@ class Address:
     def choice(self, name: str, *values: str) -> str:
         """Value of an option, by default the first of `values`; MisuseError for any other value."""
         if (value := self.option(name, values[0])) not in values:
-            forms = " or ".join(f"{name}={known}" for known in values)
-            raise MisuseError(self.text, f"{name} {value!r} is unknown", f"write {forms}")
+            choices = " or ".join(f"{name}={known}" for known in values)
+            raise MisuseError(self.text, f"{name} {value!r} is unknown", f"write {choices}")
         return value
 
 
@@ -57,21 +57,25 @@ class Scheme:
     extra: str = ""
 
 
+def forms(schemes: Mapping[str, Scheme]) -> str:
+    """Forms of the addresses of some schemes, for messages and help."""
+    return ", ".join(scheme.form for scheme in schemes.values())
+
+
 def parse_address(text: str, schemes: Mapping[str, Scheme]) -> Address:
     """Parse an address of one of these schemes.
 
     Raises:
         MisuseError: the scheme or an option is unknown, or the port is invalid.
     """
-    remedy = f"write one of {', '.join(scheme.form for scheme in schemes.values())}"
     try:
         parts = urlsplit(text)
         port = parts.port
         given = dict(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
     except ValueError as error:
-        raise MisuseError(text, f"no address ({error})", remedy) from None
+        raise MisuseError(text, f"no address ({error})", f"write one of {forms(schemes)}") from None
     if parts.scheme not in schemes:
-        raise MisuseError(text, f"scheme {parts.scheme!r} is unknown", remedy)
+        raise MisuseError(text, f"scheme {parts.scheme!r} is unknown", f"write one of {forms(schemes)}")
     allowed = schemes[parts.scheme].options
     unknown = sorted(set(given) - allowed)
     if unknown:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from modt.address import Address, Scheme, open_address
+from modt.sources.drivers import DRIVERS
 
 if TYPE_CHECKING:
     from modt.config import OdometryConfig
@@ -73,34 +74,30 @@ def _pose_socket(address: Address, config: OdometryConfig) -> PoseSource:
     return PoseSocket(open_socket(address), config, address.text)
 
 
-_PACKETS = _opener("sources.live.packets", "open_packets")
-SENSORS = {
-    "velodyne": Scheme(
-        "velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE&group=ADDRESS]",
-        _PACKETS,
-        frozenset({"model", "calibration", "group"}),
-        "velodyne",
-    ),
-    "ouster": Scheme(
-        "ouster://[HOST][:PORT][?metadata=FILE&group=ADDRESS]",
-        _PACKETS,
-        frozenset({"metadata", "group"}),
-        "ouster",
-    ),
-    "hesai": Scheme(
-        "hesai://[HOST][:PORT][?calibration=FILE&group=ADDRESS]",
-        _PACKETS,
-        frozenset({"calibration", "group"}),
-    ),
-    "livox": Scheme("livox://[HOST][:PORT][?group=ADDRESS]", _PACKETS, frozenset({"group"})),
-    "ros2": Scheme(
-        "ros2:///TOPIC[?domain=N&reliability=best_effort|reliable]",
-        _opener("sources.live.ros2", "open_ros2"),
-        frozenset({"domain", "reliability"}),
-        "ros2",
-    ),
-}
-_POINTS, _DETECTIONS = frozenset({"points"}), frozenset({"domain", "frame_id", "world_frame_id", "tracks"})
+_TOPIC = Scheme(
+    "ros2:///TOPIC[?domain=N&reliability=best_effort|reliable]",
+    _opener("sources.live.ros2", "open_ros2"),
+    frozenset({"domain", "reliability"}),
+    "ros2",
+)
+
+
+class _Sensors(Mapping[str, Scheme]):
+    """Schemes of sensors: of topics, and of each driver, which is imported when its scheme is asked for."""
+
+    def __getitem__(self, name: str) -> Scheme:
+        return _TOPIC if name == "ros2" else DRIVERS[name].scheme(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([*DRIVERS, "ros2"])
+
+    def __len__(self) -> int:
+        return len(DRIVERS) + 1
+
+
+SENSORS = _Sensors()
+_POINTS = frozenset({"points"})
+_DETECTIONS = frozenset({"domain", "frame_id", "world_frame_id", "tracks"})
 SINKS = {
     "stdout": Scheme("stdout://", _opener("sinks.frame_lines", "open_stdout")),
     "file": Scheme("file:///PATH", _opener("sinks.frame_lines", "open_file")),

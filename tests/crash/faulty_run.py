@@ -39,10 +39,10 @@ from modt.sinks.output import LineFile
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.tracks import SCHEMA, frame_line
+from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.live import live_stream
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PAUSE_S, PacketReader
-from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Frame

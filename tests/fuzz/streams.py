@@ -9,11 +9,11 @@ import pytest
 from modt.ros2.cdr import MessageError
 from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
-from modt.sources.packets.capture import Capture
-from modt.sources.packets.hesai import HesaiDecoder, read_angles
-from modt.sources.packets.livox import LivoxDecoder
+from modt.sources.drivers.hesai import HesaiDecoder, read_angles
+from modt.sources.drivers.livox import LivoxDecoder
+from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
-from modt.sources.packets.velodyne import VelodyneDecoder
+from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Reception
@@ -48,7 +48,7 @@ def pcap(folder: Path) -> Feed:
     parts = [ipv4(datagram[at : at + 40], identity=7, offset=at, more=not at) for at in (0, 40)]
     frames = [ethernet(part) for part in parts]
     fragmented = whole[:24] + b"".join(struct.pack("<IIII", 1, 0, len(f), len(f)) + f for f in frames)
-    return of_file(path, lambda: list(Capture(path)), whole, fragmented)
+    return of_file(path, lambda: list(PcapFile(path)), whole, fragmented)
 
 
 @target()
@@ -69,7 +69,7 @@ def livox_packets(folder: Path) -> Feed:
 @target()
 def ouster_packets(folder: Path) -> Feed:
     sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
-    from modt.sources.packets.ouster import OusterDecoder
+    from modt.sources.drivers.ouster import OusterDecoder
 
     info = sdk.SensorInfo.from_default(sdk.LidarMode._512x10)
     path = folder / "metadata.json"
@@ -90,7 +90,7 @@ def ouster_packets(folder: Path) -> Feed:
 @target()
 def ouster_metadata(folder: Path) -> Feed:
     sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
-    from modt.sources.packets.ouster import OusterDecoder
+    from modt.sources.drivers.ouster import OusterDecoder
 
     path = folder / "metadata.json"
     seed = sdk.SensorInfo.from_default(sdk.LidarMode._512x10).to_json_string()
@@ -157,7 +157,7 @@ def _of_packets(decoder: PacketDecoder, seed: bytes) -> Feed:
     """A sensor's packets with their lengths and times, by a decoder that has seen none."""
 
     def call(raw: bytes) -> None:
-        fresh, reception, at = decoder.again(), Reception(), 0
+        fresh, reception, at = decoder.fresh(), Reception(), 0
         while at + LENGTH.size <= len(raw):
             length, received_s = LENGTH.unpack_from(raw, at)
             at += LENGTH.size

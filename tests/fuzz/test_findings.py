@@ -12,9 +12,9 @@ from modt.classification.pointnet import read_model
 from modt.cli.status import read as read_status
 from modt.errors import ModtError
 from modt.ros2.cdr import CdrWriter
-from modt.sources.packets.hesai import read_angles
-from modt.sources.packets.ouster import OusterDecoder
-from modt.sources.packets.velodyne import VelodyneDecoder
+from modt.sources.drivers.hesai import read_angles
+from modt.sources.drivers.ouster import OusterDecoder
+from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.pose_source import read_poses
 from modt_profiling.reporting.records import read_records
 from tests.fuzz.execution import limits

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from modt.sources.packets import hesai, livox, velodyne
-from modt.sources.packets.capture import Capture
+from modt.sources.drivers import hesai, livox, velodyne
 from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.packets.turn_decoder import RECOGNISED_BY, TurnDecoder
 from tests.sources.packets.simulated import packets
 from tools.send.loops import HesaiStamps, VelodyneStamps
@@ -87,7 +87,7 @@ def _ouster() -> tuple[Any, Any, tuple[bytes, ...]]:
 
     info = sdk.SensorInfo(OUSTER_METADATA.read_text("utf-8"))
     layout = sdk.PacketFormat(info)
-    captured = [d.payload for d in Capture(OUSTER_METADATA.with_name(f"{OUSTER}_lb_n3.pcap")) if d.port == 7502]
+    captured = [d.payload for d in PcapFile(OUSTER_METADATA.with_name(f"{OUSTER}_lb_n3.pcap")) if d.port == 7502]
     ids = [layout.frame_id(np.frombuffer(p, np.uint8)) for p in captured]
     return sdk, info, tuple(p for p, frame in zip(captured, ids, strict=True) if frame == ids[0] + 1)
 
@@ -100,7 +100,7 @@ class OusterSensor:
 
     def decoder(self) -> PacketDecoder:
         """Decoder for a sensor that has just been switched on."""
-        from modt.sources.packets.ouster import OusterDecoder
+        from modt.sources.drivers.ouster import OusterDecoder
 
         self.frame = self.column = 0
         return OusterDecoder("sensor", OUSTER_METADATA)
@@ -168,5 +168,5 @@ def is_bounded(decoder: Any) -> bool:
         return len(decoder._packets) <= livox.MAX_PACKETS
     if not isinstance(decoder, TurnDecoder):
         return True  # Ouster's library keeps one frame
-    held = max(len(decoder._turn.entries), len(decoder._ending.entries)) <= decoder._most + 200
-    return held and max(len(decoder._first or []), len(decoder._others)) <= RECOGNISED_BY
+    held = max(len(decoder._turn.entries), len(decoder._ending.entries)) <= decoder._max_packets + 200
+    return held and max(len(decoder._unrecognised), len(decoder._foreign)) <= RECOGNISED_BY

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.sources.packets import hesai, livox
-from modt.sources.packets.packet_decoder import extra
+from modt.sources.drivers import hesai, livox
+from modt.sources.drivers.velodyne import STAMP_AT, azimuths
+from modt.sources.packets.packet_decoder import import_extra
 from modt.sources.packets.turn_decoder import TURN
-from modt.sources.packets.velodyne import STAMP_AT, azimuths
 from tools.send.faults import Timed
 
 
@@ -109,7 +109,7 @@ class HesaiStamps:
 
 def ouster_loop(payloads: Sequence[bytes], metadata: Path) -> Iterator[Timed]:
     """Repeat the frames of an Ouster's packets endlessly."""
-    sdk = extra("ouster.sdk.core", "ouster")
+    sdk = import_extra("ouster.sdk.core", "ouster")
     info = sdk.SensorInfo(metadata.read_text("utf-8"))
     layout, columns = sdk.PacketFormat(info), info.format.columns_per_packet
     period_ns = round(1e9 / info.format.fps)

@@ -24,7 +24,7 @@ from pathlib import Path
 
 from modt.cli.options import bounded, frames
 from modt.errors import ModtError
-from modt.sources.packets.capture import open_capture
+from modt.sources.capture import open_capture
 from modt.sources.recognise import CAPTURES, open_stream
 from modt_simulation.synthetic_stream import SyntheticStream
 from tools.options import parser

@@ -11,7 +11,7 @@ from modt.sources.scan_file import PERIOD_S, SUFFIXES, ScanStream
 from modt.sources.stream import Stream
 
 CAPTURES = frozenset({".pcap", ".cap", ".pcapng"})
-"""Suffixes of captures; for the last one `Capture` raises an error with its conversion."""
+"""Suffixes of captures; for the last one `PcapFile` raises an error with its conversion."""
 BAGS = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 """Suffixes of the files of ROS 2 recordings."""
 _LAS = ("is a LAS file", "convert it: pdal translate FILE scans/000000.ply, one file a sweep, and give scans")
@@ -45,9 +45,10 @@ def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, st
         ModtError: the recording cannot be read.
     """
     if path.is_file() and path.suffix in CAPTURES:
-        from modt.sources.packets.capture import open_capture
+        from modt.sources.capture import open_capture
+        from modt.sources.drivers import DRIVERS
 
-        _only(path, capture, {"model", "calibration", "metadata"})
+        _only(path, capture, {option for driver in DRIVERS.values() for option in driver.options})
         return open_capture(path, capture)
     if _is_bag(path):
         from modt.sources.bag import open_bag

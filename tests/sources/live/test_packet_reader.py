@@ -9,9 +9,9 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
+from modt.sources.drivers.hesai import HesaiDecoder
+from modt.sources.drivers.livox import LivoxDecoder
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
-from modt.sources.packets.hesai import HesaiDecoder
-from modt.sources.packets.livox import LivoxDecoder
 from tests.sources.packets.simulated import decoded, packets
 from tools.send.loops import endless
 

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture, Fragments
+from modt.sources.packets.ip_packets import Fragments
+from modt.sources.packets.pcap_file import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, PcapFile
 from tools.send.pcap_writer import ethernet, ipv4, udp
 
 PAYLOADS = [b"first", b"", bytes(range(256)) * 5]
@@ -26,14 +27,14 @@ def file_of(path, frames, *, order="<", magic=0xA1B2C3D4, link=ETHERNET):
 
 
 def payloads(path):
-    return [d.payload for d in Capture(path)]
+    return [d.payload for d in PcapFile(path)]
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize(("magic", "stamp_s"), [(0xA1B2C3D4, 7.25), (0xA1B23C4D, 7.00025)])
 def test_either_byte_order_and_unit(tmp_path, order, magic, stamp_s):
     frames = [ethernet(ipv4(udp(p, 2368))) for p in PAYLOADS]
-    read = list(Capture(file_of(tmp_path / "a.pcap", frames, order=order, magic=magic)))
+    read = list(PcapFile(file_of(tmp_path / "a.pcap", frames, order=order, magic=magic)))
     assert [d.payload for d in read] == PAYLOADS
     assert [d.stamp_s for d in read] == pytest.approx([stamp_s] * 3, abs=1e-9)
     assert {(d.source, d.port) for d in read} == {("192.0.2.1", 2368)}
@@ -68,7 +69,7 @@ TYPES = {4: b"\x08\x00", 6: b"\x86\xdd"}
     ids=["Ethernet", "VLAN", "two VLAN tags", "raw IP", "cooked", "cooked 2"],
 )
 def test_link_layers(tmp_path, link, frame, version):
-    (read,) = Capture(file_of(tmp_path / "a.pcap", [frame(TYPES[version], PACKETS[version])], link=link))
+    (read,) = PcapFile(file_of(tmp_path / "a.pcap", [frame(TYPES[version], PACKETS[version])], link=link))
     assert (read.source, read.port, read.payload) == (SOURCES[version], 2368, b"payload")
 
 
@@ -106,7 +107,7 @@ def test_packets_that_hold_no_datagram_are_skipped(tmp_path):
 
 def test_only_the_flow_wanted_is_read(tmp_path):
     frames = [ethernet(ipv4(udp(b"a", 2368))), ethernet(ipv4(udp(b"b", 8308)))]
-    capture = Capture(file_of(tmp_path / "a.pcap", frames))
+    capture = PcapFile(file_of(tmp_path / "a.pcap", frames))
     capture.flow = ("192.0.2.1", 8308)
     assert [d.payload for d in capture] == [b"b"]
 
@@ -118,7 +119,7 @@ def test_only_the_flow_wanted_is_read(tmp_path):
 def test_a_file_is_read_up_to_its_broken_end(tmp_path, end, flaw):
     path = file_of(tmp_path / "a.pcap", [ethernet(DATAGRAM)])
     path.write_bytes(path.read_bytes() + end)
-    capture = Capture(path)
+    capture = PcapFile(path)
     assert len(list(capture)) == 1
     assert flaw in capture.flaw
 
@@ -137,4 +138,4 @@ def test_another_file_is_refused(tmp_path, raw, cause):
     path = tmp_path / "a.pcap"
     path.write_bytes(raw)
     with pytest.raises(MisuseError, match=cause):
-        Capture(path)
+        PcapFile(path)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from modt.sources.packets.packet_decoder import DeviceClock
+from modt.sources.packets.device_clock import DeviceClock
 
 
 def host_s(clock, device_s, received_s):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import open_capture
-from modt.sources.packets.hesai import GET_CALIBRATION, REMEDY, HesaiDecoder, asked_angles, model_of, read_angles
+from modt.sources.capture import open_capture
+from modt.sources.drivers.hesai import GET_CALIBRATION, REMEDY, HesaiDecoder, asked_angles, model_of, read_angles
 from tests.sources.packets.simulated import BEGAN_S, decoded
 from tools.send.pcap_writer import write_capture
 

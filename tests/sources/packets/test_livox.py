@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from modt.sources.packets.livox import LivoxDecoder
+from modt.sources.drivers.livox import LivoxDecoder
 from tests.sources.packets.simulated import BEGAN_S, decoded
 
 STEP_S = 480e-6

@@ -9,9 +9,9 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
-from modt.sources.packets import ouster
-from modt.sources.packets.capture import Capture
-from modt.sources.packets.ouster import RESTARTED_BY, OusterDecoder
+from modt.sources.drivers import ouster
+from modt.sources.drivers.ouster import RESTARTED_BY, OusterDecoder
+from modt.sources.packets.pcap_file import PcapFile
 from tests.sources.packets.simulated import bearing_deg, decoded, equal
 
 sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
@@ -26,7 +26,7 @@ def metadata(kitti_root):
 @pytest.fixture
 def timed(kitti_root):
     """Three sweeps of 64 packets."""
-    datagrams = Capture(kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap")
+    datagrams = PcapFile(kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap")
     return [(d.stamp_s, d.payload) for d in datagrams if d.port == 7502]
 
 
@@ -110,7 +110,7 @@ def test_a_sweep_that_had_begun_is_dropped_and_a_lost_one_is_counted(timed, meta
 def test_each_packet_format(kitti_root, name, beams, turn_s, profile):
     path = kitti_root / "ouster" / f"{name}.pcap"
     decoder = OusterDecoder(name, path.with_suffix(".json"))
-    (sweep,), _ = decoded(decoder, ((d.stamp_s, d.payload) for d in Capture(path)))
+    (sweep,), _ = decoded(decoder, ((d.stamp_s, d.payload) for d in PcapFile(path)))
     assert sweep.complete
     assert sweep.turn_s == pytest.approx(turn_s, rel=0.01)
     assert (len(decoder.elevations_deg), decoder.profile) == (beams, profile)

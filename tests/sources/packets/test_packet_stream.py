@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import open_capture
+from modt.sources.capture import open_capture
 from modt.sources.recognise import open_stream
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
@@ -60,7 +60,11 @@ def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(
 
 @pytest.mark.parametrize(
     ("timed", "cause"),
-    [([], "no packets of a Velodyne"), ([(0.0, b"x")], "give metadata=FILE"), (packets()[:50], "no whole sweep")],
+    [
+        ([], "no packets of a Hesai or Livox or Ouster or Velodyne"),
+        ([(0.0, b"x")], "give metadata=FILE"),
+        (packets()[:50], "no whole sweep"),
+    ],
     ids=["empty", "others", "short"],
 )
 def test_a_capture_without_a_sweep_is_refused(tmp_path, timed, cause):

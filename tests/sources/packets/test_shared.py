@@ -10,12 +10,12 @@ import pytest
 from scipy.spatial import cKDTree
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import Capture
-from modt.sources.packets.hesai import HesaiDecoder, read_angles
-from modt.sources.packets.livox import LivoxDecoder
-from modt.sources.packets.ouster import OusterDecoder
+from modt.sources.drivers.hesai import HesaiDecoder, read_angles
+from modt.sources.drivers.livox import LivoxDecoder
+from modt.sources.drivers.ouster import OusterDecoder
+from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
-from modt.sources.packets.velodyne import VelodyneDecoder
+from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.point_cloud_file import read_pcd
 from modt.sources.stream import Reception
 from tests.sequences import makers
@@ -44,7 +44,7 @@ class Maker:
 
 
 def of_ouster() -> list[Timed]:
-    capture = Capture(makers.OUSTER_METADATA.with_name(f"{makers.OUSTER}_lb_n3.pcap"))
+    capture = PcapFile(makers.OUSTER_METADATA.with_name(f"{makers.OUSTER}_lb_n3.pcap"))
     return [(d.stamp_s, d.payload) for d in capture if d.port == 7502]
 
 

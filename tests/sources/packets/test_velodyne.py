@@ -7,8 +7,8 @@ import struct
 import numpy as np
 import pytest
 
-from modt.sources.packets.capture import Capture
-from modt.sources.packets.velodyne import VelodyneDecoder, model_named
+from modt.sources.drivers.velodyne import VelodyneDecoder, model_named
+from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.stream import Reception
 from tests.sources.packets.simulated import bearing_deg, decoded, equal, packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
@@ -129,7 +129,7 @@ def test_single_returns_of_any_kind_are_taken_but_no_unknown_model():
     ],
 )
 def test_real_captures(kitti_root, name, profile, n_sweeps, turn_s):
-    capture = Capture(kitti_root / "velodyne" / f"{name}.pcap")
+    capture = PcapFile(kitti_root / "velodyne" / f"{name}.pcap")
     decoder = VelodyneDecoder(name)
     sweeps, reception = decoded(decoder, ((d.stamp_s, d.payload) for d in capture if len(d.payload) == 1206))
     assert decoder.profile == profile

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import Capture, open_capture
+from modt.sources.capture import open_capture
+from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.recognise import open_stream
 from tests.sources import layouts
 from tests.sources.packets.simulated import packets
@@ -52,7 +53,7 @@ def test_a_capture_is_repeated_without_a_gap_or_sent_as_it_is(tmp_path, monkeypa
     assert len(stamps_s) == 9
     assert np.diff(stamps_s) == pytest.approx([0.1] * 8, abs=1e-3)
     assert stream.faults.count == 0
-    once = Capture(written(tmp_path, monkeypatch, path, "--once"))
+    once = PcapFile(written(tmp_path, monkeypatch, path, "--once"))
     assert [d.payload for d in once] == [p for _, p in packets()]
 
 
@@ -69,7 +70,7 @@ def test_a_stream_of_scans_is_sent_as_an_hdl_64e(tmp_path, monkeypatch):
 def test_an_ouster_is_repeated_without_a_gap(kitti_root, tmp_path):
     pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
     metadata = kitti_root / "ouster" / "OS-1-32-G_v2.1.1_1024x10.json"
-    payloads = [d.payload for d in Capture(metadata.with_suffix(".pcap"))]
+    payloads = [d.payload for d in PcapFile(metadata.with_suffix(".pcap"))]
     path = tmp_path / "loop.pcap"
     write_capture(path, (timed for timed, _ in zip(ouster_loop(payloads, metadata), range(256), strict=False)), 7502)
     stream = open_capture(path, {"metadata": str(metadata)})

@@ -10,7 +10,7 @@ from typing import Any
 
 from modt import host
 from modt.errors import ModtError, ScanError
-from modt.sources.packets.packet_decoder import DeviceClock
+from modt.sources.packets.device_clock import DeviceClock
 from modt.sources.scan_file import sanitised
 from modt.sources.stamp_check import StampCheck
 from modt.sources.stream import (

@@ -1,4 +1,4 @@
-"""Live Velodyne, Ouster, Hesai and Livox sensors, whose packets are received from a UDP socket."""
+"""Packets of a live sensor, received from a UDP socket."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from modt.address import Address
 from modt.errors import MisuseError
-from modt.sources.live.live_stream import LATE_S, LiveStream
-from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for, refuse
+from modt.sources.live.live_stream import LATE_S
+from modt.sources.packets.packet_decoder import PacketDecoder, refuse
 from modt.sources.stream import Reception, Sweep
 
 log = logging.getLogger(__name__)
@@ -20,8 +19,10 @@ log = logging.getLogger(__name__)
 MAX_BYTES = 65_535
 BUFFER_BYTES = 4 * 2**20
 """Requested receive buffer, which holds a second of the fastest sensor."""
-TIMESTAMP, TIMESPEC = 35, struct.Struct("@ll")
-"""SO_TIMESTAMPNS, which Python does not name; Linux reports the time of reception [s, ns]."""
+TIMESTAMP = 35
+"""SO_TIMESTAMPNS, which Python does not name: Linux reports the time of reception with each packet."""
+TIMESPEC = struct.Struct("@ll")
+"""Time of reception [s, ns]."""
 PAUSE_S = 0.01
 """Time without a packet after which a sensor with a blind sector may have ended its sweep [s]."""
 
@@ -41,9 +42,20 @@ class PacketReader:
         source: str | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        """`source`: address of the sensor, whose packets alone are used; None for any. `clock`: s since 1970."""
-        self.reception, self.decoder = Reception(), decoder
-        self._socket, self._source, self._clock = bound, source, clock
+        """Read from a bound socket.
+
+        Args:
+            bound: socket, which the reader closes.
+            decoder: decoder of the packets.
+            source: address of the sensor, whose packets alone are used; None for any.
+            clock: clock of the reception [s since 1970], of which a packet that waited is late. The timeout of `read`
+                runs on the monotonic clock.
+        """
+        self.reception = Reception()
+        self.decoder = decoder
+        self._socket = bound
+        self._source = source
+        self._clock = clock
 
     @property
     def profile(self) -> str | None:
@@ -56,24 +68,32 @@ class PacketReader:
         self._socket.settimeout(min(timeout_s, PAUSE_S))
         while True:
             try:
-                payload, facts, _, address = self._socket.recvmsg(MAX_BYTES, socket.CMSG_SPACE(TIMESPEC.size))
+                payload, ancillary, _, address = self._socket.recvmsg(MAX_BYTES, socket.CMSG_SPACE(TIMESPEC.size))
             except (TimeoutError, BlockingIOError):
                 sweeps = self.decoder.pause(self.reception)
                 if sweeps or time.monotonic() >= until_s:
                     return sweeps
                 continue
-            self.reception.messages += 1
-            now_s = self._clock()
-            received_s = next((s + 1e-9 * ns for _, _, raw in facts for s, ns in [TIMESPEC.unpack(raw)]), now_s)
-            if self._source not in (None, address[0]):
-                refuse(self.reception, self.decoder.name, "from another address than the sensor's")
-            elif now_s - received_s > LATE_S:
-                reason = "late: this process was stopped, or has too little CPU time, or the clock was set"
-                refuse(self.reception, self.decoder.name, reason)
-            elif sweeps := self.decoder.decode(received_s, payload, self.reception):
+            sweeps = self._decoded(payload, ancillary, address[0])
+            if sweeps or time.monotonic() >= until_s:
                 return sweeps
-            if time.monotonic() >= until_s:
-                return []
+
+    def _decoded(self, payload: bytes, ancillary: Sequence[tuple[int, int, bytes]], sender: str) -> Sequence[Sweep]:
+        """Sweeps completed by a packet, with the time of its reception, if the kernel tells it."""
+        self.reception.messages += 1
+        now_s = self._clock()
+        received_s = now_s
+        for _, _, raw in ancillary[:1]:
+            seconds, nanoseconds = TIMESPEC.unpack(raw)
+            received_s = seconds + 1e-9 * nanoseconds
+        if self._source not in (None, sender):
+            reason = "from another address than the sensor's"
+        elif now_s - received_s > LATE_S:
+            reason = "late: this process was stopped, or has too little CPU time, or the clock was set"
+        else:
+            return self.decoder.decode(received_s, payload, self.reception)
+        refuse(self.reception, self.decoder.name, reason)
+        return []
 
     def close(self) -> None:
         """Release the socket; a thread that waits in `read` notices it within PAUSE_S."""
@@ -118,20 +138,3 @@ def address_of(name: str, host: str) -> str | None:
         return socket.gethostbyname(host) if host else None
     except OSError as error:
         raise MisuseError(name, f"host {host} is unknown ({error.strerror})", "give the sensor's address") from None
-
-
-PORTS = {"velodyne": 2368, "hesai": 2368, "ouster": 7502, "livox": 56301}
-"""Default ports of the sensors."""
-
-
-def open_packets(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """Open the sensor at MAKER://[HOST][:PORT][?OPTION=VALUE&group=ADDRESS], with the options of `decoder_for`.
-
-    HOST is the sensor, whose packets alone are used. PORT is the port of this machine, or of a multicast group, to
-    which it sends them.
-    """
-    name, port = address.text, address.port or PORTS[address.scheme]
-    decoder = decoder_for(address.scheme, name, address.options, address.host)
-    source = address_of(name, address.host)
-    reader = PacketReader(bound_socket(name, port, address.option("group")), decoder, source)
-    return LiveStream(decoder.info(name, address.scheme), reader, cores=cores)

@@ -1,4 +1,4 @@
-"""Shared parts of the decoders of packets: interface, clock of the sensor, import of an extra."""
+"""Interface of the decoders of packets, and what they share: counted refusals, and the import of an extra."""
 
 from __future__ import annotations
 
@@ -6,60 +6,17 @@ import atexit
 import copy
 import gc
 import logging
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError, install
 from modt.sources.stream import Reception, StreamInfo, Sweep
 from modt.types import Self
 
-MAX_DRIFT = 1e-4
-"""Greatest drift of a sensor's clock against the host's [s/s]."""
-MAX_ERROR_S = 1.0
-"""Greatest difference of offsets [s]; beyond it a clock was set, or the sensor was restarted."""
-WINDOW_S, STEP_S = 10.0, 0.02
-"""If the least delay within WINDOW_S exceeds the known one by STEP_S, the host's clock was set forward [s]."""
-
-
-class DeviceClock:
-    """Follows the least delay between stamp and reception, so that a late reception moves no stamp.
-
-    Attributes:
-        offset_s: offset from the unwrapped time of the device to the host's clock [s].
-    """
-
-    def __init__(self, wrap_s: float = math.inf) -> None:
-        """`wrap_s`: time after which the stamps of the device start over [s]."""
-        self.offset_s = 0.0
-        self._wrap_s = wrap_s
-        self._last_s: float | None = None
-        self._since_s, self._least_s = 0.0, math.inf  # begin of a window, and the least offset in it
-
-    def unwrapped(self, device_s: float, received_s: float) -> float:
-        """Time of the device [s], continuous beyond `wrap_s`, for a stamp received at a time of the host."""
-        if self._last_s is None:
-            self._last_s, self._since_s, self.offset_s = device_s, device_s, received_s - device_s
-            return device_s
-        elapsed_s = math.remainder(device_s - self._last_s, self._wrap_s)
-        self._last_s += elapsed_s
-        offset_s = received_s - self._last_s
-        if abs(offset_s - self.offset_s) > MAX_ERROR_S:
-            self.offset_s = offset_s
-        else:
-            self.offset_s = min(self.offset_s + MAX_DRIFT * max(elapsed_s, 0.0), offset_s)
-        self._least_s = min(self._least_s, offset_s)
-        if not 0 <= self._last_s - self._since_s < WINDOW_S:
-            if self._least_s - self.offset_s > STEP_S:
-                self.offset_s = self._least_s
-            self._since_s, self._least_s = self._last_s, math.inf
-        return self._last_s
-
-
 MAX_QUOTED = 200
+"""Greatest length of a quoted message of a library's error."""
 
 log = logging.getLogger(__name__)
 
@@ -81,17 +38,22 @@ class PacketDecoder(ABC):
 
     def info(self, name: str, maker: str) -> StreamInfo:
         """Properties of a stream of the sensor's packets."""
-        layout, beams = f"{maker} packets", self.elevations_deg
-        return StreamInfo(name, layout, period_s=self.period_s, profile=self.profile, elevations_deg=beams)
+        return StreamInfo(
+            name,
+            f"{maker} packets",
+            period_s=self.period_s,
+            profile=self.profile,
+            elevations_deg=self.elevations_deg,
+        )
 
-    def again(self) -> Self:
+    def fresh(self) -> Self:
         """Decoder of the same sensor that has seen no packet yet."""
         other = copy.copy(self)
-        other._forget()
+        other._reset()
         return other
 
     @abstractmethod
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         """Return to the state before the first packet."""
 
     @abstractmethod
@@ -111,40 +73,7 @@ class PacketDecoder(ABC):
         return []
 
 
-def decoder_for(maker: str, name: str, options: Mapping[str, str], host: str = "") -> PacketDecoder:
-    """Decoder for the sensors of a maker, which is the scheme of their addresses.
-
-    `options` may name the model and calibration of a Velodyne, the calibration of a Hesai, the metadata of an Ouster.
-    The sensor at `host` is asked for missing options; it is empty where the sensor is not known.
-
-    Raises:
-        MisuseError: an option is invalid, there are no metadata, or an extra is missing.
-    """
-    calibration = Path(options["calibration"]) if options.get("calibration") else None
-    if maker == "livox":
-        from modt.sources.packets.livox import LivoxDecoder
-
-        return LivoxDecoder(name)
-    if maker == "hesai":
-        from modt.sources.packets.hesai import HesaiDecoder, asked_angles, read_angles
-
-        if calibration is not None:
-            return HesaiDecoder(name, read_angles(calibration))
-        return HesaiDecoder(name, asked_angles(host) if host else None)
-    if maker == "ouster":
-        from modt.sources.packets.ouster import OusterDecoder
-
-        metadata = options.get("metadata")
-        if not metadata and not host:
-            remedy = "write ouster://HOST, the sensor's address, to have it asked, or add ?metadata=FILE"
-            raise MisuseError(name, "its packets cannot be read without the sensor's metadata", remedy)
-        return OusterDecoder(name, Path(metadata) if metadata else host)
-    from modt.sources.packets.velodyne import VelodyneDecoder, model_named
-
-    return VelodyneDecoder(name, model_named(options["model"]) if options.get("model") else None, calibration)
-
-
-def extra(module: str, name: str) -> Any:
+def import_extra(module: str, name: str) -> Any:
     """Import a module of an extra that is built with nanobind.
 
     Such a library reports leaks at exit unless the objects that the loop has frozen are collected.

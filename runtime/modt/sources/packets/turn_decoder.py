@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
+from modt.sources.packets.device_clock import DeviceClock
+from modt.sources.packets.packet_decoder import PacketDecoder, refuse
 from modt.sources.stream import Reception, Sweep
 from modt.types import Float32, Float64, Self
 
@@ -67,14 +68,16 @@ class Turn:
     @property
     def reaches_seam(self) -> bool:
         """Whether the packet after its last one belongs to the next turn."""
-        last = self.entries[-1] if self.entries else None
-        return last is not None and last.end + (last.end - last.phase) // 4 > TURN
+        if not self.entries:
+            return False
+        last = self.entries[-1]
+        return last.end + (last.end - last.phase) // 4 > TURN
 
     def ends_at(self, holes: Float64) -> bool:
         """Whether the turn has reached the begin of one of the `holes` of the turn before."""
-        last = self.entries[-1] if self.entries else None
-        if last is None or self.before is None:
+        if not self.entries or self.before is None:
             return False
+        last = self.entries[-1]
         step = last.phase - self.entries[-2].phase if len(self.entries) > 1 else 0
         return bool((np.abs(last.phase - TURN - holes) <= step / 2).any())
 
@@ -89,14 +92,16 @@ class Turn:
 
     def shared(self, reach: int) -> list[Entry]:
         """Packets at its end that the next turn needs too."""
-        return [e.turned(-TURN) for e in self.entries if e.end > TURN - reach]
+        return [entry.turned(-TURN) for entry in self.entries if entry.end > TURN - reach]
 
     def times(self) -> tuple[float, float]:
         """Time at which the head looks straight ahead, and duration of the turn [s]."""
-        first, last = self.entries[0], self.entries[-1]
+        first = self.entries[0]
+        last = self.entries[-1]
         turn_s = (last.time_s - first.time_s) * TURN / max(last.phase - first.phase, 1)
-        near = min(self.entries, key=lambda e: abs(e.phase - AHEAD))
-        return near.time_s + (AHEAD - near.phase) / TURN * turn_s, turn_s
+        nearest = min(self.entries, key=lambda entry: abs(entry.phase - AHEAD))
+        ahead_s = nearest.time_s + (AHEAD - nearest.phase) / TURN * turn_s
+        return ahead_s, turn_s
 
     def missing(self, holes: Float64 | None) -> tuple[int, Float64, float]:
         """Number of missing packets, phases at which long holes begin, and interval between packets [s].
@@ -104,24 +109,27 @@ class Turn:
         A long hole that begins where one of the `holes` of the turn before did is a blind sector, and its packets are
         not missing. The same holds for every long hole if `holes` is None.
         """
-        own = [e for e in self.entries if 0 <= e.phase < TURN]
+        entries = [entry for entry in self.entries if 0 <= entry.phase < TURN]
         if self.before is not None:
-            own.insert(0, self.before.turned(-TURN))
-        times_s, phases = np.array([(e.time_s, e.phase) for e in own]).T
+            entries.insert(0, self.before.turned(-TURN))
+        times_s, phases = np.array([(entry.time_s, entry.phase) for entry in entries]).T
         gaps_s = np.diff(times_s)
         interval_s = float(np.median(gaps_s)) if len(gaps_s) else 0.0
         if interval_s <= 0:
             return 0, np.zeros(0), 0.0
-        count = np.rint(gaps_s / interval_s) - 1
-        long, begins = count >= MIN_HOLE, phases[:-1]
+        missing = np.rint(gaps_s / interval_s) - 1  # by gap
+        begins = phases[:-1]
+        long = missing >= MIN_HOLE
         if holes is None:
-            known = long
+            blind = long
         else:
-            step = 2 * float(np.median(np.diff(phases)))
-            known = long & (np.abs(begins[:, None] - holes) <= step).any(axis=1)
-        return int(count[~known].clip(0).sum()), begins[long], interval_s
+            tolerance = 2 * float(np.median(np.diff(phases)))
+            blind = long & (np.abs(begins[:, None] - holes) <= tolerance).any(axis=1)
+        return int(missing[~blind].clip(0).sum()), begins[long], interval_s
 
 
+Timed = tuple[float, bytes]
+"""Time of reception [s] and payload of a packet."""
 RECOGNISED_BY = 20
 """Number of packets by which the model is recognised."""
 LONGEST_TURN_S = 0.3
@@ -150,11 +158,14 @@ class TurnDecoder(PacketDecoder):
     _ending: Turn
 
     def __init__(self, name: str, profile: str | None = None) -> None:
-        self.name, self.profile = name, profile
-        self._first: list[tuple[float, bytes]] | None = []
-        self._signature: object = None
-        self._reach, self._packet_s, self._most = 0, 0.0, 0
-        self._forget()
+        self.name = name
+        self.profile = profile
+        self._unrecognised: list[Timed] = []  # packets kept until the model is recognised
+        self._signature: object = None  # of the model; None until it is recognised
+        self._reach = 0  # greatest angle between a beam and the head [0.01 deg]
+        self._packet_s = 0.0  # time from one packet to the next
+        self._max_packets = 0  # of a turn
+        self._reset()
 
     @staticmethod
     @abstractmethod
@@ -173,10 +184,10 @@ class TurnDecoder(PacketDecoder):
     def _table(self, entries: Sequence[Entry]) -> Float32:
         """(N, 4 or more) x, y, z [m, sensor frame], reflectance, and other columns of the points in packets."""
 
-    def again(self) -> Self:
+    def fresh(self) -> Self:
         """Decoder of the same sensor that has seen no packet yet."""
-        other = super().again()
-        other._first = None if self._first is None else []
+        other = super().fresh()
+        other._unrecognised = []
         return other
 
     def accepts(self, payload: bytes) -> bool:
@@ -189,10 +200,10 @@ class TurnDecoder(PacketDecoder):
         if signature is None:
             refuse(reception, self.name, f"no packet of a {self.maker}")
             return []
-        if self._first is None:
-            return self._packet(received_s, payload, signature, reception)
-        self._first.append((received_s, payload))
-        return self._begin(reception) if len(self._first) == RECOGNISED_BY else []
+        if self._signature is not None:
+            return self._of_known_model(received_s, payload, signature, reception)
+        self._unrecognised.append((received_s, payload))
+        return self._begin(reception) if len(self._unrecognised) == RECOGNISED_BY else []
 
     def pause(self, reception: Reception) -> Sequence[Sweep]:
         """Sweep, if the turn has reached the blind sector in which the turn before ended."""
@@ -204,87 +215,105 @@ class TurnDecoder(PacketDecoder):
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
         """Last sweep, if only the packet after it is missing."""
-        sweeps = [*self._begin(reception)] if self._first else []
+        sweeps = [*self._begin(reception)] if self._unrecognised else []
         for turn in (self._ending, self._turn):
             if turn.reaches_seam:
                 sweeps += self._sweeps(turn, reception)
-        self._forget()
+        self._reset()
         return sweeps
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         self._clock = DeviceClock(self.wrap_s)
         self._last = None
-        self._turn = self._ending = NO_TURN
-        self._holes: Float64 | None = None
-        self._interval_s, self._longest_s, self._heard_s = 0.0, LONGEST_TURN_S, -math.inf
-        self._others: list[tuple[float, bytes]] = []  # packets of another model since the last one of this model
+        self._turn = NO_TURN
+        self._ending = NO_TURN
+        self._holes: Float64 | None = None  # phases at which long holes of the last turn began
+        self._interval_s = 0.0  # between the packets of the last turn
+        self._longest_s = LONGEST_TURN_S
+        self._received_s = -math.inf  # when the last packet of this model came
+        self._foreign: list[Timed] = []  # packets of another model since then
 
     def _begin(self, reception: Reception) -> Sequence[Sweep]:
         """Recognise the model by the packets kept, and decode them."""
-        first, self._first = self._first or [], []
-        signature = self._recognise([payload for _, payload in first])
-        if signature is None:
-            for _ in first:
+        timed = self._unrecognised
+        self._unrecognised = []
+        self._signature = self._recognise([payload for _, payload in timed])
+        if self._signature is None:
+            for _ in timed:
                 refuse(reception, self.name, self.unknown)
             return []
-        self._signature, self._first = signature, None
-        self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # packets with two returns a firing
-        return [s for r, p in first for s in self._packet(r, p, self.signature(p), reception)]
+        self._max_packets = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # with two returns a firing
+        sweeps: list[Sweep] = []
+        for received_s, payload in timed:
+            sweeps += self._of_known_model(received_s, payload, self.signature(payload), reception)
+        return sweeps
 
-    def _packet(self, received_s: float, payload: bytes, signature: object, reception: Reception) -> Sequence[Sweep]:
+    def _of_known_model(
+        self, received_s: float, payload: bytes, signature: object, reception: Reception
+    ) -> Sequence[Sweep]:
+        """Sweeps completed by a packet, once a model is recognised."""
         if signature != self._signature:
-            return self._foreign(received_s, payload, reception)
-        entry, quiet_s = self._entry(received_s, payload), received_s - self._heard_s
+            return self._of_foreign_model(received_s, payload, reception)
+        entry = self._entry(received_s, payload)
+        quiet_s = received_s - self._received_s
         leap_s = 0.0 if self._last is None else entry.time_s - self._last.time_s
         if abs(leap_s) > self._longest_s and not 0 < leap_s < SILENCE_S and quiet_s < SILENCE_S:
             refuse(reception, self.name, "its stamp leaps: the clock was set, or lies")
-        self._heard_s = received_s
-        self._others.clear()
-        return self._follow(entry, reception)
+        self._received_s = received_s
+        self._foreign.clear()
+        return self._add(entry, reception)
 
-    def _foreign(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+    def _of_foreign_model(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
         """Refuse a packet of another model; adopt that model after RECOGNISED_BY packets without the known one."""
         refuse(reception, self.name, "of another model than the packets before")
-        if abs(received_s - self._heard_s) < SILENCE_S:
+        if abs(received_s - self._received_s) < SILENCE_S:
             return []
-        self._others.append((received_s, payload))
-        if len(self._others) < RECOGNISED_BY:
+        self._foreign.append((received_s, payload))
+        if len(self._foreign) < RECOGNISED_BY:
             return []
         log.warning("%s: packets are of another model, and those of the one before have ended", self.name)
-        self._first = self._others
-        self._forget()
+        self._unrecognised = self._foreign
+        self._reset()
         return self._begin(reception)
 
-    def _follow(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
+    def _add(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
         """Add a packet to its turn; return the sweep that ends with it."""
         last = self._last
         gap_s = 0.0 if last is None else entry.time_s - last.time_s
         if last is None or max(abs(gap_s), entry.time_s - self._turn.began_s) > self._longest_s:
             if self._interval_s and 0 < gap_s < SILENCE_S:
                 reception.lost += max(round(gap_s / self._interval_s) - 1, 0)
-            return self._start(entry)
-        if len(self._turn.entries) >= self._most:
+            return self._wait_for_cut(entry)
+        if len(self._turn.entries) >= self._max_packets:
             refuse(reception, self.name, "more than a turn has; do several sensors send to this port?")
-            return [] if gap_s < SAME_S else self._start(entry)
+            return [] if gap_s < SAME_S else self._wait_for_cut(entry)
         if gap_s < SAME_S:
             if not self._turn.insert(entry):
                 refuse(reception, self.name, "late or twice")
             return []
         self._last = entry
-        if entry.phase < last.phase - LEAST_TURN:
-            self._ending, self._turn = self._turn, Turn(entry.time_s, last, self._turn.shared(self._reach))
+        if entry.phase < last.phase - LEAST_TURN:  # the head has passed the seam
+            self._ending = self._turn
+            self._turn = Turn(entry.time_s, last, self._ending.shared(self._reach))
         self._turn.entries.append(entry)
-        if not self._ending.entries:
+        return self._ended(entry, reception)
+
+    def _ended(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
+        """Sweep of the turn before, once the latest packet lies beyond the reach of its beams."""
+        ending = self._ending
+        if not ending.entries:
             return []
         if entry.phase < self._reach:
-            self._ending.entries.append(entry.turned(TURN))
+            ending.entries.append(entry.turned(TURN))
             return []
-        ended, self._ending = self._ending, NO_TURN
-        return self._sweeps(ended, reception)
+        self._ending = NO_TURN
+        return self._sweeps(ending, reception)
 
-    def _start(self, entry: Entry) -> Sequence[Sweep]:
-        """Wait for the next cut, as the head may have turned any number of times."""
-        self._last, self._turn, self._ending = entry, Turn(entry.time_s, None, [entry]), NO_TURN
+    def _wait_for_cut(self, entry: Entry) -> Sequence[Sweep]:
+        """Begin with a packet and wait for the next cut, as the head may have turned any number of times."""
+        self._last = entry
+        self._turn = Turn(entry.time_s, None, [entry])
+        self._ending = NO_TURN
         self._longest_s = LONGEST_TURN_S
         return []
 
@@ -299,8 +328,9 @@ class TurnDecoder(PacketDecoder):
 
     def _points(self, entries: Sequence[Entry]) -> Float32:
         """Table of a turn, without the points that its first and last packets have beyond the seam."""
-        heads = [e for e in entries if e.phase < self._reach]
-        tails = [e for e in entries if e.end > TURN - self._reach]
-        table = self._table([e for e in entries if e.phase >= self._reach and e.end <= TURN - self._reach])
-        left, right = self._table(heads), self._table(tails)
-        return np.concatenate([left[left[:, 1] >= 0], table, right[right[:, 1] < 0]])
+        begin = self._reach
+        end = TURN - self._reach
+        first = self._table([entry for entry in entries if entry.phase < begin])
+        middle = self._table([entry for entry in entries if entry.phase >= begin and entry.end <= end])
+        last = self._table([entry for entry in entries if entry.end > end])
+        return np.concatenate([first[first[:, 1] >= 0], middle, last[last[:, 1] < 0]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from http.client import HTTPException
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,9 @@ import numpy as np
 
 from modt import assets
 from modt.errors import MisuseError
-from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, extra, one_line, refuse
+from modt.sources.drivers import Driver
+from modt.sources.packets.device_clock import DeviceClock
+from modt.sources.packets.packet_decoder import PacketDecoder, import_extra, one_line, refuse
 from modt.sources.stream import Reception, Sweep
 from modt.sources.text_file import read_text
 from modt.types import Bool, Float32
@@ -42,16 +44,17 @@ class OusterDecoder(PacketDecoder):
         Raises:
             MisuseError: ouster-sdk is missing, or the metadata cannot be read.
         """
-        self._sdk = extra("ouster.sdk.core", "ouster")
+        self._sdk = import_extra("ouster.sdk.core", "ouster")
         self.name = name
         self._info, self._format, self._project = self._read(metadata)
         info = self._info
-        self._width, self._columns = info.format.columns_per_frame, info.format.columns_per_packet
+        self._width = info.format.columns_per_frame
+        self._columns = info.format.columns_per_packet
         self._awaited = _awaited(info.format.column_window, self._width, self._columns)
         self.elevations_deg = tuple(map(float, info.beam_altitude_angles))
         self.period_s = 1.0 / (info.format.fps or 10)
         self.profile = _profile(info.prod_line)
-        self._forget()
+        self._reset()
 
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points that fits the metadata."""
@@ -75,35 +78,39 @@ class OusterDecoder(PacketDecoder):
             self._late += 1
             if self._late < RESTARTED_BY:
                 return []
-            self._forget()
+            self._reset()
         self._late = 0
         return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
 
     def _ended(self, number: int) -> bool:
         """Whether the number of a frame is before that of the present one; the batcher ignores such packets."""
-        numbers, present = self._format.max_frame_id + 1, self._frame.frame_id
+        numbers = self._format.max_frame_id + 1
+        present = self._frame.frame_id
         return bool(present >= 0 and 0 < (present - number) % numbers < numbers // 2)
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]
-        self._batcher, self._frame = self._sdk.FrameBatcher(self._info), self._sdk.LidarFrame(self._info, used)
+        self._batcher = self._sdk.FrameBatcher(self._info)
+        self._frame = self._sdk.LidarFrame(self._info, used)
         self._clock = DeviceClock()
         self._last_id: int | None = None
         self._late = 0
 
     def _read(self, metadata: Path | str) -> tuple[Any, Any, Any]:
         """SDK's objects for the metadata: sensor, format of its packets, and projection."""
-        sdk, remedy = self._sdk, "save the sensor's answer at /api/v1/sensor/metadata"
+        remedy = "save the sensor's answer at /api/v1/sensor/metadata"
         text = _asked(metadata) if isinstance(metadata, str) else read_text(metadata, remedy)
         try:
-            info = sdk.SensorInfo(text)
-            made = info, sdk.PacketFormat(info), sdk.XYZLutFloat(info, False)
+            info = self._sdk.SensorInfo(text)
+            packet_format = self._sdk.PacketFormat(info)
+            projection = self._sdk.XYZLutFloat(info, False)
         except Exception as error:  # errors of the SDK's parser have no common type
             raise MisuseError(metadata, f"no metadata of an Ouster ({one_line(error)})", remedy) from None
-        width, columns = info.format.columns_per_frame, info.format.columns_per_packet
+        width = info.format.columns_per_frame
+        columns = info.format.columns_per_packet
         if columns < 1 or width % columns:
             raise MisuseError(metadata, f"no metadata of an Ouster ({width} columns in packets of {columns})", remedy)
-        return made
+        return info, packet_format, projection
 
     def _flaw(self, payload: bytes) -> str | None:
         """Reason why a payload is no packet of points that fits the metadata; None if it is one."""
@@ -119,7 +126,8 @@ class OusterDecoder(PacketDecoder):
     def _sweeps(self, reception: Reception) -> Sequence[Sweep]:
         frame = self._frame
         missing: Bool = np.logical_and(self._awaited, frame.packet_timestamp == 0)
-        last_id, self._last_id = self._last_id, frame.frame_id
+        last_id = self._last_id
+        self._last_id = frame.frame_id
         if last_id is None and missing[self._awaited.argmax()]:
             return []
         lost = int(missing.sum())
@@ -186,3 +194,23 @@ def _profile(product_line: str) -> str | None:
     line = re.match(r"OS-?(\w+)-(\d+)", product_line)
     name = f"os{line[1]}-{line[2]}".lower() if line else ""
     return name if (assets.folder("profiles") / f"{name}.yaml").is_file() else None
+
+
+def _decoder(name: str, options: Mapping[str, str], host: str) -> OusterDecoder:
+    metadata = options.get("metadata")
+    if not metadata and not host:
+        remedy = "write ouster://HOST, the sensor's address, to have it asked, or add ?metadata=FILE"
+        raise MisuseError(name, "its packets cannot be read without the sensor's metadata", remedy)
+    return OusterDecoder(name, Path(metadata) if metadata else host)
+
+
+DRIVER = Driver(
+    maker="Ouster",
+    port=7502,
+    recognises=lambda payload: False,  # the metadata have the size and layout of the packets
+    decoder=_decoder,
+    options={"metadata": "FILE"},
+    identified_by="metadata",
+    beside={"metadata": ".json"},
+    extra="ouster",
+)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -15,20 +15,31 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from modt.errors import MisuseError, refuse_pipe
-from modt.sources.packets.packet_decoder import extra, one_line
+from modt.sources.drivers import Driver
+from modt.sources.packets.packet_decoder import import_extra, one_line
 from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, TurnDecoder
 from modt.types import Float32
 
 log = logging.getLogger(__name__)
 
 PACKET_BYTES = 1206
-BANKS, AZIMUTHS = slice(1, 1200, 100), Struct("<" + 12 * "2xH96x")
-STAMP_AT, RETURN_AT, IDENTITY_AT = 1200, 1204, 1205
+BANKS = slice(1, 1200, 100)
+"""Second bytes of the headers of the blocks."""
+AZIMUTHS = Struct("<" + 12 * "2xH96x")
+"""Azimuths of the blocks."""
+STAMP_AT = 1200
+"""Offset of the time since the full hour [us, 4 bytes]."""
+RETURN_AT = 1204
+"""Offset of the return mode."""
+IDENTITY_AT = 1205
+"""Offset of the byte that names the model."""
 DUAL = 0x39
 """Return mode of two returns a firing."""
 PACE_TOLERANCE = 0.05
 """Relative difference of the interval between packets, beyond which they are of another model."""
-UPPER, UPPER_LOWER = frozenset({0xEE}), frozenset({0xEE, 0xDD})
+UPPER = frozenset({0xEE})
+"""Banks of lasers in a packet of 16 or 32 lasers. Those of 64 and 128 lasers have two and four banks."""
+UPPER_LOWER = frozenset({0xEE, 0xDD})
 FOUR_BANKS = UPPER_LOWER | {0xCC, 0xBB}
 RETURN = 7
 """Column of the library's table that numbers the return of a firing."""
@@ -118,7 +129,8 @@ def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> 
     signatures = [signature_of(payload) for payload in payloads]
     signature, _ = Counter(signatures).most_common(1)[0]
     stated = next((model for model in _MODELS if model.signature == signature), None)
-    paced = _by_pace([p for p, s in zip(payloads, signatures, strict=True) if s == signature], stated)
+    alike = [payload for payload, other in zip(payloads, signatures, strict=True) if other == signature]
+    paced = _by_pace(alike, stated)
     used = declared or paced
     if used is not None and not (used.signature == signature and (paced is stated or stated is None)):
         facts = f"its packets say {stated.name if stated else 'nothing known'}"
@@ -143,7 +155,8 @@ def _by_pace(payloads: Sequence[bytes], stated: Model | None) -> Model | None:
 class VelodyneDecoder(TurnDecoder):
     """Turns of a Velodyne; of two returns of a firing the stronger one is taken."""
 
-    maker, wrap_s = "Velodyne", 3600.0
+    maker = "Velodyne"
+    wrap_s = 3600.0
     unknown = "of a model of Velodyne that is unknown; give model="
     signature = staticmethod(signature_of)
 
@@ -153,8 +166,9 @@ class VelodyneDecoder(TurnDecoder):
         Raises:
             MisuseError: velodyne-decoder is missing, or the calibration cannot be read.
         """
-        self._library = extra("velodyne_decoder", "velodyne")
-        self._declared, self._calibration = model, None if calibration is None else self._read(calibration)
+        self._library = import_extra("velodyne_decoder", "velodyne")
+        self._declared = model
+        self._calibration = None if calibration is None else self._read(calibration)
         self._identity: bytes | None = None
         super().__init__(name, model.profile if model else None)
 
@@ -172,7 +186,8 @@ class VelodyneDecoder(TurnDecoder):
             return None
         self.profile = model.profile
         self._identity = None if model.signature.identity is None else bytes([model.signature.identity])
-        self._reach, self._packet_s = model.reach, model.interval_us * 1e-6
+        self._reach = model.reach
+        self._packet_s = model.interval_us * 1e-6
         calibration = self._calibration
         if calibration is None and model.calibration is not None:
             calibration = self._library.get_bundled_calibration(model.calibration)
@@ -201,4 +216,22 @@ class VelodyneDecoder(TurnDecoder):
         """(N, 8) table of the library."""
         if not entries:  # the library would crash
             return np.zeros((0, 8), np.float32)
-        return np.asarray(self._decoder.decode(self._library.PacketVector([e.packet for e in entries]))[1])
+        packets = self._library.PacketVector([entry.packet for entry in entries])
+        return np.asarray(self._decoder.decode(packets)[1])
+
+
+def _decoder(name: str, options: Mapping[str, str], _host: str) -> VelodyneDecoder:
+    model = model_named(options["model"]) if options.get("model") else None
+    calibration = Path(options["calibration"]) if options.get("calibration") else None
+    return VelodyneDecoder(name, model, calibration)
+
+
+DRIVER = Driver(
+    maker=VelodyneDecoder.maker,
+    port=2368,
+    recognises=lambda payload: signature_of(payload) is not None,
+    decoder=_decoder,
+    options={"model": "MODEL", "calibration": "FILE"},
+    identified_by="model",
+    extra="velodyne",
+)

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
+from modt.sources.drivers import Driver
+from modt.sources.packets.device_clock import DeviceClock
+from modt.sources.packets.packet_decoder import PacketDecoder, refuse
 from modt.sources.stream import Reception, Sweep
 from modt.types import Float32
 
@@ -39,13 +41,13 @@ class LivoxDecoder(PacketDecoder):
     """
 
     profile = "mid-360"
-    _window: int
-    _before_ns: int | None
-    _packets: dict[int, bytes]
+    _window: int  # number of the present sweep, since time 0 of the sensor
+    _before_ns: int | None  # time of the last packet of the sweep before; None where it was not received
+    _packets: dict[int, bytes]  # packets of the present sweep by their time [ns]
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self._forget()
+        self._reset()
 
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points of a Livox."""
@@ -57,7 +59,8 @@ class LivoxDecoder(PacketDecoder):
             refuse(reception, self.name, "no packet of points of a Livox")
             return []
         stamp_ns = HEADER.unpack_from(payload)[-1]
-        ahead = stamp_ns // SWEEP_NS - self._window
+        window = stamp_ns // SWEEP_NS
+        ahead = window - self._window
         late = ahead == -1 or stamp_ns in self._packets
         if late or (ahead == 0 and len(self._packets) >= MAX_PACKETS):
             reason = "late or twice" if late else "more than a turn has; do several sensors send to this port?"
@@ -70,28 +73,33 @@ class LivoxDecoder(PacketDecoder):
         elif ahead:
             sweeps = self._sweep(reception)
         if ahead:
-            self._window, self._packets = stamp_ns // SWEEP_NS, {}
+            self._window = window
+            self._packets = {}
         self._packets[stamp_ns] = payload
         return sweeps
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
         """Last sweep, if only the packet after it is missing."""
-        stamps_ns = sorted(self._packets)
-        step_ns = stamps_ns[-1] - stamps_ns[-2] if len(stamps_ns) > 1 else 0
-        ends = len(stamps_ns) > 1 and (stamps_ns[-1] + step_ns) // SWEEP_NS > self._window
-        sweeps = self._sweep(reception) if ends else []
-        self._forget()
+        sweeps: list[Sweep] = []
+        if len(self._packets) > 1:
+            *_, before_ns, last_ns = sorted(self._packets)
+            next_ns = last_ns + (last_ns - before_ns)
+            if next_ns // SWEEP_NS > self._window:
+                sweeps = self._sweep(reception)
+        self._reset()
         return sweeps
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         self._clock = DeviceClock()
         self._window = -2 * MAX_GAP
-        self._before_ns, self._packets = None, {}
+        self._before_ns = None
+        self._packets = {}
 
     def _sweep(self, reception: Reception) -> list[Sweep]:
         """Sweep of the packets kept, if its begin was received."""
         stamps_ns = sorted(self._packets)
-        before_ns, self._before_ns = self._before_ns, stamps_ns[-1]
+        before_ns = self._before_ns
+        self._before_ns = stamps_ns[-1]
         if before_ns is None:
             return []
         gaps_ns = np.diff([before_ns, *stamps_ns])
@@ -119,12 +127,21 @@ def _points(payload: bytes) -> Float32:
     table = table[~LOW_CONFIDENCE[table["tag"]]]
     points = np.empty((len(table), 4), np.float32)
     if "depth" in (row.names or ()):
-        zenith, azimuth = np.deg2rad(table["zenith"] * 0.01), np.deg2rad(table["azimuth"] * 0.01)
+        zenith = np.deg2rad(table["zenith"] * 0.01)
+        azimuth = np.deg2rad(table["azimuth"] * 0.01)
         across = table["depth"] * np.sin(zenith)
-        units = across * np.cos(azimuth), across * np.sin(azimuth), table["depth"] * np.cos(zenith)
+        columns = [across * np.cos(azimuth), across * np.sin(azimuth), table["depth"] * np.cos(zenith)]
     else:
-        units = tuple(table[axis] for axis in _AXES)
-    for i, column in enumerate(units):
+        columns = [table[axis] for axis in _AXES]
+    for i, column in enumerate(columns):
         points[:, i] = column * unit_m
     points[:, 3] = table["reflectance"] / 255
     return points[points[:, :3].any(axis=1)]
+
+
+DRIVER = Driver(
+    maker="Livox",
+    port=56301,
+    recognises=is_packet,
+    decoder=lambda name, _options, _host: LivoxDecoder(name),
+)

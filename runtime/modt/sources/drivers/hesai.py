@@ -6,7 +6,7 @@ import logging
 import math
 import socket
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,11 +14,13 @@ from struct import Struct
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.errors import MisuseError
+from modt.sources.drivers import Driver
 from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, TurnDecoder
 from modt.sources.text_file import read_lines
-from modt.types import Float32, Float64
+from modt.types import Float32, Float64, Int
 
 log = logging.getLogger(__name__)
 
@@ -139,8 +141,12 @@ def read_angles(path: Path) -> Float64:
     return _angles(path, read_lines(path, REMEDY))
 
 
-PTC_PORT, GET_CALIBRATION, ANSWER_BYTES = 9347, b"\x47\x74\x05\x00" + bytes(4), 8
-"""A request over TCP holds magic bytes, a command, 0 and a length. In the answer an error code replaces the 0."""
+PTC_PORT = 9347
+"""TCP port at which a sensor answers requests."""
+GET_CALIBRATION = b"\x47\x74\x05\x00" + bytes(4)
+"""A request holds magic bytes, a command, 0 and a length. In the answer an error code replaces the 0."""
+ANSWER_BYTES = 8
+"""Size of the head of an answer."""
 TIMEOUT_S = 3.0
 MAX_ANSWER_BYTES = 65_536
 
@@ -151,7 +157,8 @@ def asked_angles(host: str, port: int = PTC_PORT) -> Float64 | None:
         with socket.create_connection((host, port), TIMEOUT_S) as sensor, sensor.makefile("rb") as answer:
             sensor.sendall(GET_CALIBRATION)
             head = answer.read(ANSWER_BYTES)
-            text = b"" if head[3:4] != b"\0" else answer.read(min(int.from_bytes(head[4:], "big"), MAX_ANSWER_BYTES))
+            size = int.from_bytes(head[4:], "big")
+            text = answer.read(min(size, MAX_ANSWER_BYTES)) if head[3:4] == b"\0" else b""
         return _angles(f"{host}:{port}", text.decode("ascii", "replace").splitlines())
     except (OSError, MisuseError, ValueError) as error:
         log.warning("%s: the sensor does not give its calibration on port %d (%s)", host, port, error)
@@ -159,6 +166,7 @@ def asked_angles(host: str, port: int = PTC_PORT) -> Float64 | None:
 
 
 def _angles(origin: object, lines: Sequence[str]) -> Float64:
+    """(n, 2) elevation and azimuth of the channels [deg] from the lines of a calibration."""
     rows = []
     for line in lines:
         try:
@@ -175,7 +183,8 @@ def _angles(origin: object, lines: Sequence[str]) -> Float64:
 class HesaiDecoder(TurnDecoder):
     """Turns of a Hesai; the return with the greatest reflectance represents a firing."""
 
-    maker, wrap_s = "Hesai", 86_400.0
+    maker = "Hesai"
+    wrap_s = 86_400.0
     signature = staticmethod(model_of)
 
     def __init__(self, name: str, angles_deg: Float64 | None = None) -> None:
@@ -186,7 +195,8 @@ class HesaiDecoder(TurnDecoder):
         self.elevations_deg = None if angles_deg is None else tuple(angles_deg[:, 0].tolist())
 
     def _recognise(self, payloads: Sequence[bytes]) -> Model | None:
-        model, _ = Counter(sender for payload in payloads if (sender := model_of(payload))).most_common(1)[0]
+        senders = Counter(sender for payload in payloads if (sender := model_of(payload)))
+        ((model, _),) = senders.most_common(1)
         angles_deg = self._given_deg
         if angles_deg is None and model.elevations_deg:
             log.warning("%s: beams as of any %s; %s", self.name, model.name, REMEDY)
@@ -195,7 +205,8 @@ class HesaiDecoder(TurnDecoder):
             given = "is not given" if angles_deg is None else f"has {len(angles_deg)} channels"
             self.unknown = f"the calibration of this {model.name} {given}; {REMEDY}"
             return None
-        self._model, self.profile = model, model.profile
+        self._model = model
+        self.profile = model.profile
         self._azimuth_deg = angles_deg[:, 1].astype(np.float32)
         elevation = np.deg2rad(angles_deg[:, 0])
         self._cos = np.cos(elevation).astype(np.float32)
@@ -205,15 +216,16 @@ class HesaiDecoder(TurnDecoder):
         return model
 
     def _entry(self, received_s: float, payload: bytes) -> Entry:
-        model, at = self._model, self._model.layout
-        firings = model.blocks // self._returns(payload)
-        _, _, _, hour, minute, second = payload[model.tail + at.date :][:6]
-        micros = int.from_bytes(payload[model.tail + at.micros :][:4], "little")
+        model = self._model
+        tail = payload[model.tail :]
+        _, _, _, hour, minute, second = tail[model.layout.date :][:6]
+        micros = int.from_bytes(tail[model.layout.micros :][:4], "little")
         sent_s = hour * 3600.0 + minute * 60.0 + second + micros * 1e-6
+        firings = model.blocks // self._returns(payload)
         time_s = self._clock.unwrapped(sent_s, received_s) - (firings - 1) * model.firing_us * 1e-6
         first, *_, last = model.azimuths.unpack_from(payload)
         phase = (first + AHEAD) % TURN
-        return Entry(time_s, phase, phase + (last - first) % TURN, payload[: model.tail + at.mode + 1])
+        return Entry(time_s, phase, phase + (last - first) % TURN, payload[: model.tail + model.layout.mode + 1])
 
     def _returns(self, payload: bytes) -> int:
         """Number of returns a firing, each in one of as many consecutive blocks."""
@@ -226,6 +238,7 @@ class HesaiDecoder(TurnDecoder):
         if not entries:
             return np.zeros((0, 4), np.float32)
         returns = self._returns(entries[0].packet)
+        unit_mm = UNIT_MM if model.layout.unit is None else entries[0].packet[model.layout.unit]
         raw = b"".join(entry.packet[: model.tail] for entry in entries)
         blocks = np.frombuffer(raw, model.body)["blocks"].reshape(-1, returns)
         cells = blocks["cells"]  # (firings, returns, channels)
@@ -233,14 +246,36 @@ class HesaiDecoder(TurnDecoder):
         distance = np.take_along_axis(cells["distance"], best, axis=1)[:, 0]
         reflectance = np.take_along_axis(cells["reflectance"], best, axis=1)[:, 0]
         firing, channel = np.nonzero(distance)
-        azimuth = np.deg2rad(blocks["azimuth"][firing, 0] * np.float32(0.01) + self._azimuth_deg[channel])
-        unit_mm = UNIT_MM if model.layout.unit is None else entries[0].packet[model.layout.unit]
+        azimuth_deg = blocks["azimuth"][firing, 0] * np.float32(0.01)
         distance_m = distance[firing, channel] * np.float32(unit_mm / 1000)
+        return self._cartesian(channel, azimuth_deg, distance_m, reflectance[firing, channel])
+
+    def _cartesian(
+        self, channel: Int, azimuth_deg: Float32, distance_m: Float32, reflectance: NDArray[np.uint8]
+    ) -> Float32:
+        """(N, 4) points of (N,) returns, by channel, azimuth of the head, distance and reflectance in bytes."""
+        azimuth = np.deg2rad(azimuth_deg + self._azimuth_deg[channel])
         across_m = distance_m * self._cos[channel]
         points = np.empty((len(distance_m), 4), np.float32)
         points[:, 0] = across_m * np.cos(azimuth)
         points[:, 1] = -across_m * np.sin(azimuth)
         points[:, 2] = distance_m * self._sin[channel]
-        points[:, 3] = reflectance[firing, channel]
+        points[:, 3] = reflectance
         points[:, 3] *= np.float32(1 / 255)
         return points
+
+
+def _decoder(name: str, options: Mapping[str, str], host: str) -> HesaiDecoder:
+    if options.get("calibration"):
+        return HesaiDecoder(name, read_angles(Path(options["calibration"])))
+    return HesaiDecoder(name, asked_angles(host) if host else None)
+
+
+DRIVER = Driver(
+    maker=HesaiDecoder.maker,
+    port=2368,
+    recognises=lambda payload: model_of(payload) is not None,
+    decoder=_decoder,
+    options={"calibration": "FILE"},
+    beside={"calibration": ".csv"},
+)

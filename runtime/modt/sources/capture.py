@@ -1,0 +1,132 @@
+"""Captures of a sensor's packets as streams."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+from modt.errors import MisuseError
+from modt.sources.drivers import DRIVERS, Driver
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.pcap_file import PcapFile
+from modt.sources.stamp_check import StampCheck
+from modt.sources.stream import Faults, Reception, StreamInfo, Sweep
+from modt.types import Frame, Self
+
+
+class PacketStream:
+    """Frames of one sensor's packets in a PCAP file; their number is known after they have been read.
+
+    Attributes:
+        info, faults: as in Stream.
+        capture, decoder: datagrams of the sensor, and a decoder of the same sensor.
+        reception: counts of the last pass.
+    """
+
+    def __init__(self, info: StreamInfo, capture: PcapFile, decoder: PacketDecoder, first: int = 0) -> None:
+        """Select the frames with first <= index < info.end; each pass decodes with a fresh copy of the decoder."""
+        self.info = info
+        self.faults = Faults()
+        self.reception = Reception()
+        self.capture = capture
+        self.decoder = decoder
+        self._first = first
+
+    def __iter__(self) -> Iterator[Frame]:
+        self.reception = Reception()
+        path = str(self.capture.path)
+        stamps = StampCheck()
+        lost = 0
+        index = -1
+        sweeps = islice(_decoded(self.capture, self.decoder.fresh(), self.reception), self.info.end)
+        for index, (arrived_s, sweep) in enumerate(sweeps):
+            missing = self.reception.lost - lost
+            lost = self.reception.lost
+            if index < self._first:
+                stamps.doubt(sweep.stamp_s, arrived_s)
+                continue
+            flaws = [f"{missing} packets are missing"] if missing else []
+            if frame := stamps.frame(sweep, arrived_s, index, path, self.faults, flaws):
+                yield frame
+        if index + 1 != self.info.end:  # the file was read to its end
+            refused = [f"{count} packets refused: {reason}" for reason, count in self.reception.refused.items()]
+            for flaw in [*refused, *filter(None, [self.capture.flaw])]:
+                self.faults.report(index + 1, path, flaw, skipped=False)
+
+    def between(self, first: int, last: int | None) -> Self:
+        """Frames with first <= index < last; the file is read up to the last one."""
+        first = max(first, self._first)
+        end = min((index for index in (last, self.info.end) if index is not None), default=None)
+        empty = end is not None and end <= first
+        info = replace(self.info, end=end, n_frames=0 if empty else None)
+        return type(self)(info, self.capture, self.decoder, first)
+
+
+def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
+    """Stream of the sensor whose packets come first in a PCAP file.
+
+    `options` are those of the sensor's driver. Some of them default to files with the name of the capture.
+
+    Raises:
+        MisuseError: no PCAP file, no packets of a sensor, no whole sweep; an invalid option, a missing extra.
+    """
+    capture = PcapFile(path)
+    driver = _driver_of(capture, options)
+    decoder = driver.decoder(path.stem, driver.options_beside(path) | dict(options), "")
+    capture.flow = next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
+    if capture.flow is None:
+        raise _without_packets(capture, driver.maker, f"give the {driver.identified_by} of the sensor that sent them")
+    reception = Reception()
+    _, first = next(_decoded(capture, decoder, reception), (0.0, None))
+    if first is None:
+        why, _, remedy = max(reception.refused, key=reception.refused.__getitem__, default="").partition("; ")
+        cause = f"no whole sweep ({driver.maker})" + (f", packets are refused: {why}" if why else "")
+        raise MisuseError(path, cause, remedy or "record at least two turns of the sensor")
+    info = decoder.info(path.stem, driver.maker)
+    return PacketStream(replace(info, period_s=round(first.turn_s, 3) or info.period_s), capture, decoder)
+
+
+def _driver_of(capture: PcapFile, options: Mapping[str, str]) -> Driver:
+    """Driver that an option or a file beside the capture identifies, else that of the first packet of a sensor.
+
+    Raises:
+        MisuseError: there is no packet of a sensor.
+    """
+    drivers = list(DRIVERS.values())
+    for given in (options, {option for driver in drivers for option in driver.options_beside(capture.path)}):
+        for driver in drivers:
+            if driver.identified_by in given:
+                return driver
+    for datagram in capture:
+        for driver in drivers:
+            if driver.recognises(datagram.payload):
+                return driver
+    remedies = [
+        f"for an {driver.maker}, save its {option} as {capture.path.with_suffix(suffix)} or give {option}=FILE"
+        for driver in drivers
+        for option, suffix in driver.beside.items()
+        if option == driver.identified_by
+    ]
+    raise _without_packets(capture, " or ".join(driver.maker for driver in drivers), "; ".join(remedies))
+
+
+def _without_packets(capture: PcapFile, maker: str, remedy: str) -> MisuseError:
+    """Error of a capture without packets of a maker, with what it holds instead."""
+    seen = Counter(f"{len(d.payload)} bytes to port {d.port}" for d in capture)
+    there = f"{seen.total()} UDP datagrams, mostly of {seen.most_common(1)[0][0]}" if seen else "no UDP datagram"
+    return MisuseError(capture.path, f"no packets of a {maker} ({there})", remedy)
+
+
+def _decoded(capture: PcapFile, decoder: PacketDecoder, reception: Reception) -> Iterator[tuple[float, Sweep]]:
+    """Time of the completing packet [s] and sweep, in the order of the capture."""
+    arrived_s = 0.0
+    for datagram in capture:
+        reception.messages += 1
+        arrived_s = datagram.stamp_s
+        for sweep in decoder.decode(arrived_s, datagram.payload, reception):
+            yield arrived_s, sweep
+    for sweep in decoder.finish(reception):
+        yield arrived_s, sweep

@@ -1,0 +1,39 @@
+"""A driver of a made-up maker, which the test lays beside the drivers of modt."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from modt.sources.drivers import Driver
+from modt.sources.packets.packet_decoder import PacketDecoder, refuse
+from modt.sources.stream import Reception, Sweep
+
+MAGIC = b"ACME"
+
+
+def is_packet(payload: bytes) -> bool:
+    return payload.startswith(MAGIC) and not (len(payload) - len(MAGIC)) % 16
+
+
+class AcmeDecoder(PacketDecoder):
+    """A packet is a whole sweep: float32 rows of x, y, z and reflectance."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def accepts(self, payload: bytes) -> bool:
+        return is_packet(payload)
+
+    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+        if not is_packet(payload):
+            refuse(reception, self.name, "no packet of an Acme")
+            return []
+        return [Sweep(received_s, np.frombuffer(payload, np.float32, offset=len(MAGIC)).reshape(-1, 4).copy())]
+
+    def _reset(self) -> None:
+        """No packet depends on those before it."""
+
+
+DRIVER = Driver(
+    maker="Acme", port=4711, recognises=is_packet, decoder=lambda name, _options, _host: AcmeDecoder(name)
+)
