@@ -57,6 +57,42 @@ def find_poses(
     return (topic, T_base_sensor), ()
 
 
+class RecordedPoses:
+    """Poses of a recording on the clock of its sweeps, which begins at a stamp and a recorded time [s]."""
+
+    def __init__(self, poses: Poses | None, began: tuple[float, float]) -> None:
+        self.topics: set[str] = set()
+        self._T_base_sensor = np.eye(4)
+        if poses is not None:
+            topic, self._T_base_sensor = poses
+            self.topics = {topic}
+        self._began = began
+        self._buffer = PoseBuffer(OdometryConfig())
+        self._stamps: StampCheck | None = None
+
+    @property
+    def newest_s(self) -> float:
+        """Stamp of the latest pose [s], minus infinity before the first."""
+        return self._buffer.newest_s
+
+    def add(self, message: BagMessage) -> None:
+        """Add the pose of a message; one that is wrong or out of order is left out."""
+        if self._stamps is None:  # the clock of the poses is that of the sweeps
+            began_s = message.recorded_s - STEP_S / 2
+            self._stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
+        with suppress(MessageError):
+            pose = read_odometry(message.data)
+            if self._stamps.doubt(pose.stamp_s, message.recorded_s):
+                return
+            stamp_s = pose.stamp_s + self._stamps.shift_s - self._began[0]
+            if stamp_s > self.newest_s:
+                self._buffer.add(stamp_s, pose.T_odom_child @ self._T_base_sensor)
+
+    def place(self, frame: Frame) -> Frame:
+        """The frame with its pose, None where the latest poses are too old."""
+        return replace(frame, T_world_sensor=self._buffer.at(frame.stamp_s))
+
+
 PEEKED = 50
 """Greatest number of messages that are searched for the first usable sweeps."""
 COMPARED = 4
@@ -74,25 +110,29 @@ class BagStream:
         self, info: StreamInfo, files: list[BagFile], topic: str, began: tuple[float, float], poses: Poses | None
     ) -> None:
         """`began`: stamp and recorded time of the first sweep whose stamp is accepted [s]."""
-        self.info, self.faults = info, Faults()
-        self._files, self._topic, self._began, self._poses = files, topic, began, poses
-        self._first, self._last = 0, info.n_frames or 0
+        self.info = info
+        self.faults = Faults()
+        self._files = files
+        self._topic = topic
+        self._began = began
+        self._poses = poses
+        self._first = 0
+        self._last = info.n_frames or 0
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames, with poses where there are any."""
-        buffer, held, index = PoseBuffer(OdometryConfig()), None, -1
-        stamps, pose_stamps = StampCheck(self._began), None
-        topics = {self._topic} if self._poses is None else {self._topic, self._poses[0]}
-        for message in self._readable(topics):
+        poses = RecordedPoses(self._poses, self._began)
+        stamps = StampCheck(self._began)
+        held: Frame | None = None
+        index = -1
+        for message in self._readable({self._topic} | poses.topics):
             is_sweep = message.topic == self._topic
-            index += is_sweep
-            if not is_sweep:
-                if pose_stamps is None:  # the clock of the poses is that of the sweeps
-                    began_s = message.recorded_s - STEP_S / 2
-                    pose_stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
-                self._keep(message, buffer, pose_stamps)
-            if held is not None and (is_sweep or buffer.newest_s >= held.stamp_s):
-                yield replace(held, T_world_sensor=buffer.at(held.stamp_s))
+            if is_sweep:
+                index += 1
+            else:
+                poses.add(message)
+            if held is not None and (is_sweep or poses.newest_s >= held.stamp_s):
+                yield poses.place(held)
                 held = None
             if index >= self._last:
                 return
@@ -102,7 +142,7 @@ class BagStream:
                 with suppress(MessageError):
                     stamps.doubt(CdrReader(message.data).stamp_s() or message.recorded_s, message.recorded_s)
         if held is not None:
-            yield replace(held, T_world_sensor=buffer.at(held.stamp_s))
+            yield poses.place(held)
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; others are not decoded."""
@@ -128,15 +168,6 @@ class BagStream:
             return None
         sweep = Sweep(_stamp_s(cloud, message), cloud.points, cloud.turn_s)
         return stamps.frame(sweep, message.recorded_s, index, self._topic, self.faults, began_s=self._began[0])
-
-    def _keep(self, message: BagMessage, buffer: PoseBuffer, stamps: StampCheck) -> None:
-        with suppress(MessageError):
-            pose = read_odometry(message.data)
-            if self._poses is None or stamps.doubt(pose.stamp_s, message.recorded_s):
-                return
-            stamp_s = pose.stamp_s + stamps.shift_s - self._began[0]
-            if stamp_s > buffer.newest_s:
-                buffer.add(stamp_s, pose.T_odom_child @ self._poses[1])
 
 
 def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream:

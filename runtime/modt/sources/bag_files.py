@@ -30,8 +30,9 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 MAX_RECORD_BYTES = 2**28
 """Largest record of an MCAP file and largest unpacked message; a chunk has a few megabytes."""
-ALLOWANCE_BYTES, MOST_TIMES = 16 * 2**20, 64
-"""A file may unpack to ALLOWANCE_BYTES plus MOST_TIMES its size."""
+ALLOWANCE_BYTES = 16 * 2**20
+"""A file may unpack to ALLOWANCE_BYTES plus MAX_EXPANSION times its size."""
+MAX_EXPANSION = 64
 FOOTER_BYTES = 37
 """Size of the last record of a closed MCAP file and of what follows it."""
 STEPS = 10_000
@@ -64,7 +65,7 @@ class BagFile(ABC):
 
     def __init__(self, path: Path) -> None:
         self.path = self._plain = path
-        self._most = ALLOWANCE_BYTES + MOST_TIMES * path.stat().st_size
+        self._most = ALLOWANCE_BYTES + MAX_EXPANSION * path.stat().st_size
         if path.suffix == ZSTD:
             with self._refusals():
                 handle, unpacked = tempfile.mkstemp(suffix=_kind(path))
@@ -109,7 +110,7 @@ class BagFile(ABC):
             ModtError: the limit is exceeded.
         """
         if size > left:
-            most = f"{MOST_TIMES} times its size and {ALLOWANCE_BYTES >> 20} MiB"
+            most = f"{MAX_EXPANSION} times its size and {ALLOWANCE_BYTES >> 20} MiB"
             raise ModtError(self.path, f"unpacks to more than {most}", "record it with less compression")
         return left - size
 
@@ -189,17 +190,21 @@ class McapFile(BagFile):
         """Messages ordered by recorded time; without an index, chunks come in the order of the file."""
         from mcap.records import Message
 
-        channels, index = self._summary[0].channels, list[Any]()
-        for chunk in self._summary[0].chunk_indexes:
+        summary, _ = self._summary
+        channels = summary.channels
+        index = []
+        for chunk in summary.chunk_indexes:
             held = {channels[number].topic for number in chunk.message_index_offsets}
             if not held or held & {*topics}:
                 index.append(chunk)
         index.sort(key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
-        waiting, order = list[tuple[int, int, Any]](), count()
+        waiting: list[tuple[int, int, Any]] = []
+        order = count()
         with self._plain.open("rb") as file:
             chunks = (next(_records(file, chunk.chunk_start_offset)) for chunk in index)
-            contents = self._parts(chunks if self._summary[0].chunk_indexes else _records(file, 0))
+            contents = self._parts(chunks if summary.chunk_indexes else _records(file, 0))
             next_ns = chain((chunk.message_start_time for chunk in index[1:]), repeat(math.inf))
+            # chunks may overlap: a message waits until no later chunk can hold an earlier one
             for parts, until_ns in zip(contents, next_ns, strict=False):
                 for part in parts:
                     if isinstance(part, Message) and channels[part.channel_id].topic in topics:
@@ -214,27 +219,19 @@ class McapFile(BagFile):
 
         A recording that was not closed has no index, and is read up to its end.
         """
-        from mcap.records import Channel, ChunkIndex, Message, Schema, Statistics
         from mcap.summary import Summary
 
-        start, cause = 0, ""
+        start = 0
+        cause = ""
         with self._plain.open("rb") as file:
             with suppress(Exception):
                 start = next(_records(file, file.seek(-FOOTER_BYTES, os.SEEK_END))).summary_start
             for at in dict.fromkeys((start, 0)):
-                summary, counts = Summary(), Counter[int]()
+                summary = Summary()
+                counts = Counter[int]()
                 try:
                     for record in chain.from_iterable(self._parts(_records(file, at))):
-                        if isinstance(record, Schema):
-                            summary.schemas[record.id] = record
-                        elif isinstance(record, Channel):
-                            summary.channels[record.id] = record
-                        elif isinstance(record, ChunkIndex):
-                            summary.chunk_indexes.append(record)
-                        elif isinstance(record, Statistics):
-                            counts = Counter(record.channel_message_counts)
-                        elif isinstance(record, Message):
-                            counts[record.channel_id] += 1
+                        _register(record, summary, counts)
                 except Exception as error:  # at the broken end of the file
                     cause = f" ({error.cause})" if isinstance(error, ModtError) else ""
                 if counts:
@@ -251,8 +248,26 @@ class McapFile(BagFile):
             if isinstance(record, Chunk):
                 self._less(min(left, MAX_RECORD_BYTES), record.uncompressed_size)
                 record.data = _unpacked(record.compression, record.data, record.uncompressed_size)
-                left, record.compression = self._less(left, len(record.data)), ""
+                record.compression = ""
+                left = self._less(left, len(record.data))
             yield breakup_chunk(record) if isinstance(record, Chunk) else [record]
+
+
+def _register(record: Any, summary: Any, counts: Counter[int]) -> None:
+    """Add a record of an MCAP file to its summary and to the numbers of messages by channel."""
+    from mcap.records import Channel, ChunkIndex, Message, Schema, Statistics
+
+    if isinstance(record, Schema):
+        summary.schemas[record.id] = record
+    elif isinstance(record, Channel):
+        summary.channels[record.id] = record
+    elif isinstance(record, ChunkIndex):
+        summary.chunk_indexes.append(record)
+    elif isinstance(record, Statistics):
+        counts.clear()
+        counts.update(record.channel_message_counts)
+    elif isinstance(record, Message):
+        counts[record.channel_id] += 1
 
 
 KINDS: dict[str, type[BagFile]] = {".db3": DatabaseFile, ".mcap": McapFile}

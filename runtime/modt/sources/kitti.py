@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -39,7 +39,8 @@ Poses = dict[int, Float64]
 
 def raw_drive(drive: Path) -> ScanStream:
     """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder."""
-    notes, pose_notes = list[str](), list[str]()
+    notes: list[str] = []
+    pose_notes: list[str] = []
     calib = drive.parent / "calib_cam_to_cam.txt"
     camera = _optional(kitti_calibration.camera_of_raw, calib, notes, NO_CAMERA)
     poses = _poses_of_raw(drive, pose_notes)
@@ -55,8 +56,10 @@ def tracking_sequence(scans: Path) -> ScanStream:
 
     Its sweeps are those of raw drives without time stamps; each lasts one period.
     """
-    root, number = scans.parent.parent, scans.name
-    notes, pose_notes = list[str](), list[str]()
+    root = scans.parent.parent
+    number = scans.name
+    notes: list[str] = []
+    pose_notes: list[str] = []
     calib = root / "calib" / f"{number}.txt"
     camera = _optional(kitti_calibration.camera_of_sequence, calib, notes, NO_CAMERA)
     records = root / "oxts" / f"{number}.txt"
@@ -67,7 +70,8 @@ def tracking_sequence(scans: Path) -> ScanStream:
         T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, pose_notes, NO_POSES)
         if T_imu_sensor is not None:
             poses = dict(enumerate(kitti_calibration.oxts_poses(kitti_calibration.read_oxts(records)) @ T_imu_sensor))
-    info, files = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera), _scans(scans)
+    info = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera)
+    files = _scans(scans)
     return _stream(info, files, notes, pose_notes, poses, turns=dict.fromkeys(files, PERIOD_S))
 
 
@@ -76,7 +80,8 @@ def odometry_sequence(sequence: Path) -> ScanStream:
 
     Its sweeps are published deskewed.
     """
-    notes, pose_notes = list[str](), list[str]()
+    notes: list[str] = []
+    pose_notes: list[str] = []
     calib = sequence / "calib.txt"
     cost = f"{NO_CAMERA}; get Tr from data_odometry_calib.zip"
     camera = _optional(kitti_calibration.camera_of_sequence, calib, notes, cost)
@@ -100,7 +105,8 @@ def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") 
     times = times_ns([f.stem for f in scans.values()])
     apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
     stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(scans)}
-    notes, pose_notes = [f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"]
+    notes = [f"folder of scans: no calibration, frames {apart}"]
+    pose_notes = [f"folder of scans: {NO_POSES}"]
     info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
     return _stream(info, scans, notes, pose_notes, {}, stamps)
 
@@ -131,19 +137,25 @@ def _stream(
         first = next(a + 1 for a, b in pairwise(indices) if b > a + 1)
         notes.append(f"{missing} frames are missing (the first is {first})")
     if poses:
-        lost, known = [i for i in indices if i not in poses], sorted(poses)
-        if lost:
-            cost = "have the pose of the frame before"
-            pose_notes.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
-        poses = {i: poses[known[max(bisect_right(known, i) - 1, 0)]] for i in indices}  # the first, before it
+        poses = _for_all(indices, poses, pose_notes)
     scans = [
         ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0)) for i, f in files.items()
     ]
-    if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
+    if any(later.stamp_s < earlier.stamp_s for earlier, later in pairwise(scans)):
         notes.append(f"time stamps decrease: frames {PERIOD_S} s apart instead")
-        scans = [replace(s, stamp_s=s.index * PERIOD_S) for s in scans]
+        scans = [replace(scan, stamp_s=scan.index * PERIOD_S) for scan in scans]
     info = replace(info, has_poses=bool(poses), notes=tuple(notes), pose_notes=tuple(pose_notes))
     return ScanStream(info, scans)
+
+
+def _for_all(frames: Sequence[int], poses: Poses, notes: list[str]) -> Poses:
+    """Pose of each frame: its own, else that of the frame before, else the first one."""
+    without = [frame for frame in frames if frame not in poses]
+    if without:
+        cost = "have the pose of the frame before"
+        notes.append(f"{len(without)} frames without a pose {cost} (the first is {without[0]})")
+    known = sorted(poses)
+    return {frame: poses[known[max(bisect_right(known, frame) - 1, 0)]] for frame in frames}
 
 
 def _poses_of_raw(drive: Path, notes: list[str]) -> Poses:
@@ -167,7 +179,8 @@ def _stamps(
     times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "theirs are interpolated", read)
     if not times:
         return {}
-    known, began = sorted(times), min(times.values())
+    known = sorted(times)
+    began = min(times.values())
     stamps_s = np.array([(times[i] - began) / 1e9 for i in known])
     period_s = float(np.median(np.diff(stamps_s) / np.diff(known))) if len(known) > 1 else PERIOD_S
     scans = np.array([0, *frames])

@@ -110,7 +110,7 @@ def T_imu_sensor_of_sequence(path: Path) -> Float64:
 
 EARTH_RADIUS_M = 6378137.0
 OXTS_FIELDS = ("lat", "lon", "alt", "roll", "pitch", "yaw")
-MOST_OF_OXTS = (85.0, 360.0, 1e5, 7.0, 7.0, 7.0)
+MAX_OXTS = (85.0, 360.0, 1e5, 7.0, 7.0, 7.0)
 """Greatest absolute value of each field; Mercator's projection excludes the poles."""
 OXTS_REMEDY = "restore it, or remove it to run without ego-motion"
 
@@ -147,8 +147,8 @@ def read_oxts(path: Path) -> Float64:
         raise MisuseError(path, "is no table of numbers", OXTS_REMEDY) from None
     if records.shape[1] < len(OXTS_FIELDS) or not np.isfinite(records[:, : len(OXTS_FIELDS)]).all():
         raise MisuseError(path, f"OXTS record without {', '.join(OXTS_FIELDS)}", OXTS_REMEDY)
-    beyond = np.flatnonzero((np.abs(records[:, : len(OXTS_FIELDS)]) > MOST_OF_OXTS).any(axis=0))
+    beyond = np.flatnonzero((np.abs(records[:, : len(OXTS_FIELDS)]) > MAX_OXTS).any(axis=0))
     if len(beyond):
-        field, most = OXTS_FIELDS[beyond[0]], MOST_OF_OXTS[beyond[0]]
-        raise MisuseError(path, f"OXTS record of {field} beyond {most:g}", OXTS_REMEDY)
+        field = beyond[0]
+        raise MisuseError(path, f"OXTS record of {OXTS_FIELDS[field]} beyond {MAX_OXTS[field]:g}", OXTS_REMEDY)
     return records

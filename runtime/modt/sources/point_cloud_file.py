@@ -22,7 +22,8 @@ MAX_POINTS = 10_000_000
 MAX_COUNT = 1024
 """Greatest number of values of a PCD field in one point."""
 MAX_HEADER_BYTES = 65_536
-BYTE_MAX, WORD_MAX = 255, 65_535
+BYTE_MAX = 255
+WORD_MAX = 65_535
 SKIPPED = "the frame is skipped; convert it to x, y, z [m] and reflectance"
 PCD_TYPES = {kind: f"<{kind.lower()}" for kind in ("F4", "F8", *(sign + size for sign in "UI" for size in "1248"))}
 PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
@@ -137,7 +138,8 @@ def _pcd_header(path: Path, raw: bytes) -> tuple[str, list[str], np.dtype[Any], 
 
 def _ply_header(text: str) -> tuple[str, list[tuple[str, int, list[tuple[str, str]]]]]:
     """Encoding, and name, number of rows and properties (name, type) of each element."""
-    encoding, elements = "", list[tuple[str, int, list[tuple[str, str]]]]()
+    encoding = ""
+    elements: list[tuple[str, int, list[tuple[str, str]]]] = []
     for words in map(str.split, text.splitlines()):
         match words:
             case ["format", encoding, *_]:
@@ -168,7 +170,7 @@ def _from_bytes(path: Path, raw: bytes, start: int, n_points: int, row: np.dtype
 def _from_text(path: Path, lines: Sequence[bytes], n_points: int, row: np.dtype[Any]) -> NDArray[Any]:
     """Points of lines of numbers; further words of a line are skipped."""
     counts = [row[name].shape[0] for name in row.names or ()]
-    width, table, at = sum(counts), np.empty(n_points, row), 0
+    width = sum(counts)
     words = [word for line in lines[:n_points] for word in line.split(maxsplit=width)[:width]]
     if len(words) < n_points * width:
         raise ScanError(path, f"truncated: {len(words)} numbers for {n_points} points", SKIPPED)
@@ -176,6 +178,8 @@ def _from_text(path: Path, lines: Sequence[bytes], n_points: int, row: np.dtype[
         values = np.array(words, np.float64).reshape(-1, width)
     except ValueError:
         raise ScanError(path, "its text holds what is no number", SKIPPED) from None
+    table = np.empty(n_points, row)
+    at = 0
     with np.errstate(invalid="ignore", over="ignore"):
         for i, count in enumerate(counts):
             table[str(i)] = values[:, at : at + count]
@@ -193,7 +197,8 @@ def _from_compressed(
     data = decompress(body[8 : 8 + size], length)
     if data is None:
         raise ScanError(path, "its compressed data are broken", SKIPPED)
-    columns, at = {}, 0
+    columns = {}
+    at = 0
     for i, name in enumerate(names):
         columns[name] = np.frombuffer(data, row[i], n_points, at)[:, 0]
         at += n_points * row[i].itemsize
@@ -201,32 +206,35 @@ def _from_compressed(
 
 
 MAX_LITERAL = 32
-"""Control bytes of LZF below this announce literal bytes; others announce a repetition."""
+"""Control bytes of LZF below this announce literal bytes; others announce a repetition of earlier ones."""
+LONG_REPETITION = 7
+"""Size in the control byte of a repetition that is continued in the next byte."""
 
 
 def decompress(data: bytes, length: int) -> bytes | None:
     """The `length` bytes of LZF data; None if the data are broken or hold more or less."""
-    out, at, end = bytearray(), 0, len(data)
-    while at < end:
+    out = bytearray()
+    at = 0
+    end = len(data)
+    while at < end and len(out) <= length:
         control = data[at]
         at += 1
         if control < MAX_LITERAL:
             out += data[at : at + control + 1]
             at += control + 1
-        else:
-            size = control >> 5
-            if at + 1 + (size == 7) > end:
-                return None
-            if size == 7:
-                size += data[at]
-                at += 1
-            start = len(out) - ((control & 31) << 8 | data[at]) - 1
-            at, size = at + 1, size + 2
-            if start < 0:
-                return None
-            distance = len(out) - start
-            piece = out[start : start + size]
-            out += piece if size <= distance else (piece * (size // distance + 1))[:size]
-        if len(out) > length:
+            continue
+        size = control >> 5
+        if at + 1 + (size == LONG_REPETITION) > end:
             return None
+        if size == LONG_REPETITION:
+            size += data[at]
+            at += 1
+        size += 2
+        distance = ((control & 31) << 8 | data[at]) + 1
+        at += 1
+        start = len(out) - distance
+        if start < 0:
+            return None
+        piece = out[start : start + size]
+        out += piece if size <= distance else (piece * (size // distance + 1))[:size]
     return bytes(out) if len(out) == length and at == end else None

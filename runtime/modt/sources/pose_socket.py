@@ -102,7 +102,8 @@ class PoseSocket(ReceivedPoses):
         with suppress(OSError):
             bound.setsockopt(socket.SOL_SOCKET, _OVERFLOW, 1)
         self._address = bound.getsockname()
-        self._lock, self._ended = threading.Lock(), threading.Event()
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._keep_empty, name="poses", daemon=True)
         if bound.family == socket.AF_UNIX and self._address:
             self._thread.start()
@@ -120,7 +121,8 @@ class PoseSocket(ReceivedPoses):
         """Take the newest CAPACITY datagrams; a flood must not delay the frame."""
         with self._lock:
             self._empty()
-            taken, crowded_out = list(self._kept), self._crowded_out
+            taken = list(self._kept)
+            crowded_out = self._crowded_out
             self._kept.clear()
             self._crowded_out = 0
         self.received += len(taken) + crowded_out
@@ -155,15 +157,14 @@ def open_socket(address: Address) -> socket.socket:
     Raises:
         MisuseError: the address names no socket, or it cannot be bound.
     """
-    host, port, path = address.host, address.port, address.path
     try:
-        if address.scheme == "udp" and host and port and path in ("", "/"):
-            family, _, _, _, bound = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        if address.scheme == "udp" and address.host and address.port and address.path in ("", "/"):
+            family, _, _, _, bound = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
             return _bound(family, bound)
-        if address.scheme == "unix" and not host and len(path) > 1:
-            if _stale(path):
-                Path(path).unlink()
-            return _bound(socket.AF_UNIX, path)
+        if address.scheme == "unix" and not address.host and len(address.path) > 1:
+            if _stale(address.path):
+                Path(address.path).unlink()
+            return _bound(socket.AF_UNIX, address.path)
     except OSError as error:
         remedy = "give a free port of this machine, or a free path in a writable folder"
         raise MisuseError(address.text, f"cannot be bound ({error.strerror or error})", remedy) from None

@@ -50,7 +50,8 @@ class PoseSource:
 class NoPoses(PoseSource):
     """Removes poses, so that ego-motion is estimated from the proposals."""
 
-    name, has_poses = "none", False
+    name = "none"
+    has_poses = False
 
     def place(self, frame: Frame) -> Frame:
         """Return the frame without a pose."""
@@ -121,7 +122,9 @@ def sensor_poses(T_start_camera: Float64, T_camera_sensor: Float64) -> Float64:
 
 
 def _pose(line: str, location: str) -> Float64:
-    T, numbers, remedy = np.eye(4), line.split(), "write the rows of a 3 x 4 pose"
+    remedy = "write the rows of a 3 x 4 pose"
+    numbers = line.split()
+    T = np.eye(4)
     if len(numbers) != N_ELEMENTS:
         raise MisuseError(location, f"{len(numbers)} numbers, not {N_ELEMENTS}", remedy)
     try:

@@ -22,7 +22,8 @@ class PoseTopic(ReceivedPoses):
 
     def __init__(self, subscription: Subscription, config: OdometryConfig, name: str, T_base_sensor: Float64) -> None:
         super().__init__(config, name)
-        self._subscription, self._T_base_sensor = subscription, T_base_sensor
+        self._subscription = subscription
+        self._T_base_sensor = T_base_sensor
 
     def _take(self) -> list[Message]:
         taken = self._subscription.take()

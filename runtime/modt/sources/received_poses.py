@@ -120,7 +120,8 @@ class PoseBuffer:
         else:
             first = int(np.searchsorted(stamps, 2 * self.newest_s - stamp_s, "right")) - 1
             first = max(first, int(np.searchsorted(stamps, self.newest_s - MAX_AGE_S)))
-            first, after = min(first, len(self) - 2), len(self) - 1
+            after = len(self) - 1
+            first = min(first, after - 1)
         return [(self._stamps[k], self._poses[k]) for k in (first, after)] if first >= 0 else None
 
     def _off_m(self, stamp_s: float, T: Float64) -> float:
@@ -162,7 +163,9 @@ class PoseSequence:
 
     def clear(self) -> None:
         """Remove all poses; the next one is believed."""
-        self.believed, self._doubted, self._votes = PoseBuffer(self.config), PoseBuffer(self.config), 0
+        self.believed = PoseBuffer(self.config)
+        self._doubted = PoseBuffer(self.config)
+        self._votes = 0
 
     def add(self, stamp_s: float, T: Float64, now_s: float) -> str | None:
         """Add a (4, 4) pose received before the frame at `now_s`; the reason of a doubt, None if it is believed."""
@@ -174,7 +177,9 @@ class PoseSequence:
             self._consider(stamp_s, T, now_s)
             if self._votes >= _MIN_VOTES and self._doubted.span_s >= CONFIRM_S:
                 self.restarts += self.believed.leaps(stamp_s, T)
-                self.believed, self._doubted, self._votes = self._doubted, PoseBuffer(self.config), 0
+                self.believed = self._doubted
+                self._doubted = PoseBuffer(self.config)
+                self._votes = 0
                 return None
         return doubt
 
@@ -234,7 +239,10 @@ class ReceivedPoses(PoseSource):
         except Exception as error:  # poses are optional, so the run goes on without
             T = None
             self._refuse(error)
-        self.posed, self.unposed = self.posed + (T is not None), self.unposed + (T is None)
+        if T is None:
+            self.unposed += 1
+        else:
+            self.posed += 1
         return replace(frame, T_world_sensor=T, restarts=self.restarts)
 
     def report(self) -> dict[str, Any]:
@@ -268,7 +276,8 @@ class ReceivedPoses(PoseSource):
             raise MessageError("malformed", f"{cause}: no time in seconds")
         if stamp_s > now_s + MAX_AHEAD_S:
             raise MessageError("ahead", f"{cause}: is it the stream's clock?")
-        newest_s, restarts = self._poses.believed.newest_s, self.restarts
+        newest_s = self._poses.believed.newest_s
+        restarts = self.restarts
         doubt = self._poses.add(stamp_s, T, now_s)
         if self.restarts > restarts == 0:
             where = f"another place than the sensor can have reached, at stamp {stamp_s:.3f} s"

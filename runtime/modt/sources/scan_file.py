@@ -15,8 +15,10 @@ from modt.types import UNRECORDED, Float32, Float64, Frame, Self
 
 SUFFIXES = (".bin", ".pcd", ".ply")
 """Suffixes of scan files; a folder that holds several kinds is read by the first one."""
-COLUMNS, NUSCENES_COLUMNS = 4, 5
-"""Float32 numbers per point in files of KITTI and of nuScenes (`.pcd.bin`), whose fifth number is the beam."""
+COLUMNS = 4
+"""Float32 numbers of a point in a file of KITTI."""
+NUSCENES_COLUMNS = 5
+"""Float32 numbers of a point in a file of nuScenes (`.pcd.bin`), of which the fifth is the beam."""
 MAX_BYTES = 256 << 20
 MAX_COORDINATE_M = 1000.0
 MAX_IMPLAUSIBLE_SHARE = 0.02
@@ -64,20 +66,10 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
     Raises:
         ScanError: the columns are not x, y, z, reflectance.
     """
-    flaws: list[str] = []
-    reflectance = points[:, 3]
     if _flawless(points):
-        return points, flaws
-    if not np.isfinite(points).all():
-        broken = np.flatnonzero(~np.isfinite(points[:, :3]).all(axis=1))
-        points[broken] = 0.0
-        unlit = np.flatnonzero(~np.isfinite(reflectance))
-        reflectance[unlit] = UNRECORDED
-        if len(broken):
-            flaws.append(f"{len(broken)} points are not finite and count as no return")
-        if len(unlit):
-            unread = f"{len(unlit)} reflectances are not finite and count as not recorded"
-            flaws.append(f"{unread}: have the sensor's driver write them")
+        return points, []
+    flaws = [] if np.isfinite(points).all() else _made_finite(points)
+    reflectance = points[:, 3]
     negative = np.flatnonzero(reflectance < 0)
     implausible = np.count_nonzero(reflectance[negative] != UNRECORDED) + np.count_nonzero(reflectance > 255)
     far = (np.abs(points[:, :3]) > MAX_COORDINATE_M).any(axis=1)
@@ -91,6 +83,21 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
         np.clip(reflectance / np.float32(255 if in_bytes else 1), 0, 1, out=reflectance)
     reflectance[negative] = UNRECORDED
     return points, flaws
+
+
+def _made_finite(points: Float32) -> list[str]:
+    """Flaws of points that are not finite, which are corrected in place."""
+    flaws = []
+    broken = np.flatnonzero(~np.isfinite(points[:, :3]).all(axis=1))
+    points[broken] = 0.0
+    unlit = np.flatnonzero(~np.isfinite(points[:, 3]))
+    points[unlit, 3] = UNRECORDED
+    if len(broken):
+        flaws.append(f"{len(broken)} points are not finite and count as no return")
+    if len(unlit):
+        unread = f"{len(unlit)} reflectances are not finite and count as not recorded"
+        flaws.append(f"{unread}: have the sensor's driver write them")
+    return flaws
 
 
 def _flawless(points: Float32) -> bool:

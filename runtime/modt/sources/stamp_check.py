@@ -33,8 +33,13 @@ class StampCheck:
             last: stamp and arrival of a message that is accepted.
             live: refuse a stamp that repeats or is late too; a recording may hold messages that waited.
         """
-        self.steps, self.shift_s, self.passed_s, self.waited_s = 0, 0.0, 0.0, 0.0
-        self._last, self._before_s, self._live = last, last[1] if last else 0.0, live
+        self.steps = 0
+        self.shift_s = 0.0
+        self.passed_s = 0.0
+        self.waited_s = 0.0
+        self._live = live
+        self._last = last
+        self._arrived_s = last[1] if last else 0.0  # arrival of the latest message
         self._step_s = FIRST_STEP_S
         self._doubted_s: float | None = None  # time since the first doubtful stamp
 
@@ -45,26 +50,48 @@ class StampCheck:
 
     def doubt(self, stamp_s: float, arrived_s: float) -> str:
         """Reason why a stamp is refused; empty if it is accepted. The clock of the arrivals may be set as well."""
-        since_s, self._before_s = arrived_s - self._before_s, arrived_s
+        since_s = arrived_s - self._arrived_s
+        self._arrived_s = arrived_s
         if self._last is None:
-            self._last, self.passed_s, self.waited_s = (stamp_s, arrived_s), stamp_s, stamp_s
-            return ""
-        passed_s, waited_s = self.passed_s, self.waited_s = stamp_s - self._last[0], arrived_s - self._last[1]
-        late = passed_s > 0 and waited_s - passed_s > STEP_S
-        if 0 <= passed_s <= max(waited_s, 0.0) + STEP_S and not (self._live and (late or passed_s == 0)):
-            self._step_s = passed_s or self._step_s
+            self.passed_s = stamp_s
+            self.waited_s = stamp_s
         else:
-            since_s = since_s if since_s > 0 else self._step_s
-            self._doubted_s = 0.0 if self._doubted_s is None else self._doubted_s + since_s
-            both_set = waited_s < 0 and abs(passed_s - waited_s) <= STEP_S
-            if self._doubted_s < DOUBT_S and not both_set:
-                cause = f"stamped {abs(passed_s):.3f} s {'before' if passed_s < 0 else 'after'} the last sweep"
-                arrival = f", which arrived {waited_s:.3f} s ago" if self._live else ""
-                return cause + arrival + (": this process, the sender or the network was stopped" if late else "")
-            self.steps += 1
-            self.shift_s += max(waited_s, self._step_s) - passed_s
-        self._last, self._doubted_s = (stamp_s, arrived_s), None
+            self.passed_s = stamp_s - self._last[0]
+            self.waited_s = arrived_s - self._last[1]
+            if self._continues():
+                self._step_s = self.passed_s or self._step_s
+            elif cause := self._refusal(since_s):
+                return cause
+            else:
+                self.steps += 1
+                self.shift_s += max(self.waited_s, self._step_s) - self.passed_s
+        self._last = (stamp_s, arrived_s)
+        self._doubted_s = None
         return ""
+
+    @property
+    def _late(self) -> bool:
+        return self.passed_s > 0 and self.waited_s - self.passed_s > STEP_S
+
+    def _continues(self) -> bool:
+        """Whether the latest stamp fits its arrival."""
+        if self._live and (self._late or self.passed_s == 0):
+            return False
+        return 0 <= self.passed_s <= max(self.waited_s, 0.0) + STEP_S
+
+    def _refusal(self, since_s: float) -> str:
+        """Reason to refuse a doubtful stamp `since_s` after the message before; empty if a clock was set."""
+        if self._doubted_s is None:
+            self._doubted_s = 0.0
+        else:
+            self._doubted_s += since_s if since_s > 0 else self._step_s
+        both_set = self.waited_s < 0 and abs(self.passed_s - self.waited_s) <= STEP_S
+        if both_set or self._doubted_s >= DOUBT_S:
+            return ""
+        order = "before" if self.passed_s < 0 else "after"
+        arrival = f", which arrived {self.waited_s:.3f} s ago" if self._live else ""
+        stopped = ": this process, the sender or the network was stopped" if self._late else ""
+        return f"stamped {abs(self.passed_s):.3f} s {order} the last sweep{arrival}{stopped}"
 
     def frame(
         self,
@@ -80,7 +107,8 @@ class StampCheck:
 
         Flaws and refusals of the `subject` are reported to `faults`.
         """
-        steps, cause = self.steps, self.doubt(sweep.stamp_s, arrived_s)
+        steps = self.steps
+        cause = self.doubt(sweep.stamp_s, arrived_s)
         if not cause:
             try:
                 points, broken = sanitised(sweep.points, subject)

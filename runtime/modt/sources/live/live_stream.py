@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from modt import host
@@ -39,6 +40,16 @@ LATE_S = 1.0
 """Greatest age of a sweep or packet that is used [s]."""
 
 
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """A sweep as the receiving thread hands it over: its flaws, whether it can be used, and when it came [s]."""
+
+    sweep: Sweep
+    flaws: list[str]
+    usable: bool
+    arrived_s: float
+
+
 class LiveStream:
     """Hands over the newest sweep; an older one that was not taken is dropped and counted.
 
@@ -59,16 +70,36 @@ class LiveStream:
         clock: Callable[[], float] = time.monotonic,
         pause: Callable[[float], None] = time.sleep,
     ) -> None:
-        """`cores`: cores of the receiving thread; None leaves it where it is started."""
-        self.info, self.reader, self.faults = info, reader, Faults()
-        self.sweeps = self.incomplete = self.dropped = self.silences = 0
-        self._cores, self._clock, self._pause = cores, clock, pause
+        """Read from a sensor in a thread of its own, once it is started.
+
+        Args:
+            info: properties of the stream.
+            reader: source of its sweeps, which the stream closes.
+            cores: cores of the receiving thread; None leaves it where it is started.
+            clock: monotonic clock, which is read at arrivals and when a sweep is taken [s]. The waits for a sweep run
+                on the system's own clock.
+            pause: waits for a time [s] after a failed read.
+        """
+        self.info = info
+        self.reader = reader
+        self.faults = Faults()
+        self.sweeps = 0
+        self.incomplete = 0
+        self.dropped = 0
+        self.silences = 0
+        self._cores = cores
+        self._clock = clock
+        self._pause = pause
         self._arrived = threading.Condition()
-        self._newest: tuple[Sweep, list[str], bool, float] | None = None  # sweep, flaws, usable, arrival [s]
+        self._newest: Arrival | None = None
         self._error: Exception | None = None
-        self._ended = self._silent = False
-        self._last_s = self._looked_s = clock()
-        self._index, self._steady_s, self._delay = 0, 0.0, DeviceClock()
+        self._ended = False
+        self._silent = False
+        self._last_s = clock()  # arrival of the latest sweep
+        self._looked_s = self._last_s  # when `take` last looked for one
+        self._index = 0
+        self._steady_s = 0.0
+        self._delay = DeviceClock()
         self._check = StampCheck(live=True)
         self._thread = threading.Thread(target=self._receive, name="receiver", daemon=True)
 
@@ -79,7 +110,8 @@ class LiveStream:
 
     def start(self) -> None:
         """Start receiving."""
-        self._last_s = self._looked_s = self._clock()
+        self._last_s = self._clock()
+        self._looked_s = self._last_s
         self._thread.start()
 
     def take(self, timeout_s: float) -> Received | None:
@@ -96,18 +128,20 @@ class LiveStream:
                 self._arrived.wait(timeout_s)
             if self._newest is None and self._error is not None:
                 raise self._error
-            taken, self._newest = self._newest, None
+            taken = self._newest
+            self._newest = None
         now_s = self._clock()
         if now_s - self._looked_s > timeout_s + LATE_S:  # this process was stopped, so the sensor is not blamed
             self._last_s = now_s
         self._looked_s = now_s
         if taken is None:
             if not self._silent and now_s - self._last_s > SILENT_S:
-                self._silent, self.silences = True, self.silences + 1
+                self._silent = True
+                self.silences += 1
                 remedy = "check its power, cable, address and port; tracks are kept until it returns"
                 log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)
             return None
-        return self._frame(*taken)
+        return self._frame(taken)
 
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
@@ -154,30 +188,43 @@ class LiveStream:
             self._pause(0.001)  # leaves the CPU to others if each read fails
 
     def _put(self, sweep: Sweep) -> None:
+        usable = True
         try:  # here, off the loop's thread
-            flaws, usable = sanitised(sweep.points, self.info.name)[1], True
+            _, flaws = sanitised(sweep.points, self.info.name)
         except ScanError as error:
-            flaws, usable = [error.cause], False
+            flaws = [error.cause]
+            usable = False
         with self._arrived:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
-            self._newest = sweep, flaws, usable, self._clock()
+            self._newest = Arrival(sweep, flaws, usable, self._clock())
             self._arrived.notify()
 
-    def _frame(self, sweep: Sweep, flaws: list[str], usable: bool, arrived_s: float) -> Received | None:
+    def _frame(self, taken: Arrival) -> Received | None:
+        """The frame of a sweep; None if it cannot be used."""
+        sweep = taken.sweep
         if self._silent:
-            log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
-        self._silent, self._last_s = False, max(self._last_s, arrived_s)
+            log.warning("%s: sweeps again after %.1f s", self.info.name, taken.arrived_s - self._last_s)
+        self._silent = False
+        self._last_s = max(self._last_s, taken.arrived_s)
         index = self._index if sweep.index is None else sweep.index
         self._index = index + 1
-        if doubt := self._doubt(sweep.stamp_s, arrived_s):
-            flaws, usable = [doubt], False
-        if flaws:
+        doubt = self._doubt(sweep.stamp_s, taken.arrived_s)
+        usable = taken.usable and not doubt
+        if flaws := [doubt] if doubt else taken.flaws:
             self.faults.report(index, self.info.name, "; ".join(flaws), skipped=not usable)
-        turn_s, steady_s, frame_id = sweep.turn_s, self._steady_s, sweep.frame_id
-        frame = Frame(index, sweep.stamp_s, sweep.points, turn_s=turn_s, steady_s=steady_s, frame_id=frame_id)
-        return Received(frame, arrived_s) if usable else None
+        if not usable:
+            return None
+        frame = Frame(
+            index,
+            sweep.stamp_s,
+            sweep.points,
+            turn_s=sweep.turn_s,
+            steady_s=self._steady_s,
+            frame_id=sweep.frame_id,
+        )
+        return Received(frame, taken.arrived_s)
 
     def _doubt(self, stamp_s: float, arrived_s: float) -> str:
         """Reason why a sweep is refused, empty if it is not.
@@ -188,7 +235,10 @@ class LiveStream:
             return f"taken {age_s:.1f} s after it came: this process was stopped, or has too little CPU time"
         if cause := no_seconds(stamp_s):
             return f"{cause}; have its driver write seconds"
-        check, steps, doubting, before_s = self._check, self._check.steps, self._check.doubting, self._delay.offset_s
+        check = self._check
+        steps = check.steps
+        doubting = check.doubting
+        before_s = self._delay.offset_s
         if doubt := check.doubt(stamp_s, arrived_s):
             return doubt
         if check.steps > steps:
@@ -223,9 +273,12 @@ class PlayedReader:
         wait: Callable[[float], bool] | None = None,
     ) -> None:
         self.reception = Reception()
-        self._stream, self._loop, self._closed = stream, loop, threading.Event()
-        self._clock, self._wait = clock, wait or self._closed.wait
-        self._frames = _again(stream) if loop else ((frame.stamp_s, frame) for frame in stream)
+        self._stream = stream
+        self._loop = loop
+        self._closed = threading.Event()
+        self._clock = clock
+        self._wait = wait or self._closed.wait
+        self._frames = _repeated(stream) if loop else ((frame.stamp_s, frame) for frame in stream)
         self._next: tuple[float, Frame] | None = None  # read before it is due
         self._start_s: float | None = None  # time of stamp 0 by the clock
 
@@ -234,7 +287,8 @@ class PlayedReader:
         self._next = self._next or next(self._frames, None)
         if self._next is None or self._closed.is_set():
             raise StreamEndedError
-        (stamp_s, frame), now_s = self._next, self._clock()
+        stamp_s, frame = self._next
+        now_s = self._clock()
         if self._start_s is None:
             self._start_s = now_s - stamp_s
         due_s = self._start_s + stamp_s - now_s
@@ -251,7 +305,7 @@ class PlayedReader:
         self._closed.set()
 
 
-def _again(stream: Stream) -> Iterator[tuple[float, Frame]]:
+def _repeated(stream: Stream) -> Iterator[tuple[float, Frame]]:
     """Endless frames of a stream; stamps advance by one period from its end to its beginning."""
     played_s: float | None = None
     while True:

@@ -60,7 +60,8 @@ class PointCloudReader:
     def __init__(self, subscription: Subscription, name: str) -> None:
         self.reception = Reception()
         self._subscription: Subscription | None = subscription
-        self._name, self._missing = name, MissingSweeps()
+        self._name = name
+        self._missing = MissingSweeps()
 
     def read(self, timeout_s: float) -> list[Sweep]:
         """Sweeps received until the timeout, oldest first."""
