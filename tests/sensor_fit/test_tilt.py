@@ -36,7 +36,7 @@ def test_the_mount_is_measured_by_the_floor_to_half_a_degree(scene, sensor, moun
 @pytest.mark.parametrize("seed", [900, 901])
 def test_a_level_sensor_in_a_street_stays_as_it_is(sensor, seed):
     frame = next(iter(SyntheticStream("street", sensor, 0.1, seed)))
-    assert find_floor(frame.points).tilt_deg < MIN_TILT_DEG
+    assert find_floor(frame.points).tilt_deg() < MIN_TILT_DEG
     assert recognise(frame.points, profile.load(sensor)).tilt_deg is None
 
 
@@ -45,7 +45,7 @@ def test_the_sensor_of_kitti_is_level(kitti_root):
     from modt.sources.scan_file import read_scan
 
     scans = sorted(kitti_root.glob("raw/*/*/velodyne_points/data/*.bin"))[::10]
-    tilts_deg = np.array([find_floor(read_scan(scan)[0]).tilt_deg for scan in scans])
+    tilts_deg = np.array([find_floor(read_scan(scan)[0]).tilt_deg() for scan in scans])
     assert np.median(tilts_deg) < 1.2
     assert (tilts_deg > MIN_TILT_DEG).mean() < 0.05
 

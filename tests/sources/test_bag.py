@@ -122,7 +122,7 @@ def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):
     rows = np.zeros((1, 5), [("x", "i2"), ("y", "i2"), ("z", "i2"), ("intensity", "u1")])
     raw = messages.encode(messages.cloud(rows, stamp_s=BEGAN_S))
     path = write(tmp_path / "drive", [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)])
-    with pytest.raises(ModtError, match=r"they are int16, int16, int16.*float32"):
+    with pytest.raises(ModtError, match=r"x \(int16\), y \(int16\), z \(int16\).*float32"):
         open_stream(path)
 
 

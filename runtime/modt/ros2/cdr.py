@@ -34,7 +34,8 @@ class CdrReader:
     def __init__(self, message: bytes) -> None:
         if len(message) < HEADER_BYTES or message[0] != 0 or message[1] > 1:
             raise MessageError("malformed", "it is not encoded in plain CDR")
-        self._message, self._at = memoryview(message), HEADER_BYTES
+        self._message = memoryview(message)
+        self._at = HEADER_BYTES
         self.order = "<" if message[1] else ">"
 
     def number(self, code: str) -> int | float:
@@ -64,8 +65,13 @@ class CdrReader:
 
     def stamp_s(self) -> float:
         """A builtin_interfaces/Time [s]."""
-        seconds, nanoseconds = self.number("i"), self.count()
-        return seconds + 1e-9 * nanoseconds
+        seconds = self.number("i")
+        return seconds + 1e-9 * self.count()
+
+    def header(self) -> tuple[float, str]:
+        """Stamp [s] and frame of a std_msgs/Header."""
+        stamp_s = self.stamp_s()
+        return stamp_s, self.text()
 
     def _bytes(self, size: int, alignment: int = 1) -> memoryview:
         begin = self._at + -(self._at - HEADER_BYTES) % alignment
@@ -112,7 +118,7 @@ class CdrWriter:
 
 
 Fields = tuple[tuple[str, ...], tuple[float | bytes, ...]]
-"""Fields of a part of a record with their values."""
+"""Fields of a part of a record, and their values."""
 
 
 def text_fields(text: str) -> Fields:
@@ -130,7 +136,8 @@ def header_fields(stamp_s: float, frame_id: str) -> Fields:
 @lru_cache(maxsize=1024)
 def _layout(fields: tuple[str, ...], phase: int) -> struct.Struct:
     """Layout of a record that begins `phase` bytes behind a multiple of the greatest alignment."""
-    at, text = phase, "<"
+    at = phase
+    text = "<"
     for field in fields:
         gap = -at % struct.calcsize("<" + field[-1])
         text += f"{gap}x{field}"

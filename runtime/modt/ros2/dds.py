@@ -115,7 +115,8 @@ class Publication:
     """Sends to a topic; never waits for a slow receiver."""
 
     def __init__(self, joined: Participant, name: str, kind: str, *, depth: int = 5) -> None:
-        self._kind, self._joined = message_type(kind), joined
+        self._kind = message_type(kind)
+        self._joined = joined
         self._writer = DataWriter(joined.entity, joined.topic(name, kind), qos=_qos(depth, reliable=True))
 
     def write(self, message: bytes) -> bool:

@@ -38,8 +38,9 @@ def read_odometry(message: bytes) -> OdometryMessage:
         MessageError: `malformed`, or `non_finite`.
     """
     cdr = CdrReader(message)
-    stamp_s, _, child = cdr.stamp_s(), cdr.text(), cdr.text()
-    return OdometryMessage(stamp_s, child, read_pose(cdr))
+    stamp_s, _ = cdr.header()
+    child_frame_id = cdr.text()
+    return OdometryMessage(stamp_s, child_frame_id, read_pose(cdr))
 
 
 def read_pose(cdr: CdrReader) -> Float64:
@@ -65,8 +66,10 @@ def write_odometry(stamp_s: float, frame_id: str, child_frame_id: str, T_odom_ch
     return cdr.message()
 
 
-TF, TF_STATIC = "tf2_msgs/TFMessage", "/tf_static"
-"""Type of messages of transforms, and the topic of the robot's fixed ones."""
+TF = "tf2_msgs/TFMessage"
+"""Type of the messages of transforms."""
+TF_STATIC = "/tf_static"
+"""Topic of the robot's fixed transforms."""
 MAX_TRANSFORMS = 10_000
 
 
@@ -87,13 +90,15 @@ class StaticTransforms:
         if n > MAX_TRANSFORMS:
             raise MessageError("malformed", f"{n} transforms")
         for _ in range(n):
-            _, parent, child = cdr.stamp_s(), cdr.text(), cdr.text()
-            self._parents[_plain(child)] = _plain(parent), read_pose(cdr)
+            _, parent = cdr.header()
+            child = cdr.text()
+            self._parents[child.lstrip("/")] = (parent.lstrip("/"), read_pose(cdr))
 
     def between(self, base: str, sensor: str) -> Float64 | None:
         """(4, 4) pose of `sensor` in `base`; None if they are not connected."""
-        (root, T_root_base), (other, T_other_sensor) = self._root(_plain(base)), self._root(_plain(sensor))
-        return inverse(T_root_base) @ T_other_sensor if root == other else None
+        base_root, T_root_base = self._root(base.lstrip("/"))
+        sensor_root, T_root_sensor = self._root(sensor.lstrip("/"))
+        return inverse(T_root_base) @ T_root_sensor if base_root == sensor_root else None
 
     def _root(self, frame: str) -> tuple[str, Float64]:
         """The root of a frame, and the pose of the frame in it."""
@@ -104,7 +109,3 @@ class StaticTransforms:
             frame, T_parent_frame = self._parents[frame]
             T = T_parent_frame @ T
         return frame, T
-
-
-def _plain(frame: str) -> str:
-    return frame.lstrip("/")

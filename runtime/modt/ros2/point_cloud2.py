@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,22 +62,11 @@ def read_cloud(message: bytes) -> PointCloud:
         MessageError: `malformed`, `empty`, or `fields`: without x, y and z as floating-point numbers.
     """
     cdr = CdrReader(message)
-    stamp_s, frame_id = cdr.stamp_s(), cdr.text()
-    height, width = cdr.count(), cdr.count()
-    kinds = _fields(cdr)
-    order = ">" if cdr.number("B") else "<"
-    point_step, row_step = cdr.count(), cdr.count()
-    data = cdr.octets()
-    if not height * width:
-        raise MessageError("empty", "no points")
-    strides = (row_step if height > 1 else point_step * width, point_step)  # a single row may state 0
-    if strides[0] < width * point_step or (height - 1) * strides[0] + width * point_step > len(data):
-        raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
-    fields = {name: (np.dtype(order + kind), offset) for name, (kind, offset) in kinds.items()}
-    fields = {name: (kind, at) for name, (kind, at) in fields.items() if at + kind.itemsize <= point_step}
-    formats, offsets = [kind for kind, _ in fields.values()], [at for _, at in fields.values()]
-    row = np.dtype({"names": [*fields], "formats": formats, "offsets": offsets, "itemsize": point_step})
-    table = np.ndarray((height, width), row, data, 0, strides)
+    stamp_s, frame_id = cdr.header()
+    height = cdr.count()
+    width = cdr.count()
+    table = _table(cdr, height, width, _fields(cdr))
+    fields: Mapping[str, Any] = table.dtype.fields or {}
     points = _points(table, fields)
     time = next((name for name in TIMES if name in fields), None)
     with np.errstate(all="ignore"):  # times may be any numbers
@@ -109,18 +98,44 @@ def _fields(cdr: CdrReader) -> dict[str, tuple[str, int]]:
         raise MessageError("malformed", f"{n} fields")
     fields = {}
     for _ in range(n):
-        name, offset, datatype, _count = cdr.text(), cdr.count(), int(cdr.number("B")), cdr.count()
+        name = cdr.text()
+        offset = cdr.count()
+        datatype = int(cdr.number("B"))
+        cdr.count()  # number of values of the field in a point, of which the first is used
         if datatype in NUMBERS:
             fields[name.lower()] = NUMBERS[datatype], offset
     return fields
 
 
-def _points(table: NDArray[np.void], fields: dict[str, tuple[np.dtype[Any], int]]) -> Float32:
+def _table(cdr: CdrReader, height: int, width: int, kinds: dict[str, tuple[str, int]]) -> NDArray[Any]:
+    """(height, width) records of the points, which are not copied; fields beyond the size of a point are left out.
+
+    Raises:
+        MessageError: `empty`, or `malformed`: the data are too few for the points.
+    """
+    order = ">" if cdr.number("B") else "<"
+    point_step = cdr.count()
+    row_step = cdr.count()
+    data = cdr.octets()
+    if not height * width:
+        raise MessageError("empty", "no points")
+    if height == 1:  # a single row may state 0
+        row_step = point_step * width
+    if row_step < width * point_step or (height - 1) * row_step + width * point_step > len(data):
+        raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
+    within = {name: (kind, at) for name, (kind, at) in kinds.items() if at + np.dtype(kind).itemsize <= point_step}
+    formats = [order + kind for kind, _ in within.values()]
+    offsets = [at for _, at in within.values()]
+    row = np.dtype({"names": [*within], "formats": formats, "offsets": offsets, "itemsize": point_step})
+    return np.ndarray((height, width), row, data, 0, (row_step, point_step))
+
+
+def _points(table: NDArray[Any], fields: Mapping[str, Any]) -> Float32:
+    """(N, 4) points of the records, as in PointCloud, by type and offset of each field."""
     xyz = [fields[name] for name in "xyz" if name in fields]
     if len(xyz) < 3 or any(kind.kind != "f" for kind, _ in xyz):
-        kinds = ": they are " + ", ".join(kind.name for kind, _ in xyz) if len(xyz) == 3 else ""
-        there = ", ".join(fields) or "none"
-        raise MessageError("fields", f"no x, y, z of floating point among {there}{kinds}")
+        there = ", ".join(f"{name} ({kind.name})" for name, (kind, _) in fields.items()) or "none"
+        raise MessageError("fields", f"no x, y, z of floating point among {there}")
     reflectance = reflectance_name(fields)
     points = np.empty((table.size, 4), np.float32)
     rows = points.reshape(*table.shape, 4)
@@ -170,14 +185,15 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> tuple[float, float] 
     x, y, _, _ = points[chosen].T.astype(np.float64)
     t = times[chosen].astype(np.float64)
     used = ((x != 0) | (y != 0)) & np.isfinite(t)
-    if np.count_nonzero(used) < TURN_SAMPLES // 8:
+    if used.sum() < TURN_SAMPLES // 8:
         return None
-    x, y, t = x[used], y[used], t[used]
+    t = t[used]
     unit_s = next((unit for unit in UNITS_S if SPANS_S[0] <= np.ptp(t) * unit <= SPANS_S[1]), None)
     if unit_s is None:
         return None
-    begin, bearing = t.min(), np.arctan2(y, x)
+    begin = t.min()
     t = (t - begin) * unit_s
+    bearing = np.arctan2(y[used], x[used])
     slope, ahead_s = np.polyfit(bearing, t, 1)
     turn_s = -2 * np.pi * slope
     off = np.quantile(np.abs(t - slope * bearing - ahead_s), 0.9)

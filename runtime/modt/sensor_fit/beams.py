@@ -28,7 +28,8 @@ def gaussian(values: Float64, deviation: float) -> Float64:
     reach = int(_GAUSSIAN_REACH * deviation + 0.5)
     weights = np.exp(-0.5 / (deviation * deviation) * np.arange(-reach, reach + 1) ** 2)
     weights /= weights.sum()
-    padded, n = np.pad(values, reach, "symmetric"), len(values)
+    padded = np.pad(values, reach, "symmetric")
+    n = len(values)
     smooth: Float64 = values * weights[reach]
     for k in range(reach):
         smooth += (padded[k : k + n] + padded[2 * reach - k : 2 * reach - k + n]) * weights[k]
@@ -61,27 +62,48 @@ def _valley(height: Float64) -> float:
     return float(height[: higher or None].min())
 
 
-BIN = np.deg2rad(0.01)  # width of a bin of the histogram of tangents
-STEEPEST = 2.75  # greatest tangent in the histogram: 70 degrees
+BIN = np.deg2rad(0.01)
+"""Width of a bin of the histogram of tangents."""
+STEEPEST = 2.75
+"""Greatest tangent in the histogram, which is that of 70 degrees."""
 N_BINS = int(2 * STEEPEST / BIN)
-SMOOTH_BINS = 2.0  # standard deviation of the smoothing
-WINDOW_BINS = 250  # half the window around a point in which the peaks of an origin are compared
-ORIGINS_M = np.arange(0.0, 0.26, 0.01)  # tried heights of the beams' origin above that of the frame
-FRAME_ORIGIN_FAVOUR = 1.1  # factor on the peaks of the frame's own origin
+SMOOTH_BINS = 2.0
+"""Standard deviation of the smoothing [bins]."""
+WINDOW_BINS = 250
+"""Half the window around a point in which the peaks of an origin are compared [bins]."""
+ORIGINS_M = np.arange(0.0, 0.26, 0.01)
+"""Tried heights of the beams' origin above that of the frame [m]."""
 COARSE_ORIGINS_M = ORIGINS_M[::2]
+"""The same for a single sweep, in which time counts."""
+FRAME_ORIGIN_FAVOUR = 1.1
+"""Factor on the peaks of the frame's own origin."""
 MIN_POINTS = 1000
-ASIDE = np.tan(np.deg2rad(60.0))  # points to the side: compensation for a drive ahead moves them along their ring
-MIN_ASIDE = 0.1  # the other points are left out if this share lies there
-MIN_RANGE_M = 1.0  # nearer points may lie on the robot
-FULL_WEIGHT_M = 20.0  # points beyond it have the full weight; errors of position blur nearer ones
-MIN_PROMINENCE = 0.35  # least prominence of a peak, as a share of its height
-MIN_MASS = 3e-4  # least share of all points on a beam
-MIN_GAP, GAPS_AROUND = 0.5, 7  # least gap between beams, as a share of the median of 7 gaps around
-MIN_CONTRAST = 0.6  # a sensor has beams if this share of the points lies in the peaks, above the valleys
-ONE_ORIGIN_CONTRAST = 0.995  # other origins are tried below this share
+"""Fewest points in which beams are searched."""
+ASIDE = np.tan(np.deg2rad(60.0))
+"""Points with a steeper bearing lie to the side, where compensation for a drive ahead moves them along their ring."""
+MIN_ASIDE = 0.1
+"""Share of the points to the side from which the other points are left out."""
+MIN_RANGE_M = 1.0
+"""Nearer points may lie on the robot [m]."""
+FULL_WEIGHT_M = 20.0
+"""Points beyond it have the full weight; errors of position blur nearer ones [m]."""
+MIN_PROMINENCE = 0.35
+"""Least prominence of a peak, as a share of its height."""
+MIN_MASS = 3e-4
+"""Least share of all points on a beam."""
+MIN_GAP = 0.5
+"""Least gap between beams, as a share of the median of the gaps around."""
+GAPS_AROUND = 7
+"""Number of gaps of which that median is taken."""
+MIN_CONTRAST = 0.6
+"""A sensor has beams if this share of the points lies in the peaks, above the valleys."""
+ONE_ORIGIN_CONTRAST = 0.995
+"""Other origins are tried below this share."""
 MAX_BEAMS = 512
-MAX_ASPECT = 8.0  # greatest azimuth step over the spacing of beams; beyond it the peaks are chance
-CELL_DEG = (2.0, 4.0)  # size in elevation and azimuth of a cell in which returns are counted
+MAX_ASPECT = 8.0
+"""Greatest azimuth step over the spacing of beams; beyond it the peaks are chance."""
+CELL_DEG = (2.0, 4.0)
+"""Size in elevation and azimuth of a cell in which returns are counted [deg]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,11 +132,13 @@ def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> Bea
     if rings.contrast < ONE_ORIGIN_CONTRAST:
         aside = [points[np.abs(points[:, 1]) > ASIDE * np.abs(points[:, 0])] for points in far]
         seen = aside if sum(map(len, aside)) > MIN_ASIDE * sum(map(len, far)) else far
-        rings, far = _Rings.of_points(np.concatenate(seen), origins_m), seen
+        rings = _Rings.of_points(np.concatenate(seen), origins_m)
+        far = seen
     if rings.contrast < MIN_CONTRAST or len(rings.peaks) > MAX_BEAMS:
         return _without_beams(far)
     elevations_deg = np.rad2deg(np.arctan((rings.peaks + 0.5) * BIN - STEEPEST))
-    spacing_deg, step_deg = float(np.median(np.diff(elevations_deg))), _azimuth_step_deg(far, rings)
+    spacing_deg = float(np.median(np.diff(elevations_deg)))
+    step_deg = _azimuth_step_deg(far, rings)
     if step_deg > MAX_ASPECT * spacing_deg:
         return _without_beams(far)
     return BeamPattern(elevations_deg, spacing_deg, step_deg, rings.contrast)
@@ -139,9 +163,10 @@ class _Rings:
             np.clip(bins, 0, N_BINS - 1, out=bins)
             count = _histogram(bins, weight)
             height = _mean(count * count) / np.maximum(_mean(count), 1e-6)
-            own = (height * (1.0 if origin_m else FRAME_ORIGIN_FAVOUR)).astype(np.float32)[bins]
-            better = own > score
-            score[better], best[better] = own[better], bins[better]
+            score_here = (height * (1.0 if origin_m else FRAME_ORIGIN_FAVOUR)).astype(np.float32)[bins]
+            better = score_here > score
+            score[better] = score_here[better]
+            best[better] = bins[better]
         count = _histogram(best, weight)
         peaks = _peaks(count)
         return cls(best, peaks, _contrast(count, peaks))
@@ -160,11 +185,15 @@ def _peaks(count: Float64) -> Int:
     peaks, prominence = prominent_peaks(count)
     peaks = peaks[prominence > MIN_PROMINENCE * count[peaks]]
     if not len(peaks):
-        return np.zeros(0, np.int64)
+        return peaks
     mass = np.add.reduceat(count, np.append(0, (peaks[1:] + peaks[:-1]) // 2))
     kept = mass > MIN_MASS * count.sum()
-    peaks, mass = peaks[kept], mass[kept]
-    while len(peaks) > 3:  # a gap far narrower than those around is within a blurred beam
+    return _joined(peaks[kept], mass[kept])
+
+
+def _joined(peaks: Int, mass: Float64) -> Int:
+    """Peaks without those within a blurred beam, which lie far nearer to another one than the peaks around."""
+    while len(peaks) > 3:
         gap = np.diff(peaks)
         around = sliding_window_view(np.pad(gap, GAPS_AROUND // 2, "symmetric"), GAPS_AROUND)
         usual = np.median(around, axis=1)
@@ -172,9 +201,11 @@ def _peaks(count: Float64) -> Int:
         if gap[narrowest] >= MIN_GAP * usual[narrowest]:
             break
         lesser = narrowest + int(mass[narrowest] > mass[narrowest + 1])
-        mass[2 * narrowest + 1 - lesser] += mass[lesser]
-        peaks, mass = np.delete(peaks, lesser), np.delete(mass, lesser)
-    return np.asarray(peaks, np.int64)
+        greater = 2 * narrowest + 1 - lesser
+        mass[greater] += mass[lesser]
+        peaks = np.delete(peaks, lesser)
+        mass = np.delete(mass, lesser)
+    return peaks
 
 
 def _contrast(count: Float64, peaks: Int) -> float:
@@ -256,8 +287,10 @@ def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
 
 MAX_SPACING_DEG = 10.0
 """Greatest spacing that a profile can state."""
-EVEN_DEG, EVEN_SHARE = 0.05, 0.05
-"""Deviation from even spacing up to which beams need no table: the greater of the two, and of the spacing."""
+EVEN_DEG = 0.05
+"""Deviation from even spacing up to which beams need no table [deg]."""
+EVEN_SHARE = 0.05
+"""The same as a share of the spacing; the greater of both counts."""
 
 
 def cell_m(spacing_deg: float, azimuth_step_deg: float) -> float:
@@ -267,11 +300,12 @@ def cell_m(spacing_deg: float, azimuth_step_deg: float) -> float:
 
 def beam_keys(pattern: BeamPattern) -> dict[str, Any]:
     """Keys of `sensor` that describe a pattern: a table of the beams, or their step where they are evenly spaced."""
-    found, step_deg = pattern.elevations_deg, round(pattern.azimuth_step_deg, 3)
-    if not len(found):
+    elevations_deg = pattern.elevations_deg
+    step_deg = round(pattern.azimuth_step_deg, 3)
+    if not len(elevations_deg):
         step_deg = min(step_deg, MAX_SPACING_DEG)
         return {"elevation_step_deg": step_deg, "azimuth_step_deg": step_deg}
-    mean_deg = float(np.ptp(found)) / (len(found) - 1)
-    if np.abs(np.diff(found) - mean_deg).max() < max(EVEN_DEG, EVEN_SHARE * mean_deg):
+    mean_deg = float(np.ptp(elevations_deg)) / (len(elevations_deg) - 1)
+    if np.abs(np.diff(elevations_deg) - mean_deg).max() < max(EVEN_DEG, EVEN_SHARE * mean_deg):
         return {"elevation_step_deg": min(round(mean_deg, 3), MAX_SPACING_DEG), "azimuth_step_deg": step_deg}
-    return {"elevations_deg": tuple(np.round(found[::-1], 2).tolist()), "azimuth_step_deg": step_deg}
+    return {"elevations_deg": tuple(np.round(elevations_deg[::-1], 2).tolist()), "azimuth_step_deg": step_deg}

@@ -11,6 +11,7 @@ from modt.config import ProfileConfig, SegmentationConfig, SensorConfig
 from modt.placement import Mount
 from modt.sensor_fit.beams import (
     COARSE_ORIGINS_M,
+    BeamPattern,
     azimuth_ratio,
     beam_keys,
     cell_m,
@@ -20,12 +21,17 @@ from modt.sensor_fit.beams import (
     tangents,
 )
 from modt.sensor_fit.reflectance import NONE, reflectance_scale, usable_scale
-from modt.sensor_fit.tilt import MIN_TILT_DEG, Floor, find_floor, mount_height_m
+from modt.sensor_fit.tilt import LEVEL_UP, MIN_TILT_DEG, Floor, find_floor, mount_height_m
 from modt.types import Float32
 
-MAX_SPACING_RATIO = 1.35  # greatest ratio of the beam spacings, median over the points
-MAX_AZIMUTH_RATIO = 1.6  # greatest ratio of the spacings along a beam: a head may turn faster
-MAX_HEIGHT_SHARE, MAX_HEIGHT_M = 0.2, 0.15  # greatest difference of the height: the larger of the two
+MAX_SPACING_RATIO = 1.35
+"""Greatest ratio of the beam spacings, median over the points."""
+MAX_AZIMUTH_RATIO = 1.6
+"""Greatest ratio of the spacings along a beam: a head may turn faster."""
+MAX_HEIGHT_M = 0.15
+"""Greatest difference of the height [m]."""
+MAX_HEIGHT_SHARE = 0.2
+"""The same as a share of the height; the greater of both counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,29 +81,35 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     pattern = find_beams([points], COARSE_ORIGINS_M)
     if pattern is None:
         return Recognition((), None, config)
-    sensor, tangent = SensorConfig(**beam_keys(pattern)), tangents(points)
-    of_sensor = _pattern_differences(config.sensor, sensor, tangent)
-    floor = find_floor(points, None if of_sensor else config.sensor.height_m)
-    tilt_deg = None
-    if floor is not None and floor.tilt_deg > MIN_TILT_DEG and _is_open(config.sensor):
-        tilt_deg = floor.roll_pitch_deg
-    mount = Mount.of(*(tilt_deg or (config.sensor.roll_deg, config.sensor.pitch_deg)))
-    sensor = replace(sensor, height_m=mount_height_m([mount.turn(points[::2])], sensor))
+    expected = config.sensor
+    found = SensorConfig(**beam_keys(pattern))
+    tangent = tangents(points)
+    of_sensor = _pattern_differences(expected, found, tangent)
+    floor = find_floor(points, None if of_sensor else expected.height_m)
+    tilted = floor and floor.tilt_deg() > MIN_TILT_DEG and _is_open(expected)
+    tilt_deg = floor.roll_pitch_deg if floor and tilted else None
+    mount = Mount.of(*(tilt_deg or (expected.roll_deg, expected.pitch_deg)))
     scale = reflectance_scale(points[:, 3])
-    sensor = replace(sensor, reflectance=usable_scale(points, scale, sensor))
-    if NONE not in {config.sensor.reflectance, scale} and scale != config.sensor.reflectance:
-        of_sensor.append(f"reflectance of another scale than {config.sensor.reflectance}")
-    of_mount = _mount_differences(config.sensor, sensor.height_m, mount, floor)
-    nearest, fitted = None, config
+    found = replace(found, height_m=mount_height_m([mount.turn(points[::2])], found))
+    found = replace(found, reflectance=usable_scale(points, scale, found))
+    if NONE not in {expected.reflectance, scale} and scale != expected.reflectance:
+        of_sensor.append(f"reflectance of another scale than {expected.reflectance}")
+    of_mount = _mount_differences(expected, found.height_m, mount, floor)
     if of_sensor:
-        if sensor.height_m is not None:  # a small robot is near its sensor
-            sensor = replace(sensor, min_range_m=min(sensor.min_range_m, sensor.height_m))
-        cells = SegmentationConfig(cell_m=cell_m(pattern.spacing_deg, pattern.azimuth_step_deg))
-        nearest, fitted = nearest_profile(sensor, tangent), ProfileConfig(sensor=sensor, segmentation=cells)
-    elif of_mount:
-        fitted = replace(config, sensor=replace(config.sensor, height_m=sensor.height_m))
+        fitted = _measured_profile(found, pattern)
+    else:
+        fitted = replace(config, sensor=replace(expected, height_m=found.height_m)) if of_mount else config
+    nearest = nearest_profile(found, tangent) if of_sensor else None
     recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg, not of_sensor)
     return replace(recognition, fitted=recognition.mounted(fitted))
+
+
+def _measured_profile(found: SensorConfig, pattern: BeamPattern) -> ProfileConfig:
+    """Profile of measured values, without what a sweep does not tell."""
+    if found.height_m is not None:  # a small robot is near its sensor
+        found = replace(found, min_range_m=min(found.min_range_m, found.height_m))
+    cells = SegmentationConfig(cell_m=cell_m(pattern.spacing_deg, pattern.azimuth_step_deg))
+    return ProfileConfig(sensor=found, segmentation=cells)
 
 
 def _is_open(sensor: SensorConfig) -> bool:
@@ -118,11 +130,12 @@ def _pattern_differences(expected: SensorConfig, found: SensorConfig, tangent: F
 def _mount_differences(
     expected: SensorConfig, height_m: float | None, mount: Mount, floor: Floor | None
 ) -> list[str]:
-    differences, stated_m = [], expected.height_m
+    differences = []
+    stated_m = expected.height_m
     if stated_m and height_m and abs(height_m - stated_m) >= max(MAX_HEIGHT_M, MAX_HEIGHT_SHARE * stated_m):
         differences.append(f"{height_m:.2f} m above the ground, not {stated_m:.2f}")
     if floor is not None and not _is_open(expected):
-        stated = np.array([0.0, 0.0, 1.0]) if mount.R_level_sensor is None else mount.R_level_sensor[2]
-        if np.rad2deg(np.arccos(np.clip((stated * floor.up).sum(), -1.0, 1.0))) > MIN_TILT_DEG:
+        up = LEVEL_UP if mount.R_level_sensor is None else mount.R_level_sensor[2]
+        if floor.tilt_deg(up) > MIN_TILT_DEG:
             differences.append("rolled by {:.1f} and pitched by {:.1f} deg".format(*floor.roll_pitch_deg))
     return differences

@@ -10,8 +10,10 @@ from modt.config import SensorConfig
 from modt.sensor_fit.beams import nearest_profile, tangents
 from modt.types import Float32
 
-NONE, OTHER = "none", "other"
-"""Scales of a sweep without reflectance, and of one on a scale that models do not know."""
+NONE = "none"
+"""Scale of a sweep without reflectance."""
+OTHER = "other"
+"""Scale that models do not know."""
 
 
 @dataclass(frozen=True, slots=True)

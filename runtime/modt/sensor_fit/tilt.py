@@ -12,12 +12,16 @@ from modt.geometry import rotation_zyx
 from modt.geometry.field_of_view import BlindSectors
 from modt.types import Float32, Float64
 
-REACH_M, DEPTH_M = 12.0, 3.0
-"""Range within which the floor is searched, and its greatest depth below the sensor [m]."""
+REACH_M = 12.0
+"""Range within which the floor is searched [m]."""
+DEPTH_M = 3.0
+"""Greatest depth of a floor below the sensor [m]."""
 WAY_M = 1.5
 """Half the width of the strip ahead and behind to which a floor is fitted [m]; a street slopes away beside it."""
-CUBE_M, MOST_CUBES = 0.25, 2000
-"""Side of the cubes [m] that count once each, as near returns are many, and greatest number in a search."""
+CUBE_M = 0.25
+"""Side of the cubes that count once each, as near returns are many [m]."""
+MAX_CUBES = 2000
+"""Greatest number of cubes in a search."""
 TILTS_DEG = np.arange(-20.0, 20.1, 2.5)
 """Rolls and pitches that a search tries [deg]."""
 BIN_M = 0.1
@@ -31,6 +35,7 @@ MIN_TILT_DEG = 2.0
 OTHER_SHARE = 0.25
 """A plane whose depth differs from the height of the mount by this share of the height is no floor."""
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
+LEVEL_UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +58,9 @@ class Floor:
         x, y, z = self.up.tolist()
         return round(float(np.rad2deg(np.arctan2(y, z))), 1), round(float(np.rad2deg(-np.arcsin(x))), 1)
 
-    @property
-    def tilt_deg(self) -> float:
-        """Angle from the vertical to the sensor's axis."""
-        return float(np.rad2deg(np.arccos(np.clip(self.up[2], -1.0, 1.0))))
+    def tilt_deg(self, up: Float64 = LEVEL_UP) -> float:
+        """Angle between the normal and the vertical (3,) of a mount, by default a level one."""
+        return float(np.rad2deg(np.arccos(np.clip((up * self.up).sum(), -1.0, 1.0))))
 
 
 def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
@@ -69,7 +73,8 @@ def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
     near = near[(near != 0).any(axis=1)]
     key = (np.floor(near / CUBE_M).astype(np.int64) * (1, 1_000, 1_000_000)).sum(axis=1)
     cubes = near[np.unique(key, return_index=True)[1]].astype(np.float64).T
-    upright, hanging = _floor(cubes, np.eye(3)), _floor(cubes, UPSIDE_DOWN)
+    upright = _floor(cubes, np.eye(3))
+    hanging = _floor(cubes, UPSIDE_DOWN)
     if upright is None or hanging is None:
         return upright or hanging
     if height_m is not None:
@@ -83,8 +88,9 @@ def _floor(cubes: Float64, R: Float64) -> Floor | None:
     """Floor in (3, C) cubes; None without one. R (3, 3) turns the sensor upright, up to the angles of the search."""
     if cubes.shape[1] < MIN_CUBES:
         return None
-    x, y, z = _turned(R, cubes[:, :: 1 + cubes.shape[1] // MOST_CUBES])
-    ups = np.array([rotation_zyx(*np.deg2rad([roll, pitch, 0.0]))[2] for roll in TILTS_DEG for pitch in TILTS_DEG])
+    x, y, z = _turned(R, cubes[:, :: 1 + cubes.shape[1] // MAX_CUBES])
+    turns = [_turn(roll_deg, pitch_deg) for roll_deg in TILTS_DEG for pitch_deg in TILTS_DEG]
+    ups = np.array([turn[2] for turn in turns])
     depth = np.floor((ups[:, :1] * x + ups[:, 1:2] * y + ups[:, 2:] * z) / -BIN_M).astype(np.int64)
     bins = round(DEPTH_M / BIN_M)
     column = np.where(depth < 0, bins + 1, np.minimum(depth, bins)) + np.arange(len(ups))[:, None] * (bins + 2)
@@ -92,24 +98,30 @@ def _floor(cubes: Float64, R: Float64) -> Floor | None:
     deeper = count[:, ::-1].cumsum(axis=1)[:, ::-1]
     score = count[:, :-2] + count[:, 1:-1] - deeper[:, 2:]  # nothing is below a floor
     best, bin_ = np.unravel_index(int(score.argmax()), score.shape)
-    roll, pitch = TILTS_DEG[best // len(TILTS_DEG)], TILTS_DEG[best % len(TILTS_DEG)]
-    R = rotation_zyx(*np.deg2rad([roll, pitch, 0.0])) @ R
-    return _fitted(cubes, R, float(BIN_M * (bin_ + 1)))
+    return _fitted(cubes, turns[best] @ R, float(BIN_M * (bin_ + 1)))
+
+
+def _turn(roll_deg: float, pitch_deg: float) -> Float64:
+    """(3, 3) rotation by a roll and a pitch."""
+    return rotation_zyx(*np.deg2rad([roll_deg, pitch_deg, 0.0]))
 
 
 def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
     """Plane by least squares, from a first guess at a depth that is level after R (3, 3)."""
     x, y, z = _turned(R, cubes)
     way = np.abs(y) < WAY_M
-    level, z = np.stack([np.ones(way.sum()), x[way], y[way]], axis=1), z[way]
-    plane, n = np.array([-depth_m, 0.0, 0.0]), 0
+    z = z[way]
+    rows = np.stack([np.ones(len(z)), x[way], y[way]], axis=1)  # z = rows @ plane on the plane
+    plane = np.array([-depth_m, 0.0, 0.0])
+    n = 0
     for near_m in NEAR_M:
-        on = np.abs(z - (level * plane).sum(axis=1)) < near_m
-        n = int(on.sum())
+        near = np.abs(z - (rows * plane).sum(axis=1)) < near_m
+        n = int(near.sum())
         if n < MIN_CUBES:
             return None
-        own = level[on]  # sums without BLAS, which would start threads
-        normal, right = (own[:, :, None] * own[:, None]).sum(axis=0), (own * z[on, None]).sum(axis=0)
+        used = rows[near]  # sums without BLAS, which would start threads
+        normal = (used[:, :, None] * used[:, None]).sum(axis=0)
+        right = (used * z[near, None]).sum(axis=0)
         plane = np.linalg.solve(normal, right)
     steep = np.array([-plane[1], -plane[2], 1.0])
     up = R.T @ (steep / np.linalg.norm(steep))

@@ -68,7 +68,7 @@ def find_mount(recording: Recording, config: ProfileConfig) -> Iterator[Finding]
         )
         return
     angles = np.median([floor.roll_pitch_deg for floor in floors], axis=0)
-    tilt_deg = float(np.median([floor.tilt_deg for floor in floors]))
+    tilt_deg = float(np.median([floor.tilt_deg() for floor in floors]))
     evidence = f"by the floor in {len(floors)} sweeps: the sensor is tilted by {tilt_deg:.1f} deg"
     for key, angle in zip(("roll_deg", "pitch_deg"), angles.tolist(), strict=True):
         yield Finding("sensor", key, round(angle, 1) if tilt_deg > LEVEL_DEG else 0.0, evidence)
