@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from modt.sources.drivers import Driver
-from modt.sources.packets.packet_decoder import PacketDecoder, refuse
-from modt.sources.stream import Reception, Sweep
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.stream import Sweep
 
 MAGIC = b"ACME"
 
@@ -18,15 +18,12 @@ def is_packet(payload: bytes) -> bool:
 class AcmeDecoder(PacketDecoder):
     """A packet is a whole sweep: float32 rows of x, y, z and reflectance."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-
     def accepts(self, payload: bytes) -> bool:
         return is_packet(payload)
 
-    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+    def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         if not is_packet(payload):
-            refuse(reception, self.name, "no packet of an Acme")
+            self.refuse("no packet of an Acme")
             return []
         return [Sweep(received_s, np.frombuffer(payload, np.float32, offset=len(MAGIC)).reshape(-1, 4).copy())]
 

@@ -16,7 +16,6 @@ from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
-from modt.sources.stream import Reception
 from tests.fuzz.target import Feed, of_file, target, targets_of_files
 from tests.ros2 import messages
 from tests.sources import bags, layouts
@@ -157,13 +156,14 @@ def _of_packets(decoder: PacketDecoder, seed: bytes) -> Feed:
     """A sensor's packets with their lengths and times, by a decoder that has seen none."""
 
     def call(raw: bytes) -> None:
-        fresh, reception, at = decoder.fresh(), Reception(), 0
+        fresh = decoder.fresh()
+        at = 0
         while at + LENGTH.size <= len(raw):
             length, received_s = LENGTH.unpack_from(raw, at)
             at += LENGTH.size
             received_s = received_s if abs(received_s) < 1e10 else 0.0  # of the host's clock, no outside bytes
-            fresh.decode(received_s, raw[at : at + min(length, 65_535)], reception)
+            fresh.decode(received_s, raw[at : at + min(length, 65_535)])
             at += length
-        fresh.finish(reception)
+        fresh.finish()
 
     return [seed], call

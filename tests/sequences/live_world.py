@@ -107,6 +107,8 @@ class LiveWorld:
         self.payloads = turns(source)[0] if self.maker else ()
         self.decoder = self.maker.decoder() if self.maker else None
         self.reader: Any = Reader()
+        if self.decoder:
+            self.reader.reception = self.decoder.reception
         if source == "ros2":
             from modt.sources.live.ros2 import DEPTH, PointCloudReader
 
@@ -134,7 +136,7 @@ class LiveWorld:
         self.messages += 1
         self.reader.reception.messages += 1
         received_s = self.calendar_s if received_s is None else received_s
-        self._put(self.decoder.decode(received_s, payload, self.reader.reception))
+        self._put(self.decoder.decode(received_s, payload))
 
     def stamped(self, payload: bytes, ahead_s: float = 0.0) -> bytes:
         """A packet with the time of the sensor's clock."""
@@ -152,7 +154,7 @@ class LiveWorld:
     def pause(self) -> None:
         """Let a moment pass in which nothing arrives."""
         if self.decoder is not None:
-            self._put(self.decoder.pause(self.reader.reception))
+            self._put(self.decoder.pause())
 
     def _put(self, sweeps: Iterable[Sweep]) -> None:
         for sweep in sweeps:

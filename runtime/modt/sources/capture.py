@@ -13,7 +13,7 @@ from modt.sources.drivers import DRIVERS, Driver
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.stamp_check import StampCheck
-from modt.sources.stream import Faults, Reception, StreamInfo, Sweep
+from modt.sources.stream import Faults, StreamInfo, Sweep
 from modt.types import Frame, Self
 
 
@@ -30,18 +30,19 @@ class PacketStream:
         """Select the frames with first <= index < info.end; each pass decodes with a fresh copy of the decoder."""
         self.info = info
         self.faults = Faults()
-        self.reception = Reception()
+        self.reception = decoder.reception
         self.capture = capture
         self.decoder = decoder
         self._first = first
 
     def __iter__(self) -> Iterator[Frame]:
-        self.reception = Reception()
+        decoder = self.decoder.fresh()
+        self.reception = decoder.reception
         path = str(self.capture.path)
         stamps = StampCheck()
         lost = 0
         index = -1
-        sweeps = islice(_decoded(self.capture, self.decoder.fresh(), self.reception), self.info.end)
+        sweeps = islice(_decoded(self.capture, decoder), self.info.end)
         for index, (arrived_s, sweep) in enumerate(sweeps):
             missing = self.reception.lost - lost
             lost = self.reception.lost
@@ -79,10 +80,10 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     capture.flow = next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
     if capture.flow is None:
         raise _without_packets(capture, driver.maker, f"give the {driver.identified_by} of the sensor that sent them")
-    reception = Reception()
-    _, first = next(_decoded(capture, decoder, reception), (0.0, None))
+    _, first = next(_decoded(capture, decoder), (0.0, None))
     if first is None:
-        why, _, remedy = max(reception.refused, key=reception.refused.__getitem__, default="").partition("; ")
+        refused = decoder.reception.refused
+        why, _, remedy = max(refused, key=refused.__getitem__, default="").partition("; ")
         cause = f"no whole sweep ({driver.maker})" + (f", packets are refused: {why}" if why else "")
         raise MisuseError(path, cause, remedy or "record at least two turns of the sensor")
     info = decoder.info(path.stem, driver.maker)
@@ -120,13 +121,13 @@ def _without_packets(capture: PcapFile, maker: str, remedy: str) -> MisuseError:
     return MisuseError(capture.path, f"no packets of a {maker} ({there})", remedy)
 
 
-def _decoded(capture: PcapFile, decoder: PacketDecoder, reception: Reception) -> Iterator[tuple[float, Sweep]]:
+def _decoded(capture: PcapFile, decoder: PacketDecoder) -> Iterator[tuple[float, Sweep]]:
     """Time of the completing packet [s] and sweep, in the order of the capture."""
     arrived_s = 0.0
     for datagram in capture:
-        reception.messages += 1
+        decoder.reception.messages += 1
         arrived_s = datagram.stamp_s
-        for sweep in decoder.decode(arrived_s, datagram.payload, reception):
+        for sweep in decoder.decode(arrived_s, datagram.payload):
             yield arrived_s, sweep
-    for sweep in decoder.finish(reception):
+    for sweep in decoder.finish():
         yield arrived_s, sweep

@@ -3,7 +3,6 @@
 import socket
 import time
 from itertools import islice
-from types import SimpleNamespace
 
 import pytest
 
@@ -12,6 +11,7 @@ from modt.schemes import open_sensor
 from modt.sources.drivers.hesai import HesaiDecoder
 from modt.sources.drivers.livox import LivoxDecoder
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
+from modt.sources.packets.packet_decoder import PacketDecoder
 from tests.sources.packets.simulated import decoded, packets
 from tools.send.loops import endless
 
@@ -28,8 +28,17 @@ def now():
     return pytest.approx(time.time(), abs=60.0)
 
 
-ECHO = SimpleNamespace(name="sensor", decode=lambda *packet: [packet[:2]], pause=lambda reception: [])
-"""A decoder whose sweeps are the packets, with the times of their reception."""
+class Echo(PacketDecoder):
+    """A decoder whose sweeps are the packets, with the times of their reception."""
+
+    def accepts(self, payload):
+        return True
+
+    def decode(self, *packet):
+        return [packet]
+
+    def _reset(self):
+        pass
 
 
 @pytest.fixture(name="listen")
@@ -37,7 +46,7 @@ def listening(port, request):
     """A function that makes a reader of the port."""
 
     def listen(*group, **options):
-        reader = PacketReader(bound_socket("sensor", port, *group), ECHO, **options)
+        reader = PacketReader(bound_socket("sensor", port, *group), Echo("sensor"), **options)
         request.addfinalizer(reader.close)
         return reader
 

@@ -28,11 +28,9 @@ def packets(model: str = "vlp-16", sweeps: int = 5) -> tuple[Timed, ...]:
 
 
 def decoded(decoder: PacketDecoder, timed: Iterable[Timed]) -> tuple[list[Sweep], Reception]:
-    reception, sweeps = Reception(), list[Sweep]()
-    for at_s, payload in timed:
-        reception.messages += 1
-        sweeps += decoder.decode(at_s, payload, reception)
-    return [*sweeps, *decoder.finish(reception)], reception
+    """Sweeps of packets, and the counts of the decoder."""
+    sweeps = [sweep for at_s, payload in timed for sweep in decoder.decode(at_s, payload)]
+    return [*sweeps, *decoder.finish()], decoder.reception
 
 
 def bearing_deg(points: Float32) -> Float32:

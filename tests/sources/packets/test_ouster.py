@@ -155,7 +155,6 @@ def test_a_sensor_that_was_switched_on_again_is_still_the_one_of_the_metadata(ti
     sweeps, reception = decoded(OusterDecoder("sensor", metadata), again)
     assert equal(sweeps, whole)
     assert reception.refused == {}
-    decoder, sweeps = OusterDecoder("sensor", metadata), []
-    for at_s, payload in [*timed[:128], *again[128:]]:
-        sweeps += decoder.decode(at_s, payload, reception)
+    decoder = OusterDecoder("sensor", metadata)
+    sweeps = [s for at_s, payload in [*timed[:128], *again[128:]] for s in decoder.decode(at_s, payload)]
     assert [len(s.points) for s in sweeps] == [len(s.points) for s in whole]

@@ -17,7 +17,6 @@ from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.point_cloud_file import read_pcd
-from modt.sources.stream import Reception
 from tests.sequences import makers
 from tests.sources.packets.simulated import BEGAN_S, decoded, equal, packets, scene
 from tools.send.faults import Timed
@@ -167,15 +166,16 @@ def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker: Maker
 
 @pytest.mark.parametrize("name", ["velodyne", "hesai", "livox"])
 def test_a_sweep_holds_no_more_packets_than_a_sensor_sends(name: str) -> None:
-    maker, stamped, reception = MAKERS[name], makers.MAKERS[name].stamped, Reception()
-    decoder, timed, at = maker.decoder(), maker.timed(), maker.lost[0]
+    stamped = makers.MAKERS[name].stamped
+    decoder, timed = MAKERS[name].decoder(), MAKERS[name].timed()
+    at = MAKERS[name].lost[0]
     for at_s, payload in timed[:at]:
-        decoder.decode(at_s, stamped(payload, at_s), reception)
+        decoder.decode(at_s, stamped(payload, at_s))
     for k in range(3000):
-        decoder.decode(at_s, stamped(payload, at_s - 0.01 * k / 3000), reception)
+        decoder.decode(at_s, stamped(payload, at_s - 0.01 * k / 3000))
     assert makers.is_bounded(decoder)
-    assert reception.refused["more than a turn has; do several sensors send to this port?"] > 1000
-    sweeps = [s for at_s, payload in timed[at:] for s in decoder.decode(at_s, stamped(payload, at_s), reception)]
+    assert decoder.reception.refused["more than a turn has; do several sensors send to this port?"] > 1000
+    sweeps = [s for at_s, payload in timed[at:] for s in decoder.decode(at_s, stamped(payload, at_s))]
     assert sweeps[-1].complete  # the sensor's own packets go on
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from modt.sources.drivers.velodyne import VelodyneDecoder, model_named
 from modt.sources.packets.pcap_file import PcapFile
-from modt.sources.stream import Reception
 from tests.sources.packets.simulated import bearing_deg, decoded, equal, packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 
@@ -63,15 +62,16 @@ def test_a_sector_that_the_sensor_is_set_not_to_see_is_not_lost_and_its_sweep_en
     assert len(whole) >= 2
     assert reception.lost == 0
     assert np.abs(bearing_deg(whole[0].points)).max() < 100
-    decoder, reception, paused = VelodyneDecoder("sensor"), Reception(), []
+    decoder = VelodyneDecoder("sensor")
+    paused = []
     for i, (at_s, payload) in enumerate(timed):
-        decoder.decode(at_s, payload, reception)
+        decoder.decode(at_s, payload)
         if i + 1 < len(timed) and timed[i + 1][0] - at_s > 0.01:
-            paused.append(len(decoder.pause(reception)))
-            assert not decoder.pause(reception)
+            paused.append(len(decoder.pause()))
+            assert not decoder.pause()
     assert paused[:1] == [0]  # the sector is known after a turn
     assert paused.count(1) == len(whole) - 1
-    assert reception.lost == 0
+    assert decoder.reception.lost == 0
 
 
 def restamped(payload, by_s):

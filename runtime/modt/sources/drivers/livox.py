@@ -10,8 +10,8 @@ import numpy as np
 
 from modt.sources.drivers import Driver
 from modt.sources.packets.device_clock import DeviceClock
-from modt.sources.packets.packet_decoder import PacketDecoder, refuse
-from modt.sources.stream import Reception, Sweep
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.stream import Sweep
 from modt.types import Float32
 
 HEADER = Struct("<BH2xH3xB13x4xQ")
@@ -45,18 +45,14 @@ class LivoxDecoder(PacketDecoder):
     _before_ns: int | None  # time of the last packet of the sweep before; None where it was not received
     _packets: dict[int, bytes]  # packets of the present sweep by their time [ns]
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self._reset()
-
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points of a Livox."""
         return is_packet(payload)
 
-    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+    def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Sweeps completed by a packet."""
         if not is_packet(payload):
-            refuse(reception, self.name, "no packet of points of a Livox")
+            self.refuse("no packet of points of a Livox")
             return []
         stamp_ns = HEADER.unpack_from(payload)[-1]
         window = stamp_ns // SWEEP_NS
@@ -64,28 +60,28 @@ class LivoxDecoder(PacketDecoder):
         late = ahead == -1 or stamp_ns in self._packets
         if late or (ahead == 0 and len(self._packets) >= MAX_PACKETS):
             reason = "late or twice" if late else "more than a turn has; do several sensors send to this port?"
-            refuse(reception, self.name, reason)
+            self.refuse(reason)
             return []
         self._clock.unwrapped(stamp_ns * 1e-9, received_s)
         sweeps = []
         if not 0 <= ahead <= MAX_GAP:
             self._before_ns = None
         elif ahead:
-            sweeps = self._sweep(reception)
+            sweeps = self._sweep()
         if ahead:
             self._window = window
             self._packets = {}
         self._packets[stamp_ns] = payload
         return sweeps
 
-    def finish(self, reception: Reception) -> Sequence[Sweep]:
+    def finish(self) -> Sequence[Sweep]:
         """Last sweep, if only the packet after it is missing."""
         sweeps: list[Sweep] = []
         if len(self._packets) > 1:
             *_, before_ns, last_ns = sorted(self._packets)
             next_ns = last_ns + (last_ns - before_ns)
             if next_ns // SWEEP_NS > self._window:
-                sweeps = self._sweep(reception)
+                sweeps = self._sweep()
         self._reset()
         return sweeps
 
@@ -95,7 +91,7 @@ class LivoxDecoder(PacketDecoder):
         self._before_ns = None
         self._packets = {}
 
-    def _sweep(self, reception: Reception) -> list[Sweep]:
+    def _sweep(self) -> list[Sweep]:
         """Sweep of the packets kept, if its begin was received."""
         stamps_ns = sorted(self._packets)
         before_ns = self._before_ns
@@ -104,7 +100,7 @@ class LivoxDecoder(PacketDecoder):
             return []
         gaps_ns = np.diff([before_ns, *stamps_ns])
         lost = int(np.maximum(np.rint(gaps_ns / np.median(gaps_ns)) - 1, 0).sum())  # lying stamps have gaps near 0
-        reception.lost += lost
+        self.reception.lost += lost
         points = np.concatenate([_points(self._packets[stamp_ns]) for stamp_ns in stamps_ns])
         middle_s = (self._window + 0.5) * SWEEP_NS * 1e-9
         return [Sweep(middle_s + self._clock.offset_s, points, complete=lost == 0)]

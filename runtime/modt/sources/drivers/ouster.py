@@ -14,8 +14,8 @@ from modt import assets
 from modt.errors import MisuseError
 from modt.sources.drivers import Driver
 from modt.sources.packets.device_clock import DeviceClock
-from modt.sources.packets.packet_decoder import PacketDecoder, import_extra, one_line, refuse
-from modt.sources.stream import Reception, Sweep
+from modt.sources.packets.packet_decoder import PacketDecoder, import_extra, one_line
+from modt.sources.stream import Sweep
 from modt.sources.text_file import read_text
 from modt.types import Bool, Float32
 
@@ -45,7 +45,6 @@ class OusterDecoder(PacketDecoder):
             MisuseError: ouster-sdk is missing, or the metadata cannot be read.
         """
         self._sdk = import_extra("ouster.sdk.core", "ouster")
-        self.name = name
         self._info, self._format, self._project = self._read(metadata)
         info = self._info
         self._width = info.format.columns_per_frame
@@ -54,33 +53,33 @@ class OusterDecoder(PacketDecoder):
         self.elevations_deg = tuple(map(float, info.beam_altitude_angles))
         self.period_s = 1.0 / (info.format.fps or 10)
         self.profile = _profile(info.prod_line)
-        self._reset()
+        super().__init__(name)
 
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points that fits the metadata."""
         return self._flaw(payload) is None
 
-    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+    def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Sweeps completed by a packet."""
         flaw = self._flaw(payload)
         if flaw is not None:
-            refuse(reception, self.name, flaw)
+            self.refuse(flaw)
             return []
         packet = self._sdk.LidarPacket(self._format)  # a new one each time, as the batcher keeps it
         packet.buf[:] = np.frombuffer(payload, np.uint8)
         packet.host_timestamp = round(received_s * 1e9)
         valid = packet.validate(self._info, self._format) == self._sdk.PacketValidationFailure.NONE
         if not valid and self._format.prod_sn(packet.buf) != self._info.sn:  # the number of a start may differ
-            refuse(reception, self.name, "of another sensor than the metadata")
+            self.refuse("of another sensor than the metadata")
             return []
         if self._ended(self._format.frame_id(packet.buf)):
-            refuse(reception, self.name, "late: its frame has ended")
+            self.refuse("late: its frame has ended")
             self._late += 1
             if self._late < RESTARTED_BY:
                 return []
             self._reset()
         self._late = 0
-        return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
+        return self._sweeps() if self._batcher.batch(packet, self._frame) else []
 
     def _ended(self, number: int) -> bool:
         """Whether the number of a frame is before that of the present one; the batcher ignores such packets."""
@@ -123,7 +122,7 @@ class OusterDecoder(PacketDecoder):
             return "no packet of an Ouster"
         return None
 
-    def _sweeps(self, reception: Reception) -> Sequence[Sweep]:
+    def _sweeps(self) -> Sequence[Sweep]:
         frame = self._frame
         missing: Bool = np.logical_and(self._awaited, frame.packet_timestamp == 0)
         last_id = self._last_id
@@ -134,9 +133,9 @@ class OusterDecoder(PacketDecoder):
         passed = 0 if last_id is None else (frame.frame_id - last_id) % (self._format.max_frame_id + 1) - 1
         if 0 <= passed <= MAX_LOST_FRAMES:
             lost += passed * int(self._awaited.sum())
-        reception.lost += lost
+        self.reception.lost += lost
         if not (frame.timestamp.astype(np.int64) > 0).any():
-            refuse(reception, self.name, "a whole frame without stamps, or with stamps beyond the year 2262")
+            self.refuse("a whole frame without stamps, or with stamps beyond the year 2262")
             return []
         stamp_s, turn_s = self._times()
         return [Sweep(stamp_s, self._points(), turn_s, complete=not missing.any())]

@@ -11,8 +11,8 @@ from contextlib import suppress
 
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LATE_S
-from modt.sources.packets.packet_decoder import PacketDecoder, refuse
-from modt.sources.stream import Reception, Sweep
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.stream import Sweep
 
 log = logging.getLogger(__name__)
 
@@ -31,7 +31,7 @@ class PacketReader:
     """Receives and decodes the packets of one sensor.
 
     Attributes:
-        reception: counts of packets.
+        reception: counts of packets, which are those of the decoder.
         decoder: decoder of the packets.
     """
 
@@ -51,7 +51,7 @@ class PacketReader:
             clock: clock of the reception [s since 1970], of which a packet that waited is late. The timeout of `read`
                 runs on the monotonic clock.
         """
-        self.reception = Reception()
+        self.reception = decoder.reception
         self.decoder = decoder
         self._socket = bound
         self._source = source
@@ -70,7 +70,7 @@ class PacketReader:
             try:
                 payload, ancillary, _, address = self._socket.recvmsg(MAX_BYTES, socket.CMSG_SPACE(TIMESPEC.size))
             except (TimeoutError, BlockingIOError):
-                sweeps = self.decoder.pause(self.reception)
+                sweeps = self.decoder.pause()
                 if sweeps or time.monotonic() >= until_s:
                     return sweeps
                 continue
@@ -91,8 +91,8 @@ class PacketReader:
         elif now_s - received_s > LATE_S:
             reason = "late: this process was stopped, or has too little CPU time, or the clock was set"
         else:
-            return self.decoder.decode(received_s, payload, self.reception)
-        refuse(self.reception, self.decoder.name, reason)
+            return self.decoder.decode(received_s, payload)
+        self.decoder.refuse(reason)
         return []
 
     def close(self) -> None:

@@ -26,15 +26,21 @@ class PacketDecoder(ABC):
 
     Attributes:
         name: name of the source, for messages.
+        reception: counts of lost and refused packets, and of received ones, which its user counts.
         profile: shipped profile of the sensor; None where there is none, or before its packets have identified it.
         elevations_deg: elevations of its beams, where they are known.
         period_s: nominal time of a sweep with factory settings; each sweep has its measured time.
     """
 
-    name: str
     profile: str | None = None
     elevations_deg: tuple[float, ...] | None = None
     period_s = 0.1
+
+    def __init__(self, name: str) -> None:
+        """`name`: name of the source."""
+        self.name = name
+        self.reception = Reception()
+        self._reset()
 
     def info(self, name: str, maker: str) -> StreamInfo:
         """Properties of a stream of the sensor's packets."""
@@ -49,8 +55,14 @@ class PacketDecoder(ABC):
     def fresh(self) -> Self:
         """Decoder of the same sensor that has seen no packet yet."""
         other = copy.copy(self)
+        other.reception = Reception()
         other._reset()
         return other
+
+    def refuse(self, reason: str) -> None:
+        """Count a refused packet; the first one for each reason is logged."""
+        if self.reception.refuse(reason):
+            log.warning("%s: packet refused: %s; later ones are only counted", self.name, reason)
 
     @abstractmethod
     def _reset(self) -> None:
@@ -61,14 +73,14 @@ class PacketDecoder(ABC):
         """Whether a payload is a packet of points of this kind of sensor."""
 
     @abstractmethod
-    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+    def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Sweeps completed by a packet; unusable and missing packets are counted, never raised."""
 
-    def pause(self, reception: Reception) -> Sequence[Sweep]:
+    def pause(self) -> Sequence[Sweep]:
         """Sweep that is complete because the sensor is blind in the rest of its turn; called in a pause."""
         return []
 
-    def finish(self, reception: Reception) -> Sequence[Sweep]:
+    def finish(self) -> Sequence[Sweep]:
         """Last sweep, if only the packet after it is missing."""
         return []
 
@@ -91,9 +103,3 @@ def import_extra(module: str, name: str) -> Any:
 def one_line(error: Exception) -> str:
     """Message of a library's error, shortened to a part of a line."""
     return " ".join(str(error).split())[:MAX_QUOTED]
-
-
-def refuse(reception: Reception, name: str, reason: str) -> None:
-    """Count a refused packet; the first one for each reason is logged."""
-    if reception.refuse(reason):
-        log.warning("%s: packet refused: %s; later ones are only counted", name, reason)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from modt.sources.packets.device_clock import DeviceClock
-from modt.sources.packets.packet_decoder import PacketDecoder, refuse
-from modt.sources.stream import Reception, Sweep
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.stream import Sweep
 from modt.types import Float32, Float64, Self
 
 log = logging.getLogger(__name__)
@@ -158,14 +158,13 @@ class TurnDecoder(PacketDecoder):
     _ending: Turn
 
     def __init__(self, name: str, profile: str | None = None) -> None:
-        self.name = name
+        super().__init__(name)
         self.profile = profile
         self._unrecognised: list[Timed] = []  # packets kept until the model is recognised
         self._signature: object = None  # of the model; None until it is recognised
         self._reach = 0  # greatest angle between a beam and the head [0.01 deg]
         self._packet_s = 0.0  # time from one packet to the next
         self._max_packets = 0  # of a turn
-        self._reset()
 
     @staticmethod
     @abstractmethod
@@ -194,31 +193,31 @@ class TurnDecoder(PacketDecoder):
         """Whether a payload is a packet of points of this maker."""
         return self.signature(payload) is not None
 
-    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+    def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Sweeps completed by a packet."""
         signature = self.signature(payload)
         if signature is None:
-            refuse(reception, self.name, f"no packet of a {self.maker}")
+            self.refuse(f"no packet of a {self.maker}")
             return []
         if self._signature is not None:
-            return self._of_known_model(received_s, payload, signature, reception)
+            return self._of_known_model(received_s, payload, signature)
         self._unrecognised.append((received_s, payload))
-        return self._begin(reception) if len(self._unrecognised) == RECOGNISED_BY else []
+        return self._begin() if len(self._unrecognised) == RECOGNISED_BY else []
 
-    def pause(self, reception: Reception) -> Sequence[Sweep]:
+    def pause(self) -> Sequence[Sweep]:
         """Sweep, if the turn has reached the blind sector in which the turn before ended."""
         turn = self._turn
         if self._holes is None or not turn.ends_at(self._holes):
             return []
         self._turn = Turn(turn.began_s, None, turn.entries)  # handed over
-        return self._sweeps(turn, reception)
+        return self._sweeps(turn)
 
-    def finish(self, reception: Reception) -> Sequence[Sweep]:
+    def finish(self) -> Sequence[Sweep]:
         """Last sweep, if only the packet after it is missing."""
-        sweeps = [*self._begin(reception)] if self._unrecognised else []
+        sweeps = [*self._begin()] if self._unrecognised else []
         for turn in (self._ending, self._turn):
             if turn.reaches_seam:
-                sweeps += self._sweeps(turn, reception)
+                sweeps += self._sweeps(turn)
         self._reset()
         return sweeps
 
@@ -233,39 +232,37 @@ class TurnDecoder(PacketDecoder):
         self._received_s = -math.inf  # when the last packet of this model came
         self._foreign: list[Timed] = []  # packets of another model since then
 
-    def _begin(self, reception: Reception) -> Sequence[Sweep]:
+    def _begin(self) -> Sequence[Sweep]:
         """Recognise the model by the packets kept, and decode them."""
         timed = self._unrecognised
         self._unrecognised = []
         self._signature = self._recognise([payload for _, payload in timed])
         if self._signature is None:
             for _ in timed:
-                refuse(reception, self.name, self.unknown)
+                self.refuse(self.unknown)
             return []
         self._max_packets = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # with two returns a firing
         sweeps: list[Sweep] = []
         for received_s, payload in timed:
-            sweeps += self._of_known_model(received_s, payload, self.signature(payload), reception)
+            sweeps += self._of_known_model(received_s, payload, self.signature(payload))
         return sweeps
 
-    def _of_known_model(
-        self, received_s: float, payload: bytes, signature: object, reception: Reception
-    ) -> Sequence[Sweep]:
+    def _of_known_model(self, received_s: float, payload: bytes, signature: object) -> Sequence[Sweep]:
         """Sweeps completed by a packet, once a model is recognised."""
         if signature != self._signature:
-            return self._of_foreign_model(received_s, payload, reception)
+            return self._of_foreign_model(received_s, payload)
         entry = self._entry(received_s, payload)
         quiet_s = received_s - self._received_s
         leap_s = 0.0 if self._last is None else entry.time_s - self._last.time_s
         if abs(leap_s) > self._longest_s and not 0 < leap_s < SILENCE_S and quiet_s < SILENCE_S:
-            refuse(reception, self.name, "its stamp leaps: the clock was set, or lies")
+            self.refuse("its stamp leaps: the clock was set, or lies")
         self._received_s = received_s
         self._foreign.clear()
-        return self._add(entry, reception)
+        return self._add(entry)
 
-    def _of_foreign_model(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+    def _of_foreign_model(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Refuse a packet of another model; adopt that model after RECOGNISED_BY packets without the known one."""
-        refuse(reception, self.name, "of another model than the packets before")
+        self.refuse("of another model than the packets before")
         if abs(received_s - self._received_s) < SILENCE_S:
             return []
         self._foreign.append((received_s, payload))
@@ -274,31 +271,31 @@ class TurnDecoder(PacketDecoder):
         log.warning("%s: packets are of another model, and those of the one before have ended", self.name)
         self._unrecognised = self._foreign
         self._reset()
-        return self._begin(reception)
+        return self._begin()
 
-    def _add(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
+    def _add(self, entry: Entry) -> Sequence[Sweep]:
         """Add a packet to its turn; return the sweep that ends with it."""
         last = self._last
         gap_s = 0.0 if last is None else entry.time_s - last.time_s
         if last is None or max(abs(gap_s), entry.time_s - self._turn.began_s) > self._longest_s:
             if self._interval_s and 0 < gap_s < SILENCE_S:
-                reception.lost += max(round(gap_s / self._interval_s) - 1, 0)
+                self.reception.lost += max(round(gap_s / self._interval_s) - 1, 0)
             return self._wait_for_cut(entry)
         if len(self._turn.entries) >= self._max_packets:
-            refuse(reception, self.name, "more than a turn has; do several sensors send to this port?")
+            self.refuse("more than a turn has; do several sensors send to this port?")
             return [] if gap_s < SAME_S else self._wait_for_cut(entry)
         if gap_s < SAME_S:
             if not self._turn.insert(entry):
-                refuse(reception, self.name, "late or twice")
+                self.refuse("late or twice")
             return []
         self._last = entry
         if entry.phase < last.phase - LEAST_TURN:  # the head has passed the seam
             self._ending = self._turn
             self._turn = Turn(entry.time_s, last, self._ending.shared(self._reach))
         self._turn.entries.append(entry)
-        return self._ended(entry, reception)
+        return self._ended(entry)
 
-    def _ended(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
+    def _ended(self, entry: Entry) -> Sequence[Sweep]:
         """Sweep of the turn before, once the latest packet lies beyond the reach of its beams."""
         ending = self._ending
         if not ending.entries:
@@ -307,7 +304,7 @@ class TurnDecoder(PacketDecoder):
             ending.entries.append(entry.turned(TURN))
             return []
         self._ending = NO_TURN
-        return self._sweeps(ending, reception)
+        return self._sweeps(ending)
 
     def _wait_for_cut(self, entry: Entry) -> Sequence[Sweep]:
         """Begin with a packet and wait for the next cut, as the head may have turned any number of times."""
@@ -317,11 +314,11 @@ class TurnDecoder(PacketDecoder):
         self._longest_s = LONGEST_TURN_S
         return []
 
-    def _sweeps(self, turn: Turn, reception: Reception) -> Sequence[Sweep]:
+    def _sweeps(self, turn: Turn) -> Sequence[Sweep]:
         if turn.before is None:
             return []
         lost, self._holes, self._interval_s = turn.missing(self._holes)
-        reception.lost += lost
+        self.reception.lost += lost
         ahead_s, turn_s = turn.times()
         self._longest_s = min(1.5 * turn_s, LONGEST_TURN_S)
         return [Sweep(ahead_s + self._clock.offset_s, self._points(turn.entries), turn_s, complete=lost == 0)]
