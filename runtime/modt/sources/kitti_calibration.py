@@ -1,10 +1,11 @@
 """KITTI's calibration files and OXTS records: left colour camera, inertial unit and its poses.
 
-All readers of calibrations raise a MissingError for a missing file or row, and a MisuseError for an invalid one.
+A missing file or row of a calibration raises a MissingError, and an invalid one a MisuseError.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,8 @@ from modt.geometry import Camera, inverse, rotation_zyx, se3
 from modt.sources.text_file import read_lines
 from modt.types import Float64
 
-IMAGE_PX = (1242.0, 375.0)
-"""Size of the rectified image, for a calibration without one."""
+IMAGE_PX = np.array([1242.0, 375.0])
+"""Width and height of the rectified image, for a calibration without them."""
 REMEDY = "restore the calibration file"
 MAX_ELEMENT = 1e6
 """Greatest number in a calibration [pixel or m]."""
@@ -25,40 +26,39 @@ class MissingError(MisuseError):
     """A calibration file or a row of it is missing; the recording is used without it."""
 
 
-def read_table(path: Path) -> dict[str, Float64]:
-    """Numeric rows by key.
+class Calibration:
+    """Numeric rows of a file by key."""
 
-    Raises:
-        MissingError: the file does not exist.
-    """
-    if not path.is_file():
-        raise MissingError(path, "is missing", REMEDY)
-    table: dict[str, Float64] = {}
-    for line in read_lines(path, REMEDY):
-        key, _, values = line.replace(":", " ", 1).partition(" ")
-        try:
-            table[key] = np.array(values.split(), dtype=np.float64)
-        except ValueError:
-            continue
-    return table
+    def __init__(self, path: Path) -> None:
+        """Read a file.
 
+        Raises:
+            MissingError: the file does not exist.
+        """
+        if not path.is_file():
+            raise MissingError(path, "is missing", REMEDY)
+        self.path = path
+        self.rows: dict[str, Float64] = {}
+        for line in read_lines(path, REMEDY):
+            key, _, values = line.replace(":", " ", 1).partition(" ")
+            with suppress(ValueError):
+                self.rows[key] = np.array(values.split(), dtype=np.float64)
 
-def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys: str) -> Float64:
-    """Matrix of the first known key, with numbers up to MAX_ELEMENT."""
-    for key in keys:
-        if key in table:
-            if table[key].size != shape[0] * shape[1]:
-                cause = f"{key} holds {table[key].size} numbers, not {shape[0] * shape[1]}"
-                raise MisuseError(path, cause, REMEDY)
-            if not (np.abs(table[key]) <= MAX_ELEMENT).all():
-                raise MisuseError(path, f"{key} holds a number beyond {MAX_ELEMENT:g}", REMEDY)
-            return table[key].reshape(shape)
-    raise MissingError(path, f"no {' or '.join(keys)}", REMEDY)
+    def matrix(self, rows: int, columns: int, *keys: str) -> Float64:
+        """(rows, columns) matrix of the first known key, with numbers up to MAX_ELEMENT."""
+        for key in keys:
+            if key in self.rows:
+                row = self.rows[key]
+                if row.size != rows * columns:
+                    raise MisuseError(self.path, f"{key} holds {row.size} numbers, not {rows * columns}", REMEDY)
+                if not (np.abs(row) <= MAX_ELEMENT).all():
+                    raise MisuseError(self.path, f"{key} holds a number beyond {MAX_ELEMENT:g}", REMEDY)
+                return row.reshape(rows, columns)
+        raise MissingError(self.path, f"no {' or '.join(keys)}", REMEDY)
 
-
-def rigid(table: dict[str, Float64], path: Path) -> Float64:
-    """(4, 4) transform from R and T of a raw calibration."""
-    return se3(matrix(table, path, (3, 3), "R"), matrix(table, path, (3, 1), "T")[:, 0])
+    def rigid(self) -> Float64:
+        """(4, 4) transform from R and T of a raw calibration."""
+        return se3(self.matrix(3, 3, "R"), self.matrix(3, 1, "T")[:, 0])
 
 
 def homogeneous(top: Float64) -> Float64:
@@ -68,44 +68,40 @@ def homogeneous(top: Float64) -> Float64:
     return out
 
 
-def camera(P: Float64, R_rect: Float64, T_camera_sensor: Float64, size_px: tuple[float, float] = IMAGE_PX) -> Camera:
+def camera(P: Float64, R_rect: Float64, T_camera_sensor: Float64, size_px: Float64 = IMAGE_PX) -> Camera:
     """Camera of projection P (3, 4), rectification R_rect (3, 3) and pose T_camera_sensor (4, 4)."""
     T = homogeneous(R_rect) @ T_camera_sensor
-    return Camera(P @ T, T, size_px[0], size_px[1])
+    width_px, height_px = size_px.tolist()
+    return Camera(P @ T, T, width_px, height_px)
 
 
 def camera_of_raw(path: Path) -> Camera:
     """Left colour camera from calib_cam_to_cam.txt and the calib_velo_to_cam.txt in the same folder."""
-    table = read_table(path)
-    size = matrix({"S_rect_02": np.array(IMAGE_PX)} | table, path, (1, 2), "S_rect_02")[0]
-    to_camera = path.with_name("calib_velo_to_cam.txt")
-    return camera(
-        matrix(table, path, (3, 4), "P_rect_02"),
-        matrix(table, path, (3, 3), "R_rect_00"),
-        rigid(read_table(to_camera), to_camera),
-        (float(size[0]), float(size[1])),
-    )
+    cameras = Calibration(path)
+    cameras.rows.setdefault("S_rect_02", IMAGE_PX)
+    size_px = cameras.matrix(1, 2, "S_rect_02")[0]
+    P = cameras.matrix(3, 4, "P_rect_02")
+    R_rect = cameras.matrix(3, 3, "R_rect_00")
+    return camera(P, R_rect, Calibration(path.with_name("calib_velo_to_cam.txt")).rigid(), size_px)
 
 
 def camera_of_sequence(path: Path) -> Camera:
     """Left colour camera from a calibration file of the tracking, object or odometry layout."""
-    table = read_table(path)
-    unrectified = {"R_rect": np.eye(3)}  # Tr of the odometry layout includes the rectification
-    R_rect = matrix(unrectified | table, path, (3, 3), "R0_rect", "R_rect")
-    T = homogeneous(matrix(table, path, (3, 4), "Tr_velo_to_cam", "Tr_velo_cam", "Tr"))
-    return camera(matrix(table, path, (3, 4), "P2"), R_rect, T)
+    calibration = Calibration(path)
+    calibration.rows.setdefault("R_rect", np.eye(3))  # Tr of the odometry layout includes the rectification
+    R_rect = calibration.matrix(3, 3, "R0_rect", "R_rect")
+    T_camera_sensor = homogeneous(calibration.matrix(3, 4, "Tr_velo_to_cam", "Tr_velo_cam", "Tr"))
+    return camera(calibration.matrix(3, 4, "P2"), R_rect, T_camera_sensor)
 
 
 def T_imu_sensor_of_raw(folder: Path) -> Float64:
     """(4, 4) T_imu_sensor from calib_imu_to_velo.txt."""
-    path = folder / "calib_imu_to_velo.txt"
-    return inverse(rigid(read_table(path), path))
+    return inverse(Calibration(folder / "calib_imu_to_velo.txt").rigid())
 
 
 def T_imu_sensor_of_sequence(path: Path) -> Float64:
     """(4, 4) T_imu_sensor from a calibration file of the tracking or object layout."""
-    table = read_table(path)
-    return inverse(homogeneous(matrix(table, path, (3, 4), "Tr_imu_to_velo", "Tr_imu_velo")))
+    return inverse(homogeneous(Calibration(path).matrix(3, 4, "Tr_imu_to_velo", "Tr_imu_velo")))
 
 
 EARTH_RADIUS_M = 6378137.0

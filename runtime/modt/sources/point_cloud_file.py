@@ -5,17 +5,20 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.errors import ScanError
 from modt.ros2.point_cloud2 import reflectance_name
 from modt.types import UNRECORDED, Float32
 
 Columns = Mapping[str, NDArray[Any]]
+
+
+class CloudError(Exception):
+    """Bytes that are no file of points, and the cause."""
+
 
 MAX_POINTS = 10_000_000
 """Greatest number of points in a sweep; a header that promises more is refused."""
@@ -24,7 +27,6 @@ MAX_COUNT = 1024
 MAX_HEADER_BYTES = 65_536
 BYTE_MAX = 255
 WORD_MAX = 65_535
-SKIPPED = "the frame is skipped; convert it to x, y, z [m] and reflectance"
 PCD_TYPES = {kind: f"<{kind.lower()}" for kind in ("F4", "F8", *(sign + size for sign in "UI" for size in "1248"))}
 PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
 PLY_TYPES |= {"float": "f4", "double": "f8"}
@@ -32,34 +34,34 @@ PLY_TYPES |= {np.dtype(kind).name: kind for kind in PLY_TYPES.values()}
 BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 
 
-def read_pcd(path: Path, raw: bytes) -> Float32:
+def read_pcd(raw: bytes) -> Float32:
     """(N, 4) points of a PCD file, as `points_of` scales them.
 
     Raises:
-        ScanError: the file is no PCD file, is truncated, or its header promises impossible data.
+        CloudError: the file is no PCD file, is truncated, or its header promises impossible data.
     """
-    encoding, names, row, n_points, start = _pcd_header(path, raw)
+    encoding, names, row, n_points, start = _pcd_header(raw)
     if encoding == "ascii":
-        columns = _columns(names, _from_text(path, raw[start:].splitlines(), n_points, row))
+        columns = _columns(names, _from_text(raw[start:].splitlines(), n_points, row))
     elif encoding == "binary":
-        columns = _columns(names, _from_bytes(path, raw, start, n_points, row))
+        columns = _columns(names, _from_bytes(raw, start, n_points, row))
     elif encoding == "binary_compressed":
-        columns = _from_compressed(path, raw[start:], names, n_points, row)
+        columns = _from_compressed(raw[start:], names, n_points, row)
     else:
-        raise ScanError(path, f"DATA {encoding!r} is unknown", SKIPPED)
-    return points_of(columns, path)
+        raise CloudError(f"DATA {encoding!r} is unknown")
+    return points_of(columns)
 
 
-def read_ply(path: Path, raw: bytes) -> Float32:
+def read_ply(raw: bytes) -> Float32:
     """(N, 4) points of the element `vertex` of a PLY file, as `points_of` scales them.
 
     Raises:
-        ScanError: the file is no PLY file, is truncated, or its header promises impossible data.
+        CloudError: the file is no PLY file, is truncated, or its header promises impossible data.
     """
     end = raw[:MAX_HEADER_BYTES].find(b"end_header")
     start = raw.find(b"\n", end, end + 16) + 1
     if not raw.startswith(b"ply") or end < 0 or not start:
-        raise ScanError(path, "no header of a PLY file", SKIPPED)
+        raise CloudError("no header of a PLY file")
     try:
         encoding, elements = _ply_header(raw[:end].decode("ascii", "replace"))
         before = list(takewhile(lambda element: element[0] != "vertex", elements))
@@ -70,30 +72,30 @@ def read_ply(path: Path, raw: bytes) -> Float32:
             start += sum(n_rows * _ply_row(kinds, encoding).itemsize for _, n_rows, kinds in before)
         row = _ply_row(properties, encoding)
     except (KeyError, ValueError, IndexError):
-        raise ScanError(path, "its header cannot be read, or has lists before its points", SKIPPED) from None
+        raise CloudError("its header cannot be read, or has lists before its points") from None
     counts = [n_points, *(n_rows for _, n_rows, _ in before)]
     if not all(0 <= count <= MAX_POINTS for count in counts) or not row.names:
-        raise ScanError(path, "its header promises what no scan has", SKIPPED)
+        raise CloudError("its header promises what no scan has")
     if encoding == "ascii":
         lines = [line for line in raw[start:].splitlines() if line.strip()]
-        table = _from_text(path, lines[sum(counts[1:]) :], n_points, row)
+        table = _from_text(lines[sum(counts[1:]) :], n_points, row)
     else:
-        table = _from_bytes(path, raw, start, n_points, row)
-    return points_of(_columns([name.lower() for name, _ in properties], table), path)
+        table = _from_bytes(raw, start, n_points, row)
+    return points_of(_columns([name.lower() for name, _ in properties], table))
 
 
-def points_of(columns: Columns, origin: object) -> Float32:
+def points_of(columns: Columns) -> Float32:
     """(N, 4) points of named columns.
 
     Reflectance is UNRECORDED without a column and NaN where its scale is unknown. Whole numbers are divided by 255,
     or by 65535 where they exceed 255; `sanitised` scales the others.
 
     Raises:
-        ScanError: x, y or z is missing.
+        CloudError: x, y or z is missing.
     """
     missing = [axis for axis in "xyz" if axis not in columns]
     if missing:
-        raise ScanError(origin, f"no column {', '.join(missing)}", SKIPPED)
+        raise CloudError(f"no column {', '.join(missing)}")
     points = np.empty((len(columns["x"]), 4), np.float32)
     with np.errstate(over="ignore"):  # doubles beyond float32 become infinite, which counts as no return
         for i, axis in enumerate("xyz"):
@@ -110,12 +112,12 @@ def _reflectance(values: NDArray[Any]) -> NDArray[Any]:
     return np.full(len(values), np.nan) if greatest > BYTE_MAX else values
 
 
-def _pcd_header(path: Path, raw: bytes) -> tuple[str, list[str], np.dtype[Any], int, int]:
+def _pcd_header(raw: bytes) -> tuple[str, list[str], np.dtype[Any], int, int]:
     """Encoding, names of the columns, type of a point, number of points, and offset of the data."""
     data_at = raw[:MAX_HEADER_BYTES].find(b"\nDATA ")
     end = raw.find(b"\n", data_at + 1, MAX_HEADER_BYTES)
     if data_at < 0 or end < 0:
-        raise ScanError(path, "no header of a PCD file", SKIPPED)
+        raise CloudError("no header of a PCD file")
     words = (line.split() for line in raw[:end].decode("ascii", "replace").splitlines())
     lines = {line[0].upper(): line[1:] for line in words if line and not line[0].startswith("#")}
     try:
@@ -125,13 +127,13 @@ def _pcd_header(path: Path, raw: bytes) -> tuple[str, list[str], np.dtype[Any], 
         n_points = int(lines["POINTS"][0]) if "POINTS" in lines else int(lines["WIDTH"][0]) * int(lines["HEIGHT"][0])
         encoding = lines["DATA"][0]
     except (KeyError, ValueError, IndexError):
-        raise ScanError(path, "its header lacks a line, or one is broken", SKIPPED) from None
+        raise CloudError("its header lacks a line, or one is broken") from None
     fields = [field for field in zip(names, kinds, counts, strict=False) if field[2]]  # others hold no bytes
     odd = [f"{name} of COUNT {count}" for name, _, count in fields if not 0 < count <= MAX_COUNT]
     odd += [] if 0 <= n_points <= MAX_POINTS else [f"{n_points} points"]
     odd += [] if fields and len(names) == len(kinds) == len(counts) else ["lines of unlike length"]
     if odd:
-        raise ScanError(path, f"its header promises what no scan has ({odd[0]})", SKIPPED)
+        raise CloudError(f"its header promises what no scan has ({odd[0]})")
     row = np.dtype([(str(i), kind, (count,)) for i, (_, kind, count) in enumerate(fields)])
     return encoding, [name for name, _, _ in fields], row, n_points, end + 1
 
@@ -161,23 +163,23 @@ def _columns(names: Sequence[str], table: NDArray[Any]) -> Columns:
     return {name: table[str(i)][:, 0] for i, name in enumerate(names)}
 
 
-def _from_bytes(path: Path, raw: bytes, start: int, n_points: int, row: np.dtype[Any]) -> NDArray[Any]:
+def _from_bytes(raw: bytes, start: int, n_points: int, row: np.dtype[Any]) -> NDArray[Any]:
     if len(raw) - start < n_points * row.itemsize:
-        raise ScanError(path, f"truncated: {len(raw) - start} bytes for {n_points} points", SKIPPED)
+        raise CloudError(f"truncated: {len(raw) - start} bytes for {n_points} points")
     return np.frombuffer(raw, row, n_points, start)
 
 
-def _from_text(path: Path, lines: Sequence[bytes], n_points: int, row: np.dtype[Any]) -> NDArray[Any]:
+def _from_text(lines: Sequence[bytes], n_points: int, row: np.dtype[Any]) -> NDArray[Any]:
     """Points of lines of numbers; further words of a line are skipped."""
     counts = [row[name].shape[0] for name in row.names or ()]
     width = sum(counts)
     words = [word for line in lines[:n_points] for word in line.split(maxsplit=width)[:width]]
     if len(words) < n_points * width:
-        raise ScanError(path, f"truncated: {len(words)} numbers for {n_points} points", SKIPPED)
+        raise CloudError(f"truncated: {len(words)} numbers for {n_points} points")
     try:
         values = np.array(words, np.float64).reshape(-1, width)
     except ValueError:
-        raise ScanError(path, "its text holds what is no number", SKIPPED) from None
+        raise CloudError("its text holds what is no number") from None
     table = np.empty(n_points, row)
     at = 0
     with np.errstate(invalid="ignore", over="ignore"):
@@ -187,16 +189,14 @@ def _from_text(path: Path, lines: Sequence[bytes], n_points: int, row: np.dtype[
     return table
 
 
-def _from_compressed(
-    path: Path, body: bytes, names: Sequence[str], n_points: int, row: np.dtype[Any]
-) -> dict[str, NDArray[Any]]:
+def _from_compressed(body: bytes, names: Sequence[str], n_points: int, row: np.dtype[Any]) -> dict[str, NDArray[Any]]:
     """Columns of compressed data, which hold all values of a field in a row."""
     size, length = struct.unpack_from("<II", body) if len(body) >= 8 else (0, -1)
     if length != n_points * row.itemsize or len(body) < 8 + size:
-        raise ScanError(path, "truncated, or of another size than its header says", SKIPPED)
+        raise CloudError("truncated, or of another size than its header says")
     data = decompress(body[8 : 8 + size], length)
     if data is None:
-        raise ScanError(path, "its compressed data are broken", SKIPPED)
+        raise CloudError("its compressed data are broken")
     columns = {}
     at = 0
     for i, name in enumerate(names):
@@ -222,19 +222,19 @@ def decompress(data: bytes, length: int) -> bytes | None:
         if control < MAX_LITERAL:
             out += data[at : at + control + 1]
             at += control + 1
-            continue
-        size = control >> 5
-        if at + 1 + (size == LONG_REPETITION) > end:
-            return None
-        if size == LONG_REPETITION:
-            size += data[at]
+        else:
+            size = control >> 5
+            if at + 1 + (size == LONG_REPETITION) > end:
+                return None
+            if size == LONG_REPETITION:
+                size += data[at]
+                at += 1
+            size += 2
+            distance = ((control & 31) << 8 | data[at]) + 1
             at += 1
-        size += 2
-        distance = ((control & 31) << 8 | data[at]) + 1
-        at += 1
-        start = len(out) - distance
-        if start < 0:
-            return None
-        piece = out[start : start + size]
-        out += piece if size <= distance else (piece * (size // distance + 1))[:size]
+            start = len(out) - distance
+            if start < 0:
+                return None
+            piece = out[start : start + size]
+            out += piece if size <= distance else (piece * (size // distance + 1))[:size]
     return bytes(out) if len(out) == length and at == end else None

@@ -47,9 +47,14 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
         raise ScanError(path, cause, "the frame is skipped; it is no sweep of a sensor")
     if path.suffix not in (".pcd", ".ply"):
         return sanitised(_read_rows(path, raw), path)
-    from modt.sources.point_cloud_file import read_pcd, read_ply
+    from modt.sources.point_cloud_file import CloudError, read_pcd, read_ply
 
-    return sanitised((read_pcd if path.suffix == ".pcd" else read_ply)(path, raw), path)
+    try:
+        points = read_pcd(raw) if path.suffix == ".pcd" else read_ply(raw)
+    except CloudError as error:
+        remedy = "the frame is skipped; convert it to x, y, z [m] and reflectance"
+        raise ScanError(path, str(error), remedy) from None
+    return sanitised(points, path)
 
 
 def _read_rows(path: Path, raw: bytes) -> Float32:

@@ -45,18 +45,21 @@ MAX_STAMP_S = 1e11
 """Three thousand years; a greater stamp is no time in seconds [s]."""
 
 
+UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
+"""Number of each unit of time in a second."""
+
+
 def unit_of(ratio: float) -> str:
     """Unit of a time by its ratio to the same time in seconds; empty if the ratio fits no unit."""
-    units = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
-    return next((name for factor, name in units.items() if abs(ratio / factor - 1.0) < 0.02), "")
+    return next((name for name, number in UNITS.items() if abs(ratio / number - 1.0) < 0.02), "")
 
 
 def no_seconds(stamp_s: float) -> str:
     """Reason why a stamp is no time in seconds, with its unit if it is a time since 1970; empty if it is one."""
     if abs(stamp_s) < MAX_STAMP_S:
         return ""
-    limits = {1e14: "milliseconds", 1e17: "microseconds", 1e20: "nanoseconds"}
-    unit = next((f": it is one in {name}" for most, name in limits.items() if abs(stamp_s) < most), "")
+    fitting = (name for name, number in UNITS.items() if abs(stamp_s) < MAX_STAMP_S * number)
+    unit = next((f": it is one in {name}" for name in fitting), "")
     return f"stamp {stamp_s:g} is no time in seconds{unit}"
 
 

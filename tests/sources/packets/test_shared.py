@@ -199,7 +199,7 @@ def test_points_are_those_of_another_decoder(kitti_root: Path, name: str) -> Non
     table, n_sweeps, median_m = CLOUDS[name]
     folder = kitti_root / "packets" / name
     (cloud,) = folder.glob("*.pcd")
-    theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # cut elsewhere, with both returns
+    theirs = read_pcd(cloud.read_bytes())[:, :3]  # cut elsewhere, with both returns
     if table is None:
         sweeps, reception = decoded(VelodyneDecoder("sensor"), packets_of_bag(folder))
         assert reception.lost == 0
