@@ -4,11 +4,9 @@ import resource
 import signal
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 
 CPU_TIME_S = 10.0
 """Limit for one input, of all threads of the process; a busy machine does not shorten it."""
@@ -31,7 +29,7 @@ class Finding:
     trace: str
 
 
-def execute(call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Exception], ...]) -> Finding | None:
+def execute(call, raw, refusals):
     """Read an input; None where it was read or refused."""
     signal.setitimer(signal.ITIMER_PROF, CPU_TIME_S)
     signal.setitimer(signal.ITIMER_REAL, HANG_S)
@@ -52,10 +50,10 @@ def execute(call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Ex
 
 
 @contextmanager
-def limits() -> Iterator[None]:
+def limits():
     """The limits of CPU time, wall time and memory; warnings are errors."""
 
-    def late(number: int, _: FrameType | None) -> None:
+    def late(number, _):
         limit = f"{CPU_TIME_S:g} s of CPU time" if number == signal.SIGPROF else f"{HANG_S:g} s"
         raise DeadlineError(f"longer than {limit}")
 

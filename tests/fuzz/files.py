@@ -1,8 +1,5 @@
 """Scans and KITTI's files."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 
 from modt.geometry import Camera
@@ -13,7 +10,7 @@ from modt.sources.scan_file import read_scan
 from modt_evaluation.box_tracking import detections as boxes
 from modt_evaluation.kitti_labels import read_labels
 from modt_evaluation.truth_files import open_truth
-from tests.fuzz.target import Feed, of_file, target, targets_of_files
+from tests.fuzz.target import of_file, target, targets_of_files
 from tests.modt_evaluation.test_truth_files import CUBOID, ITEM, LABEL, POSE
 from tests.sources import layouts, point_clouds
 
@@ -25,12 +22,12 @@ PLACES = "1 0 0 5 0 1 0 0 0 0 1 0\n" * 3
 CAMERA = Camera(np.eye(3, 4), np.eye(4), 1242.0, 375.0)
 
 
-def read_detections(path: Path) -> None:
+def read_detections(path):
     for sequence in boxes.read([path]):
         list(sequence.frames())
 
 
-def clouds(write: Callable[..., bytes], z: str, *encodings: str) -> list[bytes]:
+def clouds(write, z, *encodings):
     rows = point_clouds.table(x="f4", y="f4", z=z, intensity="u1")
     return [write(rows, encoding) for encoding in encodings]
 
@@ -53,10 +50,10 @@ targets_of_files(
 
 
 @target()
-def calibration_of_sequence(folder: Path) -> Feed:
+def calibration_of_sequence(folder):
     path = folder / "0003.txt"
 
-    def read() -> None:
+    def read():
         kitti_calibration.camera_of_sequence(path)
         kitti_calibration.T_imu_sensor_of_sequence(path)
 
@@ -65,14 +62,14 @@ def calibration_of_sequence(folder: Path) -> Feed:
 
 
 @target()
-def calibration_of_drive(folder: Path) -> Feed:
+def calibration_of_drive(folder):
     """All three files in one."""
     drive = layouts.raw_drive(folder)
     names = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib_imu_to_velo.txt")
     paths = [drive.parent / name for name in names]
     seeds = [path.read_bytes() for path in paths]
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         for path, part in zip(paths, [*raw.split(b"---"), b"", b""], strict=False):
             path.write_bytes(part)
         kitti_calibration.camera_of_raw(paths[0])
@@ -82,12 +79,12 @@ def calibration_of_drive(folder: Path) -> Feed:
 
 
 @target()
-def time_stamps(folder: Path) -> Feed:
+def time_stamps(folder):
     """Time stamps of the sweeps, the same for their begin and their end."""
     drive = layouts.raw_drive(folder)
     points = drive / "velodyne_points"
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         for name in ("timestamps.txt", "timestamps_start.txt", "timestamps_end.txt"):
             (points / name).write_bytes(raw)
         open_scans(drive)
@@ -96,20 +93,20 @@ def time_stamps(folder: Path) -> Feed:
 
 
 @target()
-def times_of_sequence(folder: Path) -> Feed:
+def times_of_sequence(folder):
     sequence = layouts.odometry(folder)
     return of_file(sequence / "times.txt", lambda: list(open_scans(sequence)), "0.0\n0.104\n0.207\n")
 
 
 @target()
-def truth_of_drive(folder: Path) -> Feed:
+def truth_of_drive(folder):
     drive = layouts.raw_drive(folder)
     seed = f"<root><tracklets>{TRACKLETS}</tracklets></root>"
     return of_file(drive / "tracklet_labels.xml", lambda: open_truth(drive), seed)
 
 
 @target()
-def truth_of_sequence(folder: Path) -> Feed:
+def truth_of_sequence(folder):
     scans = layouts.tracking(folder)
     path = scans.parents[1] / "label_02" / "0003.txt"
     path.parent.mkdir()
@@ -118,7 +115,7 @@ def truth_of_sequence(folder: Path) -> Feed:
 
 
 @target()
-def cuboids(folder: Path) -> Feed:
+def cuboids(folder):
     (folder / "poses.txt").write_text(PLACES)
     seed = CUBOID + "0,3,Car,9,1,0.5,2,1,1.5,0.1\n2,3,Car,9,1,0.5,2,1,1.5,0.1\n"
     return of_file(folder / "truth.csv", lambda: open_truth(folder), seed)

@@ -2,7 +2,6 @@
 
 import ctypes
 from io import BytesIO
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,12 +14,12 @@ from modt.segmentation.kernels import NUMPY
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.viewer.live_server import _Handler
-from tests.fuzz.target import Feed, target
+from tests.fuzz.target import target
 from tests.segmentation.test_native_kernels import HOSTILE, same, street
 
 
 @target()
-def sweeps(folder: Path) -> Feed:
+def sweeps(folder):
     """Sweeps of x, y, z and reflectance in single precision, by the checked compiled kernels and by NumPy's."""
     library = folder / "kernels.so"
     try:
@@ -30,7 +29,7 @@ def sweeps(folder: Path) -> Feed:
     kernels = NUMPY, NativeKernels(ctypes.CDLL(str(library)), build.BASELINE)
     numpy, native = (Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView(), each) for each in kernels)
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         points = np.frombuffer(raw[: len(raw) // 16 * 16], np.float32).reshape(-1, 4)
         assert same(numpy.segment(points.copy()), native.segment(points.copy())), "the kernels differ"
 
@@ -44,19 +43,19 @@ def sweeps(folder: Path) -> Feed:
 class Connection:
     """A socket of a client that has sent something and takes anything."""
 
-    def __init__(self, sent: bytes) -> None:
+    def __init__(self, sent):
         self._sent = sent
 
-    def makefile(self, *_: object) -> BytesIO:
+    def makefile(self, *_):
         return BytesIO(self._sent)
 
-    def settimeout(self, _: float | None) -> None: ...
+    def settimeout(self, _): ...
 
-    def sendall(self, _: bytes) -> None: ...
+    def sendall(self, _): ...
 
 
 @target()
-def requests(_: Path) -> Feed:
+def requests(_):
     """Requests to the live page."""
     events = {"enter": lambda: 0, "event_after": lambda number: None, "leave": lambda: None}
     server = SimpleNamespace(page=b"<p>", names={"localhost", "127.0.0.1"}, **events)

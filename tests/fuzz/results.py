@@ -1,32 +1,29 @@
 """Views and exports of runs, which the package has written and others may have changed."""
 
 import json
-from collections.abc import Iterable
-from pathlib import Path
-from typing import Any
 
 from modt_evaluation.export import FORMS, Export
 from modt_evaluation.run_record import RunRecord
 from modt_viewer.recorded_run import RecordedRun
 from modt_viewer.track_page import rows_of, track_page
 from tests.fuzz.runs import DESCRIPTION, described, frame_record
-from tests.fuzz.target import Feed, of_file, target
+from tests.fuzz.target import of_file, target
 from tests.modt_profiling.reporting.test_run_report import ledger_line, window, write_run
 
 
-def json_lines(records: Iterable[dict[str, Any]]) -> bytes:
+def json_lines(records):
     """Records as lines of JSON."""
     return "".join(json.dumps(record) + "\n" for record in records).encode()
 
 
 @target()
-def viewed_run(folder: Path) -> Feed:
+def viewed_run(folder):
     """The view of a run by its ledger and its tracks, with a line `---` between."""
     run = described(write_run(folder / "run", frames=2))
     ledger, tracks, costs = run / "ledger.jsonl", run / "tracks.jsonl", [ledger_line(k, 1) for k in range(2)]
     seed = [*costs, window(0, costs, 1.5)]
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         first, _, second = raw.partition(b"---\n")
         ledger.write_bytes(first)
         tracks.write_bytes(second)
@@ -37,13 +34,13 @@ def viewed_run(folder: Path) -> Feed:
 
 
 @target()
-def exported_run(folder: Path) -> Feed:
+def exported_run(folder):
     """Tracks of a run as a table, and as KITTI's results."""
     run, out = folder / "run", folder / "out"
     run.mkdir()
     (run / "run.yaml").write_text(DESCRIPTION + "service: true\n")
 
-    def read() -> None:
+    def read():
         recorded = RunRecord.open(run)
         for form in ("csv", "kitti"):
             FORMS[form](Export(recorded, points=False), out)

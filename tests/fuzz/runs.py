@@ -2,11 +2,8 @@
 
 import json
 from argparse import Namespace
-from collections.abc import Callable
 from contextlib import redirect_stdout
 from io import StringIO
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx.parser
@@ -21,7 +18,7 @@ from modt_commands import profile_report
 from modt_evaluation.run_record import RunRecord
 from modt_evaluation.truth_files import open_truth
 from tests.cli.test_top import status as status_record
-from tests.fuzz.target import Feed, of_file, target, targets_of_files
+from tests.fuzz.target import of_file, target, targets_of_files
 from tests.modt_evaluation.test_truth_files import tracklets
 from tests.modt_profiling.reporting.test_run_report import track, write_run
 from tests.sources import layouts
@@ -36,7 +33,7 @@ DESCRIPTION += "recognition: {used: vlp-16}\n"
 SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.splitlines())}]}}\n"
 
 
-def network() -> onnx.ModelProto:
+def network():
     """A small model with the inputs and outputs of a shipped one."""
     zeros = ", ".join("0" * 12)
     return onnx.parser.parse_model(f"""
@@ -48,7 +45,7 @@ def network() -> onnx.ModelProto:
     """)
 
 
-def load(path: Path) -> PointNet:
+def load(path):
     return PointNet(ClassificationConfig(model=str(path)), SensorConfig())
 
 
@@ -63,7 +60,7 @@ targets_of_files(
 
 
 @target()
-def model_metadata(folder: Path) -> Feed:
+def model_metadata(folder):
     """The classifiers of boxes and of reflectance, and the class frequency, a line each."""
     path = folder / "net.onnx"
     weights = {"network": 0.8, "box": 0.5, "reflectance": 0.3}
@@ -71,7 +68,7 @@ def model_metadata(folder: Path) -> Feed:
     reflectance = {"hdl-64e": {"weights": weights, "layers": [[[[0.1] * 4] * 12, [0.2] * 4]]}}
     entries = {"box_prior": box, "reflectance": reflectance, "class_frequency": [0.7, 0.1, 0.1, 0.1]}
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         model = network()
         for key, value in zip(entries, raw.split(b"\n"), strict=False):
             model.metadata_props.add(key=key, value=value.decode("utf-8", "replace"))
@@ -81,23 +78,23 @@ def model_metadata(folder: Path) -> Feed:
     return ["\n".join(map(json.dumps, entries.values())).encode()], call
 
 
-def _report(run: Path) -> Callable[[], object]:
+def _report(run):
     """The command on a run, without its output."""
 
-    def read() -> None:
+    def read():
         with redirect_stdout(StringIO()):
             profile_report.run(Namespace(run_directory=run, html=None, json=False))
 
     return read
 
 
-def described(run: Path) -> Path:
+def described(run):
     """The run, with a description of few lines: YAML is slow to read."""
     (run / "run.yaml").write_text(DESCRIPTION)
     return run
 
 
-def frame_record(k: int) -> dict[str, Any]:
+def frame_record(k):
     """The record of a frame with a track that is seen and one that is lost."""
     seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
     lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
@@ -107,24 +104,24 @@ def frame_record(k: int) -> dict[str, Any]:
 
 
 @target()
-def run_description(folder: Path) -> Feed:
+def run_description(folder):
     path = write_run(folder / "run", frames=5) / "run.yaml"
     return of_file(path, _report(path.parent), path.read_bytes(), DESCRIPTION, BOMB)
 
 
 @target()
-def ledger(folder: Path) -> Feed:
+def ledger(folder):
     path = described(write_run(folder / "run", frames=5)) / "ledger.jsonl"
     return of_file(path, _report(path.parent), path.read_bytes())
 
 
 @target()
-def tracks(folder: Path) -> Feed:
+def tracks(folder):
     path = described(write_run(folder / "run", frames=2)) / "tracks.jsonl"
     return of_file(path, _report(path.parent), path.read_bytes())
 
 
-def _judged(folder: Path) -> tuple[Path, Callable[[], object]]:
+def _judged(folder):
     """A run with labels of points, and its evaluation."""
     truth = open_truth(tracklets(layouts.raw_drive(folder), ("Car", 1, [8, 9])))
     run = folder / "run"
@@ -135,12 +132,12 @@ def _judged(folder: Path) -> tuple[Path, Callable[[], object]]:
 
 
 @target()
-def judged_run(folder: Path) -> Feed:
+def judged_run(folder):
     """Evaluation of a run by its description and its tracks, with a line `---` between."""
     run, judge = _judged(folder)
     lines = "".join(json.dumps(frame_record(index)) + "\n" for index in range(4))
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         about, _, found = raw.partition(b"---\n")
         (run / "run.yaml").write_bytes(about)
         (run / "tracks.jsonl").write_bytes(found)
@@ -150,7 +147,7 @@ def judged_run(folder: Path) -> Feed:
 
 
 @target()
-def labels_of_points(folder: Path) -> Feed:
+def labels_of_points(folder):
     run, judge = _judged(folder)
     (described(run) / "tracks.jsonl").write_text(json.dumps(frame_record(1)) + "\n")
     path = run / "labels" / "000001.label"
@@ -158,8 +155,8 @@ def labels_of_points(folder: Path) -> Feed:
 
 
 @target()
-def service_status(folder: Path) -> Feed:
-    def read() -> None:
+def service_status(folder):
+    def read():
         with redirect_stdout(StringIO()):
             status.run(Namespace(directory=folder, json=False))
 

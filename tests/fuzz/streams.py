@@ -1,7 +1,6 @@
 """Captures, packets, recordings and messages of ROS 2, datagrams."""
 
 import struct
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +11,10 @@ from modt.ros2.point_cloud2 import read_cloud, write_cloud
 from modt.sources.drivers.hesai import HesaiDecoder, read_angles
 from modt.sources.drivers.livox import LivoxDecoder
 from modt.sources.drivers.velodyne import VelodyneDecoder
-from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
-from tests.fuzz.target import Feed, of_file, target, targets_of_files
+from tests.fuzz.target import of_file, target, targets_of_files
 from tests.ros2 import messages
 from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets
@@ -40,7 +38,7 @@ targets_of_files(
 
 
 @target()
-def pcap(folder: Path) -> Feed:
+def pcap(folder):
     path = folder / "a.pcap"
     write_capture(path, [(1.5, b"first"), (2.5, bytes(100))], 2368)
     whole, datagram = path.read_bytes(), udp(bytes(64), 2368)
@@ -51,22 +49,22 @@ def pcap(folder: Path) -> Feed:
 
 
 @target()
-def velodyne_packets(folder: Path) -> Feed:
+def velodyne_packets(folder):
     return _of_packets(VelodyneDecoder("sensor"), _framed(packets("vlp-16", 3)[60:180]))
 
 
 @target()
-def hesai_packets(folder: Path) -> Feed:
+def hesai_packets(folder):
     return _of_packets(HesaiDecoder("sensor"), _framed(packets("xt-32", 2)[100:500]))
 
 
 @target()
-def livox_packets(folder: Path) -> Feed:
+def livox_packets(folder):
     return _of_packets(LivoxDecoder("sensor"), _framed(packets("mid-360", 3)[150:450]))
 
 
 @target()
-def ouster_packets(folder: Path) -> Feed:
+def ouster_packets(folder):
     sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
     from modt.sources.drivers.ouster import OusterDecoder
 
@@ -87,7 +85,7 @@ def ouster_packets(folder: Path) -> Feed:
 
 
 @target()
-def ouster_metadata(folder: Path) -> Feed:
+def ouster_metadata(folder):
     sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
     from modt.sources.drivers.ouster import OusterDecoder
 
@@ -97,7 +95,7 @@ def ouster_metadata(folder: Path) -> Feed:
 
 
 @target()
-def database(folder: Path) -> Feed:
+def database(folder):
     written = bags.write_rosbag2(folder / "bag", bags.by_time(bags.clouds(2), bags.poses()[:12]))
     (path,) = written.glob("*.db3")
     read = folder / "read.db3"
@@ -105,7 +103,7 @@ def database(folder: Path) -> Feed:
 
 
 @target()
-def mcap(folder: Path) -> Feed:
+def mcap(folder):
     recorded = bags.by_time(bags.clouds(2), bags.poses()[:12])
     whole = bags.write_mcap(folder / "whole", recorded, chunk_size=1000).read_bytes()
     read = folder / "read.mcap"
@@ -113,7 +111,7 @@ def mcap(folder: Path) -> Feed:
 
 
 @target(MessageError)
-def point_cloud(folder: Path) -> Feed:
+def point_cloud(folder):
     plain = write_cloud(1.5, "lidar", layouts.scan(0))
     timed = np.zeros((2, 100), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "u2"), ("t", "u4")])
     turn = np.linspace(3.1, -3.1, 200).reshape(2, 100)
@@ -122,13 +120,13 @@ def point_cloud(folder: Path) -> Feed:
 
 
 @target(MessageError)
-def odometry(folder: Path) -> Feed:
+def odometry(folder):
     return [write_odometry(1.5, "odom", "base_link", np.eye(4))], read_odometry
 
 
 @target(MessageError)
-def transforms(folder: Path) -> Feed:
-    def call(raw: bytes) -> None:
+def transforms(folder):
+    def call(raw):
         found = StaticTransforms()
         found.add(raw)
         found.between("base_link", "lidar")
@@ -139,7 +137,7 @@ def transforms(folder: Path) -> Feed:
 
 
 @target(MessageError)
-def pose_datagram(folder: Path) -> Feed:
+def pose_datagram(folder):
     matrix = [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0]
     return [
         b'{"stamp": 1.5, "x": 1, "y": 2.5, "yaw": 0.1}',
@@ -148,14 +146,14 @@ def pose_datagram(folder: Path) -> Feed:
     ], read_datagram
 
 
-def _framed(timed) -> bytes:
+def _framed(timed):
     return b"".join(LENGTH.pack(len(payload), at_s) + payload for at_s, payload in timed)
 
 
-def _of_packets(decoder: PacketDecoder, seed: bytes) -> Feed:
+def _of_packets(decoder, seed):
     """A sensor's packets with their lengths and times, by a decoder that has seen none."""
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         fresh = decoder.fresh()
         at = 0
         while at + LENGTH.size <= len(raw):

@@ -1,6 +1,6 @@
 """Targets of fuzzing: readers, the bytes that they are fed with, and how they may refuse them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -24,30 +24,30 @@ class Target:
 TARGETS: dict[str, Target] = {}
 
 
-def target(*refusals: type[Exception]) -> Callable[[Callable[[Path], Feed]], Callable[[Path], Feed]]:
+def target(*refusals):
     """Make a target of a function that prepares it, named as the function."""
 
-    def made(prepare: Callable[[Path], Feed]) -> Callable[[Path], Feed]:
+    def made(prepare):
         TARGETS[prepare.__name__] = Target(prepare.__name__, prepare, (ModtError, *refusals))
         return prepare
 
     return made
 
 
-def targets_of_files(readers: Mapping[str, tuple[str, Callable[[Path], object], Sequence[bytes | str]]]) -> None:
+def targets_of_files(readers):
     """Make a target of each reader of one file: by its name, the name of the file, the reader and valid contents."""
 
-    def prepared(folder: Path, file: str, read: Callable[[Path], object], seeds: Sequence[bytes | str]) -> Feed:
+    def prepared(folder, file, read, seeds):
         return of_file(folder / file, lambda: read(folder / file), *seeds)
 
     for name, (file, read, seeds) in readers.items():
         TARGETS[name] = Target(name, partial(prepared, file=file, read=read, seeds=seeds), (ModtError,))
 
 
-def of_file(path: Path, read: Callable[[], object], *seeds: bytes | str) -> Feed:
+def of_file(path, read, *seeds):
     """Inputs that are the content of a file."""
 
-    def call(raw: bytes) -> None:
+    def call(raw):
         path.write_bytes(raw)
         read()
 

@@ -1,35 +1,33 @@
 """Readers read any bytes, or refuse them with an error of modt, within a time and a memory."""
 
 import time
-from pathlib import Path
 
 import pytest
 
 from tests.fuzz import execution
 from tests.fuzz.execution import execute, limits
 from tests.fuzz.mutation import mutations
-from tests.fuzz.target import Target
 from tests.fuzz.targets import TARGETS
 
 READERS = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
 
 
 @READERS
-def test_valid_bytes_are_read(target: Target, tmp_path: Path) -> None:
+def test_valid_bytes_are_read(target, tmp_path):
     seeds, call = target.prepare(tmp_path)
     call(seeds[0])
 
 
 @READERS
 @pytest.mark.parametrize(("n", "seed"), [(50, 1), pytest.param(500, 2, marks=pytest.mark.slow)])
-def test_broken_bytes_are_refused(target: Target, n: int, seed: int, tmp_path: Path) -> None:
+def test_broken_bytes_are_refused(target, n, seed, tmp_path):
     seeds, call = target.prepare(tmp_path)
     with limits():
         findings = [execute(call, raw, target.refusals) for raw in mutations(seeds, n, seed)]
     assert [f"{f.error} ({f.place})" for f in findings if f is not None] == []
 
 
-def spin(_: bytes) -> None:
+def spin(_):
     while True:
         pass
 

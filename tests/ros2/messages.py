@@ -1,7 +1,6 @@
 """ROS 2 messages encoded and decoded by another implementation, `rosbags`."""
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -23,7 +22,7 @@ VISION_MSGS_4 = {
 
 
 @cache
-def store() -> Any:
+def store():
     """Types of ROS 2 Humble and of vision_msgs 4."""
     found = get_typestore(Stores.ROS2_HUMBLE)
     for name, definition in VISION_MSGS_4.items():
@@ -32,19 +31,19 @@ def store() -> Any:
     return found
 
 
-def encode(message: Any, *, little: bool = True) -> bytes:
+def encode(message, *, little=True):
     """Bytes of a message."""
     return bytes(store().serialize_cdr(message, message.__msgtype__, little_endian=little))
 
 
-def decode(message: bytes, name: str) -> Any:
+def decode(message, name):
     """Decode bytes that hold one message and at most padding."""
     decoded = store().deserialize_cdr(message, name)
     assert 0 <= len(message) - len(encode(decoded)) < 4
     return decoded
 
 
-def made(kind: str, /, **values: Any) -> Any:
+def made(kind, /, **values):
     """A message of a named type, such as `nav_msgs/Odometry`. Fields that are not given are zero or empty.
 
     A message within it may be given as a dictionary of its fields.
@@ -54,7 +53,7 @@ def made(kind: str, /, **values: Any) -> Any:
     return store().types[full](**{name: _value(*form, values.get(name)) for name, form in fields})
 
 
-def _value(form: Any, of: Any, given: Any) -> Any:
+def _value(form, of, given):
     if isinstance(given, dict) or (given is None and form.name == "NAME"):
         return made(of, **(given or {}))
     if given is not None:
@@ -65,12 +64,12 @@ def _value(form: Any, of: Any, given: Any) -> Any:
     return [] if kind.name == "NAME" else np.zeros(n or 0, "u1" if element == "octet" else element)
 
 
-def header(stamp_s: float, frame_id: str) -> dict[str, Any]:
+def header(stamp_s, frame_id):
     seconds, nanoseconds = divmod(round(stamp_s * 1e9), 10**9)
     return {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": frame_id}
 
 
-def cloud(data: np.ndarray, *, stamp_s: float = 1.0, frame_id: str = "lidar", padding: int = 0) -> Any:
+def cloud(data, *, stamp_s=1.0, frame_id="lidar", padding=0):
     """A PointCloud2 of a structured (height, width) array, its rows padded by some bytes."""
     kinds = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
     fields = []
@@ -93,7 +92,7 @@ def cloud(data: np.ndarray, *, stamp_s: float = 1.0, frame_id: str = "lidar", pa
     )
 
 
-def xyzi(n: int, kind: Any = None) -> np.ndarray:
+def xyzi(n, kind=None):
     """(1, n) points of the common layout."""
     rng = np.random.default_rng(n)
     layout = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4")] if kind is None else kind
@@ -104,14 +103,14 @@ def xyzi(n: int, kind: Any = None) -> np.ndarray:
     return points
 
 
-def odometry(stamp_s: float, position: list[float], quaternion: list[float], child: str = "base_link") -> Any:
+def odometry(stamp_s, position, quaternion, child="base_link"):
     """An Odometry message."""
     at, turned = dict(zip("xyz", position, strict=True)), dict(zip("xyzw", quaternion, strict=True))
     pose = {"pose": {"position": at, "orientation": turned}}
     return made("nav_msgs/Odometry", header=header(stamp_s, "odom"), child_frame_id=child, pose=pose)
 
 
-def transforms(*edges: tuple[str, str, list[float], list[float]]) -> Any:
+def transforms(*edges):
     """A TFMessage of (parent, child, translation, quaternion)."""
     stamped = []
     for parent, child, position, quaternion in edges:

@@ -1,7 +1,6 @@
 """Two domains of this process that meet over the loopback interface as two processes do."""
 
 import time
-from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -20,17 +19,17 @@ DEADLINE_S = 60.0
 class Scripted:
     """A subscription that hands over batches of messages, one at a time, all sent at 77 s."""
 
-    def __init__(self, *batches: list[bytes]) -> None:
+    def __init__(self, *batches):
         self.batches = list(batches)
 
-    def take(self, timeout_s: float = 0.0) -> list[object]:
+    def take(self, timeout_s=0.0):
         from modt.ros2.dds import Message
 
         return [Message(data, 77.0) for data in (self.batches.pop(0) if self.batches else [])]
 
 
 @pytest.fixture
-def loopback(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def loopback(monkeypatch):
     """Join the domains NEAR and FAR, which meet, until the test ends."""
     pytest.importorskip("cyclonedds")
     from modt.ros2.dds import participant
@@ -45,12 +44,12 @@ def loopback(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     del joined
 
 
-def has_sender(subscription: object) -> bool:
+def has_sender(subscription):
     """Whether a sender of its topic is known to a subscription."""
     return bool(subscription._reader.get_matched_publications())
 
 
-def until(condition: Callable[[], object]) -> None:
+def until(condition):
     """Wait for a condition, at most DEADLINE_S."""
     end_s = time.monotonic() + DEADLINE_S
     while not condition():

@@ -16,7 +16,7 @@ from tests.sensor_fit.recordings import recording
 SENSORS = ("vlp-16", "vlp-32c", "hdl-64e", "os1-64", "pandar64", "solid-state")
 
 
-def agree(found_deg, true_deg) -> None:
+def agree(found_deg, true_deg):
     """The number within 5 %; the elevations within 0.1 degrees or a quarter of the spacing, for 95 % of the beams."""
     true_deg = np.sort(true_deg)
     assert len(found_deg) == pytest.approx(len(true_deg), rel=0.05)

@@ -1,7 +1,6 @@
 """Small recordings of ROS 2, for tests."""
 
 import itertools
-from pathlib import Path
 
 from mcap.writer import Writer as McapWriter
 from rosbags import rosbag2
@@ -15,7 +14,7 @@ Recorded = list[tuple[str, str, float, bytes]]
 """Topic, type, time of the recording, message."""
 
 
-def write_rosbag2(path: Path, recorded: Recorded, compressed: str | None = None) -> Path:
+def write_rosbag2(path, recorded, compressed=None):
     """A folder; compressed with zstd as a "file" or by "message"."""
     writer = rosbag2.Writer(path, version=8)
     if compressed is not None:
@@ -29,7 +28,7 @@ def write_rosbag2(path: Path, recorded: Recorded, compressed: str | None = None)
     return path
 
 
-def write_mcap(path: Path, recorded: Recorded, **options: object) -> Path:
+def write_mcap(path, recorded, **options):
     path = path.with_suffix(".mcap")
     with path.open("wb") as file:
         writer = McapWriter(file, **options)
@@ -44,19 +43,19 @@ def write_mcap(path: Path, recorded: Recorded, **options: object) -> Path:
     return path
 
 
-def clouds(n: int = 4, topic: str = "/points") -> Recorded:
+def clouds(n=4, topic="/points"):
     """Sweeps 0.1 s apart, recorded 30 ms after their stamps."""
     stamps = [BEGAN_S + k / 10 for k in range(n)]
     data = [messages.encode(messages.cloud(messages.xyzi(20 + k), stamp_s=s)) for k, s in enumerate(stamps)]
     return [(topic, CLOUD, s + 0.03, raw) for s, raw in zip(stamps, data, strict=True)]
 
 
-def poses(child: str = "lidar", topic: str = "/odom") -> Recorded:
+def poses(child="lidar", topic="/odom"):
     """Poses at 50 Hz of a sensor that moves along x at 1 m/s, from 0.2 s before the first sweep."""
     stamps = [BEGAN_S + k / 50 - 0.21 for k in range(40)]
     made = [messages.odometry(s, [10.0 + s - BEGAN_S, 0.0, 0.0], UP, child) for s in stamps]
     return [(topic, ODOMETRY, s + 0.001, messages.encode(m)) for s, m in zip(stamps, made, strict=True)]
 
 
-def by_time(*recorded: Recorded) -> Recorded:
+def by_time(*recorded):
     return sorted(itertools.chain(*recorded), key=lambda message: message[2])

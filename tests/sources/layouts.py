@@ -1,7 +1,5 @@
 """Small streams of every layout, for tests."""
 
-from pathlib import Path
-
 import numpy as np
 
 CAMERA = {
@@ -12,28 +10,26 @@ CAMERA = {
 OXTS_START = (49.0, 8.4, 110.0, 0.0, 0.0, 0.0)
 
 
-def scan(frame: int, n: int = 50) -> np.ndarray:
+def scan(frame, n=50):
     rng = np.random.default_rng(frame)
     points = rng.uniform(-20, 20, (n, 4)).astype(np.float32)
     points[:, 3] = rng.uniform(0, 1, n)
     return points
 
 
-def write_scans(folder: Path, frames: range | list[int], digits: int = 6) -> Path:
+def write_scans(folder, frames, digits=6):
     folder.mkdir(parents=True)
     for f in frames:
         (folder / f"{f:0{digits}d}.bin").write_bytes(scan(f).tobytes())
     return folder
 
 
-def oxts_line(metres_north: float) -> str:
+def oxts_line(metres_north):
     lat = OXTS_START[0] + np.rad2deg(metres_north / 6378137.0)
     return " ".join(map(str, (lat, *OXTS_START[1:], *[0.0] * 24)))
 
 
-def raw_drive(
-    root: Path, frames: range | list[int] = range(4), *, calibrated: bool = True, oxts: bool = True
-) -> Path:
+def raw_drive(root, frames=range(4), *, calibrated=True, oxts=True):
     day = root / "2011_09_26"
     drive = day / "2011_09_26_drive_9999_sync"
     write_scans(drive / "velodyne_points" / "data", frames, digits=10)
@@ -53,7 +49,7 @@ def raw_drive(
     return drive
 
 
-def tracking(root: Path) -> Path:
+def tracking(root):
     scans = write_scans(root / "training" / "velodyne" / "0003", range(3))
     (root / "training" / "calib").mkdir()
     (root / "training" / "calib" / "0003.txt").write_text(
@@ -64,7 +60,7 @@ def tracking(root: Path) -> Path:
     return scans
 
 
-def odometry(root: Path) -> Path:
+def odometry(root):
     sequence = root / "sequences" / "07"
     write_scans(sequence / "velodyne", range(3))
     (sequence / "calib.txt").write_text(f"P2: {CAMERA['P']}\nTr: {CAMERA['Tr']}\n")
@@ -74,5 +70,5 @@ def odometry(root: Path) -> Path:
     return sequence
 
 
-def bare(root: Path) -> Path:
+def bare(root):
     return write_scans(root / "scans", range(3))

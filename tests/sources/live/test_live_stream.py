@@ -1,7 +1,6 @@
 """The newest sweep is handed over; everything else is counted."""
 
 import logging
-from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,11 +12,11 @@ from modt.sources.stream import Reception, StreamEndedError, StreamInfo, Sweep
 INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
 
 
-def scripted(*batches: Sequence[Sweep] | Exception) -> SimpleNamespace:
+def scripted(*batches):
     """A reader that hands over batches of sweeps, one a call, and raises those that are errors."""
     waiting = list(batches)
 
-    def read(timeout_s: float) -> Sequence[Sweep]:
+    def read(timeout_s):
         batch = waiting.pop(0) if waiting else []
         if isinstance(batch, Exception):
             raise batch
@@ -26,7 +25,7 @@ def scripted(*batches: Sequence[Sweep] | Exception) -> SimpleNamespace:
     return SimpleNamespace(profile=None, reception=Reception(), read=read, close=lambda: None)
 
 
-def sweep(stamp_s: float, *, complete: bool = True, x: float = 5.0) -> Sweep:
+def sweep(stamp_s, *, complete=True, x=5.0):
     return Sweep(stamp_s, np.full((10, 4), [x, 0, 0, 0.5], np.float32), complete=complete)
 
 

@@ -35,7 +35,7 @@ class Written:
     firing_s: float
     unit_m: float = 0.004
 
-    def packet(self, at_s: float, mode: int = 0x37, cells: bytes = b"") -> bytes:
+    def packet(self, at_s, mode=0x37, cells=b""):
         """Packet sent at a time of the day [s] by a head that looks ahead at the end of each turn."""
         returns = {0x39: 2, 0x3D: 3}.get(mode, 1)
         firings = self.blocks // returns
@@ -54,7 +54,7 @@ class Written:
         tail = b"".join(values.get(word) or bytes(int(word)) for word in self.tail.split())
         return bytes.fromhex(self.header) + body + tail
 
-    def turns(self, n: float, **said: object) -> list[tuple[float, bytes]]:
+    def turns(self, n, **said):
         """Packets of so many turns."""
         firings = self.blocks // {0x39: 2, 0x3D: 3}.get(said.get("mode", 0), 1)
         step_s, day_s = firings * self.firing_s, 36_000.0

@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ from tools.send.packet_bag import packets_of_bag
 OTHER = "of another model than the packets before"
 
 
-def edited(at: int, value: bytes) -> Callable[[bytes], bytes]:
+def edited(at, value):
     """Function that overwrites bytes of a payload."""
     return lambda payload: payload[:at] + value + payload[at + len(value) :]
 
@@ -42,7 +41,7 @@ class Maker:
     refused: dict[str, int]  # reasons for three payloads of other lengths, a broken and a foreign one
 
 
-def of_ouster() -> list[Timed]:
+def of_ouster():
     capture = PcapFile(makers.OUSTER_METADATA.with_name(f"{makers.OUSTER}_lb_n3.pcap"))
     return [(d.stamp_s, d.payload) for d in capture if d.port == 7502]
 
@@ -88,7 +87,7 @@ MAKERS = {
 
 
 @pytest.fixture(params=[pytest.param(name, marks=[pytest.mark.kitti] * (name == "ouster")) for name in MAKERS])
-def maker(request: pytest.FixtureRequest) -> Maker:
+def maker(request):
     if request.param == "ouster":
         request.getfixturevalue("kitti_root")
         pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
@@ -99,7 +98,7 @@ def maker(request: pytest.FixtureRequest) -> Maker:
     ("name", "model", "n", "whole", "turn_s"),
     [("velodyne", "vlp-16", 5, 3, 0.1), ("hesai", "xt-32", 4, 3, 0.1), ("livox", "mid-360", 4, 2, 0.0)],
 )
-def test_sweeps_are_those_of_the_scene(name: str, model: str, n: int, whole: int, turn_s: float) -> None:
+def test_sweeps_are_those_of_the_scene(name, model, n, whole, turn_s):
     """The first turn began before it was heard."""
     decoder = MAKERS[name].decoder()
     sweeps, reception = decoded(decoder, packets(model, n))
@@ -117,14 +116,14 @@ def test_sweeps_are_those_of_the_scene(name: str, model: str, n: int, whole: int
         assert np.quantile(distance, 0.95) < 0.05  # m; a packet's azimuths are those of its blocks
 
 
-def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_extra_is_named(monkeypatch):
     for module, name in (("velodyne_decoder", "velodyne"), ("ouster.sdk.core", "ouster")):
         monkeypatch.setitem(sys.modules, module, None)
         with pytest.raises(MisuseError, match=rf"pip install '\.\[{name}\]'"):
             MAKERS[name].decoder()
 
 
-def test_lost_packets_are_counted_and_their_sweep_is_incomplete(maker: Maker) -> None:
+def test_lost_packets_are_counted_and_their_sweep_is_incomplete(maker):
     timed = maker.timed()
     whole, _ = decoded(maker.decoder(), timed)
     sweeps, reception = decoded(maker.decoder(), [p for i, p in enumerate(timed) if i not in maker.lost])
@@ -135,7 +134,7 @@ def test_lost_packets_are_counted_and_their_sweep_is_incomplete(maker: Maker) ->
     assert equal([sweeps[i] for i in kept], [whole[i] for i in kept])
 
 
-def test_overtaken_and_doubled_packets_change_nothing(maker: Maker) -> None:
+def test_overtaken_and_doubled_packets_change_nothing(maker):
     timed = maker.timed()
     whole, _ = decoded(maker.decoder(), timed)
     at = maker.lost[0]
@@ -147,7 +146,7 @@ def test_overtaken_and_doubled_packets_change_nothing(maker: Maker) -> None:
     assert set(reception.refused) <= {"late or twice"}
 
 
-def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker: Maker, caplog) -> None:
+def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker, caplog):
     timed, rng, dirty, n = maker.timed(), np.random.default_rng(0), list[Timed](), 0
     whole, _ = decoded(maker.decoder(), timed)
     caplog.clear()
@@ -165,7 +164,7 @@ def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker: Maker
 
 
 @pytest.mark.parametrize("name", ["velodyne", "hesai", "livox"])
-def test_a_sweep_holds_no_more_packets_than_a_sensor_sends(name: str) -> None:
+def test_a_sweep_holds_no_more_packets_than_a_sensor_sends(name):
     stamped = makers.MAKERS[name].stamped
     decoder, timed = MAKERS[name].decoder(), MAKERS[name].timed()
     at = MAKERS[name].lost[0]
@@ -195,7 +194,7 @@ CLOUDS = {  # recorded packets: name, calibration, number of sweeps, greatest me
 
 @pytest.mark.kitti
 @pytest.mark.parametrize("name", CLOUDS)
-def test_points_are_those_of_another_decoder(kitti_root: Path, name: str) -> None:
+def test_points_are_those_of_another_decoder(kitti_root, name):
     table, n_sweeps, median_m = CLOUDS[name]
     folder = kitti_root / "packets" / name
     (cloud,) = folder.glob("*.pcd")
