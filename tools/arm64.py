@@ -37,7 +37,7 @@ TESTS = (
     *("modt_evaluation/box_tracking", "sources", "sinks", "ros2", "app", "profile", "crash"),
     *("test_library.py", "test_pipeline.py"),
 )
-NOT_EMULATED = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
+NOT_EMULATED = "tests/poses/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
 """Test that fails because the emulator does not pass on the kernel's count of dropped datagrams."""
 QEMU = Path("/usr/bin/qemu-aarch64-static")
 CPU = "cortex-a72"

@@ -22,7 +22,7 @@ from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.sources.pose_source import pose_defect
+from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
 from modt.sources.stream import Stream, no_seconds, unit_of

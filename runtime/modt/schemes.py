@@ -11,9 +11,9 @@ from modt.sources.drivers import DRIVERS
 
 if TYPE_CHECKING:
     from modt.config import OdometryConfig
+    from modt.poses.pose_source import PoseSource
     from modt.sinks.output import Sink
     from modt.sources.live.live_stream import LiveStream
-    from modt.sources.pose_source import PoseSource
 
 
 def open_sensor(text: str, cores: frozenset[int] | None = None) -> LiveStream:
@@ -69,7 +69,7 @@ def _background(module: str, name: str, depth: int) -> Callable[[Address], Sink]
 
 
 def _pose_socket(address: Address, config: OdometryConfig) -> PoseSource:
-    from modt.sources.pose_socket import PoseSocket, open_socket
+    from modt.poses.pose_socket import PoseSocket, open_socket
 
     return PoseSocket(open_socket(address), config, address.text)
 
@@ -116,6 +116,6 @@ POSES = {
     "udp": Scheme("udp://HOST:PORT", _pose_socket),
     "unix": Scheme("unix:///PATH", _pose_socket),
     "ros2": Scheme(
-        "ros2:///TOPIC", _opener("sources.pose_topic", "open_topic"), frozenset({"domain", "base_to_sensor"}), "ros2"
+        "ros2:///TOPIC", _opener("poses.pose_topic", "open_topic"), frozenset({"domain", "base_to_sensor"}), "ros2"
     ),
 }

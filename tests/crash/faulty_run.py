@@ -32,6 +32,7 @@ from modt.energy.meters.meter import Conditions, Facts, Kind, Meter, Scope
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.energy.windows import Clocks, Windows
 from modt.errors import ModtError
+from modt.poses.pose_socket import PoseSocket
 from modt.sinks import run_directory
 from modt.sinks.background import Background
 from modt.sinks.frame_lines import Datagrams
@@ -43,7 +44,6 @@ from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.live import live_stream
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PAUSE_S, PacketReader
-from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Frame
 from modt_profiling.reporting.records import read_records

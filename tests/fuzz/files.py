@@ -4,7 +4,7 @@ import numpy as np
 
 from modt.geometry import Camera
 from modt.sources import kitti_calibration
-from modt.sources.pose_source import read_poses
+from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import read_scan
 from modt_evaluation.box_tracking import detections as boxes

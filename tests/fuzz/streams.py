@@ -5,6 +5,7 @@ import struct
 import numpy as np
 import pytest
 
+from modt.poses.pose_socket import read_datagram
 from modt.ros2.cdr import MessageError
 from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
@@ -12,7 +13,6 @@ from modt.sources.drivers.hesai import HesaiDecoder, read_angles
 from modt.sources.drivers.livox import LivoxDecoder
 from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.packets.pcap_file import PcapFile
-from modt.sources.pose_socket import read_datagram
 from modt.sources.recognise import open_stream
 from tests.fuzz.target import of_file, target, targets_of_files
 from tests.ros2 import messages

@@ -14,7 +14,7 @@ from modt.ros2.cdr import CdrWriter
 from modt.sources.drivers.hesai import read_angles
 from modt.sources.drivers.ouster import OusterDecoder
 from modt.sources.drivers.velodyne import VelodyneDecoder
-from modt.sources.pose_source import read_poses
+from modt.sources.pose_file import read_poses
 from modt_profiling.reporting.records import read_records
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import SENSOR_BOMB, network

@@ -14,12 +14,13 @@ import numpy as np
 
 from modt.app.containment import OncePerSecond
 from modt.config import OdometryConfig
+from modt.poses.pose_socket import read_datagram
+from modt.poses.pose_topic import PoseTopic
+from modt.poses.received_poses import ReceivedPoses
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.pose_socket import read_datagram
-from modt.sources.pose_topic import PoseTopic
-from modt.sources.received_poses import CAPACITY, MAX_AGE_S, POSITION_NOISE_M, ReceivedPoses
+from modt.sources.pose_buffer import CAPACITY, MAX_AGE_S, POSITION_NOISE_M
 from modt.sources.stream import MAX_KEPT_FAULTS, Reception, StreamInfo, Sweep
 from modt.types import Float64, Frame
 from tests.sequences.makers import MAKERS, TURN_S, is_bounded

@@ -15,7 +15,7 @@ from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.file_names import files_in
 from modt.sources.kitti_calibration import camera_of_sequence
-from modt.sources.pose_source import read_poses
+from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import ScanStream
 from modt.types import NONE

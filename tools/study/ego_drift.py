@@ -22,9 +22,9 @@ import numpy as np
 from modt.app import assembly
 from modt.cli.options import frames as frame_range
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
+from modt.poses.pose_source import NoPoses
 from modt.profile import load
 from modt.sources import kitti_calibration
-from modt.sources.pose_source import NoPoses
 from modt.sources.recognise import open_scans
 from modt.sources.stream import Stream
 from modt.types import Float64

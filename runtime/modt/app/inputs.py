@@ -16,8 +16,8 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.placement import LEVEL, Mount
+from modt.poses.pose_source import NoPoses, PoseFile, PoseSource
 from modt.schemes import POSES, open_poses, open_sensor
-from modt.sources.pose_source import NoPoses, PoseFile, PoseSource
 from modt.sources.stream import Stream, StreamInfo
 
 if TYPE_CHECKING:

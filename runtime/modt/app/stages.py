@@ -17,8 +17,8 @@ from modt.energy.ledger import Ledger
 from modt.odometry.pose_estimator import PoseEstimator
 from modt.pipeline import Pipeline
 from modt.placement import Mount
+from modt.poses.pose_source import PoseSource
 from modt.sensor_fit.recognition import recognise
-from modt.sources.pose_source import PoseSource
 from modt.sources.stream import StreamInfo
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tracker import Tracker

@@ -18,7 +18,7 @@ from modt.ros2.cdr import CdrReader, MessageError
 from modt.ros2.odometry import StaticTransforms, read_odometry
 from modt.ros2.point_cloud2 import PointCloud, read_cloud
 from modt.sources.bag_files import BagFile, BagMessage, BagTopic, bag_files, messages_of
-from modt.sources.received_poses import PoseBuffer
+from modt.sources.pose_buffer import PoseBuffer
 from modt.sources.stamp_check import STEP_S, StampCheck
 from modt.sources.stream import Faults, StreamInfo, Sweep
 from modt.types import Float64, Frame, Self

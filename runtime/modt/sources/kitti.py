@@ -19,7 +19,7 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.sources import kitti_calibration
 from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
-from modt.sources.pose_source import read_poses, sensor_poses
+from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_file import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt.types import Float64

@@ -16,7 +16,7 @@ from modt.classes import CLASSES
 from modt.errors import MisuseError, install
 from modt.geometry import corners, inverse, transform_boxes, wrap
 from modt.sources import kitti_calibration
-from modt.sources.pose_source import read_poses
+from modt.sources.pose_file import read_poses
 from modt.types import Float64, Int
 from modt_evaluation.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
 from modt_evaluation.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, Detections, box_lines, boxes_to_kitti

@@ -8,10 +8,11 @@ from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
+from modt.poses.received_poses import ReceivedPoses
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
-from modt.sources.received_poses import CAPACITY, ReceivedPoses
+from modt.sources.pose_buffer import CAPACITY
 from modt.types import Float64
 
 MOUNT = ("x", "y", "z", "roll", "pitch", "yaw")

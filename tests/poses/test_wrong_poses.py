@@ -5,7 +5,8 @@ import pytest
 
 from modt.config import OdometryConfig
 from modt.geometry import rotation_zyx, se3
-from modt.sources.received_poses import PoseBuffer, ReceivedPoses
+from modt.poses.received_poses import ReceivedPoses
+from modt.sources.pose_buffer import PoseBuffer
 from modt.types import Frame
 
 CONFIG = OdometryConfig()

@@ -7,14 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
+from modt.poses.pose_source import NoPoses, PoseFile, PoseSource
 from modt.sources.kitti_calibration import oxts_poses
-from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, read_poses
+from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_stream
-
-from . import layouts
+from tests.sources import layouts
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 CAMERA = Camera(np.zeros((3, 4)), T_CAMERA_SENSOR, 100.0, 100.0)
@@ -97,17 +98,11 @@ records = arrays(np.float64, (4, 6), elements=small).map(lambda a: a + np.array(
 
 
 def mercator_pose(record, scale):
-    lat, lon, alt, roll, pitch, yaw = record
+    lat, lon, alt, *roll_pitch_yaw = record
     er = 6378137.0
     tx = scale * lon * math.pi * er / 180
     ty = scale * er * math.log(math.tan((90 + lat) * math.pi / 360))
-    rx = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
-    ry = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
-    rz = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    T = np.eye(4)
-    T[:3, :3] = rz @ ry @ rx
-    T[:3, 3] = tx, ty, alt
-    return T
+    return se3(Rotation.from_euler("xyz", roll_pitch_yaw).as_matrix(), np.array([tx, ty, alt]))
 
 
 @given(records)

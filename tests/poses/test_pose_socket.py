@@ -15,10 +15,10 @@ from modt.address import parse_address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
+from modt.poses.pose_socket import PoseSocket, open_socket, read_datagram
 from modt.ros2.cdr import MessageError
 from modt.schemes import POSES, open_poses
-from modt.sources.pose_socket import PoseSocket, open_socket, read_datagram
-from modt.sources.received_poses import MAX_AGE_S, PoseBuffer
+from modt.sources.pose_buffer import MAX_AGE_S, PoseBuffer
 from modt.types import Frame
 from tests.fuzz.mutation import mutations
 
@@ -185,7 +185,7 @@ def test_no_motion_below_the_speed_limit_is_a_restart(steps):
 
 
 def test_the_newest_poses_of_a_flood_are_kept(monkeypatch):
-    monkeypatch.setattr("modt.sources.pose_socket.CAPACITY", 4)
+    monkeypatch.setattr("modt.poses.pose_socket.CAPACITY", 4)
     with connected() as (there, odometry):
         for k in range(6):
             there.send(planar(0.1 * k, 1.0 * k))

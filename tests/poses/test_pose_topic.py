@@ -10,9 +10,9 @@ from modt.types import Frame
 from tests.ros2.network import Scripted
 
 pytest.importorskip("cyclonedds")
+from modt.poses import pose_topic
 from modt.ros2.odometry import write_odometry
 from modt.schemes import open_poses
-from modt.sources import pose_topic
 
 
 def frame(stamp_s):

@@ -24,8 +24,9 @@ from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
+from modt.poses.received_poses import ReceivedPoses
 from modt.ros2.cdr import MessageError
-from modt.sources.received_poses import CAPACITY, ReceivedPoses
+from modt.sources.pose_buffer import CAPACITY
 from modt.types import Float64
 
 MAX_BYTES = 4096

@@ -1,0 +1,1 @@
+"""Sources of the poses of frames: the recording, a file, or another process by datagrams or a topic of ROS 2."""
