@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from modt.address import Address, Scheme, open_address
-from modt.sources.drivers import DRIVERS
+from modt.sources import drivers
 
 if TYPE_CHECKING:
     from modt.config import OdometryConfig
@@ -86,13 +86,15 @@ class _Sensors(Mapping[str, Scheme]):
     """Schemes of sensors: of topics, and of each driver, which is imported when its scheme is asked for."""
 
     def __getitem__(self, name: str) -> Scheme:
-        return _TOPIC if name == "ros2" else DRIVERS[name].scheme(name)
+        if name in drivers.names():
+            return drivers.driver(name).scheme(name)
+        return {"ros2": _TOPIC}[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter([*DRIVERS, "ros2"])
+        return iter([*drivers.names(), "ros2"])
 
     def __len__(self) -> int:
-        return len(DRIVERS) + 1
+        return len(drivers.names()) + 1
 
 
 SENSORS = _Sensors()

@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from modt.errors import MisuseError
-from modt.sources.drivers import DRIVERS, Driver
+from modt.sources.drivers import Driver, all_drivers
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.stamp_check import StampCheck
@@ -96,7 +96,7 @@ def _driver_of(capture: PcapFile, options: Mapping[str, str]) -> Driver:
     Raises:
         MisuseError: there is no packet of a sensor.
     """
-    drivers = list(DRIVERS.values())
+    drivers = all_drivers()
     for given in (options, {option for driver in drivers for option in driver.options_beside(capture.path)}):
         for driver in drivers:
             if driver.identified_by in given:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -72,7 +71,7 @@ def tracking_sequence(scans: Path) -> ScanStream:
             poses = dict(enumerate(kitti_calibration.oxts_poses(kitti_calibration.read_oxts(records)) @ T_imu_sensor))
     info = StreamInfo(f"tracking {number}", "KITTI tracking", int(number), camera=camera)
     files = _scans(scans)
-    return _stream(info, files, notes, pose_notes, poses, turns=dict.fromkeys(files, PERIOD_S))
+    return _stream(info, files, notes, pose_notes, poses, {}, dict.fromkeys(files, PERIOD_S))
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
@@ -96,7 +95,7 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     scans = _scans(sequence / "velodyne")
     stamps = _stamps(sequence / "times.txt", scans, notes, seconds_ns)
     info = StreamInfo(f"odometry {sequence.name}", "KITTI odometry", camera=camera)
-    return _stream(info, scans, notes, pose_notes, poses, stamps)
+    return _stream(info, scans, notes, pose_notes, poses, stamps, {})
 
 
 def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") -> ScanStream:
@@ -108,7 +107,7 @@ def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") 
     notes = [f"folder of scans: no calibration, frames {apart}"]
     pose_notes = [f"folder of scans: {NO_POSES}"]
     info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
-    return _stream(info, scans, notes, pose_notes, {}, stamps)
+    return _stream(info, scans, notes, pose_notes, {}, stamps, {})
 
 
 def _scans(data: Path, suffix: str = ".bin") -> dict[int, Path]:
@@ -127,8 +126,8 @@ def _stream(
     notes: list[str],
     pose_notes: list[str],
     poses: Poses,
-    stamps: Mapping[int, float] = MappingProxyType({}),
-    turns: Mapping[int, float] = MappingProxyType({}),
+    stamps: Mapping[int, float],
+    turns: Mapping[int, float],
 ) -> ScanStream:
     """Stream of scan files with their poses, stamps and durations [s] by frame."""
     indices = list(files)

@@ -46,9 +46,9 @@ def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, st
     """
     if path.is_file() and path.suffix in CAPTURES:
         from modt.sources.capture import open_capture
-        from modt.sources.drivers import DRIVERS
+        from modt.sources.drivers import all_drivers
 
-        _only(path, capture, {option for driver in DRIVERS.values() for option in driver.options})
+        _only(path, capture, {option for driver in all_drivers() for option in driver.options})
         return open_capture(path, capture)
     if _is_bag(path):
         from modt.sources.bag import open_bag

@@ -6,7 +6,7 @@ To add a maker, add a file `<maker>.py` with a `DRIVER`. Its name is the scheme 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -78,20 +78,12 @@ def names() -> list[str]:
     return [module.name for module in iter_modules(__path__)]
 
 
-class _Drivers(Mapping[str, Driver]):
-    """Drivers by the names of the files in this folder; a file is imported when its driver is asked for."""
-
-    def __getitem__(self, name: str) -> Driver:
-        if name not in names():
-            raise KeyError(name)
-        driver: Driver = import_module(f"{__name__}.{name}").DRIVER
-        return driver
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(names())
-
-    def __len__(self) -> int:
-        return len(names())
+def driver(name: str) -> Driver:
+    """Driver of a file in this folder, which is imported."""
+    found: Driver = import_module(f"{__name__}.{name}").DRIVER
+    return found
 
 
-DRIVERS = _Drivers()
+def all_drivers() -> list[Driver]:
+    """Drivers of all files in this folder, which are imported."""
+    return [driver(name) for name in names()]

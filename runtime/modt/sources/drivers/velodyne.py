@@ -81,7 +81,7 @@ class Model:
 
 
 _HDL_64E = Signature(UPPER_LOWER, None)
-_MODELS = (
+MODELS = (
     Model("vlp-16", "VLP16", Signature(UPPER, 0x22), 1327.1, "vlp-16"),
     Model("puck-hi-res", "PuckHiRes", Signature(UPPER, 0x24), 1327.1),
     Model("vlp-32c", "VLP32C", Signature(UPPER, 0x28), 663.6, "vlp-32c", 450),
@@ -90,7 +90,6 @@ _MODELS = (
     Model("hdl-64e-s2", "HDL64E_S2", _HDL_64E, 288.0, "hdl-64e", 900, "HDL-64E_S2.1-sztaki.yml"),
     Model("vls-128", "VLS128", Signature(FOUR_BANKS, 0xA1), 165.9, None, 700),
 )
-MODELS = {model.name: model for model in _MODELS}
 
 
 def model_named(name: str) -> Model:
@@ -99,9 +98,10 @@ def model_named(name: str) -> Model:
     Raises:
         MisuseError: the name is unknown.
     """
-    if name not in MODELS:
-        raise MisuseError(f"model={name}", "no model of Velodyne that is known", f"use one of {', '.join(MODELS)}")
-    return MODELS[name]
+    by_name = {model.name: model for model in MODELS}
+    if name not in by_name:
+        raise MisuseError(f"model={name}", "no model of Velodyne that is known", f"use one of {', '.join(by_name)}")
+    return by_name[name]
 
 
 def signature_of(payload: bytes) -> Signature | None:
@@ -128,7 +128,7 @@ def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> 
     """
     signatures = [signature_of(payload) for payload in payloads]
     signature, _ = Counter(signatures).most_common(1)[0]
-    stated = next((model for model in _MODELS if model.signature == signature), None)
+    stated = next((model for model in MODELS if model.signature == signature), None)
     alike = [payload for payload, other in zip(payloads, signatures, strict=True) if other == signature]
     paced = _by_pace(alike, stated)
     used = declared or paced
@@ -147,7 +147,7 @@ def _by_pace(payloads: Sequence[bytes], stated: Model | None) -> Model | None:
     if not gaps_us or stated is None or stated.signature == _HDL_64E:
         return stated
     interval_us = median(gaps_us) * (2 if payloads[0][RETURN_AT] == DUAL else 1)
-    alike = [model for model in _MODELS if model.signature.banks == stated.signature.banks]
+    alike = [model for model in MODELS if model.signature.banks == stated.signature.banks]
     fitting = [model for model in alike if abs(interval_us / model.interval_us - 1.0) < PACE_TOLERANCE]
     return stated if stated in fitting or not fitting else fitting[0]
 

@@ -16,7 +16,7 @@ import numpy as np
 from modt.sources.packets.device_clock import DeviceClock
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.stream import Sweep
-from modt.types import Float32, Float64, Self
+from modt.types import Float32, Float64
 
 log = logging.getLogger(__name__)
 
@@ -160,7 +160,6 @@ class TurnDecoder(PacketDecoder):
     def __init__(self, name: str, profile: str | None = None) -> None:
         super().__init__(name)
         self.profile = profile
-        self._unrecognised: list[Timed] = []  # packets kept until the model is recognised
         self._signature: object = None  # of the model; None until it is recognised
         self._reach = 0  # greatest angle between a beam and the head [0.01 deg]
         self._packet_s = 0.0  # time from one packet to the next
@@ -182,12 +181,6 @@ class TurnDecoder(PacketDecoder):
     @abstractmethod
     def _table(self, entries: Sequence[Entry]) -> Float32:
         """(N, 4 or more) x, y, z [m, sensor frame], reflectance, and other columns of the points in packets."""
-
-    def fresh(self) -> Self:
-        """Decoder of the same sensor that has seen no packet yet."""
-        other = super().fresh()
-        other._unrecognised = []
-        return other
 
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points of this maker."""
@@ -223,6 +216,7 @@ class TurnDecoder(PacketDecoder):
 
     def _reset(self) -> None:
         self._clock = DeviceClock(self.wrap_s)
+        self._unrecognised: list[Timed] = []  # packets kept until the model is recognised
         self._last = None
         self._turn = NO_TURN
         self._ending = NO_TURN
@@ -269,8 +263,9 @@ class TurnDecoder(PacketDecoder):
         if len(self._foreign) < RECOGNISED_BY:
             return []
         log.warning("%s: packets are of another model, and those of the one before have ended", self.name)
-        self._unrecognised = self._foreign
+        foreign = self._foreign
         self._reset()
+        self._unrecognised = foreign
         return self._begin()
 
     def _add(self, entry: Entry) -> Sequence[Sweep]:
