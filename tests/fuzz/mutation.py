@@ -51,7 +51,8 @@ def _remove(raw, _, chance):
 
 
 def _extreme(raw, _, chance):
-    size, order = chance.choice((1, 2, 4, 8)), chance.choice(("little", "big"))
+    size = chance.choice((1, 2, 4, 8))
+    order = chance.choice(("little", "big"))
     at = _place(raw, chance)
     raw[at : at + size] = (chance.choice(EXTREMES) & (256**size - 1)).to_bytes(size, order)
 
@@ -63,7 +64,8 @@ def _repeat(raw, _, chance):
 
 def _splice(raw, seeds, chance):
     other = chance.choice(seeds)
-    begin, at = chance.randrange(len(other) + 1), _place(raw, chance)
+    begin = chance.randrange(len(other) + 1)
+    at = _place(raw, chance)
     raw[at : at + chance.choice((0, 16, len(raw)))] = other[begin : begin + chance.choice((16, 256, len(other)))]
 
 

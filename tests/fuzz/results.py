@@ -20,7 +20,9 @@ def json_lines(records):
 def viewed_run(folder):
     """The view of a run by its ledger and its tracks, with a line `---` between."""
     run = described(write_run(folder / "run", frames=2))
-    ledger, tracks, costs = run / "ledger.jsonl", run / "tracks.jsonl", [ledger_line(k, 1) for k in range(2)]
+    ledger = run / "ledger.jsonl"
+    tracks = run / "tracks.jsonl"
+    costs = [ledger_line(k, 1) for k in range(2)]
     seed = [*costs, window(0, costs, 1.5)]
 
     def call(raw):
@@ -36,7 +38,8 @@ def viewed_run(folder):
 @target()
 def exported_run(folder):
     """Tracks of a run as a table, and as KITTI's results."""
-    run, out = folder / "run", folder / "out"
+    run = folder / "run"
+    out = folder / "out"
     run.mkdir()
     (run / "run.yaml").write_text(DESCRIPTION + "service: true\n")
 

@@ -41,7 +41,8 @@ targets_of_files(
 def pcap(folder):
     path = folder / "a.pcap"
     write_capture(path, [(1.5, b"first"), (2.5, bytes(100))], 2368)
-    whole, datagram = path.read_bytes(), udp(bytes(64), 2368)
+    whole = path.read_bytes()
+    datagram = udp(bytes(64), 2368)
     parts = [ipv4(datagram[at : at + 40], identity=7, offset=at, more=not at) for at in (0, 40)]
     frames = [ethernet(part) for part in parts]
     fragmented = whole[:24] + b"".join(struct.pack("<IIII", 1, 0, len(f), len(f)) + f for f in frames)
@@ -71,7 +72,8 @@ def ouster_packets(folder):
     info = sdk.SensorInfo.from_default(sdk.LidarMode._512x10)
     path = folder / "metadata.json"
     path.write_text(info.to_json_string())
-    form, timed = sdk.PacketFormat(info), []
+    form = sdk.PacketFormat(info)
+    timed = []
     for index in range(2):
         frame = sdk.LidarFrame(info)
         frame.frame_id = index
@@ -115,7 +117,9 @@ def point_cloud(folder):
     plain = write_cloud(1.5, "lidar", layouts.scan(0))
     timed = np.zeros((2, 100), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "u2"), ("t", "u4")])
     turn = np.linspace(3.1, -3.1, 200).reshape(2, 100)
-    timed["x"], timed["y"], timed["t"] = np.cos(turn), np.sin(turn), (turn.max() - turn) / 6.2 * 1e8
+    timed["x"] = np.cos(turn)
+    timed["y"] = np.sin(turn)
+    timed["t"] = (turn.max() - turn) / 6.2 * 1e8
     return [plain, messages.encode(messages.cloud(timed, padding=4))], read_cloud
 
 

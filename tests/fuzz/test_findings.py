@@ -22,7 +22,8 @@ from tests.fuzz.targets import TARGETS
 from tests.modt_profiling.reporting.test_run_report import ledger_line
 from tests.sources.layouts import CAMERA
 
-R, T = f"R: {CAMERA['R']}", "T: 0 0 0"
+R = f"R: {CAMERA['R']}"
+T = "T: 0 0 0"
 MODEL = network().SerializeToString()
 CALIBRATION = f"R_rect_00: {CAMERA['R']}\nP_rect_02: {CAMERA['P']}\n"
 

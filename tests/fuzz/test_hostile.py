@@ -48,7 +48,8 @@ def odd_messages():
 
 TOPICS = "CREATE TABLE topics(id INTEGER{key}, name, type, serialization_format, offered_qos_profiles)"
 MESSAGES = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp{stamp}, data{data})"
-PLAIN_TOPICS, PLAIN_MESSAGES = TOPICS.format(key=""), MESSAGES.format(stamp="", data="")
+PLAIN_TOPICS = TOPICS.format(key="")
+PLAIN_MESSAGES = MESSAGES.format(stamp="", data="")
 ENDLESS = "WITH RECURSIVE r(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM r) SELECT {columns} FROM r"
 VIEWED = "CREATE VIEW messages AS " + ENDLESS
 NO_TABLES = [
@@ -112,7 +113,15 @@ def test_views_and_triggers_are_refused_by_their_name(schema, tmp_path):
 
 
 MAGIC = b"\x89MCAP0\r\n"
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, INDEX, STATISTICS, END = 1, 2, 3, 4, 5, 6, 8, 11, 15
+HEADER = 1
+FOOTER = 2
+SCHEMA = 3
+CHANNEL = 4
+MESSAGE = 5
+CHUNK = 6
+INDEX = 8
+STATISTICS = 11
+END = 15
 PACKERS = {b"zstd": zstandard.compress, b"lz4": lz4.frame.compress}
 
 
@@ -165,7 +174,8 @@ def indexed(part, place, entries, count):
 @pytest.mark.parametrize("packer", PACKERS)
 @pytest.mark.parametrize("content", CONTENTS)
 def test_a_hostile_mcap_file_is_read_or_refused(content, packer, tmp_path):
-    inner, path = CONTENTS[content](), tmp_path / "a.mcap"
+    inner = CONTENTS[content]()
+    path = tmp_path / "a.mcap"
     whole = chunk(inner, packer)
     files = [BEGIN + chunk(inner, packer, size) * times for size in (None, 0, 2**31, 2**64 - 1) for times in (1, 3)]
     files += [BEGIN + chunk(whole, packer), indexed(whole, len(BEGIN), 500, 2**63 - 1)]

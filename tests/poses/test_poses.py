@@ -19,7 +19,8 @@ from tests.sources import layouts
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 CAMERA = Camera(np.zeros((3, 4)), T_CAMERA_SENSOR, 100.0, 100.0)
-angle, place = st.floats(-3, 3), st.floats(-1000, 1000)
+angle = st.floats(-3, 3)
+place = st.floats(-1000, 1000)
 pose = st.builds(lambda r, p, y, *xyz: se3(rotation_zyx(r, p, y), np.array(xyz)), *[angle] * 3, *[place] * 3)
 
 

@@ -35,7 +35,8 @@ class Odometry(ReceivedPoses):
         self.waiting = []
 
     def _take(self):
-        taken, self.waiting = self.waiting, []
+        taken = self.waiting
+        self.waiting = []
         return taken
 
     def _read(self, message):
@@ -48,7 +49,9 @@ class Robot:
 
     def __init__(self, rate_hz=50.0):
         self.odometry = Odometry()
-        self.interval_s, self.time_s, self.sent = 1.0 / rate_hz, 0.0, 0
+        self.interval_s = 1.0 / rate_hz
+        self.time_s = 0.0
+        self.sent = 0
         self.sender_s = self.sensor_s = 0.0  # what they are off
         self.origin_m = 0.0  # of the sender's world
 
@@ -184,7 +187,8 @@ def test_no_pose_is_refused_after_a_silence_of_the_sender(robot):
 
 @pytest.mark.parametrize("far_m", [1e155, -1e308])
 def test_a_distance_beyond_all_numbers_is_a_leap(far_m):
-    buffer, T = PoseBuffer(CONFIG), np.eye(4)
+    buffer = PoseBuffer(CONFIG)
+    T = np.eye(4)
     T[0, 3] = far_m
     buffer.add(0.0, np.eye(4))
     assert buffer.leaps(0.1, T)

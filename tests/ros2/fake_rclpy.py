@@ -21,7 +21,8 @@ class Node:
     """A node whose topics hand bytes from publishers to subscriptions."""
 
     def __init__(self):
-        self.subscribed, self.types = defaultdict(list), {}
+        self.subscribed = defaultdict(list)
+        self.types = {}
 
     def create_subscription(self, kind, topic, callback, qos, *, raw):
         assert raw
@@ -46,7 +47,8 @@ def put(monkeypatch, modules):
 
 def install(monkeypatch):
     """Put the fake in the place of rclpy, and return its one node."""
-    node, spinning = Node(), threading.Event()
+    node = Node()
+    spinning = threading.Event()
     executor = SimpleNamespace(add_node=lambda node: None, spin=spinning.set)
     modules = {
         "rclpy": {"create_node": lambda name: node, "init": lambda **_: None},

@@ -105,7 +105,8 @@ def xyzi(n, kind=None):
 
 def odometry(stamp_s, position, quaternion, child="base_link"):
     """An Odometry message."""
-    at, turned = dict(zip("xyz", position, strict=True)), dict(zip("xyzw", quaternion, strict=True))
+    at = dict(zip("xyz", position, strict=True))
+    turned = dict(zip("xyzw", quaternion, strict=True))
     pose = {"pose": {"position": at, "orientation": turned}}
     return made("nav_msgs/Odometry", header=header(stamp_s, "odom"), child_frame_id=child, pose=pose)
 
@@ -114,7 +115,8 @@ def transforms(*edges):
     """A TFMessage of (parent, child, translation, quaternion)."""
     stamped = []
     for parent, child, position, quaternion in edges:
-        at, turned = dict(zip("xyz", position, strict=True)), dict(zip("xyzw", quaternion, strict=True))
+        at = dict(zip("xyz", position, strict=True))
+        turned = dict(zip("xyzw", quaternion, strict=True))
         placed = {"translation": at, "rotation": turned}
         values = {"header": header(0.0, parent), "child_frame_id": child, "transform": placed}
         stamped.append(made("geometry_msgs/TransformStamped", **values))

@@ -6,7 +6,8 @@ import pytest
 
 from modt.errors import ModtError
 
-NEAR, FAR = 201, 202
+NEAR = 201
+FAR = 202
 LOOPBACK = (
     '<CycloneDDS><Domain Id="any"><General><AllowMulticast>false</AllowMulticast>'
     '<Interfaces><NetworkInterface name="lo"/></Interfaces></General>'

@@ -37,7 +37,8 @@ def test_the_threads_of_a_domain_run_where_they_are_told():
     if len(allowed) < 2:
         pytest.skip("one core")
     gc.collect()
-    before, cores = {*os.listdir("/proc/self/task")}, []
+    before = {*os.listdir("/proc/self/task")}
+    cores = []
     with host.threads_on(frozenset(allowed[:1])):
         joined = dds.participant(NEAR - 1)
     for thread in {*os.listdir("/proc/self/task")} - before:

@@ -23,7 +23,8 @@ def test_a_pose_of_another_implementation_is_read(little):
 def test_a_written_pose_is_read_by_another_implementation():
     message = messages.decode(write_odometry(3.25, "odom", "lidar", T), "nav_msgs/msg/Odometry")
     assert (message.header.frame_id, message.child_frame_id) == ("odom", "lidar")
-    at, turned = message.pose.pose.position, message.pose.pose.orientation
+    at = message.pose.pose.position
+    turned = message.pose.pose.orientation
     assert (at.x, at.y, at.z) == (10.0, -20.0, 0.5)
     np.testing.assert_allclose(Rotation.from_quat([turned.x, turned.y, turned.z, turned.w]).as_matrix(), T[:3, :3])
 

@@ -152,7 +152,8 @@ def test_clouds_and_poses_of_the_node_reach_modt_and_its_results_the_node(node):
     poses = open_poses("ros2:///odom", OdometryConfig())
     node.subscribed["/odom"][0](write_odometry(1.0, "odom", "base_link", np.eye(4)))
     assert [poses._read(message)[0] for message in poses._take()] == [1.0]
-    received, written = [], threading.Event()
+    received = []
+    written = threading.Event()
     node.subscribed["/modt/markers"].append(lambda data: (received.append(data), written.set()))
     sink = open_sink("ros2:///modt")
     sink.write(FRAME)

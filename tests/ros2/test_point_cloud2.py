@@ -22,7 +22,8 @@ def tables(draw):
     others = st.dictionaries(st.sampled_from(["ring", "intensity", "rgb", "range"]), st.sampled_from(KINDS))
     kinds = {name: draw(st.sampled_from(["f4", "f8"])) for name in "xyz"} | draw(others)
     names = draw(st.permutations(sorted(kinds)))
-    offsets, end = [], 0
+    offsets = []
+    end = 0
     for name in names:
         offsets.append(end + draw(st.integers(0, 5)))
         end = offsets[-1] + np.dtype(kinds[name]).itemsize
@@ -107,7 +108,8 @@ def turning(*, turn_s=0.1, seam=np.pi, field="time", kind="f4", unit=1e-9, begin
     """Points all round by a head that turns clockwise once, seen `turn_s / 2` before to after straight ahead."""
     bearing = np.linspace(-np.pi, np.pi, 2000, endpoint=False)
     points = np.zeros((1, 2000), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), (field, kind)])
-    points["x"], points["y"] = 10 * np.cos(bearing), 10 * np.sin(bearing)
+    points["x"] = 10 * np.cos(bearing)
+    points["y"] = 10 * np.sin(bearing)
     since_seam = np.mod(seam - bearing, 2 * np.pi) if turn_s > 0 else np.mod(bearing - seam, 2 * np.pi)
     points[field] = (begin + abs(turn_s) * since_seam / (2 * np.pi)) / unit
     return read_cloud(messages.encode(messages.cloud(points, stamp_s=1000.0)))

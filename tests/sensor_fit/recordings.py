@@ -21,7 +21,8 @@ def recording(sensor, scene="street", sweeps=6, seed=3):
 
 def with_scale(recorded, name):
     """The same with reflectances on a scale that is known."""
-    rng, values = np.random.default_rng(0), np.array([0.0, *SCALES[name].deciles, 0.5], np.float32)
+    rng = np.random.default_rng(0)
+    values = np.array([0.0, *SCALES[name].deciles, 0.5], np.float32)
     sweeps = [np.column_stack([sweep[:, :3], rng.choice(values, len(sweep))]) for sweep in recorded.sweeps]
     return Recording(sweeps, recorded.stamps_s)
 

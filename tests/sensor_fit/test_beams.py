@@ -26,7 +26,8 @@ def agree(found_deg, true_deg):
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_beams_of_a_sensor_are_found(name):
-    found, model = find_beams(recording(name).sweeps), sensor(name)
+    found = find_beams(recording(name).sweeps)
+    model = sensor(name)
     agree(found.elevations_deg, np.rad2deg(model.elevation_rad))
     assert found.azimuth_step_deg == pytest.approx(np.rad2deg(np.diff(model.azimuth_rad).mean()), rel=0.02)
 
@@ -63,7 +64,8 @@ ROWS = st.lists(st.integers(0, 5000), min_size=1, max_size=600).map(np.array)
 
 @given(ROWS, st.sampled_from([0.7, 1.0, 2.0]), st.integers(1, 260))
 def test_filters_are_those_of_scipy(values, deviation, width):
-    values, near = values / 7, {"rtol": 1e-9, "atol": 1e-9}
+    values = values / 7
+    near = {"rtol": 1e-9, "atol": 1e-9}
     np.testing.assert_allclose(gaussian(values, deviation), ndimage.gaussian_filter1d(values, deviation), **near)
     np.testing.assert_allclose(running_mean(values, width), ndimage.uniform_filter1d(values, width), **near)
 

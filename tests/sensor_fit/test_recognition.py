@@ -32,7 +32,8 @@ def test_another_sensor_than_the_default_is_noticed_and_named(name):
 
 
 def test_what_is_found_takes_the_place_of_the_profile():
-    own, found = profile.load("vlp-16"), recognise(recording("vlp-16").sweeps[0], profile.load()).fitted
+    own = profile.load("vlp-16")
+    found = recognise(recording("vlp-16").sweeps[0], profile.load()).fitted
     assert found.sensor.elevation_step_deg == pytest.approx(own.sensor.elevation_step_deg, rel=0.02)
     assert found.sensor.azimuth_step_deg == pytest.approx(own.sensor.azimuth_step_deg, rel=0.02)
     assert found.sensor.height_m == pytest.approx(own.sensor.height_m, abs=0.15)
@@ -74,7 +75,8 @@ def test_any_cloud_is_recognised_or_not_but_no_error(seed, n, reach_m, rise_m):
 
 @pytest.mark.kitti
 def test_every_kitti_scan_is_of_the_default(kitti_root):
-    objects, drives = "object/training*/velodyne/*.bin", "raw/*/*/velodyne_points/data/*.bin"
+    objects = "object/training*/velodyne/*.bin"
+    drives = "raw/*/*/velodyne_points/data/*.bin"
     scans = [*kitti_root.glob(objects), *kitti_root.glob(drives)]
     config = profile.load()
     assert len(scans) > 100

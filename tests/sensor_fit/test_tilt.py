@@ -64,7 +64,8 @@ def test_a_tilt_that_a_profile_leaves_open_is_named_once_and_applied(mount_deg, 
 
 
 def test_a_mount_that_a_profile_states_is_kept_and_another_one_named():
-    frame, base = next(iter(stream("yard", "vlp-16", (0.0, 15.0)))), profile.load("vlp-16")
+    frame = next(iter(stream("yard", "vlp-16", (0.0, 15.0))))
+    base = profile.load("vlp-16")
     stated = profile.parse("sensor: {roll_deg: 0, pitch_deg: 15.5}\nextends: vlp-16", "test")
     found = recognise(frame.points, stated)
     assert found.tilt_deg is None

@@ -7,7 +7,9 @@ from rosbags import rosbag2
 
 from tests.ros2 import messages
 
-CLOUD, ODOMETRY, TF = "sensor_msgs/msg/PointCloud2", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
+CLOUD = "sensor_msgs/msg/PointCloud2"
+ODOMETRY = "nav_msgs/msg/Odometry"
+TF = "tf2_msgs/msg/TFMessage"
 BEGAN_S = 1_700_000_000.0
 UP = [0.0, 0.0, 0.0, 1.0]
 Recorded = list[tuple[str, str, float, bytes]]

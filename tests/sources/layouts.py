@@ -29,23 +29,21 @@ def oxts_line(metres_north):
     return " ".join(map(str, (lat, *OXTS_START[1:], *[0.0] * 24)))
 
 
-def raw_drive(root, frames=range(4), *, calibrated=True, oxts=True):
+def raw_drive(root, frames=range(4)):
     day = root / "2011_09_26"
     drive = day / "2011_09_26_drive_9999_sync"
     write_scans(drive / "velodyne_points" / "data", frames, digits=10)
     for end, later in (("", 0.0), ("_start", -0.05), ("_end", 0.05)):  # the head turns once in 0.1 s
         times = "".join(f"2011-09-26 13:02:{25 + f / 10 + later:012.9f}\n" for f in range(max(frames) + 1))
         (drive / "velodyne_points" / f"timestamps{end}.txt").write_text(times)
-    if calibrated:
-        (day / "calib_cam_to_cam.txt").write_text(
-            f"calib_time: 09-Jan-2012\nS_rect_02: 200 100\nR_rect_00: {CAMERA['R']}\nP_rect_02: {CAMERA['P']}\n"
-        )
-        (day / "calib_velo_to_cam.txt").write_text("R: 0 -1 0 0 0 -1 1 0 0\nT: 0 0 0\n")
-        (day / "calib_imu_to_velo.txt").write_text(f"R: {CAMERA['R']}\nT: -0.8 0.3 -0.8\n")
-    if oxts:
-        (drive / "oxts" / "data").mkdir(parents=True)
-        for f in range(max(frames) + 1):
-            (drive / "oxts" / "data" / f"{f:010d}.txt").write_text(oxts_line(1.0 * f))
+    (day / "calib_cam_to_cam.txt").write_text(
+        f"calib_time: 09-Jan-2012\nS_rect_02: 200 100\nR_rect_00: {CAMERA['R']}\nP_rect_02: {CAMERA['P']}\n"
+    )
+    (day / "calib_velo_to_cam.txt").write_text("R: 0 -1 0 0 0 -1 1 0 0\nT: 0 0 0\n")
+    (day / "calib_imu_to_velo.txt").write_text(f"R: {CAMERA['R']}\nT: -0.8 0.3 -0.8\n")
+    (drive / "oxts" / "data").mkdir(parents=True)
+    for f in range(max(frames) + 1):
+        (drive / "oxts" / "data" / f"{f:010d}.txt").write_text(oxts_line(1.0 * f))
     return drive
 
 

@@ -38,7 +38,8 @@ def test_each_layout_is_recognised(tmp_path, build, inner, layout, poses, turn_s
         np.testing.assert_allclose(frames[2].T_world_sensor[:3, 3], position, atol=1e-4)
 
 
-EVEN, TURNS = [0, 0.1, 0.2, 0.3], [0.1] * 4
+EVEN = [0, 0.1, 0.2, 0.3]
+TURNS = [0.1] * 4
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,8 @@ def test_missing_frames_leave_gaps_and_a_note_and_their_times_may_be_blank(tmp_p
     assert "2 frames are missing" in note
 
 
-DAY, DRIVE = "2011_09_26", "2011_09_26/2011_09_26_drive_9999_sync"
+DAY = "2011_09_26"
+DRIVE = "2011_09_26/2011_09_26_drive_9999_sync"
 
 
 def emptied(path):
@@ -179,7 +181,8 @@ def test_a_frame_without_a_pose_has_that_of_the_frame_before(tmp_path):
 
 
 def test_bad_scans_are_counted_and_skipped_bad_points_are_counted_and_the_first_of_them_logged(tmp_path, caplog):
-    folder, n = layouts.bare(tmp_path), 3 * MAX_KEPT_FAULTS
+    folder = layouts.bare(tmp_path)
+    n = 3 * MAX_KEPT_FAULTS
     for k in range(n):
         scan = layouts.scan(k)
         scan[0, 0] = np.nan if k % 3 == 2 else 0.0

@@ -20,7 +20,8 @@ def write(path, points):
     return path
 
 
-LOST, UNLIT = r"points are not finite and count as no return", r"reflectances are not finite .*driver"
+LOST = r"points are not finite and count as no return"
+UNLIT = r"reflectances are not finite .*driver"
 FLAWS = {  # rows and columns that are overwritten, the value, the expected reflectance, None for no return, flaws
     "none": ([], [], 0, 0, []),
     **{

@@ -17,7 +17,8 @@ STEP_S = st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2)
 
 def believed(stamps, arrivals):
     """Indices of the accepted messages, their corrected stamps, and the check."""
-    check, kept = StampCheck(), []
+    check = StampCheck()
+    kept = []
     for k, (stamp_s, arrived_s) in enumerate(zip(stamps, arrivals, strict=True)):
         if not check.doubt(stamp_s, arrived_s):
             kept.append((k, stamp_s + check.shift_s))

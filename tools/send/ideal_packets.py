@@ -15,7 +15,8 @@ from modt.types import Float32, Float64, Frame
 
 UNIT_M = 0.002
 TURN = 36_000
-HOUR_US, DAY_US = 3_600_000_000, 86_400_000_000
+HOUR_US = 3_600_000_000
+DAY_US = 86_400_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,8 @@ class Layout:
     def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
         """Packet for the azimuths of its blocks [0.01 deg], and (blocks, lasers, 2) distances and reflectances."""
         table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1")]))
-        table["distance"], table["reflectance"] = cells[..., 0], cells[..., 1]
+        table["distance"] = cells[..., 0]
+        table["reflectance"] = cells[..., 1]
         body = b""
         for i, azimuth in enumerate(azimuths):
             body += self.headers[i % len(self.headers)] + struct.pack("<H", azimuth) + table[i].tobytes()
@@ -60,7 +62,8 @@ class HesaiLayout(Layout):
     def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
         """Packet as in Layout, stamped with the time of the last firing since midnight."""
         table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1"), ("none", "u1")]))
-        table["distance"], table["reflectance"] = cells[..., 0], cells[..., 1]
+        table["distance"] = cells[..., 0]
+        table["reflectance"] = cells[..., 1]
         head = bytes((0xEE, 0xFF, 6, 1, 0, 0, self.lasers, self.blocks, 1, round(1000 * self.unit_m), 1, 1))
         body = b"".join(struct.pack("<H", a) + row.tobytes() for a, row in zip(azimuths, table, strict=True))
         second, micros = divmod(round(at_us + (self.firings - 1) * self.firing_us) % DAY_US, 1_000_000)
@@ -77,7 +80,8 @@ LAYOUTS = {
 }
 
 
-MID_360, LIVOX_POINTS = "mid-360", 96
+MID_360 = "mid-360"
+LIVOX_POINTS = 96
 MODELS = (*LAYOUTS, MID_360)
 
 
@@ -112,8 +116,10 @@ def livox_packets_of(frames: Sequence[Frame], period_s: float) -> Iterator[tuple
         for i in range(n_packets):
             points = frame.points[i * LIVOX_POINTS : (i + 1) * LIVOX_POINTS]
             table = np.zeros(len(points), row)
-            table["xyz"], table["reflectance"] = np.rint(points[:, :3] * 1000), np.rint(points[:, 3].clip(0, 1) * 255)
-            at_s, body = k * period_s + i * step_s, table.tobytes()
+            table["xyz"] = np.rint(points[:, :3] * 1000)
+            table["reflectance"] = np.rint(points[:, 3].clip(0, 1) * 255)
+            at_s = k * period_s + i * step_s
+            body = table.tobytes()
             span = round(step_s * 1e7 * (len(points) - 1) / LIVOX_POINTS)
             head = struct.pack("<BHHHHBBB12x", 0, 36 + len(body), span, len(points), i, 0, 1, 0)
             stamp = struct.pack("<Q", round(at_s * 1e9))

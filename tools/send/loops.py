@@ -53,7 +53,8 @@ def turn_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
     if len(seams) < 2:
         raise MisuseError("capture", "no whole turn to repeat", "give a longer one, or --once")
     stamps_us = [wire.stamp_us(p) for p in payloads]
-    first, end = int(seams[0]), int(seams[-1])
+    first = int(seams[0])
+    end = int(seams[-1])
     duration_us = (stamps_us[end] - stamps_us[first]) % wire.wrap_us
     for turn in count():
         for i in range(first, end):
@@ -86,7 +87,8 @@ class HesaiStamps:
 
     def __init__(self, model: hesai.Model) -> None:
         self._model = model
-        self._hour_at, self._micros_at = model.tail + model.layout.date + 3, model.tail + model.layout.micros
+        self._hour_at = model.tail + model.layout.date + 3
+        self._micros_at = model.tail + model.layout.micros
 
     def azimuth(self, payload: bytes) -> int:
         """Azimuth of the first block [0.01 deg]."""
@@ -111,7 +113,8 @@ def ouster_loop(payloads: Sequence[bytes], metadata: Path) -> Iterator[Timed]:
     """Repeat the frames of an Ouster's packets endlessly."""
     sdk = import_extra("ouster.sdk.core", "ouster")
     info = sdk.SensorInfo(metadata.read_text("utf-8"))
-    layout, columns = sdk.PacketFormat(info), info.format.columns_per_packet
+    layout = sdk.PacketFormat(info)
+    columns = info.format.columns_per_packet
     period_ns = round(1e9 / info.format.fps)
     raw = [np.frombuffer(p, np.uint8) for p in payloads]
     stamps_ns = np.array([layout.packet_header(sdk.ColHeader.TIMESTAMP, r).astype(np.int64) for r in raw])

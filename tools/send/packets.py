@@ -44,7 +44,8 @@ def send(
     sleep: Callable[[float], None] = time.sleep,
 ) -> int:
     """Send payloads over a connected socket, each at its time from now on; returns their number."""
-    began_s, sent = clock(), 0
+    began_s = clock()
+    sent = 0
     for at_s, payload in packets:
         early_s = began_s + at_s - clock()
         if early_s > 0:

@@ -26,7 +26,8 @@ from tools.options import parser
 
 WAIT_S = 60.0
 """Time to wait for the first receiver [s]."""
-FRAME_ID, WORLD = "lidar", "odom"
+FRAME_ID = "lidar"
+WORLD = "odom"
 
 
 class Sender:
@@ -67,7 +68,8 @@ def looped(stream: Stream, loops: int) -> Iterator[tuple[float, Frame]]:
 def pace(due: Iterator[tuple[float, Frame]], send: Callable[[Frame, float], int], rate: float) -> tuple[int, int]:
     """Send each frame when it is due, at `rate` times the pace; frames and bytes sent."""
     frames = octets = 0
-    epoch_s, began_s = time.time(), time.monotonic()
+    epoch_s = time.time()
+    began_s = time.monotonic()
     for after_s, frame in due:
         time.sleep(max(0.0, began_s + after_s / rate - time.monotonic()))
         octets += send(frame, epoch_s + after_s)

@@ -1,1 +1,1 @@
-"""Sources of frames (KITTI layouts, folders of scans, the simulator) and of poses."""
+"""Sources of frames: KITTI's layouts, folders of scans, captures of packets, recordings of ROS 2, and live sensors."""

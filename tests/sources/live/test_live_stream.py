@@ -113,7 +113,8 @@ def test_a_silent_sensor_is_diagnosed_once_and_its_return_is_logged(driven, capl
 
 @pytest.mark.parametrize("step_s", [-3600.0, -0.95, -0.5, 0.3, 0.7, 0.95, 3600.0])
 def test_a_clock_that_is_set_is_followed_within_a_second_and_steady_time_goes_on(driven, step_s, caplog):
-    taken, times_s = [], []
+    taken = []
+    times_s = []
     for k in range(1, 301):
         frame = driven.sweep(0.1, 500.0 + 0.1 * k + step_s * (k >= 50))
         if frame is not None:

@@ -28,7 +28,8 @@ def recording(stamps):
 
 def played(stamps, n, **options):
     """Times at which the first n sweeps of a recording are read, their stamps and numbers, and the reader."""
-    time, out = Time(), []
+    time = Time()
+    out = []
     reader = PlayedReader(recording(stamps), clock=lambda: time.now, wait=time.wait, **options)
     while len(out) < n:
         out += [(round(time.now - 50.0, 6), round(s.stamp_s, 6), s.index) for s in reader.read(0.2)]

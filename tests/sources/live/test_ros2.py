@@ -97,7 +97,8 @@ def test_sweeps_that_are_sent_over_loopback_are_frames(loopback):
 def test_a_sender_keeps_the_pace_of_the_stream():
     from modt_simulation.synthetic_stream import SyntheticStream
 
-    stream, sent = SyntheticStream("street", "vlp-16", 0.3, seed=0), []
+    stream = SyntheticStream("street", "vlp-16", 0.3, seed=0)
+    sent = []
     frames, octets = pace(looped(stream, 2), lambda frame, stamp_s: sent.append(stamp_s) or 10, rate=50.0)
     assert (frames, octets) == (6, 60)
     np.testing.assert_allclose(np.diff(sent), 0.1, atol=1e-6)

@@ -79,7 +79,8 @@ def test_extension_headers_of_ipv6_are_skipped(tmp_path):
 
 
 def fragment(version, at):
-    piece, more = WHOLE[at : at + 1480], at + 1480 < len(WHOLE)
+    piece = WHOLE[at : at + 1480]
+    more = at + 1480 < len(WHOLE)
     if version == 4:
         return ipv4(piece, identity=9, offset=at, more=more)
     return ipv6(struct.pack(">BBHI", 17, 0, at | more, 9) + piece, kind=44)

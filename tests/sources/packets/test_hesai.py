@@ -57,7 +57,8 @@ class Written:
     def turns(self, n, **said):
         """Packets of so many turns."""
         firings = self.blocks // {0x39: 2, 0x3D: 3}.get(said.get("mode", 0), 1)
-        step_s, day_s = firings * self.firing_s, 36_000.0
+        step_s = firings * self.firing_s
+        day_s = 36_000.0
         times_s = [day_s + step_s * k for k in range(int(n * TURN_S / step_s))]
         return [(BEGAN_S + at_s, self.packet(at_s, **said)) for at_s in times_s]
 

@@ -56,7 +56,8 @@ def test_each_data_type_is_decoded(kind, point, xyz):
 @pytest.mark.parametrize(("tag", "kept"), [(0, True), (0x15, True), (0x02, False), (0x08, False), (0x20, False)])
 def test_points_without_a_return_or_of_low_confidence_are_left_out(tag, kept):
     sound = struct.pack("<iiiBB", 4000, 0, 0, 0, 0)
-    other, none = struct.pack("<iiiBB", 1000, 0, 0, 0, tag), bytes(14)
+    other = struct.pack("<iiiBB", 1000, 0, 0, 0, tag)
+    none = bytes(14)
     (sweep, *_), _ = decoded(LivoxDecoder("sensor"), timed(500, points=[sound, other, none]))
     assert set(sweep.points[:, 0].tolist()) == ({1.0, 4.0} if kept else {4.0})
 

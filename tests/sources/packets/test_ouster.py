@@ -40,7 +40,9 @@ def test_sweeps_are_the_frames_of_the_sdk(timed, metadata):
     assert np.diff([s.stamp_s for s in sweeps]) == pytest.approx([0.1, 0.1], abs=1e-3)
     assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * 3, abs=1e-3)
     info = sdk.SensorInfo(metadata.read_text())
-    batcher, frame, project = sdk.FrameBatcher(info), sdk.LidarFrame(info), sdk.XYZLut(info)
+    batcher = sdk.FrameBatcher(info)
+    frame = sdk.LidarFrame(info)
+    project = sdk.XYZLut(info)
     for _, payload in timed[:64]:
         packet = sdk.LidarPacket(sdk.PacketFormat(info))
         packet.buf[:] = np.frombuffer(payload, np.uint8)
@@ -49,7 +51,8 @@ def test_sweeps_are_the_frames_of_the_sdk(timed, metadata):
     seen = frame.field("RANGE") > 0
     np.testing.assert_allclose(sweeps[0].points[:, :3], project(frame)[seen], atol=1e-4)
     np.testing.assert_allclose(sweeps[0].points[:, 3] * 255, frame.field("REFLECTIVITY")[seen], atol=1e-3)
-    header, heads = sdk.PacketFormat(info).packet_header, [np.frombuffer(p, np.uint8) for _, p in timed[:64]]
+    header = sdk.PacketFormat(info).packet_header
+    heads = [np.frombuffer(p, np.uint8) for _, p in timed[:64]]
     columns_ns = np.concatenate([header(sdk.ColHeader.TIMESTAMP, head) for head in heads])
     ahead_s = float(columns_ns[512] - columns_ns[0]) * 1e-9  # the middle one looks straight ahead
     assert sweeps[0].stamp_s - timed[0][0] == pytest.approx(ahead_s, abs=2e-3)
@@ -59,7 +62,8 @@ def test_sweeps_are_the_frames_of_the_sdk(timed, metadata):
 
 def edited(timed, metadata, edit):
     """The packets after a call of `edit` with their format, the packet and its number."""
-    layout, out = sdk.PacketFormat(sdk.SensorInfo(metadata.read_text())), []
+    layout = sdk.PacketFormat(sdk.SensorInfo(metadata.read_text()))
+    out = []
     for k, (at_s, payload) in enumerate(timed):
         packet = sdk.LidarPacket(layout)
         packet.buf[:] = np.frombuffer(payload, np.uint8)

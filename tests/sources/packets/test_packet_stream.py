@@ -28,7 +28,8 @@ def test_a_hesai_is_recognised_and_has_the_calibration_beside_its_capture(tmp_pa
 
 
 def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
-    info, whole = open_stream(path).info, list(open_stream(path))
+    info = open_stream(path).info
+    whole = list(open_stream(path))
     assert (info.name, info.layout, info.profile, info.period_s) == ("drive", "Velodyne packets", "vlp-16", 0.1)
     path.write_bytes(path.read_bytes()[:-50])
     stream = open_stream(path)

@@ -147,7 +147,10 @@ def test_overtaken_and_doubled_packets_change_nothing(maker):
 
 
 def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker, caplog):
-    timed, rng, dirty, n = maker.timed(), np.random.default_rng(0), list[Timed](), 0
+    timed = maker.timed()
+    rng = np.random.default_rng(0)
+    dirty = list[Timed]()
+    n = 0
     whole, _ = decoded(maker.decoder(), timed)
     caplog.clear()
     for i, (at_s, payload) in enumerate(timed):
@@ -166,7 +169,8 @@ def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker, caplo
 @pytest.mark.parametrize("name", ["velodyne", "hesai", "livox"])
 def test_a_sweep_holds_no_more_packets_than_a_sensor_sends(name):
     stamped = makers.MAKERS[name].stamped
-    decoder, timed = MAKERS[name].decoder(), MAKERS[name].timed()
+    decoder = MAKERS[name].decoder()
+    timed = MAKERS[name].timed()
     at = MAKERS[name].lost[0]
     for at_s, payload in timed[:at]:
         decoder.decode(at_s, stamped(payload, at_s))
