@@ -16,7 +16,11 @@ def is_packet(payload: bytes) -> bool:
 
 
 class AcmeDecoder(PacketDecoder):
-    """A packet is a whole sweep: float32 rows of x, y, z and reflectance."""
+    """A packet is a whole sweep: float32 rows of x, y, z and reflectance, on a scale that an option states."""
+
+    def __init__(self, name: str, scale: float) -> None:
+        super().__init__(name)
+        self._scale = np.float32(scale)
 
     def accepts(self, payload: bytes) -> bool:
         return is_packet(payload)
@@ -25,12 +29,18 @@ class AcmeDecoder(PacketDecoder):
         if not is_packet(payload):
             self.refuse("no packet of an Acme")
             return []
-        return [Sweep(received_s, np.frombuffer(payload, np.float32, offset=len(MAGIC)).reshape(-1, 4).copy())]
+        points = np.frombuffer(payload, np.float32, offset=len(MAGIC)).reshape(-1, 4).copy()
+        points[:, 3] /= self._scale
+        return [Sweep(received_s, points)]
 
     def _reset(self) -> None:
         """No packet depends on those before it."""
 
 
 DRIVER = Driver(
-    maker="Acme", port=4711, recognises=is_packet, decoder=lambda name, _options, _host: AcmeDecoder(name)
+    maker="Acme",
+    port=4711,
+    recognises=is_packet,
+    decoder=lambda name, options, _host: AcmeDecoder(name, float(options.get("scale", 1.0))),
+    options={"scale": "NUMBER"},
 )

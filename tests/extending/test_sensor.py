@@ -68,9 +68,9 @@ def a_folder_of_drivers_with_that_of_acme(tmp_path, monkeypatch):
 
 def test_a_file_makes_the_captures_of_a_maker_readable(folder):
     write_capture(folder / "a.pcap", [(1.0, b"of another"), (1.0, PACKET), (1.1, PACKET)], acme.DRIVER.port)
-    stream = open_stream(folder / "a.pcap")
+    stream = open_stream(folder / "a.pcap", capture={"scale": "2"})
     assert stream.info.layout == "Acme packets"
-    assert [frame.points.tobytes() for frame in stream] == 2 * [SWEEP.tobytes()]
+    assert [frame.points.tobytes() for frame in stream] == 2 * [(SWEEP / np.float32([1, 1, 1, 2])).tobytes()]
 
 
 def test_a_file_makes_the_addresses_of_a_maker_known(folder, port):

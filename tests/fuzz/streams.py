@@ -11,6 +11,7 @@ from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
 from modt.sources.drivers.hesai import HesaiDecoder, read_angles
 from modt.sources.drivers.livox import LivoxDecoder
+from modt.sources.drivers.ouster import OusterDecoder
 from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.recognise import open_stream
@@ -67,8 +68,6 @@ def livox_packets(folder):
 @target()
 def ouster_packets(folder):
     sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
-    from modt.sources.drivers.ouster import OusterDecoder
-
     info = sdk.SensorInfo.from_default(sdk.LidarMode._512x10)
     path = folder / "metadata.json"
     path.write_text(info.to_json_string())
@@ -89,8 +88,6 @@ def ouster_packets(folder):
 @target()
 def ouster_metadata(folder):
     sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
-    from modt.sources.drivers.ouster import OusterDecoder
-
     path = folder / "metadata.json"
     seed = sdk.SensorInfo.from_default(sdk.LidarMode._512x10).to_json_string()
     return of_file(path, lambda: OusterDecoder("sensor", path), seed)

@@ -20,7 +20,6 @@ from modt.ros2.cdr import MessageError
 from modt.schemes import POSES, open_poses
 from modt.sources.pose_buffer import MAX_AGE_S, PoseBuffer
 from modt.types import Frame
-from tests.fuzz.mutation import mutations
 
 CONFIG = OdometryConfig()
 EMPTY = np.zeros((0, 4), np.float32)
@@ -68,10 +67,8 @@ def send_to(address, *payloads):
             sender.sendto(payload, str(address) if local else ("127.0.0.1", address))
 
 
-BROKEN = [*mutations([planar(1.5, 1.0, 2.0, 0.5), b'{"stamp": 1.5, "pose": [1,0,0,5,0,1,0,0,0,0,1,0]}'], 500, seed=1)]
 payload = st.one_of(
     st.binary(max_size=200),
-    st.sampled_from(BROKEN),
     st.builds(planar, st.floats(-5, 5), st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)),
     st.builds(planar, st.floats(), st.floats(), st.floats(), st.floats()),
 )

@@ -103,11 +103,13 @@ def xyzi(n, kind=None):
     return points
 
 
+def _named(names, numbers):
+    return dict(zip(names, numbers, strict=True))
+
+
 def odometry(stamp_s, position, quaternion, child="base_link"):
     """An Odometry message."""
-    at = dict(zip("xyz", position, strict=True))
-    turned = dict(zip("xyzw", quaternion, strict=True))
-    pose = {"pose": {"position": at, "orientation": turned}}
+    pose = {"pose": {"position": _named("xyz", position), "orientation": _named("xyzw", quaternion)}}
     return made("nav_msgs/Odometry", header=header(stamp_s, "odom"), child_frame_id=child, pose=pose)
 
 
@@ -115,9 +117,7 @@ def transforms(*edges):
     """A TFMessage of (parent, child, translation, quaternion)."""
     stamped = []
     for parent, child, position, quaternion in edges:
-        at = dict(zip("xyz", position, strict=True))
-        turned = dict(zip("xyzw", quaternion, strict=True))
-        placed = {"translation": at, "rotation": turned}
+        placed = {"translation": _named("xyz", position), "rotation": _named("xyzw", quaternion)}
         values = {"header": header(0.0, parent), "child_frame_id": child, "transform": placed}
         stamped.append(made("geometry_msgs/TransformStamped", **values))
     return made("tf2_msgs/TFMessage", transforms=stamped)

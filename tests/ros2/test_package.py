@@ -131,11 +131,12 @@ def node_of_ros_2(monkeypatch):
     from modt_ros import middleware
 
     middleware._node.cache_clear()
-    for name in ("modt.sources.live.ros2", "modt.poses.pose_topic", "modt.sinks.ros2"):
+    users = ("modt.sources.live.ros2", "modt.poses.pose_topic", "modt.sinks.ros2")
+    for name in users:
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "modt.ros2.dds", middleware)
     yield node
-    for name in ("modt.sources.live.ros2", "modt.poses.pose_topic", "modt.sinks.ros2"):
+    for name in users:
         sys.modules.pop(name, None)
 
 

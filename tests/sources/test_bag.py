@@ -22,6 +22,10 @@ def write(request):
     return request.param
 
 
+def x_of(frames):
+    return [frame.T_world_sensor[0, 3] for frame in frames]
+
+
 def test_sweeps_are_frames_and_stamps_count_from_the_first(write, tmp_path):
     stream = open_stream(write(tmp_path / "drive", by_time(clouds(), poses())))
     assert (stream.info.name, stream.info.layout, stream.info.n_frames) == ("drive", "rosbag2", 4)
@@ -33,7 +37,7 @@ def test_sweeps_are_frames_and_stamps_count_from_the_first(write, tmp_path):
         expected = messages.xyzi(20 + k).view(np.float32).reshape(-1, 4)
         np.testing.assert_array_equal(frame.points, expected)
     assert stream.info.has_poses  # interpolated at the stamps of the sweeps
-    assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-6)
+    assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-6)
 
 
 def test_the_mount_of_the_sensor_is_taken_from_the_static_transforms(write, tmp_path):
@@ -107,7 +111,7 @@ def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
         message = messages.odometry(lying(k, true_s), [10.0 + true_s - BEGAN_S, 0.0, 0.0], UP, "lidar")
         recorded.append((topic, kind, recorded_s, messages.encode(message)))
     frames = list(open_stream(write(tmp_path / "drive", by_time(clouds(), recorded))))
-    assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+    assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
 
 
 def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(write, tmp_path):
@@ -115,7 +119,7 @@ def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(write, tmp_path):
     recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())
     frames = list(open_stream(write(tmp_path / "drive", recorded)))
     assert [frame.index for frame in frames] == [1, 2, 3]
-    assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.1, 10.2, 10.3], abs=1e-5)
+    assert x_of(frames) == pytest.approx([10.1, 10.2, 10.3], abs=1e-5)
 
 
 def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):

@@ -97,6 +97,9 @@ def emptied(path):
     path.write_text("")
 
 
+GONE = [Path.unlink, emptied]
+
+
 def without(row):
     """A function that removes a row from a calibration."""
 
@@ -110,19 +113,19 @@ def without(row):
 @pytest.mark.parametrize(
     ("build", "files", "edits", "named"),
     [
-        (layouts.raw_drive, f"{DAY}/calib_cam_to_cam.txt", [Path.unlink, emptied, without("P_rect_02")], "no camera"),
-        (layouts.raw_drive, f"{DAY}/calib_velo_to_cam.txt", [Path.unlink, emptied, without("T")], "no camera"),
-        (layouts.raw_drive, f"{DAY}/calib_imu_to_velo.txt", [Path.unlink, emptied, without("R")], "no odometry"),
-        (layouts.raw_drive, f"{DRIVE}/oxts/data/*.txt", [Path.unlink, emptied], "no odometry"),
-        (layouts.raw_drive, f"{DRIVE}/velodyne_points/timestamps.txt", [Path.unlink, emptied], "0.1 s apart"),
-        (layouts.raw_drive, f"{DRIVE}/velodyne_points/timestamps_start.txt", [Path.unlink, emptied], "not deskewed"),
-        (layouts.raw_drive, f"{DRIVE}/velodyne_points/timestamps_end.txt", [Path.unlink, emptied], "not deskewed"),
-        (layouts.odometry, "sequences/07/times.txt", [Path.unlink, emptied], "0.1 s apart"),
-        (layouts.odometry, "sequences/07/poses.txt", [Path.unlink, emptied], "no odometry"),
-        (layouts.odometry, "sequences/07/calib.txt", [Path.unlink, emptied, without("P2")], "no camera"),
+        (layouts.raw_drive, f"{DAY}/calib_cam_to_cam.txt", [*GONE, without("P_rect_02")], "no camera"),
+        (layouts.raw_drive, f"{DAY}/calib_velo_to_cam.txt", [*GONE, without("T")], "no camera"),
+        (layouts.raw_drive, f"{DAY}/calib_imu_to_velo.txt", [*GONE, without("R")], "no odometry"),
+        (layouts.raw_drive, f"{DRIVE}/oxts/data/*.txt", GONE, "no odometry"),
+        (layouts.raw_drive, f"{DRIVE}/velodyne_points/timestamps.txt", GONE, "0.1 s apart"),
+        (layouts.raw_drive, f"{DRIVE}/velodyne_points/timestamps_start.txt", GONE, "not deskewed"),
+        (layouts.raw_drive, f"{DRIVE}/velodyne_points/timestamps_end.txt", GONE, "not deskewed"),
+        (layouts.odometry, "sequences/07/times.txt", GONE, "0.1 s apart"),
+        (layouts.odometry, "sequences/07/poses.txt", GONE, "no odometry"),
+        (layouts.odometry, "sequences/07/calib.txt", [*GONE, without("P2")], "no camera"),
         (layouts.odometry, "sequences/07/calib.txt", [without("Tr")], "get Tr from data_odometry_calib.zip"),
-        (layouts.tracking, "training/oxts/0003.txt", [Path.unlink, emptied], "no odometry"),
-        (layouts.tracking, "training/calib/0003.txt", [Path.unlink, emptied, without("Tr_velo_cam")], "no camera"),
+        (layouts.tracking, "training/oxts/0003.txt", GONE, "no odometry"),
+        (layouts.tracking, "training/calib/0003.txt", [*GONE, without("Tr_velo_cam")], "no camera"),
         (layouts.tracking, "training/calib/0003.txt", [without("R_rect")], None),
         (layouts.tracking, "training/calib/0003.txt", [without("Tr_imu_velo")], "no odometry"),
     ],

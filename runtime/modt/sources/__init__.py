@@ -1,1 +1,1 @@
-"""Sources of frames: KITTI's layouts, folders of scans, captures of packets, recordings of ROS 2, and live sensors."""
+"""Sources of frames: folders of scans, captures of packets, recordings of ROS 2, and live sensors."""
