@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from modt.energy.ledger import LedgerLine, StageWork
+from modt.energy.meters.meter import Kind
+from modt.energy.windows import EnergyWindow
 from modt.sinks.tracks import frame_line
 from modt.types import NONE, Frame, FrameResult, Proposals, Tracks
 
@@ -73,18 +76,46 @@ class Kept:
         pass
 
 
+def ledger_line(frame: int, cpu_ns: int = 0, **stages: StageWork) -> LedgerLine:
+    """The costs of a frame."""
+    return LedgerLine(frame=frame, stages=stages, wall_ns=cpu_ns, cpu_ns=cpu_ns, overhead_ns=0, idle_ns=0, marks=[])
+
+
+def energy_window(energy_J: float | None, frames: int = 10, **changes: Any) -> EnergyWindow:
+    """A window of a second with so many frames."""
+    values: dict[str, Any] = {
+        "window": 0,
+        "frames": (0, frames - 1, frames),
+        "wall_ns": 10**9,
+        "process_ns": 0,
+        "overhead_ns": 0,
+        "idle_ns": 0,
+        "stages": {},
+        "energy_J": energy_J,
+        "kind": Kind.MEASURED,
+        "resolution_J": 0.0,
+        "meters": [],
+        "conditions": {},
+        "marks": [],
+    }
+    return EnergyWindow(**{**values, **changes})
+
+
 def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
     """A status as `modt run` writes it."""
     times = {"p50": 0.1, "p99": 0.9}
+    recording = {"keep": "all", "lines": 40, "lost_lines": 0, "thinned_lines": 0, "pauses": 0, "parts": 1}
+    totals = {"frames": 20, "proposals": 60, "classifications": 9, "deferred": 0}
     return {
         "schema": "modt.status/1",
         "time_s": time.time(),
+        "pid": 1,
         "up_s": 2.0,
         "period_s": 0.1,
         "source": "a\x1b[2Jb",
         "mode": "accurate",
         "profile": "vlp-16",
-        "counts": {"rate_hz": rate_hz, "tracks": 7, "visible": {"background": 3, "car": 2}},
+        "counts": {**totals, "rate_hz": rate_hz, "tracks": 7, "visible": {"background": 3, "car": 2}},
         "loop": {
             "frames": 20,
             "missed_deadlines": 1,
@@ -95,11 +126,13 @@ def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
             "step": "reduced",
             "steps_entered": {"reduced": 1},
             "failures": {'frame: "x"': 2},
+            "reloads": 0,
+            "refused_reloads": 0,
         },
         "power": {"watts": 6.25, "kind": "estimated", "frame_J": 0.6, "stages_J": {"segmentation": 0.25}, **power},
         "sensor": {"lost_messages": 4, "silent": False, "refused_messages": {"too short": 3}},
         "odometry": {"source": "none"},
         "sinks": {"udp://x": {"written": 5, "state": "ok"}},
-        "recording": {"lines": 40, "lost_lines": 0, "failing": None},
-        "host": {"lacking": []},
+        "recording": {**recording, "failing": None},
+        "host": {"core": None, "resident_mb": 80.0, "lacking": []},
     }

@@ -30,7 +30,7 @@ def a_pipeline_that_has_seen_three_frames():
 
 
 def calls(pipe):
-    return {stage: row["calls"] for stage, row in pipe.ledger.close_frame(3)["stages"].items()}
+    return {stage: work.calls for stage, work in pipe.ledger.close_frame(3).stages.items()}
 
 
 def test_every_call_is_booked_on_its_stage_and_the_budget_binds(pipe):
@@ -55,5 +55,5 @@ def test_points_are_counted_and_the_cost_model_learns_where_cpu_time_binds(pipe,
     classified = np.isin(result.tracks.id, result.classified)
     points = result.proposals.count[result.tracks.proposal[classified]]
     assert paid == [(sorted(points), 0.25)] * learns
-    row = pipe.ledger.close_frame(3)["stages"][CLASSIFICATION]
-    assert (row["calls"], row["items"], row["points"]) == (1, len(points), pipe.scheduler.cost.size(points))
+    work = pipe.ledger.close_frame(3).stages[CLASSIFICATION]
+    assert (work.calls, work.items, work.points) == (1, len(points), pipe.scheduler.cost.size(points))

@@ -1,14 +1,16 @@
 """Figures of the status, as JSON, as a line, and as metrics."""
 
-import json
+from dataclasses import replace
 
 import pytest
 
 from modt.app.prometheus import metrics_text, write_metrics
-from modt.app.status import Counts, Power
+from modt.app.status import FrameCounter, PowerStatus
 from modt.config import EnergyConfig
+from modt.energy.ledger import StageWork
+from modt.energy.meters.meter import Kind
 from modt.reporting.summary import Summary
-from tests.results import CAR, result, status
+from tests.results import CAR, energy_window, result, status
 
 
 def test_metrics_are_valid_lines_with_one_type_each():
@@ -33,25 +35,22 @@ def test_the_file_of_metrics_is_replaced_as_a_whole(tmp_path):
 
 def test_counts_are_of_what_is_seen_and_the_rate_of_the_time_since_the_last_report():
     totals = Summary()
-    counts = Counts(totals, 10.0)
-    assert counts.report(10.0)["tracks"] == 0
+    counter = FrameCounter(totals, 10.0)
+    assert counter.report(10.0).tracks == 0
     for k in range(20):
         totals.add_result(result(k, [5, 4], {0: 1, 1: 2}, {1: CAR}, lost=(3,), classified=1))
-    report = counts.report(12.0)
-    assert (report["frames"], report["rate_hz"], report["tracks"]) == (20, 10.0, 3)
-    assert report["visible"]["car"] == 1
-    assert report["classifications"] == 20
-    assert counts.report(13.0)["rate_hz"] == 0.0
-    json.dumps(report)
+    counts = counter.report(12.0)
+    assert (counts.frames, counts.rate_hz, counts.tracks) == (20, 10.0, 3)
+    assert counts.visible["car"] == 1
+    assert counts.classifications == 20
+    assert counter.report(13.0).rate_hz == 0.0
 
 
 def test_power_is_that_of_the_last_window_and_unknown_without_a_meter():
-    power = Power()
-    window = {"energy_J": 12.0, "kind": "measured", "wall_ns": 2_000_000_000, "frames": [0, 19, 20]}
-    window |= {"process_ns": 400, "stages": {"segmentation": {"cpu_ns": 300}, "tracking": {"cpu_ns": 100}}}
-    assert power.add(window, EnergyConfig(idle_W=2.0)) == pytest.approx(6.0)
-    assert power.report()["frame_J"] == pytest.approx(0.6)
-    parts = {"idle": 0.2, "segmentation": 0.3, "tracking": 0.1, "unattributed": 0.0}
-    assert power.report()["stages_J"] == pytest.approx(parts)
-    assert power.add(window | {"energy_J": None, "kind": "unavailable"}, EnergyConfig(idle_W=2.0)) is None
-    assert (power.report()["watts"], power.report()["stages_J"], power.unread) == (None, {}, 1)
+    stages = {"segmentation": StageWork(cpu_ns=300), "tracking": StageWork(cpu_ns=100)}
+    window = energy_window(12.0, 20, wall_ns=2_000_000_000, process_ns=400, stages=stages)
+    power = PowerStatus().after(window, EnergyConfig(idle_W=2.0))
+    assert (power.watts, power.frame_J) == pytest.approx((6.0, 0.6))
+    assert power.stages_J == pytest.approx({"idle": 0.2, "segmentation": 0.3, "tracking": 0.1, "unattributed": 0.0})
+    unread = power.after(replace(window, energy_J=None, kind=Kind.UNAVAILABLE), EnergyConfig(idle_W=2.0))
+    assert (unread.watts, unread.stages_J, unread.windows, unread.unread_windows) == (None, {}, 2, 1)

@@ -5,8 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from modt.app.build import replay
 from modt.app.inputs import Request
-from modt.app.session import Session, replay
+from modt.app.loop import Loop
 from modt.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,6 +55,6 @@ def refusal(capsys, *arguments: object, program=main) -> str:
     return line
 
 
-def session(out: Path, frames: int | None, **options) -> Session:
+def session(out: Path, frames: int | None, **options) -> Loop:
     """A replay in this process."""
     return replay(Request(mode="efficient", frames=(0, frames), **options), {}, out, None, ["modt"])

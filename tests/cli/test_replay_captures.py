@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from modt.app.supervisor import Supervisor
+from modt.app.systemd import Notifier
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sinks.tracks import SCHEMA
@@ -63,7 +63,7 @@ def test_a_recording_of_sweeps_and_poses_gives_the_tracks_of_what_was_recorded(t
         recorded.append(("/points", CLOUD, s, write_cloud(s, "lidar", frame.points)))
     found = []
     for out, path in ((tmp_path / "bag", write_mcap(tmp_path / "drive", recorded)), (tmp_path / "own", None)):
-        session(out, 5, path=path, profile="hdl-64e").run(Supervisor())
+        session(out, 5, path=path, profile="hdl-64e").run(Notifier())
         frames = read_records(out / "tracks.jsonl", SCHEMA)
         found.append([(t["id"], *(t["box"] or {}).values()) for frame in frames for t in frame["tracks"]])
     assert [row[0] for row in found[0]] == [row[0] for row in found[1]]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from modt.app.supervisor import Supervisor
+from modt.app.systemd import Notifier
 from modt.geometry import inverse, rotation_zyx, se3
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
@@ -29,7 +29,7 @@ def the_embedded_street():
 
 def run(out, **options):
     """Summary of a run and the bytes of its tracks."""
-    summary = session(out, FRAMES, **options).run(Supervisor())
+    summary = session(out, FRAMES, **options).run(Notifier())
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
@@ -54,7 +54,7 @@ def test_poses_from_a_socket_equal_recorded_poses_and_a_restart_of_the_sender_mo
             pose = T_elsewhere @ T if restarted and i >= FRAMES // 2 else T
             message = {"stamp": stamp_s, "pose": pose.ravel().tolist()}
             out.sendto(json.dumps(message).encode(), str(tmp_path / "s"))
-    received = played.run(Supervisor())["odometry"]
+    received = played.run(Notifier())["odometry"]
     tracks = (tmp_path / "run" / "tracks.jsonl").read_bytes()
     assert not (tmp_path / "s").exists()
     if restarted:
@@ -95,7 +95,7 @@ def test_missing_poses_are_noted_unless_they_come_from_elsewhere(tmp_path, optio
     (tmp_path / "poses.txt").write_text(3 * GOOD)
     options = {key: places.get(name, name) for key, name in options.items()}
     made = session(tmp_path / "run", None, path=layouts.bare(tmp_path), **options)
-    made.run(Supervisor())
+    made.run(Notifier())
     notes = [*made.stages.info.notes, *made.stages.info.pose_notes]
     assert any("no calibration" in note for note in notes)
     assert any("no odometry" in note for note in notes) == noted

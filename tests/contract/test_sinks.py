@@ -5,12 +5,13 @@ import threading
 
 import pytest
 
+from modt.energy.ledger import StageWork
 from modt.errors import ModtError
 from modt.schemes import SINKS, open_sink
 from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import LedgerSink, LineFile
 from modt.sinks.tracks import frame_line
-from tests.results import CAR, result
+from tests.results import CAR, ledger_line, result
 
 FILES = {
     "tracks": lambda root: LineFile(root / "tracks.jsonl", frame_line),
@@ -34,7 +35,7 @@ FRAMES = [
     result(2, [4], {0: 1}, {1: CAR}, lost=(2,)),
     result(7, [], {}, lost=(1, 2)),
 ]
-LEDGER = {"schema": "modt.ledger/1", "frame": 1, "stages": {"sink": {"cpu_ns": 10}}, "cpu_ns": 10}
+LEDGER = ledger_line(1, 10, sink=StageWork(cpu_ns=10))
 
 
 def opened(kind, root):

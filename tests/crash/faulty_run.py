@@ -17,13 +17,13 @@ from unittest.mock import Mock, patch
 
 import numpy as np
 
-from modt.app import session as sessions
-from modt.app.containment import Containment
+from modt.app import loop as loops
 from modt.app.deadlines import Deadlines
-from modt.app.session import Session
+from modt.app.failures import Failures
+from modt.app.loop import Service
 from modt.app.status import STALE_S
 from modt.app.stop import Stop
-from modt.app.supervisor import Supervisor
+from modt.app.systemd import Notifier
 from modt.cli.status import read
 from modt.config import ProfileConfig, RecordingConfig
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
@@ -167,17 +167,26 @@ class FaultyRun:
                 lambda: faults.call("meter", lambda: 5.0 * faults.now_s),
             )
             stages = stages_with(poses)
-            supervisor = Supervisor(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
-            stack.enter_context(patch.object(sessions, "Windows", self._windows))
+            notifier = Notifier(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
+            stack.enter_context(patch.object(loops, "Windows", self._windows))
             stack.enter_context(patch.object(live_stream, "READ_S", PAUSE_S))
             (folder / "memory").mkdir()
             stack.enter_context(patch.object(run_directory, "MEMORY", folder / "memory"))
             stack.enter_context(faults.installed())
-            session = Session(
-                source, stages, recording, sinks, deadlines, Containment(), stop, [meter], None,
-                metrics=folder / "modt.prom", clock=lambda: faults.now_s,
-            )  # fmt: skip
-            self.session = session
+            service = Service(
+                source=source,
+                stages=stages,
+                recording=recording,
+                sinks=sinks,
+                deadlines=deadlines,
+                failures=Failures(),
+                stop=stop,
+                meters=[meter],
+                core=None,
+                metrics=folder / "modt.prom",
+                clock=lambda: faults.now_s,
+            )
+            self.service = service
 
             def tick(taken: Any) -> None:
                 self.frames[taken.frame.index] = faults.now_s
@@ -185,18 +194,18 @@ class FaultyRun:
                     while True:
                         socket.socket.__base__.recv(notified, 65_536)  # type: ignore[union-attr]
 
-            report = session._report
+            report = service._report
 
-            def reported(supervisor: Any) -> None:
-                report(supervisor)
+            def reported(to: Any) -> None:
+                report(to)
                 self._check_status()
                 if source.turn >= TURNS:
                     stop.signal = "SIGTERM"
 
-            session._report = reported  # type: ignore[method-assign]
+            service._report = reported  # type: ignore[method-assign]
             faults.active = True
             try:
-                session.run(supervisor, tick)
+                service.run(notifier, tick)
             finally:
                 faults.active = False
 
@@ -211,12 +220,12 @@ class FaultyRun:
             if (part / "ledger.jsonl").exists():
                 kept = read_records(part / "ledger.jsonl", ENERGY_SCHEMA, (LEDGER_SCHEMA,))
                 records[ENERGY_SCHEMA] += [r["window"] for r in kept]
-        health = self.session.recording.health()
-        recording: Any = self.session.recording
+        health = self.service.recording.health()
+        recording: Any = self.service.recording
         missing = recording.write.call_count + recording.ledger.call_count - sum(map(len, records.values()))
         for schema, numbers in records.items():
             assert len(numbers) == len({*numbers}), f"{schema} twice"
-        assert missing <= health["lost_lines"], f"{missing} lines are missing, {health['lost_lines']} are counted"
+        assert missing <= health.lost_lines, f"{missing} lines are missing, {health['lost_lines']} are counted"
         late = {frame for frame, at_s in self.frames.items() if at_s > self.faults.last_s + BACK_S}
         assert late <= {*records[SCHEMA]}, "frames are missing after the fault"
         if self.faults.last_s + BACK_S < self.faults.now_s - 1.0:

@@ -51,12 +51,12 @@ class Service:
             self.recording.write(frame(self.n))
             self.n += 1
             if self.n % 10 == 0:
-                self.recording.state(json.dumps({"schema": STATUS_SCHEMA, "frames": self.n}))
+                self.recording.write_status(json.dumps({"schema": STATUS_SCHEMA, "frames": self.n}))
 
     def lost(self):
         kept = frames(self.path.parent)
         assert len(kept) == len({*kept})
-        assert self.recording.health()["lost_lines"] == self.n - len(kept)
+        assert self.recording.health().lost_lines == self.n - len(kept)
         return sorted({*range(self.n)} - {*kept})
 
 
@@ -73,7 +73,7 @@ def test_removed_records_are_begun_anew_within_a_second_and_their_lines_counted(
     service.recording.finish()
     lost = service.lost()
     assert (service.path / "run.yaml").read_text() == OURS
-    assert service.recording.health()["failing"] is None
+    assert service.recording.health().failing is None
     assert all(n in lost for n in range(70))
     assert not any(n in lost for n in range(90, 175))
 
@@ -87,7 +87,7 @@ def test_a_disk_that_is_unmounted_costs_the_lines_meanwhile_and_nothing_is_writt
     mount("--bind", disk, other)
     subprocess.run(["umount", "--lazy", disk], check=True)
     service.run(15 + 10 * seconds)
-    assert "is not mounted" in service.recording.health()["failing"]
+    assert "is not mounted" in service.recording.health().failing
     assert not [*disk.iterdir()]
     mount("--bind", other, disk)
     subprocess.run(["umount", other], check=True)
@@ -119,7 +119,7 @@ def test_the_status_stays_readable_and_the_lines_meanwhile_are_lost(disk, fault)
         if fault != "full at start":
             fail()
         service.run(500)
-        assert service.recording.health()["failing"]
+        assert service.recording.health().failing
         assert read(service.path)["frames"] == service.n
         mount("-o", "remount,rw", disk)
         for name in ("others", "more"):
@@ -128,7 +128,7 @@ def test_the_status_stays_readable_and_the_lines_meanwhile_are_lost(disk, fault)
             service.path.unlink()
         back = service.n
         service.run(20)
-        assert service.recording.health()["failing"] is None
+        assert service.recording.health().failing is None
         assert read(service.path)["frames"] == service.n
         service.recording.finish()
     lost = service.lost()

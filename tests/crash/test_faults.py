@@ -20,7 +20,7 @@ def calls_without_faults(tmp_path_factory):
     run = FaultyRun(tmp_path_factory.mktemp("clean"), {})
     run.run()
     run.check()
-    assert run.session.recording.health()["lost_lines"] == 0
+    assert run.service.recording.health().lost_lines == 0
     assert len(run.frames) >= 35
     return run.faults.calls
 

@@ -9,6 +9,7 @@ from unittest.mock import patch
 
 import pytest
 
+from tests.results import ledger_line
 from tests.sinks.recordings import begun, frame, frames, parts
 
 FRAMES, A_SECOND = 50, 5
@@ -95,7 +96,7 @@ def disks(tmp_path_factory):
                 if k % 12 == 11:
                     recording._bytes = 1_000_000  # the part is full
                 recording.write(frame(k))
-                recording.ledger({"schema": "modt.ledger/1", "frame": k})
+                recording.ledger(ledger_line(k))
                 if k % A_SECOND == A_SECOND - 1:
                     recording.sync()
                     disk.safe = k + 1
@@ -117,7 +118,7 @@ def test_synced_records_survive_and_a_restart_works(disk, kind, tmp_path):
         recording = begun(folder, disk_mb=1.0)
         recording.write(frame(1000))
         recording.finish()
-        assert recording.cause is None
+        assert recording.health().failing is None
         assert frames(folder)[-1] == 1000
         assert frames(folder)[:-1] == whole
         assert recording.directory.kept() == parts(folder)[:-1]  # all are known as its own, and will be trimmed

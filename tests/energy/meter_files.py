@@ -1,9 +1,12 @@
-"""Files of meters as the kernel writes them, and lines of windows."""
+"""Files of meters as the kernel writes them, and windows."""
 
 from pathlib import Path
 from typing import Any
 
 from modt.config import EnergyConfig
+from modt.energy.ledger import StageWork
+from modt.energy.windows import EnergyWindow
+from tests.results import energy_window
 
 RANGE_UJ = 262_143_328_850
 
@@ -24,11 +27,10 @@ def write_files(folder: Path, **contents: object) -> Path:
 CALIBRATED = EnergyConfig(idle_W=3.0, seg_J=0.1, class_J=0.01, point_J=1e-3)
 
 
-def line_of(energy_J: float | None, frames: int, load: int = 0, **more: Any) -> dict[str, Any]:
-    row = {"calls": frames, "items": 0, "points": 0, "wall_ns": 0, "cpu_ns": 300_000_000}
+def window_of(energy_J: float | None, frames: int, load: int = 0, **changes: Any) -> EnergyWindow:
+    """A window of a second of so many frames, with `load` classifications of nine points each."""
     stages = {
-        "segmentation": row,
-        "classification": {**row, "items": load, "points": 9 * load, "cpu_ns": 100_000_000},
+        "segmentation": StageWork(calls=frames, cpu_ns=300_000_000),
+        "classification": StageWork(calls=frames, items=load, points=9 * load, cpu_ns=100_000_000),
     }
-    base = {"energy_J": energy_J, "wall_ns": 10**9, "process_ns": 500_000_000, "stages": stages, "marks": []}
-    return {**base, "kind": "measured", **more}
+    return energy_window(energy_J, frames, process_ns=500_000_000, stages=stages, **changes)

@@ -1,6 +1,6 @@
 import pytest
 
-from modt.energy.ledger import SCHEMA, Ledger
+from modt.energy.ledger import SCHEMA, Ledger, StageWork
 
 
 class Machine:
@@ -35,10 +35,10 @@ def test_spans_are_timed_and_counted_also_when_the_stage_fails(machine):
     with pytest.raises(ValueError, match="scan"):
         ledger.run("source", fail)
     line = ledger.close_frame(12)
-    assert (line["schema"], line["frame"]) == (SCHEMA, 12)
-    assert line["stages"]["tracking"] == {"calls": 2, "items": 3, "points": 7, "wall_ns": 55, "cpu_ns": 44}
-    assert line["stages"]["source"]["cpu_ns"] == 20
-    assert (line["wall_ns"], line["cpu_ns"], line["idle_ns"], line["marks"]) == (185, 74, 100, [])
+    assert (line.schema, line.frame) == (SCHEMA, 12)
+    assert line.stages["tracking"] == StageWork(calls=2, items=3, points=7, wall_ns=55, cpu_ns=44)
+    assert line.stages["source"].cpu_ns == 20
+    assert (line.wall_ns, line.cpu_ns, line.idle_ns, line.marks) == (185, 74, 100, [])
 
 
 @pytest.mark.parametrize(("wall", "cpu"), [(-500, 3), (40, -500), (-10_000, -10_000)])
@@ -46,9 +46,9 @@ def test_clock_that_steps_back_is_marked_and_never_negative(machine, wall, cpu):
     machine.ledger.run("segmentation", machine.work, 20, 20)
     machine.ledger.run("tracking", machine.work, wall, cpu)
     line = machine.ledger.close_frame(0)
-    assert line["marks"] == ["clock"]
-    assert min(line["wall_ns"], line["cpu_ns"], line["idle_ns"], line["overhead_ns"]) >= 0
-    assert all(row["wall_ns"] >= 0 and row["cpu_ns"] >= 0 for row in line["stages"].values())
+    assert line.marks == ["clock"]
+    assert min(line.wall_ns, line.cpu_ns, line.idle_ns, line.overhead_ns) >= 0
+    assert all(row.wall_ns >= 0 and row.cpu_ns >= 0 for row in line.stages.values())
 
 
 def test_overhead_is_measured_with_the_clocks_given(machine):
@@ -60,4 +60,4 @@ def test_overhead_is_measured_with_the_clocks_given(machine):
     for _ in range(2):
         ledger.run("tracking", machine.work, 100, 100)
     machine.work(1_000, 0)
-    assert ledger.close_frame(0)["overhead_ns"] == 3 * 20  # of two spans and the frame
+    assert ledger.close_frame(0).overhead_ns == 3 * 20  # of two spans and the frame

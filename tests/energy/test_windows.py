@@ -4,12 +4,12 @@ from hypothesis import strategies as st
 
 from modt.config import EnergyConfig
 from modt.energy.attribution import attribute
-from modt.energy.ledger import Ledger
+from modt.energy.ledger import Ledger, StageWork
 from modt.energy.meters.discovery import find_powercap
-from modt.energy.meters.meter import Conditions, model_meter
+from modt.energy.meters.meter import Conditions, Kind, model_meter
 from modt.energy.windows import SCHEMA, Clocks, Windows
 
-from .meter_files import CALIBRATED, RANGE_UJ, line_of, write_files, write_zone
+from .meter_files import CALIBRATED, RANGE_UJ, window_of, write_files, write_zone
 
 STEP_UJ, IDLE_W = 61.035, 3.0
 
@@ -54,7 +54,7 @@ class Machine:
     def frame(self, index, wait_s):
         self.wait(wait_s)
         line = self.ledger.close_frame(index)
-        assert line["marks"] == []
+        assert line.marks == []
         return self.windows.add(line)
 
     def second(self, index=0):
@@ -68,25 +68,24 @@ def machine(tmp_path):
     """A machine after its first window, which is short: a counter is judged by the power measured before."""
     made = Machine(tmp_path)
     line = made.frame(0, 0.1)
-    assert (line["energy_J"], line["marks"]) == (None, ["first"])
+    assert (line.energy_J, line.marks) == (None, ["first"])
     return made
 
 
 def test_window_has_its_energy_and_counts(machine):
     line = machine.second(7)
-    assert line["schema"] == SCHEMA
-    assert line["frames"] == [7, 7, 1]
-    assert line["energy_J"] == pytest.approx(3.0 + 0.5, abs=2 * 61e-6)
-    assert line["kind"] == "measured"
-    counts = {"calls": 1, "items": 3, "points": 0, "wall_ns": 250_000_000, "cpu_ns": 250_000_000}
-    assert line["stages"]["segmentation"] == counts
-    assert line["process_ns"] == 250_000_000
-    assert line["conditions"] == {"governor": "performance", "frequency_MHz": 2600.0, "temperature_C": None}
-    assert line["marks"] == []
+    assert line.schema == SCHEMA
+    assert line.frames == (7, 7, 1)
+    assert line.energy_J == pytest.approx(3.0 + 0.5, abs=2 * 61e-6)
+    assert line.kind == "measured"
+    assert line.stages["segmentation"] == StageWork(1, 3, 0, 250_000_000, 250_000_000)
+    assert line.process_ns == 250_000_000
+    assert line.conditions == {"governor": "performance", "frequency_MHz": 2600.0, "temperature_C": None}
+    assert line.marks == []
     assert machine.frame(8, 0.9) is None
-    assert machine.frame(9, 0.1)["frames"] == [8, 9, 2]
+    assert machine.frame(9, 0.1).frames == (8, 9, 2)
     line = machine.second(10)  # the counter begins anew
-    assert (line["energy_J"], line["marks"]) == (pytest.approx(3.5, abs=2 * 61e-6), ["wrap"])
+    assert (line.energy_J, line.marks) == (pytest.approx(3.5, abs=2 * 61e-6), ["wrap"])
 
 
 def test_lost_meter_is_marked_and_resumes(machine):
@@ -95,18 +94,18 @@ def test_lost_meter_is_marked_and_resumes(machine):
     lost = [machine.second() for _ in range(2)]
     machine.zone.with_name("gone").rename(machine.zone)
     back, good = machine.second(), machine.second()
-    assert [(line["energy_J"], line["kind"], line["marks"]) for line in lost] == [(None, "unavailable", ["lost"])] * 2
-    assert (back["energy_J"], back["marks"]) == (None, ["back"])
-    assert good["energy_J"] == pytest.approx(3.5, abs=1e-3)
+    assert [(line.energy_J, line.kind, line.marks) for line in lost] == [(None, "unavailable", ["lost"])] * 2
+    assert (back.energy_J, back.marks) == (None, ["back"])
+    assert good.energy_J == pytest.approx(3.5, abs=1e-3)
 
 
 def test_window_of_a_suspension_has_no_energy(machine):
     machine.second()
     machine.slept_ns += 3600 * 10**9
     line = machine.second()
-    assert line["energy_J"] is None
-    assert "suspended" in line["marks"]
-    assert machine.second()["energy_J"] == pytest.approx(3.5, abs=1e-3)
+    assert line.energy_J is None
+    assert "suspended" in line.marks
+    assert machine.second().energy_J == pytest.approx(3.5, abs=1e-3)
 
 
 FRAMES = st.lists(st.tuples(st.floats(0, 0.6), st.floats(0, 0.6), st.integers(0, 4)), max_size=8)
@@ -123,12 +122,12 @@ def test_parts_of_every_window_sum_to_it(tmp_path_factory, frames, tick_ns):
     lines.append(machine.windows.close())
     closed = [line for line in lines if line is not None]
     for line in closed:
-        spans = sum(row["wall_ns"] for row in line["stages"].values())
-        assert spans + line["overhead_ns"] + line["idle_ns"] == line["wall_ns"]
-        assert min(line["overhead_ns"], line["idle_ns"]) >= 0
-    assert sum(line["wall_ns"] for line in closed) == machine.now_ns - start
-    assert sum(line["frames"][2] for line in closed) == len(frames)
-    assert [line["window"] for line in closed] == list(range(len(closed)))
+        spans = sum(row.wall_ns for row in line.stages.values())
+        assert spans + line.overhead_ns + line.idle_ns == line.wall_ns
+        assert min(line.overhead_ns, line.idle_ns) >= 0
+    assert sum(line.wall_ns for line in closed) == machine.now_ns - start
+    assert sum(line.n_frames for line in closed) == len(frames)
+    assert [line.window for line in closed] == list(range(len(closed)))
 
 
 def test_a_window_is_as_reliable_as_its_least_reliable_meter(machine, tmp_path):
@@ -142,19 +141,19 @@ def test_a_window_is_as_reliable_as_its_least_reliable_meter(machine, tmp_path):
         for _ in range(2):
             machine.wait(1.0)
             line = windows.close()
-        assert (line["energy_J"], line["kind"]) == found
+        assert (line.energy_J, line.kind) == found
 
 
 @given(energy_J=st.floats(0, 20), frames=st.integers(0, 9), load=st.integers(0, 9))
 def test_the_energy_attributed_to_the_parts_of_a_window_is_its_own(energy_J, frames, load):
-    line = line_of(energy_J, frames, load)
+    line = window_of(energy_J, frames, load)
     for board in (EnergyConfig(), CALIBRATED):
         assert sum(attribute(line, board).values()) == pytest.approx(energy_J)
 
 
 def test_coefficients_split_the_reading_of_a_calibrated_board_but_not_the_model():
-    parts = attribute(line_of(5.0, 2, 4), CALIBRATED)
+    parts = attribute(window_of(5.0, 2, 4), CALIBRATED)
     expected = {"idle": 3.0, "segmentation": 0.2, "classification": 0.04 + 0.036, "unattributed": 1.724}
     assert parts == pytest.approx(expected)
-    estimated = line_of(5.0, 2, 4, kind="estimated")
+    estimated = window_of(5.0, 2, 4, kind=Kind.ESTIMATED)
     assert attribute(estimated, CALIBRATED) == attribute(estimated, EnergyConfig())

@@ -3,6 +3,8 @@
 import time
 from pathlib import Path
 
+import pytest
+
 from modt.config import EnergyConfig
 from modt.energy.meters import discovery
 from modt.energy.meters.meter import Candidate, Conditions, Facts, Kind, Scope, file_meter, probe
@@ -37,6 +39,6 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
     for reading_mJ in (1004, 1008):
         time.sleep(0.05)
         counter.write_text(str(reading_mJ))
-        line = windows.close()
-    assert line["kind"] == "measured"
-    assert abs(line["energy_J"] - 0.004) < 1e-9
+        window = windows.close()
+    assert window.kind == "measured"
+    assert window.energy_J == pytest.approx(0.004, abs=1e-9)

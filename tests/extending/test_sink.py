@@ -2,9 +2,9 @@
 
 import csv
 
+from modt.app.build import replay
 from modt.app.inputs import Request
-from modt.app.session import replay
-from modt.app.supervisor import Supervisor
+from modt.app.systemd import Notifier
 from modt.classes import CLASS_NAMES
 from modt.sinks.output import LineFile
 from modt.types import FrameResult
@@ -26,8 +26,8 @@ class ObjectTable(LineFile[FrameResult]):
 def test_a_replay_writes_every_frame_to_the_sink_and_books_it(tmp_path):
     sink, results = ObjectTable(tmp_path / "objects.csv"), []
     request = Request(profile=["vlp-16"], mode="efficient", frames=(0, 5))
-    session = replay(request, {"objects": sink}, tmp_path / "run", None, ["test"])
-    summary = session.run(Supervisor(), results.append)
+    loop = replay(request, {"objects": sink}, tmp_path / "run", None, ["test"])
+    summary = loop.run(Notifier(), results.append)
     rows = list(csv.reader((tmp_path / "objects.csv").read_text().splitlines()))
     assert {int(frame) for frame, _, _ in rows} == set(range(5))
     assert len(rows) == sum(len(result.proposals) for result in results)

@@ -4,17 +4,9 @@ import re
 
 import pytest
 
+from modt.energy.ledger import StageWork
 from modt.reporting.summary import Summary, around, summary_text
-from tests.results import CAR, result
-
-
-def ledger_line(frame, ms):
-    stages = {
-        "segmentation": {"calls": 1, "items": 2, "wall_ns": ms * 10**6, "cpu_ns": ms * 10**6},
-        "classification": {"calls": 1, "items": 1, "wall_ns": 10**6, "cpu_ns": 10**6},
-    }
-    return {"schema": "modt.ledger/1", "frame": frame, "stages": stages}
-
+from tests.results import CAR, ledger_line, result
 
 FRAMES = [
     result(0, [5, 5], {0: 1, 1: 2}, {1: CAR}, classified=2),
@@ -32,7 +24,9 @@ def whole():
     summary = Summary()
     for r in FRAMES:
         summary.add_result(r)
-        summary.add_ledger(ledger_line(r.frame.index, 1 + r.frame.index))
+        ns = (1 + r.frame.index) * 10**6
+        stages = {"segmentation": StageWork(1, 2, 0, ns, ns), "classification": StageWork(1, 1, 0, 10**6, 10**6)}
+        summary.add_ledger(ledger_line(r.frame.index, **stages))
     return summary.result()
 
 
@@ -64,9 +58,8 @@ def test_the_nearest_return_of_each_class_is_of_the_last_frame():
 
 def test_the_text_names_objects_and_costs_and_sums_the_stages_alone():
     summary = Summary()
-    line = ledger_line(0, 3)
-    line["stages"]["source"] = dict(line["stages"]["segmentation"], cpu_ns=40 * 10**6)
-    summary.add_ledger(line)
+    ms = {"source": 40, "segmentation": 3, "classification": 1}
+    summary.add_ledger(ledger_line(0, **{stage: StageWork(cpu_ns=cpu_ms * 10**6) for stage, cpu_ms in ms.items()}))
     together, source = summary_text(summary.result()).splitlines()[-2:]
     assert together.split()[:2] == ["together", "4.00"]
     assert source.split()[0] == "source"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.app.containment import OncePerSecond
+from modt.app.failures import OncePerSecond
 from modt.config import OdometryConfig
 from modt.poses.pose_socket import read_datagram
 from modt.poses.pose_topic import PoseTopic

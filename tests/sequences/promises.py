@@ -14,7 +14,7 @@ from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import Scheduler, Selection
 from modt.config import ProfileConfig, TrackingConfig
-from modt.energy.ledger import Ledger
+from modt.energy.ledger import Ledger, LedgerLine
 from modt.geometry import FieldOfView
 from modt.sinks.records import line
 from modt.sinks.tracks import frame_line
@@ -159,10 +159,10 @@ class Run:
         landmarks: Any = self.pipeline.odometry._landmarks  # type: ignore[attr-defined]
         assert set(landmarks._id.tolist()) <= self._before
 
-    def _parts_are_the_whole(self, book: dict[str, Any]) -> None:
-        parts = [stage["wall_ns"] for stage in book["stages"].values()]
-        assert book["wall_ns"] == sum(parts) + book["overhead_ns"] + book["idle_ns"]
-        assert min([book["overhead_ns"], book["idle_ns"], book["cpu_ns"], *parts]) >= 0
+    def _parts_are_the_whole(self, book: LedgerLine) -> None:
+        parts = [work.wall_ns for work in book.stages.values()]
+        assert book.wall_ns == sum(parts) + book.overhead_ns + book.idle_ns
+        assert min([book.overhead_ns, book.idle_ns, book.cpu_ns, *parts]) >= 0
 
 
 def most_frames(tracking: TrackingConfig) -> int:

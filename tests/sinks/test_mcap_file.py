@@ -8,13 +8,15 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from rosbags.highlevel import AnyReader
 
+from modt.energy.ledger import StageWork
+from modt.energy.meters.meter import Kind
 from modt.errors import ModtError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import open_sink
-from modt.sinks.foxglove_sinks import McapFile
+from modt.sinks.foxglove_sinks import McapRecorder
 from modt.sinks.messages import topics
 from modt.sources.recognise import open_stream
-from tests.results import CAR, PEDESTRIAN, result
+from tests.results import CAR, PEDESTRIAN, energy_window, ledger_line, result
 from tests.sinks.recordings import files_of_at_most
 
 
@@ -28,8 +30,8 @@ def moving(index):
     return made
 
 
-WINDOW = {"schema": "modt.energy/1", "frames": [0, 9, 10], "wall_ns": 10**9, "energy_J": 0.5, "kind": "measured"}
-LEDGER = {"schema": "modt.ledger/1", "frame": 1, "cpu_ns": 3_000_000, "stages": {"tracking": {"cpu_ns": 2_000_000}}}
+WINDOW = energy_window(0.5)
+LEDGER = ledger_line(1, 3_000_000, tracking=StageWork(cpu_ns=2_000_000))
 
 
 def read(path, topic=None):
@@ -49,7 +51,7 @@ def n_frames(path):
 
 
 def record(path, *frames, records=()):
-    sink = McapFile(path, points=True)
+    sink = McapRecorder(path, points=True)
     for frame in frames:
         sink.write(frame)
     for line in records:
@@ -58,7 +60,7 @@ def record(path, *frames, records=()):
 
 
 def test_another_reader_of_ros_2_finds_what_the_topics_hold(tmp_path):
-    unknown = {**WINDOW, "energy_J": None, "kind": "unavailable"}
+    unknown = energy_window(None, kind=Kind.UNAVAILABLE)
     record(tmp_path / "a.mcap", moving(3), records=(WINDOW, unknown, LEDGER))
     with AnyReader([tmp_path / "a.mcap"]) as reader:
         found = {c.topic: (raw, reader.deserialize(raw, c.msgtype), stamp) for c, stamp, raw in reader.messages()}
@@ -96,7 +98,7 @@ def test_the_oldest_parts_make_room_and_nothing_else(tmp_path):
     (tmp_path / "a-note.mcap").write_bytes(bytes(100_000))
     sizes = []
     limit = 200_000
-    sink = McapFile(tmp_path / "a.mcap", points=True, max_bytes=limit)
+    sink = McapRecorder(tmp_path / "a.mcap", points=True, max_bytes=limit)
     rng = np.random.default_rng(0)
     for k in range(200):
         frame = moving(k)
@@ -118,7 +120,7 @@ def parts(folder):
 
 def test_a_second_old_frame_survives_a_crash(tmp_path):
     now_s = iter(np.arange(0.0, 100.0, 0.3).tolist())
-    sink = McapFile(tmp_path / "a.mcap", points=False, clock=lambda: next(now_s))
+    sink = McapRecorder(tmp_path / "a.mcap", points=False, clock=lambda: next(now_s))
     for k in range(20):
         sink.write(moving(k))
     (tmp_path / "crashed.mcap").write_bytes((tmp_path / "a.mcap").read_bytes())
@@ -128,7 +130,7 @@ def test_a_second_old_frame_survives_a_crash(tmp_path):
 
 
 def test_a_full_disk_is_an_error_and_the_recording_goes_on_when_there_is_room(tmp_path):
-    sink = McapFile(tmp_path / "a.mcap", points=False, clock=iter(range(1000)).__next__)
+    sink = McapRecorder(tmp_path / "a.mcap", points=False, clock=iter(range(1000)).__next__)
     sink.write(moving(0))
     with files_of_at_most(0):
         for k in range(1, 4):

@@ -8,6 +8,7 @@ import pytest
 from modt.config import RecordingConfig
 from modt.sinks.recording import KEPT, RETRY_S, AtOnce, WholeRecording
 from modt.sinks.run_directory import RunDirectory
+from tests.results import ledger_line
 from tests.sinks.recordings import OURS, Time, begun, files_of_at_most, frame, frames, parts
 
 
@@ -15,7 +16,7 @@ from tests.sinks.recordings import OURS, Time, begun, files_of_at_most, frame, f
 def test_the_profile_decides_which_records_are_kept(tmp_path, keep):
     recording = begun(tmp_path, keep=keep)
     recording.write(frame(0))
-    recording.ledger({"schema": "modt.ledger/1", "frame": 0})
+    recording.ledger(ledger_line(0))
     recording.finish()
     assert {p.name for p in (tmp_path / "run").iterdir()} == {"run.yaml", *KEPT[keep]}
 
@@ -49,19 +50,19 @@ def test_a_full_disk_pauses_the_recording_until_there_is_room(tmp_path, caplog):
         write(range(50, 100))
     recording.finish()
     lost = sorted({*range(100)} - {*frames(tmp_path)})
-    assert recording.health()["lost_lines"] == len(lost)
+    assert recording.health().lost_lines == len(lost)
     assert lost == list(range(lost[0], lost[-1] + 1))
     assert 50 <= lost[-1] <= 50 + RETRY_S / 0.1
-    assert recording.pauses == 1
+    assert recording.health().pauses == 1
     assert ["recording pauses" in r.message for r in caplog.records] == [True, False]
     assert "recording again" in caplog.text
-    assert recording.cause is None
+    assert recording.health().failing is None
 
 
 def test_another_profile_changes_what_is_kept_and_the_description(tmp_path):
     recording = begun(tmp_path, keep="none")
     (tmp_path / "run" / "run.yaml").write_text("before")
-    recording.follow(RecordingConfig(keep="tracks"))
+    recording.configure(RecordingConfig(keep="tracks"))
     recording.write(frame(0))
     recording.finish()
     assert {p.name for p in (tmp_path / "run").iterdir()} == {"run.yaml", "tracks.jsonl"}
@@ -73,8 +74,8 @@ def test_lines_that_the_writer_has_no_room_for_are_counted(tmp_path, monkeypatch
     monkeypatch.setattr(AtOnce, "write", lambda _, job: dropped.append(job))
     monkeypatch.setattr(AtOnce, "health", lambda _: {"dropped": len(dropped)}, raising=False)
     recording.write(frame(0))
-    recording.ledger({})
-    assert recording.health()["lost_lines"] == 2
+    recording.ledger(ledger_line(0))
+    assert recording.health().lost_lines == 2
 
 
 def test_beyond_the_bytes_of_a_day_frames_are_left_out_evenly_and_counted(tmp_path, monkeypatch):
@@ -84,14 +85,14 @@ def test_beyond_the_bytes_of_a_day_frames_are_left_out_evenly_and_counted(tmp_pa
     for k in range(1000):
         time.now += 0.1
         recording.write(frame(k))
-        recording.ledger({"schema": "modt.ledger/1", "frame": k})
+        recording.ledger(ledger_line(k))
     recording.finish()
     kept = frames(tmp_path)
     assert kept[:8] == list(range(8))
     steps = np.diff(kept[50:])
     assert max(steps) - min(steps) <= 1
-    assert recording.health()["thinned_lines"] == 1000 - len(kept)
-    assert recording.health()["lost_lines"] == 0
+    assert recording.health().thinned_lines == 1000 - len(kept)
+    assert recording.health().lost_lines == 0
     size = (tmp_path / "run" / "tracks.jsonl").stat().st_size
     assert size <= 10_000 + 0.1e9 / 86_400 * time.now + 2_000
 
@@ -99,10 +100,10 @@ def test_beyond_the_bytes_of_a_day_frames_are_left_out_evenly_and_counted(tmp_pa
 def test_a_replay_is_recorded_whole_whatever_the_profile_keeps(tmp_path):
     recording = WholeRecording(RunDirectory(tmp_path / "run"), lambda: "schema: modt.run/1\n", 3, None, labels=True)
     recording.start()
-    recording.follow(RecordingConfig(keep="none"))
+    recording.configure(RecordingConfig(keep="none"))
     for k in range(2):
         recording.write(frame(k))
-        recording.ledger({"schema": "modt.ledger/1", "frame": k})
+        recording.ledger(ledger_line(k))
     recording.finish()
     assert frames(tmp_path) == [0, 1]
     names = {str(p.relative_to(tmp_path / "run")) for p in (tmp_path / "run").rglob("*") if p.is_file()}

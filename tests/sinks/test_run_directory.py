@@ -41,7 +41,7 @@ def test_a_half_made_directory_is_made_anew(tmp_path, left):
 def test_each_part_is_kept_under_the_next_number_and_the_oldest_go_first(tmp_path):
     for k in range(13):
         directory = begun(tmp_path / "run", 2500)
-        assert directory.before == (tmp_path / f"run~{k}" if k else None)
+        assert directory.previous == (tmp_path / f"run~{k}" if k else None)
         fill(directory.path, 1000 + k)
     assert names(tmp_path) == ["run", "run~11", "run~12"]
     assert (tmp_path / "run~11" / "tracks.jsonl").stat().st_size == 1010

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from modt.address import parse_address
+from modt.energy.ledger import StageWork
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import SINKS
@@ -20,10 +21,6 @@ from tests import results
 from . import pages
 
 WAIT_S = 60.0
-
-
-def ledger(frame):
-    return {"schema": "modt.ledger/1", "frame": frame, "stages": {"tracking": {"cpu_ns": 2_000_000}}}
 
 
 def opened(text):
@@ -40,7 +37,7 @@ def show(live, *made, **more):
     """Write a frame and its line of the ledger."""
     frame = results.result(*made, **more)
     live.write(frame)
-    live.ledger(ledger(frame.frame.index))
+    live.ledger(results.ledger_line(frame.frame.index, tracking=StageWork(cpu_ns=2_000_000)))
 
 
 class Reader:
@@ -100,9 +97,8 @@ def test_one_that_asks_too_slowly_is_left(live, monkeypatch):
 def test_a_frame_reaches_a_client_with_the_energy_of_the_last_window(live, read):
     reader = read()
     T = se3(rotation_zyx(0.0, 0.0, 0.3), np.array([10.0, 1.0, 2.0]))
-    window = {"schema": "modt.energy/1", "energy_J": 2.0, "frames": [0, 9, 10], "kind": "measured"}
-    live.ledger(window)
-    live.ledger(window | {"energy_J": None})
+    live.ledger(results.energy_window(2.0))
+    live.ledger(results.energy_window(None))
     show(live, 3, [5, 4], {0: 1, 1: 2}, {1: results.CAR}, T_world_sensor=T)
     event = reader.event()
     assert (event["frame"]["frame"], event["frame"]["cpu_ms"]) == (3, {"tracking": 2.0})
@@ -120,7 +116,7 @@ def test_nothing_is_made_without_a_client_nor_for_a_line_without_its_frame(live,
     show(live, 0, [5], {0: 1})
     reader = read()
     live.write(results.result(1, [5], {0: 1}))
-    live.ledger(ledger(2))
+    live.ledger(results.ledger_line(2))
     assert made == []
     assert reader.answer.status == 200
 

@@ -56,7 +56,7 @@ def timed(work: Callable[[Frame], object], frame: Frame) -> float:
 
 def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
     """CPU time of the stage in the last frame [ms]."""
-    return float(ledger.close_frame(frame.index)["stages"][SEGMENTATION]["cpu_ns"]) / 1e6
+    return ledger.close_frame(frame.index).stages[SEGMENTATION].cpu_ns / 1e6
 
 
 def contenders() -> dict[str, Work]:

@@ -142,7 +142,7 @@ def _hangup(_world: World, on: bool) -> None:
 
 
 def _late_frames(session: Any) -> int:
-    """Frames that began late, and steps of the ladder; a hog need not cost a deadline."""
+    """Frames that began late, and steps of load shedding; a hog need not cost a deadline."""
     lateness = session.deadlines.late_or_later()
     late = max((n for ms, n in zip(lateness["ms"], lateness["frames"], strict=True) if ms > LATE_MS), default=0)
     return int(late) + session.deadlines.changes.total()
@@ -168,9 +168,9 @@ FAULTS = (
     Fault("other sensor", 3.0, lambda s: s.stages.misfits, packet=_few_lasers),
     Fault("lying stamps", 2.0, _refused, packet=_lie),
     Fault("clock set back", 0.2, _refused, clock_s=-100.0),
-    Fault(FULL_DISK, 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
-    Fault("meter lost", 3.0, lambda s: s.power.unread, switch=_switch("meter_lost")),
+    Fault(FULL_DISK, 3.0, lambda s: s.recording.health().lost_lines, switch=_switch("disk_full")),
+    Fault("meter lost", 3.0, lambda s: s.power.unread_windows, switch=_switch("meter_lost")),
     Fault("failing stage", 1.0, lambda s: s.failures.counts.total(), switch=_switch("stage_broken")),
     Fault("hog", 4.0, _late_frames, switch=World.set_hogs, silent_if_steady=True),
-    Fault("reload", 0.2, lambda s: s.loop.reloads, switch=_hangup),
+    Fault("reload", 0.2, lambda s: s.reloads, switch=_hangup),
 )

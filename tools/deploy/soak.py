@@ -28,12 +28,11 @@ from pathlib import Path
 import numpy as np
 
 from modt import host
-from modt.app import session as sessions
-from modt.app.deadlines import Deadlines
+from modt.app import build
 from modt.app.inputs import Request
-from modt.app.ladder import Step
-from modt.app.session import Session, service
-from modt.app.supervisor import Supervisor
+from modt.app.load_shedding import Step
+from modt.app.loop import Service
+from modt.app.systemd import Notifier
 from modt.schemes import open_sensor
 from modt.sinks.output import Health
 from modt.sources.stream import StreamEndedError, Sweep, SweepReader
@@ -64,7 +63,7 @@ class Witness:
     """A sink that notes when results come, what has been missed, the memory and the open descriptors."""
 
     def __init__(self) -> None:
-        self.session: Session | None = None
+        self.session: Service | None = None
         self.times_s: list[float] = []
         self.full: list[bool] = []  # nothing was given up
         self.missed: list[int] = []
@@ -75,9 +74,8 @@ class Witness:
         """Note a result."""
         assert self.session is not None
         deadlines = self.session.deadlines
-        assert isinstance(deadlines, Deadlines)
         self.times_s.append(time.monotonic())
-        self.full.append(deadlines.ladder.step is Step.ALL)
+        self.full.append(deadlines.shedding.step is Step.ALL)
         self.missed.append(deadlines.missed)
         if len(self.times_s) % 50 == 0:
             self.resident_mb.append(host.resident_mb())
@@ -103,7 +101,7 @@ class FaultyReader:
         self._rest_s += WARM_UP_S
         self._end_s = self._begin_s + seconds
         self._waiting: list[Fault] = []
-        self.session: Session | None = None
+        self.session: Service | None = None
         self.episodes: list[Episode] = []
         self._now: Episode | None = None
 
@@ -164,7 +162,7 @@ def free_port() -> int:
         return int(bound.getsockname()[1])
 
 
-def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[str]:
+def judge(witness: Witness, episodes: list[Episode], session: Service) -> list[str]:
     """Print the figures; returns the broken promises."""
     wrong: list[str] = []
     times_s = np.array(witness.times_s)
@@ -190,13 +188,13 @@ def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[s
         clear &= (times_s < e.begin_s) | (times_s > e.end_s + SETTLE_S)
     missed = int(np.diff(witness.missed, prepend=0)[clear].sum())
     recording = session.recording.health()
-    lost = recording["lost_lines"] - sum(e.after - e.before for e in episodes if e.fault.name == FULL_DISK)
+    lost = recording.lost_lines - sum(e.after - e.before for e in episodes if e.fault.name == FULL_DISK)
     memory_mb, late_mb = _thirds(witness.resident_mb)
     growth = late_mb / memory_mb - 1
     descriptors, late = _thirds(witness.descriptors)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
     share = missed / max(int(clear.sum()), 1)
-    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.status()['loop']}")
+    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.status().loop}")
     print(f"memory {max(witness.resident_mb):.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
     print(f"descriptors {max(witness.descriptors)} at most, {descriptors:.0f} midway, {late:.0f} at the end")
     if share > MAX_MISSED:
@@ -234,7 +232,7 @@ def main(arguments: list[str] | None = None) -> int:
         host.take_real_time_priority()
     world = World(core, given.hogs, fifo=given.fifo)
     world.install()
-    sessions.discover = lambda board: world.meters(time.monotonic)  # type: ignore[attr-defined,assignment,misc]
+    build.discover = lambda board: world.meters(time.monotonic)  # type: ignore[attr-defined,assignment,misc]
     port = str(free_port())
     command = [sys.executable, "-m", "tools.deploy.sender", port, *([str(given.drive)] if given.drive else [])]
     with host.threads_on(others):
@@ -245,10 +243,10 @@ def main(arguments: list[str] | None = None) -> int:
         reader = FaultyReader(source.reader, sender, world, 60 * given.minutes, given.seed)
         source.reader, witness = reader, Witness()
         request = Request(profile=[given.profile] if given.profile else ())
-        session = service(request, source, {"witness": witness}, given.out, None, core, ["soak"])
+        session = build.service(request, source, {"witness": witness}, given.out, None, core, ["soak"])
     witness.session = reader.session = session
     try:
-        session.run(Supervisor())
+        session.run(Notifier())
     finally:
         world.set_hogs(False)
         sender.kill()

@@ -133,12 +133,12 @@ class Export:
 def _mcap(export: Export, target: Path) -> None:
     """Write an MCAP file as the sink mcap:///FILE does."""
     try:
-        from modt.sinks.foxglove_sinks import McapFile
+        from modt.sinks.foxglove_sinks import McapRecorder
     except ModuleNotFoundError as error:
         raise MisuseError("--mcap", f"needs {error.name}", install("foxglove")) from None
     results = _with_points(export) if export.points else export.results()
     lines = export.run.ledger_lines()
-    with closing(McapFile(target, points=export.points)) as file:
+    with closing(McapRecorder(target, points=export.points)) as file:
         for result in results:
             file.write(result)
             for line in lines.get(result.frame.index, ()):

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from modt.app import inputs
-from modt.energy import ledger, windows
+from modt.energy.ledger import LedgerLine
+from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.placement import Mount
@@ -23,7 +24,7 @@ from modt.types import Float32, Frame, Int, Self
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.recorded_result import recorded_result
 from modt_evaluation.truth import Truth
-from modt_profiling.reporting.records import read_records
+from modt_profiling.reporting.records import read_ledger, read_records, read_windows
 from modt_profiling.reporting.run_sums import GIVE, run_facts
 
 
@@ -132,15 +133,15 @@ class RunRecord:
         if not number:
             raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
 
-    def ledger_lines(self) -> dict[int, list[dict[str, Any]]]:
+    def ledger_lines(self) -> dict[int | None, list[LedgerLine | EnergyWindow]]:
         """The lines of the ledger by the frame after which each was written; none where no ledger was kept."""
         path = self.path / LEDGER
-        lines = defaultdict[int, list[dict[str, Any]]](list)
+        lines: defaultdict[int | None, list[LedgerLine | EnergyWindow]] = defaultdict(list)
         if path.exists():
-            for line in read_records(path, ledger.SCHEMA, {windows.SCHEMA}):
-                lines[line["frame"]].append(line)
-            for line in read_records(path, windows.SCHEMA, {ledger.SCHEMA}):
-                lines[line["frames"][1]].append(line)
+            for line in read_ledger(path):
+                lines[line.frame].append(line)
+            for window in read_windows(path):
+                lines[window.frames[1]].append(window)
         return lines
 
     def frames(

@@ -13,8 +13,7 @@ import numpy as np
 from modt import profile
 from modt.config import EnergyConfig, ProfileConfig
 from modt.energy.attribution import usable
-from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
-from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
+from modt.energy.ledger import StageWork
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
 from modt.profile import to_yaml
@@ -26,7 +25,7 @@ from modt.viewer.track_rows import COLUMNS, SCALE, planar, result_rows, scaled
 from modt_evaluation.recorded_result import recorded_result
 from modt_evaluation.run_record import RunRecord, broken
 from modt_profiling.energy.run_energy import run_energy
-from modt_profiling.reporting.records import read_records
+from modt_profiling.reporting.records import read_ledger, read_windows
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,19 +128,19 @@ class RecordedRun:
 
 def _costs(ledger: Path, board: EnergyConfig) -> dict[int, dict[str, Any]]:
     """CPU time and energy by number of frame."""
-    lines = [*read_records(ledger, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})]
-    windows = [*read_records(ledger, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA})]
+    lines = [*read_ledger(ledger)]
+    windows = [*read_windows(ledger)]
     call_W = run_energy(windows, lines, board).watts(CLASSIFICATION)
     costs: dict[int, dict[str, Any]] = {}
     for line in lines:
-        costs[line["frame"]] = {"cpu_ms": {name: s["cpu_ns"] / 1e6 for name, s in line["stages"].items()}}
-        calls = line["stages"].get(CLASSIFICATION, {"items": 0})
-        if calls["items"] and not math.isnan(call_W):
-            costs[line["frame"]]["call_mJ"] = 1e-6 * call_W * calls["cpu_ns"] / calls["items"]
+        costs[line.frame] = {"cpu_ms": {name: work.cpu_ns / 1e6 for name, work in line.stages.items()}}
+        calls = line.stages.get(CLASSIFICATION, StageWork())
+        if calls.items and not math.isnan(call_W):
+            costs[line.frame]["call_mJ"] = 1e-6 * call_W * calls.cpu_ns / calls.items
     for window in windows:
-        first, last, n = window["frames"]
-        if n and usable(window):
-            energy = {"energy_mJ": 1e3 * window["energy_J"] / n, "kind": window["kind"]}
+        first, last, _ = window.frames
+        if first is not None and last is not None and window.frame_J is not None and usable(window):
+            energy = {"energy_mJ": 1e3 * window.frame_J, "kind": window.kind}
             for frame in range(first, last + 1):
                 if frame in costs:
                     costs[frame] |= energy

@@ -28,10 +28,14 @@ class Playback:
         sleep: Callable[[float], None] = time.sleep,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.info, self.faults, self.profile = stream.info, stream.faults, stream.info.profile
-        self._frames, self._ledger = iter(stream), ledger
+        self.info = stream.info
+        self.faults = stream.faults
+        self.profile = stream.info.profile
+        self._frames = iter(stream)
+        self._ledger = ledger
         self._period_s = None if rate_hz is None else 1.0 / rate_hz
-        self._clock, self._sleep = clock, sleep
+        self._sleep = sleep
+        self._clock = clock
         self._due_s: float | None = None  # time of the next frame
 
     def start(self) -> None:

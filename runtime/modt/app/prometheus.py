@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from modt.app.ladder import Step
+from modt.app.load_shedding import Step
 from modt.errors import ModtError
 from modt.sinks.output import replace_file
 

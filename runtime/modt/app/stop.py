@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
+"""Signals that end a run."""
 NAP_S = 0.05
 """Longest sleep without a check of the signals [s]."""
 
@@ -24,8 +25,10 @@ class Stop:
         reload: bool = False,
     ) -> None:
         """`reload`: whether SIGHUP is handled."""
-        self.signal: str | None = None
-        self._reload, self._sleep, self._clock = False, sleep, clock
+        self.signal: str | None = None  # name of the one that ends the run
+        self._reload = False
+        self._sleep = sleep
+        self._clock = clock
         self._handlers: dict[signal.Signals, Callable[[int, object], None]] = dict.fromkeys(STOPPING, self._on_stop)
         if reload:
             self._handlers[signal.SIGHUP] = self._on_reload
@@ -38,7 +41,8 @@ class Stop:
 
     def take_reload(self) -> bool:
         """Whether a reload has been asked for since the last call."""
-        asked, self._reload = self._reload, False
+        asked = self._reload
+        self._reload = False
         return asked
 
     @contextmanager

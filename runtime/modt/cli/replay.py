@@ -45,29 +45,29 @@ def run(arguments: argparse.Namespace) -> int:
     """Replay; SIGTERM ends it with exit status 0, SIGINT with 130, both with complete records."""
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
+    from modt.app.build import replay
     from modt.app.inputs import Request
-    from modt.app.session import replay
-    from modt.app.supervisor import supervisor_of
+    from modt.app.systemd import notifier_of
     from modt.cli.progress import bar
     from modt.reporting.summary import summary_text
     from modt.schemes import open_sink
 
-    supervisor = supervisor_of(os.environ)
+    notifier = notifier_of(os.environ)
     sinks = {address: open_sink(address) for address in dict.fromkeys(arguments.sink)}
-    session = replay(Request.of(arguments), sinks, arguments.out, pinned, ["modt", *sys.argv[1:]])
-    info, directory, show = session.stages.info, session.recording.directory, not arguments.quiet
-    if show:
+    loop = replay(Request.of(arguments), sinks, arguments.out, pinned, ["modt", *sys.argv[1:]])
+    info = loop.stages.info
+    directory = loop.recording.directory
+    shown = not arguments.quiet
+    if shown:
         for note in (*info.notes, *info.pose_notes):
             print(f"modt: {note}", file=sys.stderr)
-    with bar(info.n_frames, "frame", shown=show and sys.stderr.isatty()) as step:
-        summary = session.run(
-            supervisor, lambda r: step(f"{len(r.proposals)} proposals, {len(r.classified)} classified")
-        )
-    if show:
+    with bar(info.n_frames, "frame", shown=shown and sys.stderr.isatty()) as step:
+        summary = loop.run(notifier, lambda r: step(f"{len(r.proposals)} proposals, {len(r.classified)} classified"))
+    if shown:
         print(summary_text(summary))
-        kept = f"; those before are kept in {directory.before}" if directory.before else ""
+        kept = f"; those before are kept in {directory.previous}" if directory.previous else ""
         print(f"  results in {directory.path}; to look at them: modt view {directory.path}{kept}")
-    stopped_by = session.stop.signal
+    stopped_by = loop.stop.signal
     if stopped_by is not None:
         frames_done = f"after {summary['frames']} frames"
         print(f"modt: stopped by {stopped_by} {frames_done}: {directory.path} is whole", file=sys.stderr)

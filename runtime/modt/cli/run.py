@@ -9,10 +9,15 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from modt import host
 from modt.cli import options
 from modt.cli.command import INTERRUPTED
+
+if TYPE_CHECKING:
+    from modt.app.status import Status
+    from modt.sinks.recording import RecordingHealth
 
 log = logging.getLogger(__name__)
 
@@ -45,31 +50,38 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.app.containment import OncePerSecond
+    from modt.app.build import service
+    from modt.app.failures import OncePerSecond
     from modt.app.inputs import Request, live_source
-    from modt.app.session import service
-    from modt.app.status import one_line
-    from modt.app.supervisor import supervisor_of
+    from modt.app.systemd import notifier_of
     from modt.schemes import open_sink
 
-    supervisor = supervisor_of(os.environ)
+    notifier = notifier_of(os.environ)
     refusals = host.take_real_time_priority()
     for refusal in refusals:
         log.warning("%s", refusal)
+    # The receiver and the writers start their threads here, on the cores that the loop leaves free.
     with host.threads_on(cores):
         source, path = live_source(arguments.source, cores)
         addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
         sinks = {address: open_sink(address) for address in dict.fromkeys(addresses)}
-        command = ["modt", *sys.argv[1:]]
         request = replace(Request.of(arguments), path=path)
-        out, metrics = arguments.out, arguments.metrics
-        session = service(request, source, sinks, out, metrics, pinned, command, refusals)
+        command = ["modt", *sys.argv[1:]]
+        loop = service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, refusals)
     for handler in logging.getLogger().handlers:
         handler.addFilter(OncePerSecond())
-    status = session.run(supervisor)["status"]
-    counts, recording = status["counts"], session.recording.health()
-    records = f"records in {out}" if recording["parts"] else "nothing is recorded"
-    records += f", {recording['lost_lines']} lines are lost" if recording["lost_lines"] else ""
-    records += f": {recording['failing']}" if recording["failing"] else ""
-    print(f"modt: {counts['frames']} frames; {one_line(status)}; {records}", file=sys.stderr)
-    return INTERRUPTED if session.stop.signal == "SIGINT" else 0
+    status = loop.run(notifier)["status"]
+    print(f"modt: {_last_words(status, loop.recording.health(), arguments.out)}", file=sys.stderr)
+    return INTERRUPTED if loop.stop.signal == "SIGINT" else 0
+
+
+def _last_words(status: Status, recording: RecordingHealth, out: Path) -> str:
+    """Frames, rate and power of a service that has ended, and whether its records are whole."""
+    from modt.app.status import one_line
+
+    records = f"records in {out}" if recording.parts else "nothing is recorded"
+    if recording.lost_lines:
+        records += f", {recording.lost_lines} lines are lost"
+    if recording.failing:
+        records += f": {recording.failing}"
+    return f"{status.counts.frames} frames; {one_line(status)}; {records}"

@@ -25,8 +25,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare both commands and their options."""
     p = commands.add_parser("status", help="say what a running modt run is doing")
     q = commands.add_parser("top", help="show what a running modt run is doing, until Ctrl-C is pressed")
+    run_directory = "its run directory (default: %(default)s)"
     for command, function in ((p, run), (q, run_top)):
-        run_directory = "its run directory (default: %(default)s)"
         command.add_argument(
             "directory", nargs="?", type=Path, default=options.OUT, metavar="DIR", help=run_directory
         )
@@ -44,20 +44,21 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the status; 0 while the service runs, else 1."""
-    from modt.app.status import STALE_S, status_text
+    from modt.app.status import STALE_S, Status, status_text
     from modt.sinks.records import records_of
 
-    directory, now_s = arguments.directory, time.time()
-    status = read(directory)
-    with records_of(directory):
-        text = json.dumps(status, indent=1) if arguments.json else status_text(status, now_s)
-        stale = bool(now_s - status["time_s"] >= STALE_S)
+    now_s = time.time()
+    record = read(arguments.directory)
+    with records_of(arguments.directory):
+        status = Status.of(record)
+        text = json.dumps(record, indent=1) if arguments.json else status_text(status, now_s)
+        stale = bool(now_s - status.time_s >= STALE_S)
     print(text)
     return int(stale)
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """The status of a run: in memory while its disk cannot be written, else beside its records.
+    """The record of the status: in memory while the disk of the run cannot be written, else beside its records.
 
     Raises:
         MisuseError: there is none.
@@ -85,9 +86,7 @@ def run_top(arguments: argparse.Namespace) -> int:
     Raises:
         MisuseError: there is no status at the start.
     """
-    from modt.app.status import status_text
-
-    text = status_text(read(arguments.directory), time.time())
+    text = _text(arguments.directory)
     if not sys.stdout.isatty():
         print(text)
         return 0
@@ -97,7 +96,16 @@ def run_top(arguments: argparse.Namespace) -> int:
             print(CLEAR + "\n".join(rows), flush=True)
             time.sleep(PERIOD_S)
             try:
-                text = status_text(read(arguments.directory), time.time())
+                text = _text(arguments.directory)
             except MisuseError as error:  # another part of the records begins, or the service ends
                 text = str(error)
     return 0
+
+
+def _text(directory: Path) -> str:
+    from modt.app.status import Status, status_text
+    from modt.sinks.records import records_of
+
+    record = read(directory)
+    with records_of(directory):
+        return status_text(Status.of(record), time.time())

@@ -6,23 +6,25 @@ A board is described by E_window = P_idle T + e_seg N_seg + e_class N_class + e_
 from __future__ import annotations
 
 from modt.config import EnergyConfig
-from modt.energy.ledger import NO_WORK, Line
+from modt.energy.ledger import StageWork
 from modt.energy.meters.meter import Kind
+from modt.energy.windows import EnergyWindow
 
-SEGMENTATION, CLASSIFICATION = "segmentation", "classification"
+SEGMENTATION = "segmentation"
+CLASSIFICATION = "classification"
 _HARMLESS_MARKS = frozenset({"wrap"})
 _MAX_W = 10_000.0
 """Power above which the record of a window is not believed [W]."""
 
 
-def usable(line: Line) -> bool:
+def usable(window: EnergyWindow) -> bool:
     """Whether a window has a plausible reading and no mark that forbids its use."""
-    energy_J = line["energy_J"]
-    known = energy_J is not None and _HARMLESS_MARKS.issuperset(line.get("marks", ()))
-    return known and 0.0 <= energy_J <= _MAX_W * 1e-9 * line["wall_ns"]
+    if window.energy_J is None or not _HARMLESS_MARKS.issuperset(window.marks):
+        return False
+    return 0.0 <= window.energy_J <= _MAX_W * 1e-9 * window.wall_ns
 
 
-def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
+def attribute(window: EnergyWindow, board: EnergyConfig) -> dict[str, float]:
     """Energy of idling, of each stage, and of the unattributed rest of a window [J], or nothing without a reading.
 
     With P_idle of the board, E and T of the window and t of its CPU time, in all and of a stage,
@@ -34,21 +36,22 @@ def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
     E_segmentation = e_seg N_seg, E_classification = e_class N_class + e_point N_point, the rest is unattributed.
     The parts sum to E.
     """
-    energy_J = line["energy_J"]
+    energy_J = window.energy_J
     if energy_J is None:
         return {}
-    idle_J, stages = board.idle_W * 1e-9 * line["wall_ns"], line["stages"]
-    if board.coefficients is not None and line["kind"] != Kind.ESTIMATED:
+    idle_J = board.idle_W * 1e-9 * window.wall_ns
+    if board.coefficients is not None and window.kind is not Kind.ESTIMATED:
         seg_J, class_J, point_J = board.coefficients
-        segmented, classified = (stages.get(stage, NO_WORK) for stage in (SEGMENTATION, CLASSIFICATION))
+        segmented = window.stages.get(SEGMENTATION, StageWork())
+        classified = window.stages.get(CLASSIFICATION, StageWork())
         parts = {
             "idle": idle_J,
-            SEGMENTATION: seg_J * segmented["calls"],
-            CLASSIFICATION: class_J * classified["items"] + point_J * classified["points"],
+            SEGMENTATION: seg_J * segmented.calls,
+            CLASSIFICATION: class_J * classified.items + point_J * classified.points,
         }
         return parts | {"unattributed": energy_J - sum(parts.values())}
-    cpu_ns = {stage: row["cpu_ns"] for stage, row in stages.items()}
-    cpu_ns["unattributed"] = max(line["process_ns"] - sum(cpu_ns.values()), 0)
+    cpu_ns = {stage: work.cpu_ns for stage, work in window.stages.items()}
+    cpu_ns["unattributed"] = max(window.process_ns - sum(cpu_ns.values()), 0)
     total_ns = sum(cpu_ns.values())
     if not total_ns:
         return {"idle": energy_J}

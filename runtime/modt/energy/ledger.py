@@ -8,31 +8,63 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ParamSpec, TypeVar
 
 SCHEMA = "modt.ledger/1"
 STAGES = ("source", "segmentation", "odometry", "tracking", "scheduling", "classification", "fusion", "sink")
 
 Clock = Callable[[], int]
-Line = dict[str, Any]
 P = ParamSpec("P")
 R = TypeVar("R")
 
-NO_WORK = {"calls": 0, "items": 0, "points": 0, "wall_ns": 0, "cpu_ns": 0}
-"""Row of a stage that has not run."""
+
+@dataclass(slots=True)
+class StageWork:
+    """Work of one stage in a frame or a window."""
+
+    calls: int = 0  # spans
+    items: int = 0  # length of their results: points, proposals or tracks
+    points: int = 0  # points that the network has processed
+    wall_ns: int = 0
+    cpu_ns: int = 0  # CPU time of the thread of the ledger
+
+    def add(self, other: StageWork) -> None:
+        """Add the work of another frame."""
+        self.calls += other.calls
+        self.items += other.items
+        self.points += other.points
+        self.wall_ns += other.wall_ns
+        self.cpu_ns += other.cpu_ns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LedgerLine:
+    """The costs of a frame, a line modt.ledger/1 of ledger.jsonl. Its fields are the keys of the line."""
+
+    schema: str = SCHEMA
+    frame: int
+    stages: Mapping[str, StageWork]  # of the stages that ran
+    wall_ns: int  # exactly the sum of the stages' wall_ns, overhead_ns and idle_ns
+    cpu_ns: int
+    overhead_ns: int  # the ledger itself
+    idle_ns: int  # waiting, and the loop
+    marks: Sequence[str]  # "clock": a clock ran backwards, which counts as zero time
 
 
 class Ledger:
     """Records wall time, CPU time of this thread, calls, items and points of every stage."""
 
     def __init__(self, wall_ns: Clock = time.perf_counter_ns, cpu_ns: Clock = time.thread_time_ns) -> None:
-        self._wall_ns, self._cpu_ns = wall_ns, cpu_ns
-        self._stages = defaultdict[str, dict[str, int]](NO_WORK.copy)
-        self._wall0, self._cpu0 = wall_ns(), cpu_ns()
-        self.span_overhead_ns = self.frame_overhead_ns = 0
+        self._wall_ns = wall_ns
+        self._cpu_ns = cpu_ns
+        self._stages: defaultdict[str, StageWork] = defaultdict(StageWork)
+        self.span_overhead_ns = 0
+        self.frame_overhead_ns = 0
+        self._begin_frame(wall_ns(), cpu_ns())
         self.span_overhead_ns, self.frame_overhead_ns = self._measure_overhead()
-        self._wall0, self._cpu0 = wall_ns(), cpu_ns()
+        self._begin_frame(wall_ns(), cpu_ns())
 
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args), timed as a span of the stage. Its items are len(result), if defined."""
@@ -40,72 +72,78 @@ class Ledger:
 
     def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
         """Result as in `run`, and the CPU time of the span [ns]."""
-        wall0, cpu0 = self._wall_ns(), self._cpu_ns()
+        # The clock of the CPU is read inside the wall time, so that CPU time never exceeds it.
+        wall_begin = self._wall_ns()
+        cpu_begin = self._cpu_ns()
         try:
             result = function(*args, **kwargs)
         finally:
-            cpu1, wall1 = self._cpu_ns(), self._wall_ns()
-            row = self._stages[stage]
-            row["calls"] += 1
-            row["wall_ns"] += wall1 - wall0
-            row["cpu_ns"] += cpu1 - cpu0
+            cpu_end = self._cpu_ns()
+            wall_end = self._wall_ns()
+            work = self._stages[stage]
+            work.calls += 1
+            work.wall_ns += wall_end - wall_begin
+            work.cpu_ns += cpu_end - cpu_begin
         length = getattr(result, "__len__", None)
         if length is not None:
-            row["items"] += length()
-        return result, cpu1 - cpu0
+            work.items += length()
+        return result, cpu_end - cpu_begin
 
     def count(self, stage: str, *, points: int) -> None:
         """Add points to the work of the stage."""
-        self._stages[stage]["points"] += points
+        self._stages[stage].points += points
 
-    def close_frame(self, index: int) -> Line:
-        """Line of the frame: its stages, and the parts of the time since the last line.
+    def close_frame(self, index: int) -> LedgerLine:
+        """Line of the frame: its stages, and the parts of the time since the last line."""
+        wall_end = self._wall_ns()
+        cpu_end = self._cpu_ns()
+        wall_ns = wall_end - self._wall_begin
+        cpu_ns = cpu_end - self._cpu_begin
+        stages = dict(self._stages)
+        self._begin_frame(wall_end, cpu_end)
+        backwards = False
+        for work in stages.values():
+            backwards |= work.wall_ns < 0 or work.cpu_ns < 0
+            work.wall_ns = max(work.wall_ns, 0)
+            work.cpu_ns = max(work.cpu_ns, 0)
+        calls = sum(work.calls for work in stages.values())
+        spans_ns = sum(work.wall_ns for work in stages.values())
+        backwards |= wall_ns < spans_ns or cpu_ns < 0
+        wall_ns = max(wall_ns, spans_ns)
+        overhead_ns = min(calls * self.span_overhead_ns + self.frame_overhead_ns, wall_ns - spans_ns)
+        return LedgerLine(
+            frame=index,
+            stages=stages,
+            wall_ns=wall_ns,
+            cpu_ns=max(cpu_ns, 0),
+            overhead_ns=overhead_ns,
+            idle_ns=wall_ns - spans_ns - overhead_ns,
+            marks=["clock"] if backwards else [],
+        )
 
-        The stages' wall_ns, overhead_ns and idle_ns sum to wall_ns exactly. A clock that ran backwards is marked
-        "clock" and counts as zero time.
-        """
-        wall, cpu = self._wall_ns(), self._cpu_ns()
-        frame_wall, frame_cpu = wall - self._wall0, cpu - self._cpu0
-        self._wall0, self._cpu0 = wall, cpu
-        rows, self._stages = dict(self._stages), defaultdict(NO_WORK.copy)
-        marks: list[str] = []
-        for row in rows.values():
-            if row["wall_ns"] < 0 or row["cpu_ns"] < 0:
-                marks = ["clock"]
-                row["wall_ns"], row["cpu_ns"] = max(row["wall_ns"], 0), max(row["cpu_ns"], 0)
-        calls, spans = (sum(row[key] for row in rows.values()) for key in ("calls", "wall_ns"))
-        if frame_wall < spans or frame_cpu < 0:
-            marks = ["clock"]
-            frame_wall, frame_cpu = max(frame_wall, spans), max(frame_cpu, 0)
-        overhead = min(calls * self.span_overhead_ns + self.frame_overhead_ns, frame_wall - spans)
-        return {
-            "schema": SCHEMA,
-            "frame": index,
-            "stages": rows,
-            "wall_ns": frame_wall,
-            "cpu_ns": frame_cpu,
-            "overhead_ns": overhead,
-            "idle_ns": frame_wall - spans - overhead,
-            "marks": marks,
-        }
+    def _begin_frame(self, wall_ns: int, cpu_ns: int) -> None:
+        self._wall_begin = wall_ns
+        self._cpu_begin = cpu_ns
+        self._stages = defaultdict(StageWork)
 
     def _measure_overhead(self, spans: int = 32, rounds: int = 32) -> tuple[int, int]:
         """Cost of a span beyond the timed call, and of a frame beyond its spans [ns], the least of the rounds."""
-        span_ns, frame_ns = [], []
+        span_ns = []
+        frame_ns = []
         for _ in range(rounds):
-            t0 = self._cpu_ns()
+            start = self._cpu_ns()
             for _ in range(spans):
                 _nothing()
-            t1 = self._cpu_ns()
+            called = self._cpu_ns()
             for _ in range(spans):
                 self.run("", _nothing)
-            t2 = self._cpu_ns()
-            self._stages.update({stage: NO_WORK.copy() for stage in STAGES})
-            t3 = self._cpu_ns()
+            timed = self._cpu_ns()
+            self._stages.update({stage: StageWork() for stage in STAGES})
+            filled = self._cpu_ns()
             self.close_frame(0)
-            t4 = self._cpu_ns()
-            span_ns.append(max((t2 - t1) - (t1 - t0), 0) // spans)
-            frame_ns.append(max(t4 - t3, 0))
+            closed = self._cpu_ns()
+            span_ns.append(max((timed - called) - (called - start), 0) // spans)
+            frame_ns.append(max(closed - filled, 0))
         return min(span_ns), min(frame_ns)
 
 

@@ -36,6 +36,7 @@ class History:
 class _Step:
     """Change between two readings: its energy, bounds of its power, and its fault."""
 
+    start: float | None  # the first of the two readings
     joules: float
     watts: float | None  # None where the interval is too short to tell
     least_W: float
@@ -48,68 +49,96 @@ class _Step:
         return not self.fault and low_W / SURGE <= self.most_W and self.least_W <= SURGE * high_W
 
 
-def judge(facts: Facts, before: History, reading: float | None, seconds: float) -> tuple[History, float | None, str]:
-    """The history after a reading, the energy of the interval up to it [J], None where not measured, and its mark.
+Judgement = tuple[History, float | None, str]
+"""The history after a reading, the energy of the interval up to it [J], None where not measured, and its mark."""
+
+
+def judge(facts: Facts, before: History, reading: float | None, seconds: float) -> Judgement:
+    """Judge a reading, `seconds` after the one before.
 
     Marks: "wrap" (measured; a counter passed its range); without energy "first" (nothing to compare with), "lost"
     (unreadable or out of range), "back" (the reading before was lost or doubtful), "implausible" (unlike what the
     meter has shown), "reset" (counter decreased), "negative" (power below zero), "stuck" (nothing is drawn),
     "ambiguous" (long enough for a full range of the counter).
     """
-    shown = before.low_W, before.high_W
-    unsettled = replace(before, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None)
-    if (
-        reading is None
-        or not math.isfinite(reading)
-        or (facts.counts and not 0 <= reading <= (facts.wrap_J or reading))
-    ):
-        return replace(unsettled, accepted=False), None, "lost"
+    unsettled = replace(
+        before, accepted=False, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None
+    )
+    if reading is None or not _in_range(facts, reading):
+        return unsettled, None, "lost"
     if facts.kind is Kind.ESTIMATED:  # computed by a formula, which is never wrong
         return History(True, reading), None if before.base is None else reading - before.base, ""
-    step = from_base = _step(facts, before, before.base, reading, unsettled.base_s)
-    near_W = before.doubtful_W
+    step = _step(facts, before, before.base, reading, unsettled.base_s)
+    if step.fault != "stuck" and step.near(before.low_W, before.high_W):
+        return _accept(facts, before, step, reading, seconds, measured=before.accepted)
+    # The reading does not continue the accepted one. It may continue the doubtful one.
     if before.doubtful is not None:
         step = _step(facts, before, before.doubtful, reading, before.doubtful_s + seconds)
-    agrees = near_W is not None and not step.mark and step.near(near_W, near_W)
-    fits = step.fault != "stuck" and from_base.near(*shown)  # continues the accepted reading
-    follows = not fits and before.doubtful is not None and (agrees or step.near(*shown))  # continues the doubtful one
-    if fits:
-        step, agrees = from_base, False
-    if not fits and not follows:
-        mark = step.fault or ("first" if before.base is None else "implausible")
-        age_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
-        doubt = replace(unsettled, accepted=False, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts)
-        return doubt, None, mark
-    measured = before.accepted if fits else not before.doubtful_s  # unless the meter stood still at its start
-    levels = [W for W in (step.watts, near_W if agrees else None) if W is not None] if measured else []
-    after = History(True, reading, low_W=min(shown[0], *levels, math.inf), high_W=max(shown[1], *levels, -math.inf))
+        doubtful_W = before.doubtful_W
+        agrees = doubtful_W is not None and not step.mark and step.near(doubtful_W, doubtful_W)
+        if agrees or step.near(before.low_W, before.high_W):
+            stood_still = before.doubtful_s > 0
+            agreed_W = doubtful_W if agrees else None
+            return _accept(facts, before, step, reading, seconds, measured=not stood_still, agreed_W=agreed_W)
+    mark = step.fault or ("first" if before.base is None else "implausible")
+    stood_still_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
+    doubt = replace(unsettled, doubtful=reading, doubtful_s=stood_still_s, doubtful_W=step.watts)
+    return doubt, None, mark
+
+
+def _in_range(facts: Facts, reading: float) -> bool:
+    """Whether a meter can show the reading."""
+    return math.isfinite(reading) and (not facts.counts or 0 <= reading <= (facts.wrap_J or reading))
+
+
+def _accept(
+    facts: Facts,
+    before: History,
+    step: _Step,
+    reading: float,
+    seconds: float,
+    *,
+    measured: bool,
+    agreed_W: float | None = None,
+) -> Judgement:
+    """Accept a reading. Its power, and that of the doubtful reading with which it agrees, count as shown."""
     if not measured:
-        return after, None, "back"
-    start = before.base if fits else before.doubtful
-    joules = step.joules if facts.counts else 0.5 * seconds * (max(start or 0.0, 0.0) + reading)
-    return after, max(joules, 0.0), step.mark
+        return History(True, reading, low_W=before.low_W, high_W=before.high_W), None, "back"
+    shown_W = [watts for watts in (step.watts, agreed_W) if watts is not None]
+    low_W = min([before.low_W, *shown_W])
+    high_W = max([before.high_W, *shown_W])
+    # Power samples are integrated by the trapezoidal rule.
+    joules = step.joules if facts.counts else 0.5 * seconds * (max(step.start or 0.0, 0.0) + reading)
+    return History(True, reading, low_W=low_W, high_W=high_W), max(joules, 0.0), step.mark
 
 
 def _step(facts: Facts, before: History, start: float | None, end: float, seconds: float) -> _Step:
     """Change from one reading of a counter to another. A power sample stands alone, as the joules of a second."""
-    fault, mark, tick_s = "", "", TICK_S
+    mark = ""
     if not facts.counts:
-        start, seconds, tick_s = 0.0, 1.0, 0.0
+        joules = end
+        seconds = 1.0
+        tick_s = 0.0
     elif start is None:
-        return _Step(0.0, None, 0.0, 0.0, "first")
-    joules, wrap_J = end - start, facts.wrap_J or math.inf
+        return _Step(start, 0.0, None, 0.0, 0.0, "first")
+    else:
+        joules = end - start
+        tick_s = TICK_S
     if joules < 0 and facts.wrap_J:
-        joules, mark = joules + wrap_J, "wrap"
+        joules += facts.wrap_J
+        mark = "wrap"
     least_W = (joules - facts.resolution) / (seconds + tick_s)
     most_W = (joules + facts.resolution) / (seconds - tick_s) if seconds > tick_s else math.inf
+    known_W = SURGE * before.high_W if before.base is not None else math.inf
+    fault = ""
     # A wrap that implies another power than was shown may as well be a reset.
     if joules < -facts.resolution or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
         fault = "reset" if facts.counts else "negative"
-    elif seconds * min(facts.max_W, SURGE * before.high_W if before.base is not None else math.inf) >= wrap_J:
+    elif seconds * min(facts.max_W, known_W) >= (facts.wrap_J or math.inf):
         fault = "ambiguous"
     elif joules <= 0 and seconds > 10 * tick_s and facts.must_draw:
         fault = "stuck"
     elif least_W > facts.max_W:
         fault = "implausible"
     watts = joules / seconds if seconds > 2 * tick_s and not fault and not mark else None
-    return _Step(joules, watts, least_W, most_W, fault, mark)
+    return _Step(start, joules, watts, least_W, most_W, fault, mark)

@@ -21,7 +21,9 @@ class Histogram:
     """
 
     def __init__(self, bits: int = BITS) -> None:
-        self.count = self.total = self.maximum = 0
+        self.count = 0
+        self.total = 0
+        self.maximum = 0
         self._bits = bits
         self._occurrences: Counter[int] = Counter()
 

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
+from modt.energy.ledger import LedgerLine
+from modt.energy.windows import EnergyWindow
 from modt.errors import ModtError
 from modt.sinks.output import Health, LedgerSink, Writer
 
@@ -50,12 +52,20 @@ class Background(Generic[T]):
         close_s: float = CLOSE_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.name, self._writer, self._depth, self._encode = name, writer, depth, encode
-        self._retry_s, self._close_s, self._clock = retry_s, close_s, clock
+        self.name = name
+        self._writer = writer
+        self._depth = depth
+        self._encode = encode
+        self._retry_s = retry_s
+        self._close_s = close_s
+        self._clock = clock
+        # The queue and the two fields after it are guarded by `_changed`; the counts belong to the thread.
         self._jobs: deque[Callable[[], None]] = deque()
         self._changed = threading.Condition()
         self._end_s: float | None = None
-        self._written = self._dropped = self._failed = 0
+        self._dropped = 0
+        self._written = 0
+        self._failed = 0
         self._state = "ok"
         self._thread = threading.Thread(target=self._work, name="sink", daemon=True)
         self._thread.start()
@@ -65,17 +75,17 @@ class Background(Generic[T]):
         encoded: T = item if self._encode is None else self._encode(item)
         self._put(lambda: self._writer.write(encoded))
 
-    def ledger(self, record: dict[str, Any], /) -> None:
+    def ledger(self, line: LedgerLine | EnergyWindow, /) -> None:
         """Queue a line of the ledger, if the writer takes them."""
         writer = self._writer
         if isinstance(writer, LedgerSink):
-            self._put(lambda: writer.ledger(record))
+            self._put(lambda: writer.ledger(line))
 
     def health(self) -> Health:
         """Items written, dropped, failed and waiting, the last failure, and the writer's own counts."""
-        own: Health = getattr(self._writer, "health", dict)()
+        counts_of_writer: Health = getattr(self._writer, "health", dict)()
         return {
-            **own,
+            **counts_of_writer,
             "written": self._written,
             "dropped": self._dropped,
             "failed": self._failed,
@@ -109,7 +119,8 @@ class Background(Generic[T]):
 
     def _work(self) -> None:
         with suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # real-time priority is for the loop alone
+            # The thread inherits the priority of the loop, which alone runs in real time.
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         while (job := self._next()) is not None:
             self._attempt(job)
         with suppress(Exception):
@@ -137,15 +148,15 @@ class Background(Generic[T]):
     def _fail(self, error: Exception) -> None:
         self._failed += 1
         known = isinstance(error, (ModtError, OSError))
-        what = f"{error}" if known else f"{type(error).__name__}: {error}"
+        cause = f"{error}" if known else f"{type(error).__name__}: {error}"
         if self._state == "ok":
             log.warning(
                 "%s: %s; tried again every %g s, what cannot be written is counted",
                 self.name,
-                what,
+                cause,
                 self._retry_s,
                 exc_info=None if known else error,
             )
-        self._state = what
+        self._state = cause
         with self._changed:
             self._changed.wait_for(lambda: self._end_s is not None, self._retry_s)

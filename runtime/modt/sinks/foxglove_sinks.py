@@ -16,8 +16,9 @@ import foxglove
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from modt.address import Address
-from modt.energy import ledger, windows
 from modt.energy.attribution import usable
+from modt.energy.ledger import STAGES, LedgerLine
+from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.ros2.cdr import CdrWriter
 from modt.ros2.definitions import schema
@@ -30,13 +31,14 @@ logging.getLogger("foxglove").setLevel(logging.ERROR)  # its warnings of each un
 BACKLOG = 16
 """Messages that may wait for a client. A slow client misses the oldest."""
 PORT = 8765
-NUMBER, TEXT = "std_msgs/Float64", "std_msgs/String"
+NUMBER = "std_msgs/Float64"
+TEXT = "std_msgs/String"
 FIGURES = {
     "energy/mJ_per_frame": NUMBER,
     "energy/watts": NUMBER,
     "energy/kind": TEXT,
     "cpu_ms/total": NUMBER,
-    **{f"cpu_ms/{stage}": NUMBER for stage in ledger.STAGES},
+    **{f"cpu_ms/{stage}": NUMBER for stage in STAGES},
 }
 """Topics with one number or word each, and their types."""
 
@@ -65,9 +67,9 @@ class FoxgloveChannels:
             if channel.has_sinks():
                 channel.log(encode(result), log_time=self._stamp_ns)
 
-    def ledger(self, record: dict[str, Any]) -> None:
+    def ledger(self, line: LedgerLine | EnergyWindow) -> None:
         """Publish the mean energy a frame of a window, or the CPU time of a frame's stages, at the last stamp."""
-        for name, value in figures(record).items():
+        for name, value in figures(line).items():
             cdr = CdrWriter()
             if isinstance(value, str):
                 cdr.text(value)
@@ -76,17 +78,18 @@ class FoxgloveChannels:
             self._figures[name].log(cdr.message(), log_time=self._stamp_ns)
 
 
-def figures(record: dict[str, Any]) -> dict[str, float | str]:
+def figures(line: LedgerLine | EnergyWindow) -> dict[str, float | str]:
     """Values of the FIGURES that a line of the ledger contains."""
-    if record["schema"] == windows.SCHEMA and usable(record) and record["frames"][2]:
-        energy_J, n_frames = record["energy_J"], record["frames"][2]
-        watts = energy_J / (1e-9 * record["wall_ns"]) if record["wall_ns"] else 0.0
-        energy = {"mJ_per_frame": 1e3 * energy_J / n_frames, "watts": watts, "kind": record["kind"]}
-        return {f"energy/{name}": value for name, value in energy.items()}
-    if record["schema"] == ledger.SCHEMA:
-        cpu_ns = {"total": record.get("cpu_ns", 0), **{s: row["cpu_ns"] for s, row in record["stages"].items()}}
-        return {f"cpu_ms/{name}": 1e-6 * value for name, value in cpu_ns.items()}
-    return {}
+    if isinstance(line, LedgerLine):
+        cpu_ms = {f"cpu_ms/{stage}": 1e-6 * work.cpu_ns for stage, work in line.stages.items()}
+        return {"cpu_ms/total": 1e-6 * line.cpu_ns, **cpu_ms}
+    if line.frame_J is None or line.watts is None or not usable(line):
+        return {}
+    return {
+        "energy/mJ_per_frame": 1e3 * line.frame_J,
+        "energy/watts": line.watts,
+        "energy/kind": line.kind,
+    }
 
 
 class FoxgloveServer(FoxgloveChannels):
@@ -134,7 +137,8 @@ class _Output(FileIO):
     def __init__(self, path: Path) -> None:
         with writing(path):
             super().__init__(path, "xb")
-        self.path, self.frames = path, 0
+        self.path = path
+        self.frames = 0
         self.error: OSError | None = None
 
     def write(self, data: Any) -> int:
@@ -146,7 +150,7 @@ class _Output(FileIO):
             raise
 
 
-class McapFile:
+class McapRecorder:
     """Records at PATH, then at PATH with -1, -2 … before its suffix.
 
     After a write error the part ends, readable up to there, and the next frame begins another.
@@ -164,10 +168,13 @@ class McapFile:
     def __init__(
         self, path: Path, *, points: bool, max_bytes: float = math.inf, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        self._path, self._max_bytes, self._clock = path, max_bytes, clock
+        self._path = path
+        self._max_bytes = max_bytes
+        self._clock = clock
         self._context = foxglove.Context()
         self._channels = FoxgloveChannels(self._context, points=points)
-        self._output, self._writer, self._flushed_s = self._part()
+        self._output, self._writer = self._begin_part()
+        self._flushed_s = clock()
 
     def write(self, result: FrameResult, /) -> None:
         """Record a frame.
@@ -177,7 +184,8 @@ class McapFile:
         """
         if self._output.error is not None or self._output.tell() > self._max_bytes / PARTS:
             self.close()
-            self._output, self._writer, self._flushed_s = self._part()
+            self._output, self._writer = self._begin_part()
+            self._flushed_s = self._clock()
         self._channels.write(result)
         if self._clock() - self._flushed_s >= FLUSH_S:
             self._flushed_s = self._clock()
@@ -188,9 +196,9 @@ class McapFile:
                 raise self._output.error
         self._output.frames += 1
 
-    def ledger(self, record: dict[str, Any], /) -> None:
+    def ledger(self, line: LedgerLine | EnergyWindow, /) -> None:
         """Record a line of the ledger. A failure is raised with the next frame."""
-        self._channels.ledger(record)
+        self._channels.ledger(line)
 
     def close(self) -> None:
         """Write the index and close the part. A part that failed before its first frame is removed."""
@@ -200,14 +208,14 @@ class McapFile:
         if self._output.error is not None and not self._output.frames:
             self._output.path.unlink(missing_ok=True)
 
-    def _part(self) -> tuple[_Output, foxglove.MCAPWriter, float]:
+    def _begin_part(self) -> tuple[_Output, foxglove.MCAPWriter]:
         earlier = self._earlier()
         self._make_room([path for _, path in earlier])
         number = earlier[-1][0] + 1 if earlier else 0
         name = f"{self._path.stem}-{number}{self._path.suffix}" if number else self._path.name
         output = _Output(self._path.with_name(name))
         writer = foxglove.open_mcap(output, context=self._context, writer_options=OPTIONS)
-        return output, writer, self._clock()
+        return output, writer
 
     def _earlier(self) -> list[tuple[int, Path]]:
         """Numbers and files of the existing parts, the oldest first."""
@@ -224,7 +232,7 @@ class McapFile:
                     path.unlink()
 
 
-def open_mcap(address: Address) -> McapFile:
+def open_mcap(address: Address) -> McapRecorder:
     """A recording. `points=none` leaves the points out, `max_mb` limits its size.
 
     Raises:
@@ -239,4 +247,5 @@ def open_mcap(address: Address) -> McapFile:
         max_bytes = 0.0
     if not max_bytes > 0:
         raise MisuseError(address.text, "max_mb is not a size", "write max_mb=MEGABYTES")
-    return McapFile(Path(address.path), points=address.choice("points", "all", "none") == "all", max_bytes=max_bytes)
+    points = address.choice("points", "all", "none") == "all"
+    return McapRecorder(Path(address.path), points=points, max_bytes=max_bytes)

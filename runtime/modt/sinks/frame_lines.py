@@ -85,11 +85,14 @@ class Datagrams:
     """One datagram a frame. An absent or slow receiver misses frames and delays nothing."""
 
     def __init__(self, name: str, family: int, target: Any) -> None:
-        self._name, self._target = name, target
+        self._name = name
+        self._target = target
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
-        self._written = self._dropped = self._failed = 0
+        self._written = 0
+        self._dropped = 0
+        self._failed = 0
         self._state = "ok"
 
     def write(self, result: FrameResult, /) -> None:
@@ -104,7 +107,8 @@ class Datagrams:
         except OSError as error:
             self._miss(error)
         else:
-            self._written, self._state = self._written + 1, "ok"
+            self._written += 1
+            self._state = "ok"
 
     def close(self) -> None:
         """Close the socket."""
@@ -117,7 +121,8 @@ class Datagrams:
     def _miss(self, error: OSError) -> None:
         cause = str(error.strerror or error)
         full = error.errno in _FULL
-        self._dropped, self._failed = self._dropped + full, self._failed + (not full)
+        self._dropped += full
+        self._failed += not full
         if self._state == "ok":
             who = "its receiver is behind" if full else "nobody receives"
             log.warning("%s: %s (%s); frames are lost and counted until it reads again", self._name, who, cause)

@@ -42,10 +42,11 @@ def join_columns(n: int, *columns: str | Text) -> Text:
     """(n, w) rows of columns side by side: texts (n, v), or one text for all rows."""
     blocks = [encode(column)[None] if isinstance(column, str) else column for column in columns]
     out = np.empty((n, sum(block.shape[1] for block in blocks)), np.uint32)
-    end = 0
+    begin = 0
     for block in blocks:
-        begin, end = end, end + block.shape[1]
+        end = begin + block.shape[1]
         out[:, begin:end] = block
+        begin = end
     return out
 
 
@@ -109,5 +110,6 @@ def probabilities(numbers: Float64) -> Text:
     out[..., 1] = np.where(tail > 0, DECIMALS_1_TO_3.take(decimals), DECIMALS_1_TO_3_STRIPPED.take(decimals))
     out[..., 2] = DECIMALS_4_TO_6_STRIPPED.take(tail)
     small = (millionths > 0) & (millionths < len(EXPONENTIAL))
-    out[small, 0], out[small, 1:] = 0, EXPONENTIAL[millionths[small]]
+    out[small, 0] = 0
+    out[small, 1:] = EXPONENTIAL[millionths[small]]
     return out

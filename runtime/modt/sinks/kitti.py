@@ -77,6 +77,7 @@ def _image_boxes(boxes: Float64, camera: Camera) -> Float64:
 
 
 MAX_INSTANCE = 0xFFFF
+"""Greatest number of a proposal in the upper half of a label."""
 
 
 class PointLabels(Writer[FrameResult]):

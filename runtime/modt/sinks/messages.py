@@ -15,24 +15,39 @@ from modt.ros2 import odometry, point_cloud2
 from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
 from modt.types import NONE, Float64, FrameResult, Int
 
-PREFIX, FRAME_ID, WORLD_FRAME_ID = "modt", "lidar", "world"
-"""Names used if neither the address nor the input gives one."""
-DETECTIONS, MARKERS, TF = "vision_msgs/Detection3DArray", "visualization_msgs/MarkerArray", odometry.TF
-UNKNOWN_COVARIANCE = f"{8 * 36}x"
+# Names used if neither the address nor the input gives one
+PREFIX = "modt"
+FRAME_ID = "lidar"
+WORLD_FRAME_ID = "world"
 
-ARROW, CUBE, TEXT = 0, 1, 9
-ADD, DELETE_ALL = 0, 3
+DETECTIONS = "vision_msgs/Detection3DArray"
+MARKERS = "visualization_msgs/MarkerArray"
+TF = odometry.TF
+UNKNOWN_COVARIANCE = f"{8 * 36}x"
+"""Field of a covariance of zeros, which stands for an unknown one."""
+
+# Types and actions of visualization_msgs/Marker
+ARROW = 0
+CUBE = 1
+TEXT = 9
+ADD = 0
+DELETE_ALL = 3
+
 LIFETIME_S = 1
 """Time after which viewers remove a marker that was not replaced [s]."""
-TEXT_M, ABOVE_M = 0.6, 0.5
-"""Height of a label, and of its middle above the box [m]."""
-MIN_ARROW_MPS, ARROW_WIDTH_M = 0.3, 0.2
-"""Slower objects have no arrow. An arrow is as long as the distance of one second."""
+TEXT_M = 0.6
+"""Height of a label [m]."""
+ABOVE_M = 0.5
+"""Height of the middle of a label above the box [m]."""
+MIN_ARROW_MPS = 0.3
+"""Slower objects have no arrow [m/s]. An arrow is as long as the distance of one second."""
+ARROW_WIDTH_M = 0.2
 WHITE = (1.0, 1.0, 1.0, 1.0)
 COLOURS = tuple((*(int(c.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.6) for c in CLASSES.values())
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """Pose and scale of the marker that deletes all others."""
-NO_TEXT, NO_HEADER = text_fields(""), header_fields(0.0, "")
+NO_TEXT = text_fields("")
+NO_HEADER = header_fields(0.0, "")
 
 
 def _joined(*parts: Fields) -> Fields:
@@ -96,14 +111,15 @@ def seen(result: FrameResult, background: bool = False) -> Int:
 
 def detections(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
     """vision_msgs/Detection3DArray (version 4): boxes and posteriors of tracks in view, the reported class first."""
-    tracks, rows = result.tracks, seen(result, background)
+    tracks = result.tracks
+    rows = seen(result, background)
     boxes = result.proposals.box[tracks.proposal[rows]]
     poses = in_sensor_frame(box_poses(boxes), result.frame.R_level_sensor)
     header, header_values = header_fields(result.frame.stamp_s, frame_id)
     layouts = [_detection(header, class_) for class_ in range(len(CLASS_NAMES))]
     cdr = CdrWriter()
     cdr.record((*header, "I"), *header_values, len(rows))
-    columns = tracks.id[rows], tracks.object_class[rows], tracks.posterior[rows], poses, boxes[:, 3:6]
+    columns = (tracks.id[rows], tracks.object_class[rows], tracks.posterior[rows], poses, boxes[:, 3:6])
     for track, class_, posterior, pose, size in zip(*(column.tolist() for column in columns), strict=True):
         fields, hypotheses = layouts[class_]
         results = [(*name, posterior[k], *pose) for k, name in hypotheses]
@@ -124,8 +140,11 @@ def _detection(
 
 def markers(result: FrameResult, frame_id: str) -> bytes:
     """visualization_msgs/MarkerArray: a cube, a label and, if it moves, an arrow for each object in view."""
-    tracks, rows = result.tracks, seen(result)
-    boxes, speed = result.proposals.box[tracks.proposal[rows]], tracks.x[rows, 3]
+    tracks = result.tracks
+    rows = seen(result)
+    boxes = result.proposals.box[tracks.proposal[rows]]
+    speed = tracks.x[rows, 3]
+    # An arrow points where the object goes, which is backwards if its speed is negative.
     ahead = boxes.copy()
     ahead[:, 6] = tracks.x[rows, 2] - yaw_of(result.T_world_sensor) + np.pi * (speed < 0)
     above = box_poses(boxes) + np.array([0, 0, 1, 0, 0, 0, 0]) * (boxes[:, 5:6] / 2 + ABOVE_M)
@@ -136,7 +155,8 @@ def markers(result: FrameResult, frame_id: str) -> bytes:
     _marker(cdr, header, "", (0, CUBE, DELETE_ALL), NOWHERE)
     columns = (tracks.id[rows], tracks.object_class[rows], np.abs(speed), boxes[:, 3:6], *poses)
     for track, class_, speed_mps, size, pose, top, way in zip(*(column.tolist() for column in columns), strict=True):
-        label, colour = f"{CLASS_NAMES[class_]} {track}, {speed_mps:.1f} m/s", COLOURS[class_]
+        label = f"{CLASS_NAMES[class_]} {track}, {speed_mps:.1f} m/s"
+        colour = COLOURS[class_]
         _marker(cdr, header, "objects", (track, CUBE, ADD), (*pose, *size), colour)
         _marker(cdr, header, "labels", (track, TEXT, ADD), (*top, 0.0, 0.0, TEXT_M), WHITE, label)
         if speed_mps >= MIN_ARROW_MPS:
@@ -154,8 +174,8 @@ def _marker(
     colour: tuple[float, ...] = WHITE,
     text: str = "",
 ) -> None:
-    own: Fields = ("3i", "10d", "4f", "2i"), (*number_kind_action, *pose_scale, *colour, LIFETIME_S, 0)
-    fields, values = _joined(header, text_fields(namespace), own, UNUSED, text_fields(text), NO_MESH)
+    shape: Fields = ("3i", "10d", "4f", "2i"), (*number_kind_action, *pose_scale, *colour, LIFETIME_S, 0)
+    fields, values = _joined(header, text_fields(namespace), shape, UNUSED, text_fields(text), NO_MESH)
     cdr.record(fields, *values)
 
 
@@ -177,7 +197,8 @@ def transform(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:
 
 def cloud(result: FrameResult, frame_id: str) -> bytes:
     """sensor_msgs/PointCloud2: the sweep."""
-    points, R_level_sensor = result.frame.points, result.frame.R_level_sensor
+    points = result.frame.points
+    R_level_sensor = result.frame.R_level_sensor
     if R_level_sensor is not None:
         points = np.column_stack([points[:, :3] @ R_level_sensor.astype(np.float32), points[:, 3]])
     return point_cloud2.write_cloud(result.frame.stamp_s, frame_id, points)
@@ -201,5 +222,6 @@ def in_sensor_frame(poses: Float64, R_level_sensor: Float64 | None) -> Float64:
 
 def T_world_sensor(result: FrameResult) -> Float64:
     """(4, 4) pose of the sensor as it is mounted, tilted or not."""
-    T, R_level_sensor = result.T_world_sensor, result.frame.R_level_sensor
+    T = result.T_world_sensor
+    R_level_sensor = result.frame.R_level_sensor
     return T if R_level_sensor is None else T @ se3(R_level_sensor, np.zeros(3))

@@ -7,8 +7,10 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Generic, Literal, Protocol, TypeVar, runtime_checkable
+from typing import BinaryIO, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
+from modt.energy.ledger import LedgerLine
+from modt.energy.windows import EnergyWindow
 from modt.errors import ModtError
 from modt.types import FrameResult
 
@@ -39,10 +41,10 @@ class Sink(Writer[FrameResult], Protocol):
 
 @runtime_checkable
 class LedgerSink(Protocol):
-    """A sink that also takes the lines of the ledger (`modt.ledger/1`, `modt.energy/1`)."""
+    """A sink that also takes the lines of the ledger."""
 
-    def ledger(self, record: dict[str, Any], /) -> None:
-        """Write a line of the ledger."""
+    def ledger(self, line: LedgerLine | EnergyWindow, /) -> None:
+        """Write the costs of a frame, or the energy of a window."""
 
 
 @contextmanager
@@ -88,7 +90,9 @@ class LineFile(Generic[T]):
     """
 
     def __init__(self, path: Path, encode: Callable[[T], str] = str, mode: Literal["wb", "ab"] = "wb") -> None:
-        self.path, self._encode, self._written = path, encode, 0
+        self.path = path
+        self._encode = encode
+        self._written = 0
         with writing(path):
             self._file: BinaryIO = path.open(mode, buffering=0)
 

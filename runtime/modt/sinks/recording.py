@@ -6,15 +6,18 @@ import logging
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from modt.config import RecordingConfig
+from modt.energy.ledger import LedgerLine
+from modt.energy.windows import EnergyWindow
 from modt.errors import ModtError
 from modt.geometry import Camera
 from modt.sinks.kitti import KittiResults, PointLabels
-from modt.sinks.output import Health, LineFile, Sink, Writer
+from modt.sinks.output import Health, LineFile, Writer
 from modt.sinks.records import line
-from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
+from modt.sinks.run_directory import LEDGER, RUN, STATUS, SUMMARY, TRACKS, RunDirectory
 from modt.sinks.tracks import frame_line
 from modt.types import FrameResult
 
@@ -52,7 +55,20 @@ class AtOnce(Writer[Job]):
         return {"dropped": 0}
 
 
-class Recording(Sink):
+@dataclass(frozen=True, slots=True)
+class RecordingHealth:
+    """Counts of a recording, for status and summary."""
+
+    keep: str  # as in the configuration
+    lines: int  # written
+    lost_lines: int  # not written, or perhaps missing since their file was removed or not synced
+    thinned_lines: int  # left out to keep to `gb_per_day`
+    pauses: int  # how often writing failed
+    parts: int  # begun
+    failing: str | None  # why nothing can be written now
+
+
+class Recording(Writer[FrameResult]):
     """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted.
 
     Once a second it checks that its files are in place, and begins another part if they were removed or moved.
@@ -60,16 +76,9 @@ class Recording(Sink):
     Args:
         directory: directory of the records.
         config: choice of the records and their limits.
-        writer: runs what writes, in a thread; `write`, `ledger`, `start` and `follow` are for the loop, the rest for
-            that thread.
+        writer: runs what writes, in a thread; `write`, `ledger`, `start` and `configure` are for the loop, the rest
+            for that thread.
         describe: text of run.yaml for a new part.
-
-    Attributes:
-        lines: number written.
-        lost: number of those that could not be written, or may be missing since their file was removed or not synced.
-        thinned: number left out to keep to `gb_per_day`.
-        pauses, parts: number of times that writing failed, and of parts begun.
-        cause: why nothing can be written now, or None.
     """
 
     def __init__(
@@ -80,14 +89,28 @@ class Recording(Sink):
         describe: Callable[[], str],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.directory, self.config = directory, config
-        self.lines = self.lost = self.thinned = self.pauses = self.parts = 0
-        self.cause: str | None = None
-        self.writer, self._describe, self._clock = writer, describe, clock
+        self.directory = directory
+        self.config = config
+        self.writer = writer
+        self._describe = describe
+        self._clock = clock
+        # Counts, as in RecordingHealth
+        self._lines = 0
+        self._lost = 0
+        self._thinned = 0
+        self._pauses = 0
+        self._parts = 0
+        self._failing: str | None = None
+        # The present part
+        self._begun = False
         self._files: dict[str, LineFile[str]] = {}
-        self._begun, self._bytes, self._retry_s = False, 0, float("-inf")
-        self._unsynced, self._named = 0, 0  # lines, and files, that a power cut may take
-        self._allowed_bytes, self._allowed_s = WHOLE_BYTES, clock()
+        self._bytes = 0
+        self._unsynced_lines = 0  # a power cut may take them
+        self._synced_files = 0  # files whose names survive a power cut
+        self._retry_s = float("-inf")  # time of the next attempt after a failure
+        # A token bucket: what may be written of the tracks, and when it was last filled
+        self._allowed_bytes = WHOLE_BYTES
+        self._filled_s = clock()
 
     def start(self) -> None:
         """Begin the first part."""
@@ -100,29 +123,30 @@ class Recording(Sink):
             self._allowed_bytes -= len(text)
             self.writer.write(lambda: self._append(TRACKS, text))
 
-    def ledger(self, record: dict[str, Any]) -> None:
+    def ledger(self, costs: LedgerLine | EnergyWindow, /) -> None:
         """Hand over a line of the ledger."""
         if LEDGER in KEPT[self.config.keep]:
-            text = line(record)
+            text = line(costs)
             self.writer.write(lambda: self._append(LEDGER, text))
 
-    def follow(self, config: RecordingConfig) -> None:
-        """Follow the recording of another profile, and describe that profile in run.yaml."""
+    def configure(self, config: RecordingConfig) -> None:
+        """Record as another profile says, and describe that profile in run.yaml."""
         self.config = config
         self.writer.write(self._redescribe)
 
-    def health(self) -> dict[str, Any]:
-        """Counts for status and summary."""
-        counts = {
-            "lines": self.lines,
-            "lost_lines": self.lost + int(self.writer.health()["dropped"]),
-            "thinned_lines": self.thinned,
-            "pauses": self.pauses,
-            "parts": self.parts,
-        }
-        return {"keep": self.config.keep, **counts, "failing": self.cause}
+    def health(self) -> RecordingHealth:
+        """Counts so far. Lines that wait for a hanging disk are dropped, and count as lost."""
+        return RecordingHealth(
+            keep=self.config.keep,
+            lines=self._lines,
+            lost_lines=self._lost + int(self.writer.health()["dropped"]),
+            thinned_lines=self._thinned,
+            pauses=self._pauses,
+            parts=self._parts,
+            failing=self._failing,
+        )
 
-    def state(self, status: str) -> None:
+    def write_status(self, status: str) -> None:
         """Write the status beside the records or in memory, and make the lines so far survive a power cut."""
         self._check_files()
         self.sync()
@@ -133,13 +157,18 @@ class Recording(Sink):
                 return
         self.directory.in_memory(status)
 
+    def write_summary(self, text: str) -> None:
+        """Write the summary beside the records, if any could be begun."""
+        if self._parts:
+            self.directory.write(SUMMARY, text)
+
     def sync(self) -> None:
         """Make the lines so far survive a power cut. If that fails, they count as lost."""
-        if self.cause is None and self._unsynced:
+        if self._failing is None and self._unsynced_lines:
             if not self._attempt(self._sync):
-                self.lost += self._unsynced
+                self._lost += self._unsynced_lines
                 self._close_files()
-            self._unsynced = 0
+            self._unsynced_lines = 0
 
     def finish(self) -> None:
         """Close the files."""
@@ -149,24 +178,26 @@ class Recording(Sink):
 
     def _allows(self) -> bool:
         """Whether another frame keeps to `gb_per_day`."""
-        now_s, self._allowed_s = self._allowed_s, self._clock()
-        self._allowed_bytes += 1e9 * self.config.gb_per_day / DAY_S * max(self._allowed_s - now_s, 0.0)
-        self._allowed_bytes = min(self._allowed_bytes, WHOLE_BYTES)
-        self.thinned += self._allowed_bytes < 0
+        now_s = self._clock()
+        filled_bytes = 1e9 * self.config.gb_per_day / DAY_S * max(now_s - self._filled_s, 0.0)
+        self._filled_s = now_s
+        self._allowed_bytes = min(self._allowed_bytes + filled_bytes, WHOLE_BYTES)
+        self._thinned += self._allowed_bytes < 0
         return self._allowed_bytes >= 0
 
     def _append(self, name: str, text: str) -> None:
         if self._begun and self._bytes + len(text) > 1e6 * self.config.disk_mb / PARTS:
             self.finish()
         if not self._ready() or not self._attempt(lambda: self._line(name, text)):
-            self.lost += 1
+            self._lost += 1
             return
-        self.lines, self._bytes = self.lines + 1, self._bytes + len(text)
-        self._unsynced += 1
+        self._lines += 1
+        self._unsynced_lines += 1
+        self._bytes += len(text)
 
     def _ready(self) -> bool:
         """Whether a part is open, or can be begun now."""
-        if self.cause is not None and self._clock() < self._retry_s:
+        if self._failing is not None and self._clock() < self._retry_s:
             return False
         if not self._begun:
             self._begin()
@@ -175,21 +206,25 @@ class Recording(Sink):
     def _begin(self) -> None:
         limit_bytes = 1e6 * self.config.disk_mb * (1 - 1 / PARTS)
         self._begun = self._attempt(lambda: self.directory.begin(self._describe(), limit_bytes))
-        self._bytes, self.parts = RESERVED_BYTES, self.parts + self._begun
+        self._parts += self._begun
+        self._bytes = RESERVED_BYTES
 
     def _check_files(self) -> None:
         """Close a part whose files were moved or removed. The lines of removed files count as lost."""
         if self._begun and not (self.directory.present() and all(file.present() for file in self._files.values())):
             removed = sum(int(file.health()["written"]) for file in self._files.values() if file.removed())
-            self.lost, self._unsynced = self.lost + removed, 0
+            self._lost += removed
+            self._unsynced_lines = 0
             log.warning("%s: records were removed or moved; %d lines are lost", self.directory.path, removed)
             self._close_files()
 
     def _close_files(self) -> None:
-        files, self._files, self._named, self._begun = self._files, {}, 0, False
-        for file in files.values():
+        for file in self._files.values():
             with suppress(ModtError):
                 file.close()
+        self._files = {}
+        self._synced_files = 0
+        self._begun = False
 
     def _redescribe(self) -> None:
         if self._begun:
@@ -203,9 +238,9 @@ class Recording(Sink):
     def _sync(self) -> None:
         for file in self._files.values():
             file.sync()
-        if self._named != len(self._files):
+        if self._synced_files != len(self._files):
             self.directory.sync()
-            self._named = len(self._files)
+            self._synced_files = len(self._files)
 
     def _attempt(self, action: Callable[[], None]) -> bool:
         """Whether an action succeeded. A failure pauses the recording, and its end is logged."""
@@ -213,16 +248,16 @@ class Recording(Sink):
             action()
         except Exception as error:
             cause = error.cause if isinstance(error, ModtError) else f"{type(error).__name__}: {error}"
-            if self.cause is None:
-                self.pauses += 1
+            if self._failing is None:
+                self._pauses += 1
                 subject = error.subject if isinstance(error, ModtError) else self.directory.path
                 log.warning("%s: %s; recording pauses until it can", subject, cause)
-            self.cause = cause
+            self._failing = cause
             self._retry_s = self._clock() + RETRY_S
             return False
-        if self.cause is not None:
-            log.warning("%s: recording again; %d lines are lost", self.directory.path, self.lost)
-            self.cause = None
+        if self._failing is not None:
+            log.warning("%s: recording again; %d lines are lost", self.directory.path, self._lost)
+            self._failing = None
         return True
 
 
@@ -246,7 +281,9 @@ class WholeRecording(Recording):
     ) -> None:
         more_than_a_disk_has = RecordingConfig(disk_mb=1e7, gb_per_day=1e5)
         super().__init__(directory, more_than_a_disk_has, AtOnce(), describe)
-        self._sequence, self._camera, self._labels = sequence, camera, labels
+        self._sequence = sequence
+        self._camera = camera
+        self._labels = labels
         self._more: list[Writer[FrameResult]] = []
 
     def start(self) -> None:
@@ -263,9 +300,9 @@ class WholeRecording(Recording):
         for writer in self._more:
             writer.write(result)
 
-    def follow(self, config: RecordingConfig) -> None:
+    def configure(self, config: RecordingConfig) -> None:
         """Describe another profile, and keep the same records."""
-        super().follow(self.config)
+        super().configure(self.config)
 
     def finish(self) -> None:
         """Close the files."""

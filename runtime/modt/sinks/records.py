@@ -15,13 +15,21 @@ BROKEN = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeErro
 """Exceptions raised by the use of a record that lacks a value or has one of another kind."""
 
 
-def line(record: dict[str, Any]) -> str:
-    """Line of a record.
+def fields_of(record: Any) -> dict[str, Any]:
+    """Fields of a dataclass by their names, as the argument `default` of json.dumps.
+
+    Every dataclass of a record is written by this function: its fields are the keys of the record, in their order.
+    """
+    return {name: getattr(record, name) for name in record.__dataclass_fields__}
+
+
+def line(record: object) -> str:
+    """Line of a record, which is a mapping or a dataclass.
 
     Raises:
         ValueError: a number is not finite.
     """
-    return json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n"
+    return json.dumps(record, separators=(",", ":"), allow_nan=False, default=fields_of) + "\n"
 
 
 @contextmanager

@@ -13,7 +13,11 @@ from pathlib import Path
 from modt.errors import MisuseError, ModtError
 from modt.sinks.output import replace_file, writing
 
-RUN, TRACKS, LEDGER, SUMMARY, STATUS = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"
+RUN = "run.yaml"
+TRACKS = "tracks.jsonl"
+LEDGER = "ledger.jsonl"
+SUMMARY = "summary.json"
+STATUS = "status.json"
 MARK = "service: true"
 """Line of run.yaml in the directories of a service. No other directory is ever deleted."""
 MEMORY = Path("/dev/shm")
@@ -32,7 +36,7 @@ class RunDirectory:
 
     Attributes:
         path: the directory.
-        before: new path of the previous part, None if there was none.
+        previous: new path of the previous part, None if there was none.
 
     Raises:
         MisuseError: the path is a file, or a directory that holds other files.
@@ -40,10 +44,11 @@ class RunDirectory:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.before: Path | None = None
-        self._locked, self._lock = False, ExitStack()
+        self.previous: Path | None = None
+        self._locked = False  # within `locked`, so that each new part keeps the lock
+        self._lock = ExitStack()
         self._shut_out = False  # another run has the lock
-        self._number: int | None = None  # descriptor of the lock
+        self._lock_file: int | None = None  # its descriptor
         self._disk = next(folder for folder in path.absolute().parents if os.path.ismount(folder))
         if path.exists() and not path.is_dir():
             raise MisuseError(path, "is a file", "give a directory as --out")
@@ -77,8 +82,8 @@ class RunDirectory:
                 raise OSError(f"{self._disk} is not mounted")
             if self._locked:
                 self._take_lock()
-            self._keep()
-            self._trim(limit_bytes)
+            self._set_aside()
+            self._delete_oldest(limit_bytes)
             self.path.mkdir(parents=True, exist_ok=True)
         self.write(RUN, description, lasting=True)
 
@@ -127,16 +132,17 @@ class RunDirectory:
         """Take the lock, or take it once more if its file was removed together with the folder around the run."""
         path = self.path.with_name(f".{self.path.name}.lock")
         with suppress(OSError):
-            if self._number is not None and os.path.samestat(os.fstat(self._number), os.stat(path)):
+            if self._lock_file is not None and os.path.samestat(os.fstat(self._lock_file), os.stat(path)):
                 return
         self._lock.close()
-        self._number, self._shut_out = None, False
+        self._lock_file = None
+        self._shut_out = False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             number = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW)
             self._lock.callback(os.close, number)
             fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._number = number
+            self._lock_file = number
         except BlockingIOError:
             self._shut_out = True
             remedy = "end it, or give another --out"
@@ -150,17 +156,19 @@ class RunDirectory:
             if match:
                 yield int(match[1]), path
 
-    def _keep(self) -> None:
+    def _set_aside(self) -> None:
+        """Rename the previous part, or remove one without any record."""
         if not self.path.is_dir():
             return
         if any((self.path / name).is_file() for name in (TRACKS, LEDGER)):
             (self.path / STATUS).unlink(missing_ok=True)
             number = 1 + max((n for n, _ in self._numbered()), default=0)
-            self.before = self.path.rename(self.path.with_name(f"{self.path.name}~{number}"))
+            self.previous = self.path.rename(self.path.with_name(f"{self.path.name}~{number}"))
         else:
             _remove_known(self.path)
 
-    def _trim(self, limit_bytes: float) -> None:
+    def _delete_oldest(self, limit_bytes: float) -> None:
+        """Delete the oldest parts of services until the rest keeps to the limit."""
         parts = [(path, _size(path)) for path in self.kept()]
         excess = sum(size for _, size in parts) - limit_bytes
         for path, size in parts:

@@ -18,7 +18,7 @@ BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 UNKNOWN_NEAR = "unknown, near"
 """Value of `uncertain` for a track that may be a person too near to be seen whole."""
-BOOLEANS = False, True
+BOOLEANS = (False, True)
 UNCERTAIN = (None, *(f"{name}?" for name in CLASS_NAMES[1:]), UNKNOWN_NEAR)
 NUMBER_BYTES = 32
 """Room for the numbers in `part` and `parts` [bytes]."""
@@ -32,7 +32,8 @@ class _Latest:
 
     def of(self, result: FrameResult) -> str:
         if result is not self.result:
-            self.line, self.result = f"{_head(result)},{_tracks(text.decode(_rows(result)))}", result
+            self.line = f"{_head(result)},{_tracks(text.decode(_rows(result)))}"
+            self.result = result
         return self.line
 
 
@@ -104,7 +105,8 @@ def _rows(result: FrameResult) -> text.Text:
     Raises:
         ValueError: a number is not finite.
     """
-    tracks, lost = result.tracks, result.tracks.proposal == NONE
+    tracks = result.tracks
+    lost = tracks.proposal == NONE
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
     id_, proposal, points, age, missed = text.integers(np.stack(counts))
     boxes = np.vstack([result.proposals.box, np.zeros(len(BOX_KEYS))])  # the last row stands for NONE

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from modt.address import Address
-from modt.energy import ledger, windows
+from modt.energy.ledger import LedgerLine
+from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.sinks.records import line
 from modt.types import FrameResult
@@ -37,17 +38,17 @@ class LivePage(LiveServer):
         """Keep a frame until its line of the ledger arrives."""
         self._result = result if self.watched else None
 
-    def ledger(self, record: dict[str, Any], /) -> None:
+    def ledger(self, line: LedgerLine | EnergyWindow, /) -> None:
         """Take the line of a frame, or the energy of the frames of a window."""
-        if record["schema"] == windows.SCHEMA:
-            n = record["frames"][2]
-            if n and record["energy_J"] is not None:
-                self._energy = {"energy_mJ": 1e3 * record["energy_J"] / n, "kind": record["kind"]}
-        elif record["schema"] == ledger.SCHEMA and self._result is not None:
-            result, self._result = self._result, None
-            if result.frame.index == record["frame"]:
-                cpu_ms = {name: round(1e-6 * stage["cpu_ns"], 3) for name, stage in record["stages"].items()}
-                self.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}))
+        if isinstance(line, EnergyWindow):
+            if line.frame_J is not None:
+                self._energy = {"energy_mJ": 1e3 * line.frame_J, "kind": line.kind}
+            return
+        result = self._result
+        self._result = None
+        if result is not None and result.frame.index == line.frame:
+            cpu_ms = {stage: round(1e-6 * work.cpu_ns, 3) for stage, work in line.stages.items()}
+            self.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}))
 
 
 def open_view(address: Address) -> LivePage:
@@ -67,7 +68,9 @@ def open_view(address: Address) -> LivePage:
 
 
 STEP_CM = 5
+"""Width of a cell of the points [cm]."""
 MOST_CELLS = 50_000
+"""Greatest number of cells of a frame; those of the ground are left out first."""
 FASTEST = 1
 """Level of the fastest compression."""
 

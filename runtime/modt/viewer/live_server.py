@@ -11,8 +11,10 @@ from socketserver import ThreadingTCPServer
 
 _Request = socket.socket | tuple[bytes, socket.socket]
 
-MOST_PAGES, MOST_CONNECTIONS = 8, 32
-"""Most pages that receive events, and most connections, each with its thread."""
+MOST_PAGES = 8
+"""Greatest number of pages that receive events."""
+MOST_CONNECTIONS = 32
+"""Greatest number of connections, each with its thread."""
 SEND_S = 5.0
 """A client that takes nothing for so long is disconnected [s]."""
 POLL_S = 0.1
@@ -44,8 +46,13 @@ class LiveServer(ThreadingTCPServer):
         self.port = int(self.server_address[1])
         local = ip_address(str(address[0])).is_loopback
         self.names = {"localhost", "127.0.0.1", "[::1]", host} if local else None
-        self._free, self._changed = threading.Semaphore(MOST_CONNECTIONS), threading.Condition()
-        self._event, self._number, self._pages, self._closed = b"", 0, 0, False
+        self._free = threading.Semaphore(MOST_CONNECTIONS)
+        # The fields below are guarded by `_changed`.
+        self._changed = threading.Condition()
+        self._event = b""
+        self._number = 0  # of the event
+        self._pages = 0
+        self._closed = False
         threading.Thread(target=self.serve_forever, args=(POLL_S,), name="view", daemon=True).start()
 
     @property
@@ -56,7 +63,8 @@ class LiveServer(ThreadingTCPServer):
     def publish(self, data: str) -> None:
         """Replace the event, which every page receives as soon as it has sent the one before."""
         with self._changed:
-            self._event, self._number = f"data: {data.rstrip()}\n\n".encode(), self._number + 1
+            self._event = f"data: {data.rstrip()}\n\n".encode()
+            self._number += 1
             self._changed.notify_all()
 
     def enter(self) -> int | None:

@@ -13,7 +13,9 @@ from modt.types import Float32, Int
 LEVEL = 6
 """Level of the compression. Higher ones take longer and gain little."""
 CELL_BYTES = 3
+"""Bytes of the number of a cell."""
 NUMBER_BYTES = 4
+"""Bytes of a number of a table."""
 
 
 def packed(data: bytes, level: int = LEVEL) -> str:
@@ -40,8 +42,9 @@ def packed_table(table: Int, level: int = LEVEL) -> str:
 SIDE = 4096
 """Cells of the grid along x and along y. Three bytes count them all."""
 LEVEL_M = 0.1
+"""Height above ground of one level [m]. Level 0 is ground."""
 LEVELS = 64
-"""Heights above ground are whole multiples of LEVEL_M below LEVELS. Level 0 is ground."""
+"""Number of levels; the highest one holds all greater heights."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +69,7 @@ def occupied(x: Float32, y: Float32, level: Int, step_cm: int) -> Cells:
     """The cells of points x, y [m] within the grid, each with the highest level of its points."""
     column, row = (np.floor(v * (100 / step_cm)).astype(np.int64) + SIDE // 2 for v in (x, y))
     # Sorted by cell, then by height: the last of each cell is its highest.
-    packed = np.sort((SIDE * row + column) * LEVELS + level)
-    cell, level = np.divmod(packed, LEVELS)
+    cell_and_level = np.sort((SIDE * row + column) * LEVELS + level)
+    cell, level = np.divmod(cell_and_level, LEVELS)
     highest = np.append(np.diff(cell) > 0, True)[: len(cell)]
     return Cells(cell[highest], level[highest])

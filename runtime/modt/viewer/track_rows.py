@@ -34,12 +34,17 @@ def scaled(rows: Float64) -> Int:
 
 def result_rows(result: FrameResult) -> Float64:
     """(M, COLUMNS) rows of the tracks of a result, at frame 0."""
-    tracks, pose = result.tracks, planar(result.T_world_sensor)
-    seen = tracks.proposal != NONE
+    tracks = result.tracks
+    pose = planar(result.T_world_sensor)
+    # The box of a lost track: its last one in the world, at the predicted position, seen from the sensor
     box = tracks.box - [0, 0, result.T_world_sensor[2, 3], 0, 0, 0, 0]
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+    cos = np.cos(pose[2])
+    sin = np.sin(pose[2])
     dx, dy = (tracks.x[:, :2] - pose[:2]).T
-    box[:, 0], box[:, 1], box[:, 6] = c * dx + s * dy, c * dy - s * dx, wrap(box[:, 6] - pose[2])
+    box[:, 0] = cos * dx + sin * dy
+    box[:, 1] = cos * dy - sin * dx
+    box[:, 6] = wrap(box[:, 6] - pose[2])
+    seen = tracks.proposal != NONE
     box[seen] = result.proposals.box[tracks.proposal[seen]]
     plain = (
         tracks.id,

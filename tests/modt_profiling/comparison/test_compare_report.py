@@ -100,8 +100,8 @@ def test_meters_are_read_at_the_ends_of_turns():
     made = [mode_run("conventional", metered=True) for _ in range(2)]
     interleave(FRAMES[:6], made, turn=3)
     for each in made:
-        assert [line["frames"][2] for line in each.energy_lines] == [3, 3]
-        assert all(line["energy_J"] > 0 for line in each.energy_lines)
+        assert [window.n_frames for window in each.energy_lines] == [3, 3]
+        assert all(window.energy_J > 0 for window in each.energy_lines)
 
 
 MEAN_MS = {"conventional": 10.975 + 2 + 3, "efficient": 10.975 + 2 + 3 / 20, "accurate": 10.975 + 2 + 3 / 5}

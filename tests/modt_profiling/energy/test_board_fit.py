@@ -3,7 +3,7 @@ import pytest
 from scipy import optimize
 
 from modt_profiling.energy.board_fit import CLASS, SEG, FitError, fit, nonnegative_fit, unit_energy_J
-from tests.energy.meter_files import line_of
+from tests.energy.meter_files import window_of
 
 TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
 
@@ -12,8 +12,8 @@ def windows(loads, energy_J):
     """Windows of a second of these segmentations, classifications and points, and an energy that they give."""
     lines = []
     for n, m, points in loads.tolist():
-        lines.append(line_of(energy_J(n, m, points), n, m))
-        lines[-1]["stages"]["classification"]["points"] = points
+        lines.append(window_of(energy_J(n, m, points), n, m))
+        lines[-1].stages["classification"].points = points
     return lines
 
 
@@ -30,7 +30,7 @@ def test_intervals_cover_the_truth_through_noise_and_windows_without_energy():
         lines = windows(random.integers([1, 0, 0], [9, 60, 24_000], (40, 3)), drawn_J)
         result = fit(lines, random)
         assert result.windows + result.dropped == len(lines)
-        assert result.dropped == sum(line["energy_J"] is None for line in lines)
+        assert result.dropped == sum(line.energy_J is None for line in lines)
         for c in result.coefficients:
             hits[c.name] += c.low <= TRUE[c.name] <= c.high
             assert 0.0 <= c.low <= c.value <= c.high
@@ -44,9 +44,9 @@ LOADS = np.random.default_rng(0).integers(1, 60, (24, 3))
     ("lines", "cause"),
     [
         (windows(LOADS, lambda n, m, _: 9.0 + 0.2 * n - 0.1 * m), r"class_J is -0\.1 .* gives no energy back"),
-        ([line_of(3.0 + n, n, 10 * n) for n in range(1, 20)], "varied together"),
-        ([line_of(3.0 + n, n) for n in range(1, 20)], "class_J, point_J"),
-        ([line_of(None, 1), line_of(3.0, 1, marks=["suspended"]), line_of(3.0, 1)], "at least 8"),
+        ([window_of(3.0 + n, n, 10 * n) for n in range(1, 20)], "varied together"),
+        ([window_of(3.0 + n, n) for n in range(1, 20)], "class_J, point_J"),
+        ([window_of(None, 1), window_of(3.0, 1, marks=["suspended"]), window_of(3.0, 1)], "at least 8"),
     ],
 )
 def test_windows_that_determine_no_coefficient_are_refused(lines, cause):
@@ -68,7 +68,7 @@ def test_work_that_costs_nothing_is_bounded_at_zero():
 
 
 def test_unit_energy_of_bursts_is_the_true_one():
-    lines = [line_of(3.0 + n * TRUE["seg_J"], n) for n in (40, 50, 60)]
+    lines = [window_of(3.0 + n * TRUE["seg_J"], n) for n in (40, 50, 60)]
     assert unit_energy_J(lines, 3.0, SEG) == pytest.approx(TRUE["seg_J"])
     assert unit_energy_J(lines, 3.0, CLASS) is None
 

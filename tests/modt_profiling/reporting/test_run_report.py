@@ -14,6 +14,7 @@ from modt import profile
 from modt.app.deadlines import Deadlines
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
+from modt.energy.ledger import StageWork
 from modt.errors import MisuseError
 from modt.pipeline import STAGES
 from modt.sinks.run_directory import SUMMARY
@@ -22,6 +23,7 @@ from modt_profiling.reporting.energy_plots import stage_energy_mJ
 from modt_profiling.reporting.quantity import to_json
 from modt_profiling.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
 from modt_profiling.reporting.run_sums import FrameSeries, FrameSums
+from tests import results
 from tests.results import CAR, frame_record, result
 
 
@@ -81,11 +83,13 @@ def window(index, lines, energy_J, kind="measured", marks=()):
         "frames": [lines[0]["frame"], lines[-1]["frame"], len(lines)],
         "wall_ns": sum(line["wall_ns"] for line in lines),
         "process_ns": sum(line["cpu_ns"] for line in lines),
+        "overhead_ns": 0,
+        "idle_ns": 0,
         "stages": stages,
         "energy_J": energy_J,
         "kind": kind,
         "resolution_J": 1e-4,
-        "meters": [{"name": "RAPL packages"}],
+        "meters": [{"name": "RAPL packages", "kind": kind, "scope": "CPU packages", "J": energy_J}],
         "conditions": {"governor": "performance", "frequency_MHz": 2600.0, "temperature_C": 50.0},
         "marks": list(marks),
     }
@@ -168,7 +172,7 @@ def test_a_report_of_a_long_run_holds_no_more_than_one_of_a_short_run(tmp_path):
         for k in range(frames):
             tracks = [track(id_, id_ - k, named=True) for id_ in range(k, k + 20)]
             record = {"proposals": 20, "classifications": 1, "deferred": 0, "tracks": tracks}
-            sums.add(ledger_line(k, 1), record)
+            sums.add(results.ledger_line(k, classification=StageWork(1, 1, 40)), record)
         assert sums.counts().tracks == sums.counts().classified_tracks == frames + 19
         assert sums.counts().proposals == 20 * frames
         return len(pickle.dumps(sums))
@@ -261,7 +265,7 @@ def test_missing_records_are_named(run, missing):
 def test_how_many_are_as_late_or_later(tmp_path):
     late, punctual = Deadlines(0.1), Deadlines(0.1)
     for ms in (0.2, 0.2, 3.0, 40.0):
-        late.lateness.add(round(1e6 * ms))
+        late.lateness_ns.add(round(1e6 * ms))
     found, none = late.late_or_later(), punctual.late_or_later()
     assert found["ms"] == pytest.approx([0.2, 3.0, 40.0], rel=0.03)
     assert found["frames"] == [4, 2, 1]

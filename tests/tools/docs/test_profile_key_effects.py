@@ -7,7 +7,6 @@ key has an effect if another value of it, half and double the default first, giv
 import dataclasses
 import hashlib
 import itertools
-import json
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from operator import attrgetter
@@ -70,7 +69,7 @@ def street(stream: tuple[int, float] = (3, 1.0), also: str = "", value: Any = No
             columns += [proposals.members, proposals.box, proposals.cut, pipeline.decision.frequency]
             for column in columns:
                 digest.update(column.tobytes())
-            digest.update(json.dumps(ledger.close_frame(frame.index)["stages"]).encode())
+            digest.update(repr(ledger.close_frame(frame.index).stages).encode())
         return digest.hexdigest()
 
     return digest_of

@@ -10,6 +10,7 @@ import numpy as np
 
 from modt.config import EnergyConfig
 from modt.energy.meters.meter import Facts, Kind, worst
+from modt.energy.windows import EnergyWindow
 from modt.pipeline import CLASSIFICATION, ODOMETRY, SEGMENTATION, STAGES, TRACKING
 from modt.reporting.histogram import Histogram
 from modt.types import Float64
@@ -83,23 +84,23 @@ def compare_tree(
 
 def _energy(
     run: gamma.RunCosts,
-    windows: list[dict[str, Any]],
+    windows: list[EnergyWindow],
     attributed: EnergySums,
     basis: Basis,
     random: np.random.Generator,
 ) -> dict[str, Quantity]:
     """Energy a frame with and without idling [J], by the meter if it was read, else by the model."""
     good = usable_windows(windows)
-    frames = np.array([line["frames"][2] for line in good])
+    frames = np.array([window.n_frames for window in good])
     if frames.sum():
-        gross_J = np.array([line["energy_J"] for line in good])
-        net_J = gross_J - basis.board.idle_W * 1e-9 * np.array([line["wall_ns"] for line in good])
+        gross_J = np.array([window.energy_J for window in good], np.float64)
+        net_J = gross_J - basis.board.idle_W * 1e-9 * np.array([window.wall_ns for window in good])
 
         def per_frame(energy_J: Float64, kind: Kind) -> Quantity:
             bounds = gamma.interval(len(good), lambda k: float(energy_J[k].sum() / max(frames[k].sum(), 1)), random)
             return quantity(float(energy_J.sum() / frames.sum()), "J", kind, bounds)
 
-        kind = worst(Kind(line["kind"]) for line in good)
+        kind = worst(window.kind for window in good)
         return {"net_J": per_frame(net_J, Kind.ESTIMATED), "gross_J": per_frame(gross_J, kind)}
     net_J = run.cost @ np.array([attributed.watts(stage) for stage in STAGES])
     gross_J = net_J + basis.board.idle_W * basis.period_s

@@ -10,8 +10,8 @@ from itertools import islice
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.energy.ledger import Ledger, Line
-from modt.energy.windows import Windows
+from modt.energy.ledger import Ledger, LedgerLine, StageWork
+from modt.energy.windows import EnergyWindow, Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Fusion, Pipeline
 from modt.reporting.histogram import Histogram
 from modt.types import NONE, Bool, Budget, Float64, Frame, FrameResult, Int, Proposals, Tracks
@@ -51,8 +51,8 @@ class ModeRun:
     ledger: Ledger
     budget: Callable[[int], Budget]  # budget of a frame by its index
     windows: Windows | None = None  # None where no meter is read
-    lines: list[Line] = field(default_factory=list)  # lines of the ledger
-    energy_lines: list[Line] = field(default_factory=list)
+    lines: list[LedgerLine] = field(default_factory=list)  # lines of the ledger
+    energy_lines: list[EnergyWindow] = field(default_factory=list)
     lengths: Histogram = field(default_factory=Histogram)  # frames with a proposal of every track that has ended
     _counts: list[tuple[int, ...]] = field(default_factory=list)
     _alive: dict[int, int] = field(default_factory=dict)  # the same of the tracks alive
@@ -91,15 +91,15 @@ class ModeRun:
 
     def cpu_s(self) -> Float64:
         """(frames, stages) CPU time of each stage of the pipeline [s]."""
-        rows = [[line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES] for line in self.lines]
+        rows = [[line.stages.get(stage, StageWork()).cpu_ns for stage in STAGES] for line in self.lines]
         return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
     def _end(self, ids: Iterable[int]) -> None:
         for id_ in ids:
             self.lengths.add(self._alive[id_])
 
-    def _count(self, result: FrameResult, line: Line) -> None:
-        tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
+    def _count(self, result: FrameResult, line: LedgerLine) -> None:
+        tracks, work = result.tracks, line.stages.get(CLASSIFICATION, StageWork())
         visible = tracks.proposal != NONE
         alive, seen, classified = (set(ids.tolist()) for ids in (tracks.id, tracks.id[visible], result.classified))
         self._counts.append(
@@ -110,8 +110,8 @@ class ModeRun:
                 len(classified - self._classified),
                 len(result.classified),
                 len((classified & self._classified) - self._seen),
-                row.get("points", 0),
-                row.get("calls", 0),
+                work.points,
+                work.calls,
                 len(result.frame.points),
                 len(tracks.id),
             )

@@ -9,8 +9,8 @@ from itertools import cycle
 
 import numpy as np
 
-from modt.energy.ledger import Ledger, Line
-from modt.energy.windows import Windows
+from modt.energy.ledger import Ledger, StageWork
+from modt.energy.windows import EnergyWindow, Windows
 from modt.types import Float32, Float64, Frame, Int, Proposals
 from modt_profiling.energy.board_fit import CLASS, IDLE, SEG, Fit, fit, unit_energy_J, usable_windows
 
@@ -52,19 +52,20 @@ class Workload:
         work = cycle([(f, p, np.arange(len(p))) for f in self.frames for p in [self.segment(f.points)]])
         segmented = [self._window(burst_s, lambda: self._segment(next(frames))) for _ in range(_BURSTS)]
         classified = [self._window(burst_s, lambda: self._classify(*next(work))) for _ in range(_BURSTS)]
-        rows = [line["stages"].get("classification", {}) for line in usable_windows(classified)]
-        points, items = (sum(row.get(key, 0) for row in rows) for key in ("points", "items"))
-        busy = [line for line in usable_windows([*segmented, *classified]) if line["process_ns"]]
-        above_W = [1e9 * (line["energy_J"] - idle_W * IDLE.count(line)) / line["process_ns"] for line in busy]
+        total = StageWork()
+        for window in usable_windows(classified):
+            total.add(window.stages.get("classification", StageWork()))
+        busy = [window for window in usable_windows([*segmented, *classified]) if window.process_ns]
+        above_W = [1e9 * ((w.energy_J or 0.0) - idle_W * IDLE.count(w)) / w.process_ns for w in busy]
         return Calibration(
             fit=found,
             seg_burst_J=unit_energy_J(segmented, idle_W, SEG),
             class_burst_J=unit_energy_J(classified, idle_W, CLASS),
-            class_fit_J=found["class_J"].value + found["point_J"].value * points / max(items, 1),
+            class_fit_J=found["class_J"].value + found["point_J"].value * total.points / max(total.items, 1),
             busy_W=idle_W + (float(np.median(above_W)) if above_W else 0.0),
         )
 
-    def _varied(self, frames: Iterator[Frame], seconds: float, random: np.random.Generator) -> Line:
+    def _varied(self, frames: Iterator[Frame], seconds: float, random: np.random.Generator) -> EnergyWindow:
         """A window of random load: share of waiting, classifications a frame, largest or smallest proposals first."""
         load, waiting = int(random.integers(0, 60)), float(random.uniform(0.0, 0.9))
         order = -1 if random.random() < 0.5 else 1
@@ -78,7 +79,7 @@ class Workload:
 
         return self._window(seconds, task)
 
-    def _window(self, seconds: float, task: Callable[[], object]) -> Line:
+    def _window(self, seconds: float, task: Callable[[], object]) -> EnergyWindow:
         """A window of one repeated task."""
         self.ledger.close_frame(0)
         self.windows.close()

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import linalg, optimize, stats
 
 from modt.energy.attribution import CLASSIFICATION, SEGMENTATION, usable
-from modt.energy.ledger import Line
+from modt.energy.windows import EnergyWindow
 from modt.types import Float64
 
 _RIDGE = 1e-12
@@ -47,10 +47,10 @@ class Regressor:
     key: str
     scale: float = 1.0  # factor on the count, so that the coefficient has its unit
 
-    def count(self, line: Line) -> float:
+    def count(self, window: EnergyWindow) -> float:
         """Count of one window."""
-        row = line["stages"].get(self.stage, {}) if self.stage else line
-        return self.scale * float(row.get(self.key, 0))
+        row = window.stages.get(self.stage) if self.stage else window
+        return self.scale * float(getattr(row, self.key, 0))
 
 
 IDLE = Regressor("idle_W", "", "wall_ns", 1e-9)
@@ -89,12 +89,12 @@ class FitError(Exception):
     """The windows do not determine the coefficients; the message names the load to vary."""
 
 
-def usable_windows(lines: Iterable[Line]) -> list[Line]:
+def usable_windows(lines: Iterable[EnergyWindow]) -> list[EnergyWindow]:
     """The windows that are usable."""
     return [line for line in lines if usable(line)]
 
 
-def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 1000) -> Fit:
+def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: int = 1000) -> Fit:
     """Coefficients of REGRESSORS over "modt.energy/1" lines, each at least 0.
 
     Raises:
@@ -105,7 +105,7 @@ def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 100
     if n < 2 * p:
         raise FitError(f"{n} usable windows are too few for {p} coefficients; record at least {2 * p}")
     X = np.array([[regressor.count(line) for regressor in REGRESSORS] for line in good])
-    y = np.array([line["energy_J"] for line in good])
+    y = np.array([line.energy_J for line in good], np.float64)
     scale = np.linalg.norm(X, axis=0)
     if not scale.all():
         missing = ", ".join(r.name for r, s in zip(REGRESSORS, scale, strict=True) if not s)
@@ -152,8 +152,8 @@ def _bootstrap(X: Float64, y: Float64, random: np.random.Generator, resamples: i
     return np.asarray(np.linalg.solve(normal, moment[..., None])[..., 0])
 
 
-def unit_energy_J(lines: Sequence[Line], idle_W: float, work: Regressor) -> float | None:
+def unit_energy_J(lines: Sequence[EnergyWindow], idle_W: float, work: Regressor) -> float | None:
     """Median of (energy - idle) / count over windows of that work alone; None without a usable window."""
     worked = [line for line in usable_windows(lines) if work.count(line) > 0]
-    each = [(line["energy_J"] - idle_W * IDLE.count(line)) / work.count(line) for line in worked]
+    each = [((line.energy_J or 0.0) - idle_W * IDLE.count(line)) / work.count(line) for line in worked]
     return float(np.median(each)) if each else None

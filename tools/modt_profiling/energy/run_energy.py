@@ -4,25 +4,34 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from modt.config import EnergyConfig
 from modt.energy.attribution import attribute, usable
-from modt.energy.ledger import Line
-from modt.energy.meters.meter import Kind, model_J, model_name, worst
+from modt.energy.ledger import LedgerLine
+from modt.energy.meters.meter import Kind, Scope, model_J, model_name, worst
+from modt.energy.windows import EnergyWindow, MeterEnergy
 
 
-def modelled(line: Line, board: EnergyConfig) -> Line:
+def modelled(line: LedgerLine, board: EnergyConfig) -> EnergyWindow:
     """A frame's ledger line as a window of one frame, with the energy of the power model."""
-    return line | {
-        "frames": [line["frame"], line["frame"], 1],
-        "process_ns": line["cpu_ns"],
-        "energy_J": model_J(board, line["wall_ns"], line["cpu_ns"]),
-        "kind": Kind.ESTIMATED.value,
-        "resolution_J": 0.0,
-        "meters": [{"name": model_name(board)}],
-    }
+    energy_J = model_J(board, line.wall_ns, line.cpu_ns)
+    return EnergyWindow(
+        window=line.frame,
+        frames=(line.frame, line.frame, 1),
+        wall_ns=line.wall_ns,
+        process_ns=line.cpu_ns,
+        overhead_ns=line.overhead_ns,
+        idle_ns=line.idle_ns,
+        stages=line.stages,
+        energy_J=energy_J,
+        kind=Kind.ESTIMATED,
+        resolution_J=0.0,
+        meters=[MeterEnergy(model_name(board), Kind.ESTIMATED, Scope.PROCESS, energy_J)],
+        conditions={},
+        marks=line.marks,
+    )
 
 
 class EnergySums:
@@ -35,20 +44,20 @@ class EnergySums:
         self.parts_J: Counter[str] = Counter()
         self._cpu_ns: Counter[str] = Counter()  # CPU time of each stage
         self.kind, self.meter = Kind.ESTIMATED, ""
-        self.conditions: dict[str, Any] = {}  # conditions of the last window
+        self.conditions: Mapping[str, Any] = {}  # conditions of the last window
         self.marks: set[str] = set()
 
-    def add_window(self, window: Line) -> None:
+    def add_window(self, window: EnergyWindow) -> None:
         """Add a line of modt.energy; one that is not usable is counted as dropped."""
-        self.conditions = window["conditions"]
-        self.marks.update(window["marks"])
+        self.conditions = window.conditions
+        self.marks.update(window.marks)
         if not usable(window):
             self.dropped += 1
-            self.marks.update(() if window["energy_J"] is None or window["marks"] else {"implausible"})
-        elif window["frames"][2]:
+            self.marks.update(() if window.energy_J is None or window.marks else {"implausible"})
+        elif window.n_frames:
             self._add(window)
 
-    def add_frame(self, line: Line) -> None:
+    def add_frame(self, line: LedgerLine) -> None:
         """Add a frame of the ledger by the power model."""
         self._add(modelled(line, self._board))
 
@@ -62,19 +71,20 @@ class EnergySums:
         """Power of each of these stages as by `watts` [W]; stages without a part of the energy are left out."""
         return {stage: watts for stage in stages if not math.isnan(watts := self.watts(stage))}
 
-    def _add(self, window: Line) -> None:
-        self.kind = worst([Kind(window["kind"]), *([self.kind] if self.count else [])])
-        self.meter = self.meter or window["meters"][0]["name"]
+    def _add(self, window: EnergyWindow) -> None:
+        assert window.energy_J is not None
+        self.kind = worst([window.kind, *([self.kind] if self.count else [])])
+        self.meter = self.meter or window.meters[0].name
         self.count += 1
-        self.frames += window["frames"][2]
-        self.wall_ns += window["wall_ns"]
-        self.gross_J += window["energy_J"]
-        self.error2_J2 += window["resolution_J"] ** 2
+        self.frames += window.n_frames
+        self.wall_ns += window.wall_ns
+        self.gross_J += window.energy_J
+        self.error2_J2 += window.resolution_J**2
         self.parts_J.update(attribute(window, self._board))
-        self._cpu_ns.update({stage: row["cpu_ns"] for stage, row in window["stages"].items()})
+        self._cpu_ns.update({stage: work.cpu_ns for stage, work in window.stages.items()})
 
 
-def run_energy(windows: Iterable[Line], frames: Iterable[Line], board: EnergyConfig) -> EnergySums:
+def run_energy(windows: Iterable[EnergyWindow], frames: Iterable[LedgerLine], board: EnergyConfig) -> EnergySums:
     """Energy of a run: the energy of its windows if a meter was read, else that of its frames by the power model."""
     sums = EnergySums(board)
     for window in windows:

@@ -16,10 +16,8 @@ import numpy as np
 
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, EnergyConfig
-from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
-from modt.energy.ledger import Line
+from modt.energy.ledger import LedgerLine
 from modt.energy.meters.meter import Kind
-from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE, STAGES
 from modt.sinks.run_directory import LEDGER, SUMMARY, TRACKS
@@ -32,7 +30,7 @@ from modt_profiling.reporting import energy_plots, svg
 from modt_profiling.reporting.document import Cell, Document, Plot, Table
 from modt_profiling.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_profiling.reporting.quantity import Quantity, estimate, quantity
-from modt_profiling.reporting.records import read_records
+from modt_profiling.reporting.records import read_ledger, read_records, read_windows
 from modt_profiling.reporting.run_sums import COLUMNS, FrameSums, run_facts
 
 SCHEMA = "modt.report/2"
@@ -58,8 +56,7 @@ def run_tree(run: Path) -> dict[str, Any]:
     sums.finish()
     if not sums.series.count:
         raise MisuseError(run, "no whole frame is recorded", "wait for the first, or give another run")
-    windows = read_records(run / LEDGER, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA})
-    used = run_energy(windows, islice(_frames(run), sums.series.count), board)
+    used = run_energy(read_windows(run / LEDGER), islice(_frames(run), sums.series.count), board)
     saved, e1_s = _saved(mode, sums, used)
     return {
         "schema": SCHEMA,
@@ -90,8 +87,8 @@ def run_tree(run: Path) -> dict[str, Any]:
     }
 
 
-def _frames(run: Path) -> Iterator[Line]:
-    return read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})
+def _frames(run: Path) -> Iterator[LedgerLine]:
+    return read_ledger(run / LEDGER)
 
 
 def _energy(sums: EnergySums, idle_W: float) -> dict[str, Any]:
@@ -113,11 +110,13 @@ def _times(sums: FrameSums) -> dict[str, Any]:
     frames = sums.series.count
     return {
         stage: {
-            "cpu_ms": quantity(1e-6 * row["cpu_ns"] / frames, "ms"),
-            "wall_ms": quantity(1e-6 * row["wall_ns"] / frames, "ms"),
-            **{key: quantity(row[key]) for key in ("calls", "items", "points")},
+            "cpu_ms": quantity(1e-6 * work.cpu_ns / frames, "ms"),
+            "wall_ms": quantity(1e-6 * work.wall_ns / frames, "ms"),
+            "calls": quantity(work.calls),
+            "items": quantity(work.items),
+            "points": quantity(work.points),
         }
-        for stage, row in sums.stages.items()
+        for stage, work in sums.stages.items()
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from modt import profile
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
+from modt.energy.ledger import LedgerLine, StageWork
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, STAGES
 from modt.reporting.histogram import Histogram
@@ -91,7 +92,7 @@ class FrameSums:
     def __init__(self, size: Callable[[Int], int]) -> None:
         self._size = size  # points that the network processes for proposals of (R,) points
         self.series = FrameSeries(len(COLUMNS))
-        self.stages: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger's columns
+        self.stages: defaultdict[str, StageWork] = defaultdict(StageWork)  # sums of the ledger's columns
         self.overhead_ns = self.cpu_ns = 0
         self.marks: set[str] = set()
         self.lengths = Histogram()  # frames with a proposal, of the tracks that ended
@@ -101,16 +102,16 @@ class FrameSums:
         self._length: dict[int, int] = {}  # frames with a proposal by track alive
         self._viewed: set[int] = set()
 
-    def add(self, line: dict[str, Any], record: dict[str, Any]) -> None:
+    def add(self, line: LedgerLine, record: dict[str, Any]) -> None:
         """Add a frame by its two lines."""
-        for stage, row in line["stages"].items():
-            self.stages[stage].update(row)
-        self.overhead_ns += line["overhead_ns"]
-        self.cpu_ns += line["cpu_ns"]
-        self.marks.update(line["marks"])
-        cpu_s = {stage: 1e-9 * line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES}
-        row = line["stages"].get(CLASSIFICATION, {})
-        load = np.array([row.get("calls", 0), record["classifications"], row.get("points", 0)], float)
+        for stage, work in line.stages.items():
+            self.stages[stage].add(work)
+        self.overhead_ns += line.overhead_ns
+        self.cpu_ns += line.cpu_ns
+        self.marks.update(line.marks)
+        cpu_s = {stage: 1e-9 * line.stages.get(stage, StageWork()).cpu_ns for stage in STAGES}
+        classified = line.stages.get(CLASSIFICATION, StageWork())
+        load = np.array([classified.calls, record["classifications"], classified.points], float)
         self.load_gram += np.outer(load, load)
         self.load_moment += load * cpu_s[CLASSIFICATION]
         all_points = self._add_tracks(record["tracks"])
@@ -136,8 +137,8 @@ class FrameSums:
             classified_tracks=self.classified_tracks,
             classified=int(self.column("classified")),
             reacquired=0,
-            points=row["points"],
-            calls=row["calls"],
+            points=row.points,
+            calls=row.calls,
         )
 
     def _add_tracks(self, tracks: list[dict[str, Any]]) -> int:

@@ -67,6 +67,10 @@ class Facts:
         """Whether a reading is an energy [J], or else a momentary power [W]."""
         return self.kind is not Kind.INTEGRATED
 
+    def resolution_J(self, seconds: float) -> float:
+        """Smallest step of the energy of an interval [J]."""
+        return self.resolution * (1.0 if self.counts else seconds)
+
     @property
     def must_draw(self) -> bool:
         """Whether its consumers draw power whenever this program runs."""

@@ -1,14 +1,14 @@
-"""The ladder: its steps by event, and when the events come."""
+"""Load shedding: its steps by event, and when the events come."""
 
 import itertools
 
 import pytest
 
-from modt.app.ladder import (
+from modt.app.load_shedding import (
     CALM_S,
     DEFERRED_EVERY,
     MAX_PATIENCE_S,
-    Ladder,
+    LoadShedding,
     Step,
     budget_at,
 )
@@ -19,14 +19,14 @@ class Frames:
     """Frames at 10 Hz on a made-up clock."""
 
     def __init__(self):
-        self.ladder, self.now, self.changes = Ladder(), 0.0, []
+        self.shedding, self.now, self.changes = LoadShedding(), 0.0, []
 
     def run(self, seconds, share):
         end = self.now + seconds
         while self.now < end - 1e-9:
             self.now += 0.1
-            if self.ladder.frame(self.now, share(self.ladder.step) if callable(share) else share):
-                self.changes.append((round(self.now, 1), self.ladder.step))
+            if self.shedding.frame(self.now, share(self.shedding.step) if callable(share) else share):
+                self.changes.append((round(self.now, 1), self.shedding.step))
         return self
 
 
@@ -68,11 +68,11 @@ def test_a_power_limit_is_kept_by_the_same_steps():
     frames, over = Frames(), 0
     for _second in range(120):
         frames.run(1.0, 0.3)
-        watts = 7.0 - 1.4 * frames.ladder.step
+        watts = 7.0 - 1.4 * frames.shedding.step
         over += watts > 5.0
-        frames.ladder.power(frames.now, watts, 5.0)
+        frames.shedding.power(frames.now, watts, 5.0)
     assert over < 20  # of 120 windows: the first ones, and trials
-    assert frames.ladder.step in (Step.DEFERRED, Step.REDUCED)
+    assert frames.shedding.step in (Step.DEFERRED, Step.REDUCED)
 
 
 def test_the_budget_is_the_time_that_is_left_or_less():

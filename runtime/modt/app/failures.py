@@ -20,17 +20,21 @@ RENEW_AFTER = 5
 """Failures in a row after which new stages are made."""
 
 
-class Containment:
+class Failures:
     """Counts of contained exceptions by kind.
 
     Args:
-        contains: whether exceptions are contained. If not, each one ends the run.
+        contained: whether exceptions are contained. If not, each one ends the run.
+
+    Attributes:
+        counts: number of exceptions by place and type.
+        in_a_row: number of frames that failed since the last one that did not.
     """
 
-    def __init__(self, *, contains: bool = True) -> None:
-        self._contains = contains
+    def __init__(self, *, contained: bool = True) -> None:
         self.counts: Counter[str] = Counter()
         self.in_a_row = 0
+        self._contained = contained
 
     def succeed(self) -> None:
         """Note a frame without a failure."""
@@ -43,7 +47,7 @@ class Containment:
             ModtError: it is the last of MAX_IN_A_ROW failures in a row.
         """
         self.in_a_row += 1
-        self.note(error, where)
+        self._count(error, where)
         if self.in_a_row >= MAX_IN_A_ROW:
             cause = f"{self.in_a_row} failures in a row, the last one {type(error).__name__}: {error}"
             raise ModtError(where, cause, "report it, with the traceback above") from error
@@ -53,12 +57,11 @@ class Containment:
         try:
             return call(*arguments, **options)
         except Exception as error:
-            self.note(error, where)
+            self._count(error, where)
             return None
 
-    def note(self, error: Exception, where: str) -> None:
-        """Count an exception that cost no frame."""
-        if not self._contains:
+    def _count(self, error: Exception, where: str) -> None:
+        if not self._contained:
             raise error
         kind = f"{where}: {type(error).__name__}"
         self.counts[kind] += 1
@@ -71,15 +74,18 @@ class OncePerSecond(logging.Filter):
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
-        self._clock, self._passed = clock, dict[str, tuple[float, int]]()
+        self._clock = clock
+        # Time at which a line of a kind last passed, and number of lines held back since then
+        self._passed: dict[str, tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether a line passes."""
-        kind, now_s = f"{record.name} {record.msg}", self._clock()
+        kind = f"{record.name} {record.msg}"
+        now_s = self._clock()
         passed_s, held = self._passed.get(kind, (float("-inf"), 0))
         if now_s - passed_s < 1.0:
-            self._passed[kind] = passed_s, held + 1
+            self._passed[kind] = (passed_s, held + 1)
             return False
-        self._passed[kind] = now_s, 0
+        self._passed[kind] = (now_s, 0)
         record.msg = f"{record.msg} (and {held} lines like it)" if held else record.msg
         return True

@@ -1,4 +1,4 @@
-"""Notification of a supervisor: systemd by sd_notify(3), without its library, or none."""
+"""Notification of systemd by sd_notify(3), without its library."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from modt.errors import MisuseError
 
 log = logging.getLogger(__name__)
 
-_VARIABLE, _WATCHDOG = "NOTIFY_SOCKET", "WATCHDOG_USEC"
+_VARIABLE = "NOTIFY_SOCKET"
+_WATCHDOG = "WATCHDOG_USEC"
 
 
-class Supervisor:
-    """Tells systemd READY=1, WATCHDOG=1 at half its period, STATUS, RELOADING=1 and, at the end, STOPPING=1.
+class Notifier:
+    """Sends READY=1, WATCHDOG=1 at half its period, STATUS, RELOADING=1 and, at the end, STOPPING=1.
 
     Sending never blocks. The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
 
     Args:
-        address: address of the socket; None without a supervisor.
+        address: address of the socket; None where the process is not a service of systemd.
         watchdog_s: period of the watchdog; None where there is none.
         clock: monotonic [s].
     """
@@ -28,9 +29,11 @@ class Supervisor:
     def __init__(
         self, address: str | None = None, watchdog_s: float | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        self._address, self._clock = address, clock
+        self._address = address
+        self._clock = clock
         self._interval_s = 0.0 if watchdog_s is None else watchdog_s / 2
-        self._ready = self._failed = False
+        self._ready = False
+        self._failed = False
         self._alive_s = float("-inf")
         if address is not None:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -74,13 +77,17 @@ class Supervisor:
         return True
 
 
-def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
-    """Supervisor of the socket that the environment names (/PATH, or @NAME if abstract). Without one: no effect."""
+def notifier_of(environment: Mapping[str, str]) -> Notifier:
+    """Notifier for the socket that the environment names: /PATH, or @NAME if abstract. Without one: no effect.
+
+    Raises:
+        MisuseError: the address is neither.
+    """
     name = environment.get(_VARIABLE)
     if not name:
-        return Supervisor()
+        return Notifier()
     if name[0] not in "/@" or len(name) == 1:
         raise MisuseError(_VARIABLE, f"{name!r} is neither /PATH nor @NAME", "unset it, or let systemd set it")
     watchdog = environment.get(_WATCHDOG, "")
     watchdog_s = 1e-6 * int(watchdog) if watchdog.isdecimal() else None
-    return Supervisor("\0" + name[1:] if name[0] == "@" else name, watchdog_s)
+    return Notifier("\0" + name[1:] if name[0] == "@" else name, watchdog_s)

@@ -1,4 +1,4 @@
-"""Load shedding: the loop takes one step after the other under load, and takes them back when there is slack."""
+"""Load shedding: under load the loop gives up one thing after the other, and takes them back when there is slack."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from modt.types import Budget
 
 CALM_S = 0.5
 """Time with slack before one step is restored [s]."""
-BUSY_SHARE, AMPLE_SHARE = 0.8, 0.5
-"""Share of the period from arrival to result. Below BUSY_SHARE there is slack, below AMPLE_SHARE ample slack."""
+BUSY_SHARE = 0.8
+"""Share of the period from arrival to result below which there is slack."""
+AMPLE_SHARE = 0.5
+"""Share of the period from arrival to result below which there is ample slack."""
 NEAR_SHARE = 0.9
-"""Share of the power limit, below which there is slack."""
+"""Share of the power limit below which there is slack."""
 PROBE_S = 3.0
 """A step down fails if a step up follows within this time [s]. The next step down then waits twice as long."""
 MAX_PATIENCE_S = 30.0
@@ -38,7 +40,7 @@ GIVEN_UP = {
 }
 
 
-class Event(Enum):
+class LoadEvent(Enum):
     """Load that a frame or a window of the meters shows."""
 
     OVERRUN = "the result came after its deadline"
@@ -47,51 +49,58 @@ class Event(Enum):
     AMPLE = "ample slack"
 
 
-class Ladder:
-    """Present step, by the times of the frames and the power. All times are monotonic [s].
+class LoadShedding:
+    """Chooses the step by the times of the frames and the power. All times are monotonic [s].
 
     `frame` and `power` return the event that has changed the step, None where it stays.
     """
 
     def __init__(self) -> None:
         self.step = Step.ALL
-        self.patience_s = CALM_S
-        self._cause = Event.OVERRUN  # cause of the last step up
-        # start of slack, start of ample slack, time of the last step down
-        self._calm_s = self._ample_s = self._down_s = float("-inf")
+        self.patience_s = CALM_S  # time with slack before the next step down
+        self._cause = LoadEvent.OVERRUN  # cause of the last step up
+        self._slack_since_s = float("-inf")
+        self._ample_since_s = float("-inf")
+        self._stepped_down_s = float("-inf")
 
-    def frame(self, now_s: float, share: float) -> Event | None:
+    def frame(self, now_s: float, share: float) -> LoadEvent | None:
         """A frame whose result came `share` of a period after its sweep."""
         if share > BUSY_SHARE:
-            self._calm_s = now_s
+            self._slack_since_s = now_s
         if share > AMPLE_SHARE:
-            self._ample_s = now_s
+            self._ample_since_s = now_s
         if share > 1.0:
-            return self._fire(Event.OVERRUN, now_s)
-        if self._cause is Event.OVERRUN and now_s - self._ample_s >= CALM_S:
-            return self._fire(Event.AMPLE, now_s)
-        if now_s - self._calm_s >= self.patience_s:
-            return self._fire(Event.SLACK, now_s)
+            return self._apply(LoadEvent.OVERRUN, now_s)
+        # Slack in time says nothing about power: after too much power the steps are taken back one by one.
+        if self._cause is LoadEvent.OVERRUN and now_s - self._ample_since_s >= CALM_S:
+            return self._apply(LoadEvent.AMPLE, now_s)
+        if now_s - self._slack_since_s >= self.patience_s:
+            return self._apply(LoadEvent.SLACK, now_s)
         return None
 
-    def power(self, now_s: float, watts: float, limit_W: float) -> Event | None:
+    def power(self, now_s: float, watts: float, limit_W: float) -> LoadEvent | None:
         """A window of the meters."""
         if watts <= NEAR_SHARE * limit_W:
             return None
-        self._calm_s = self._ample_s = now_s
-        return self._fire(Event.OVER_POWER, now_s) if watts > limit_W else None
+        self._slack_since_s = now_s
+        self._ample_since_s = now_s
+        return self._apply(LoadEvent.OVER_POWER, now_s) if watts > limit_W else None
 
-    def _fire(self, event: Event, now_s: float) -> Event | None:
+    def _apply(self, event: LoadEvent, now_s: float) -> LoadEvent | None:
         """Change the step by one, at ample slack to the first; returns the event if that changes anything."""
         before = self.step
-        change = {Event.AMPLE: -before, Event.SLACK: -1}.get(event, 1)
+        change = {LoadEvent.AMPLE: -before, LoadEvent.SLACK: -1}.get(event, 1)
         self.step = Step(min(max(before + change, Step.ALL), Step.DROPPED))
         if self.step > before:
-            failed = now_s - self._down_s < PROBE_S
+            failed = now_s - self._stepped_down_s < PROBE_S
             self.patience_s = min(2 * self.patience_s, MAX_PATIENCE_S) if failed else CALM_S
-            self._cause, self._calm_s, self._ample_s = event, now_s, now_s
+            self._cause = event
+            self._slack_since_s = now_s
+            self._ample_since_s = now_s
         elif self.step < before:
-            self._down_s = self._calm_s = now_s  # the time with ample slack is not reset
+            # The time with ample slack goes on, so that all is restored as soon as it has lasted long enough.
+            self._stepped_down_s = now_s
+            self._slack_since_s = now_s
         return event if self.step != before else None
 
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from modt.app.supervisor import supervisor_of
+from modt.app.systemd import notifier_of
 from modt.errors import MisuseError
 
 
@@ -31,40 +31,40 @@ def systemd(address):
 @pytest.mark.parametrize("place", ["notify", "/", "@", "vsock:2:1234"])
 def test_an_invalid_address_is_named(place):
     with pytest.raises(MisuseError, match="NOTIFY_SOCKET"):
-        supervisor_of({"NOTIFY_SOCKET": place})
+        notifier_of({"NOTIFY_SOCKET": place})
 
 
 @pytest.mark.parametrize("abstract", [False, True])
 def test_ready_is_sent_first_and_the_watchdog_served(tmp_path, abstract):
     name = f"@modt-test-{os.getpid()}" if abstract else str(tmp_path / "notify")
     with systemd(name.replace("@", "\0")) as heard:
-        supervisor = supervisor_of({"NOTIFY_SOCKET": name})
+        notifier = notifier_of({"NOTIFY_SOCKET": name})
         assert heard() == []
         for expected in ("READY=1\nWATCHDOG=1", "WATCHDOG=1"):
-            supervisor.alive()
+            notifier.alive()
             assert heard() == [expected]
-        supervisor.close()
+        notifier.close()
         assert heard() == ["STOPPING=1"]
 
 
 def test_unreachable_supervisor_is_logged_once_and_retried(tmp_path, caplog):
-    supervisor = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
+    notifier = notifier_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     with caplog.at_level(logging.WARNING):
-        supervisor.alive()
-        supervisor.alive()
+        notifier.alive()
+        notifier.alive()
     assert [r.levelname for r in caplog.records] == ["WARNING"]
     with systemd(tmp_path / "notify") as heard:
-        supervisor.alive()
+        notifier.alive()
         assert heard() == ["READY=1\nWATCHDOG=1"]
-        supervisor.close()
+        notifier.close()
 
 
 def test_slow_supervisor_does_not_block(tmp_path):
-    supervisor = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
+    notifier = notifier_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     with systemd(tmp_path / "notify") as heard:
         for _ in range(10_000):  # far more than a socket holds
-            supervisor.alive()
+            notifier.alive()
         assert 1 < len(heard()) < 10_000
-        supervisor.alive()
+        notifier.alive()
         assert heard() == ["WATCHDOG=1"]
-        supervisor.close()
+        notifier.close()

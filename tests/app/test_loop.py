@@ -11,19 +11,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment, OncePerSecond
 from modt.app.deadlines import Deadlines
-from modt.app.ladder import Step
+from modt.app.failures import MAX_IN_A_ROW, RENEW_AFTER, Failures, OncePerSecond
+from modt.app.load_shedding import Step
+from modt.app.loop import WAIT_S, Service
 from modt.app.playback import Playback
-from modt.app.session import WAIT_S, Session
 from modt.app.stop import NAP_S, Stop
-from modt.energy.ledger import Ledger
+from modt.energy.ledger import Ledger, StageWork
 from modt.errors import MisuseError, ModtError
 from modt.sources.stream import Received, StreamEndedError
 from modt.types import Budget, Frame
-from tests.results import Kept, result
+from tests.results import Kept, ledger_line, result
 
 POINTS = np.zeros((1, 4), np.float32)
+
+
+def line_of(**ms):
+    """A ledger line of stages that take so long."""
+    return ledger_line(0, **{stage: StageWork(wall_ns=int(1e6 * value)) for stage, value in ms.items()})
 
 
 class Time:
@@ -73,8 +78,8 @@ class Stages:
     def __init__(self, time, work_s, fails):
         self.time, self.work_s, self.fails, self.steps = time, work_s, fails, []
         self.recognise, self.watch, self.recover = Mock(), Mock(), Mock()
-        stages = {"stages": {"segmentation": {"wall_ns": 20_000_000}}}
-        self.ledger = Mock(run=lambda stage, write, r: write(r), close_frame=lambda index: {"frame": index, **stages})
+        line = line_of(segmentation=20)
+        self.ledger = Mock(run=lambda stage, write, r: write(r), close_frame=lambda index: line)
 
     def step(self, frame, budget, *, reduced):
         if frame.index in self.fails:
@@ -85,21 +90,31 @@ class Stages:
 
 
 class Live:
-    """A session over the sensor, and the frames, reports and pings of the watchdog that it makes."""
+    """A service over the sensor, and the frames, reports and pings of the watchdog that it makes."""
 
     def __init__(self, seconds, work=lambda t: 0.02, sinks=(), silent=(0.0, 0.0), fails=(), **calls):
         self.time = time = Time()
         self.sensor, self.stages = Sensor(time, seconds, silent), Stages(time, work, dict(fails))
         self.seen, self.reports, self.pings = [], [], []
-        self.supervisor = Mock(alive=lambda: self.pings.append(time.now))
-        self.deadlines, self.failures, self.stop = Deadlines(0.1, time), Containment(), Stop()
-        named, kinds = {f"sink {k}": sink for k, sink in enumerate(sinks)}, (self.deadlines, self.failures, self.stop)
-        self.session = Session(self.sensor, self.stages, Mock(), named, *kinds, (), None, clock=time)
-        self.session._observe = calls.get("observe", lambda r, line: self.seen.append(r.frame.index))
-        self.session._report = calls.get("report", lambda supervisor: self.reports.append(time.now))
+        self.notifier = Mock(alive=lambda: self.pings.append(time.now))
+        self.deadlines, self.failures, self.stop = Deadlines(0.1, time), Failures(), Stop()
+        self.service = Service(
+            source=self.sensor,
+            stages=self.stages,
+            recording=Mock(),
+            sinks={f"sink {k}": sink for k, sink in enumerate(sinks)},
+            deadlines=self.deadlines,
+            failures=self.failures,
+            stop=self.stop,
+            meters=(),
+            core=None,
+            clock=time,
+        )
+        self.service._account = calls.get("account", lambda r, line: self.seen.append(r.frame.index))
+        self.service._report = calls.get("report", lambda notifier: self.reports.append(time.now))
 
     def run(self):
-        self.session.follow(self.supervisor)
+        self.service.process_frames(self.notifier)
         return self
 
 
@@ -109,13 +124,13 @@ def test_every_sweep_in_time_goes_through():
     assert len(live.seen) == 100
     assert sink.indices == live.seen
     assert live.deadlines.missed == live.sensor.dropped == live.deadlines.shed == 0
-    assert live.deadlines.report()["lateness_ms"]["max"] == 0.0
+    assert live.deadlines.figures().lateness_ms["max"] == 0.0
     ((first, named),) = (made.args for made in live.stages.recognise.call_args_list)
     assert (first.index, named) == (1, "vlp-16")
     assert [made.args[0].index for made in live.stages.watch.call_args_list] == live.seen
-    report = live.deadlines.report()
-    assert (report["execution_ms"]["max"], report["latency_ms"]["max"]) == pytest.approx((20.0, 20.0))
-    live.supervisor.ready.assert_called_once_with()
+    figures = live.deadlines.figures()
+    assert (figures.execution_ms["max"], figures.latency_ms["max"]) == pytest.approx((20.0, 20.0))
+    live.notifier.ready.assert_called_once_with()
     assert len(live.reports) in (10, 11)
     assert live.stages.steps[-1][1] == Budget(16, pytest.approx(80.0)), "of the time that is left to the deadline"
 
@@ -131,7 +146,7 @@ def test_under_load_the_loop_sheds_and_is_back_within_a_second(caplog):
         live = Live(10.0, lambda t: 0.15 if 2.0 <= t < 5.0 else 0.02).run()
     reduced_s = [0.1 * index for index, _, reduced in live.stages.steps if reduced]
     assert 2.0 < min(reduced_s) < max(reduced_s) < 5.0 + 0.15 + 1.01
-    assert live.deadlines.ladder.step is Step.ALL
+    assert live.deadlines.shedding.step is Step.ALL
     assert live.deadlines.shed > 0
     assert live.deadlines.changes["dropped"] == 1
     assert len(caplog.records) >= 4, "each step is logged"
@@ -141,16 +156,16 @@ def test_a_slow_loop_takes_the_newest_sweep_and_counts_what_it_misses():
     live = Live(20.0, lambda t: 0.15).run()
     assert len(live.seen) + live.sensor.dropped + live.deadlines.shed == 200
     assert live.deadlines.missed == len(live.seen) - 1  # all but the first one, which warms up
-    report = live.deadlines.report()
-    assert 0.0 < report["lateness_ms"]["max"] < 100.0
-    assert report["latency_ms"]["max"] == pytest.approx(report["lateness_ms"]["max"] + 150.0, abs=5.0)
+    figures = live.deadlines.figures()
+    assert 0.0 < figures.lateness_ms["max"] < 100.0
+    assert figures.latency_ms["max"] == pytest.approx(figures.lateness_ms["max"] + 150.0, abs=5.0)
 
 
 def test_after_a_long_first_frame_the_loop_begins_afresh():
     live = Live(3.0, lambda t: 0.25 if t < 0.2 else 0.02).run()
     assert live.seen[:3] == [1, 4, 5]
     assert live.sensor.dropped == live.deadlines.shed == 1
-    assert live.deadlines.report()["lateness_ms"]["max"] == 0.0
+    assert live.deadlines.figures().lateness_ms["max"] == 0.0
 
 
 def test_a_failure_costs_its_frame_and_is_logged_once(caplog):
@@ -173,7 +188,7 @@ def test_failures_that_repeat_renew_the_stages_and_then_end_the_run():
 
 
 def test_a_replay_contains_no_failure():
-    failures, gone = Containment(contains=False), ConnectionError("gone")
+    failures, gone = Failures(contained=False), ConnectionError("gone")
     for failing in (lambda: failures.contain("sink", Mock(side_effect=gone)), lambda: failures.fail(gone, "frame")):
         with pytest.raises(ConnectionError):
             failing()
@@ -187,7 +202,7 @@ def test_a_source_that_fails_is_asked_again_and_after_ten_failures_ends_the_run(
     assert live.sensor.take.call_count == 10
 
 
-@pytest.mark.parametrize(("broken", "kind"), [("sink", "sink 0"), ("observe", "records"), ("report", "status")])
+@pytest.mark.parametrize(("broken", "kind"), [("sink", "sink 0"), ("account", "records"), ("report", "status")])
 def test_a_sink_records_and_status_that_fail_cost_no_frame(broken, kind):
     failing, sink = Mock(side_effect=KeyError("wall_ns")), Kept()
     sinks, calls = ([Mock(write=failing), sink], {}) if broken == "sink" else ([sink], {broken: failing})
@@ -224,16 +239,12 @@ def test_a_signal_ends_the_loop_though_the_sensor_is_silent():
     assert live.run().time.now < 103.0 + 0.5
 
 
-def line(**ms):
-    return {"stages": {stage: {"wall_ns": int(1e6 * value)} for stage, value in ms.items()}}
-
-
 def test_the_cost_of_the_rest_rises_at_once_and_falls_slowly():
     deadlines = Deadlines(0.1, lambda: 0.0)
 
     def rest_ms(**ms):
-        deadlines.finish(0.0, line(**ms))
-        return deadlines.report()["other_stages_ms"]
+        deadlines.finish(0.0, line_of(**ms))
+        return deadlines.figures().other_stages_ms
 
     assert rest_ms(segmentation=10, tracking=5, classification=50) == pytest.approx(15)
     assert rest_ms(segmentation=30) == pytest.approx(30)

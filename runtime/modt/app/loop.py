@@ -1,0 +1,290 @@
+"""The loop of a run: take the next sweep, process it, hand the result to the sinks, keep the deadline, report."""
+
+from __future__ import annotations
+
+import gc
+import json
+import logging
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from modt.app.deadlines import Deadlines, NoDeadlines
+from modt.app.failures import RENEW_AFTER, Failures
+from modt.app.playback import Playback
+from modt.app.run_report import run_summary, service_status
+from modt.app.stages import Stages
+from modt.app.status import FrameCounter, PowerStatus, Status, one_line
+from modt.app.stop import Stop
+from modt.app.systemd import Notifier
+from modt.energy.ledger import LedgerLine
+from modt.energy.meters.meter import Conditions, Meter
+from modt.energy.windows import Clocks, EnergyWindow, Windows
+from modt.errors import ModtError
+from modt.pipeline import SINK
+from modt.reporting.summary import Summary
+from modt.sinks.output import LedgerSink, Sink, Writer, close_together
+from modt.sinks.recording import Recording
+from modt.sinks.records import fields_of
+from modt.sources.stream import Received, StreamEndedError
+from modt.types import FrameResult
+
+if TYPE_CHECKING:
+    from modt.sources.live.live_stream import LiveStream
+
+log = logging.getLogger(__name__)
+
+WAIT_S = 0.2
+"""Longest wait for a sweep without a check of the signals and the watchdog [s]."""
+REPORT_S = 1.0
+"""Time between two reports of the status [s]."""
+
+
+@dataclass(kw_only=True, eq=False)
+class Loop:
+    """Drives the stages by the frames of a source. This class replays a recording; Service adds what a robot needs.
+
+    Attributes:
+        source, stages, recording: give the frames, process them, and keep the records.
+        sinks: sinks of the results, by their addresses.
+        deadlines, failures, stop: decide which sweeps are processed, which failures are contained, and when to end.
+        meters: meters to read.
+        core: core to which the loop is pinned, None without one.
+        clock: monotonic [s].
+        totals: counts so far.
+        power: power so far.
+        frames_without_reflectance: number of frames without the reflectance that the profile promises.
+        summary: the summary as written; empty before the end.
+    """
+
+    source: LiveStream | Playback
+    stages: Stages
+    recording: Recording
+    sinks: Mapping[str, Sink]
+    deadlines: Deadlines | NoDeadlines
+    failures: Failures
+    stop: Stop
+    meters: Sequence[Meter]
+    core: int | None
+    clock: Callable[[], float] = time.monotonic
+
+    def __post_init__(self) -> None:
+        self.totals = Summary()
+        self.power = PowerStatus()
+        self.frames_without_reflectance = 0
+        self.summary: dict[str, Any] = {}
+        self._writers: dict[str, Writer[FrameResult]] = {**self.sinks, "recording": self.recording}
+        self._ledger_sinks = [writer for writer in self._writers.values() if isinstance(writer, LedgerSink)]
+        self._recorded_profile = self.stages.chosen
+        self._windows = Windows(self.meters, Clocks(), Conditions(self.core or 0))
+        self._began_s = self.clock()
+        self._on_frame: Callable[[FrameResult], None] = lambda result: None
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time since the start [s]."""
+        return self.clock() - self._began_s
+
+    def run(self, notifier: Notifier, on_frame: Callable[[FrameResult], None] | None = None) -> dict[str, Any]:
+        """Run until a signal or the end of the source; return the summary as written.
+
+        Args:
+            notifier: tells systemd that the run is alive.
+            on_frame: called after every frame.
+
+        Raises:
+            ModtError: a failure that is not contained, or another run that records into the same directory.
+        """
+        self._on_frame = on_frame or self._on_frame
+        with self.recording.directory.locked(), ExitStack() as at_end:
+            # At the end these are called in the reverse order: the last window, the sources, the sinks, the summary.
+            self.recording.start()
+            at_end.callback(self._finish)
+            at_end.callback(close_together, self.sinks.values())
+            for part in (self.stages.odometry, self.source, notifier):
+                at_end.callback(self.failures.contain, "end", part.close)
+            at_end.callback(self.failures.contain, "records", lambda: self._write_costs(self._windows.close()))
+            at_end.enter_context(self.stop.on_signals())
+            self.source.start()
+            self.process_frames(notifier)
+        return self.summary
+
+    def process_frames(self, notifier: Notifier) -> None:
+        """Process frames until a signal, or the end of the source. The first one identifies the sensor.
+
+        Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
+
+        Raises:
+            ModtError: a failure that cannot be contained.
+        """
+        gc.collect()
+        gc.freeze()
+        notifier.ready()
+        sweeps = self._sweeps(notifier)
+        first = next(sweeps, None)
+        if first is None:
+            return
+        self.stages.recognise(first.frame, self.source.profile)
+        for received in chain([first], sweeps):
+            if self.deadlines.admit(received.arrived_s):
+                self._process(received)
+
+    def _sweeps(self, notifier: Notifier) -> Iterator[Received]:
+        """Sweeps as they arrive. Reloads, watchdog and reports are served between them."""
+        reported_s = float("-inf")
+        while self.stop.signal is None:
+            if self.stop.take_reload():
+                self._reload(notifier)
+            try:
+                received = self.source.take(WAIT_S)
+            except StreamEndedError:
+                return
+            except ModtError:
+                raise
+            except Exception as error:
+                self.failures.fail(error, "source")
+                received = None
+            if received is not None and self.stop.signal is None:
+                yield received
+            notifier.alive()
+            now_s = self.clock()
+            if now_s - reported_s >= REPORT_S:
+                reported_s = now_s
+                self.failures.contain("status", self._report, notifier)
+
+    def _process(self, received: Received) -> None:
+        """Process a frame. Its failure is contained: the tracks are those of the frame before."""
+        try:
+            line = self._step(received)
+        except ModtError:
+            raise
+        except Exception as error:
+            self.stages.ledger.close_frame(received.frame.index)
+            self.failures.fail(error, "frame")
+            self.stages.recover(anew=self.failures.in_a_row == RENEW_AFTER)
+            return
+        self.failures.succeed()
+        self.deadlines.finish(received.arrived_s, line)
+        self.stages.watch(received.frame)
+
+    def _step(self, received: Received) -> LedgerLine:
+        """Run the stages, then the sinks, which cost no frame if they fail; returns the frame's ledger line."""
+        stages = self.stages
+        frame = received.frame
+        budget = self.deadlines.budget(stages.budget, received.arrived_s, frame.index)
+        result = stages.step(frame, budget, reduced=self.deadlines.reduced)
+        for name, writer in self._writers.items():
+            self.failures.contain(name, stages.ledger.run, SINK, writer.write, result)
+        line = stages.ledger.close_frame(frame.index)
+        self.failures.contain("records", self._account, result, line)
+        return line
+
+    def _account(self, result: FrameResult, line: LedgerLine) -> None:
+        """Add a frame to the totals and the records, and a window that it completes to the power."""
+        if self.stages.chosen is not self._recorded_profile:
+            self._recorded_profile = self.stages.chosen
+            self.recording.configure(self.stages.config.recording)
+        config = self.stages.config
+        self.totals.add_result(result)
+        self.totals.add_ledger(line)
+        self._write_costs(line)
+        window = self._windows.add(line)
+        if window is not None:
+            self._write_costs(window)
+            self.power = self.power.after(window, config.energy)
+            if self.power.watts is not None and config.loop.power_W is not None:
+                self.deadlines.power(self.power.watts, config.loop.power_W)
+        if config.sensor.reflectance != "none" and result.proposals.reflectance is None and len(result.proposals):
+            self.frames_without_reflectance += 1
+        self._on_frame(result)
+
+    def _write_costs(self, line: LedgerLine | EnergyWindow) -> None:
+        for sink in self._ledger_sinks:
+            sink.ledger(line)
+
+    def _reload(self, notifier: Notifier) -> None:
+        """Take over the profile from disk. A recording is replayed with one profile."""
+
+    def _report(self, notifier: Notifier) -> None:
+        """Show the status. A replay has none."""
+
+    def pace(self) -> dict[str, Any]:
+        """Figures of the pace for the summary."""
+        return {"rate_hz": self.stages.request.rate_hz}
+
+    def _finish(self) -> None:
+        """Write the summary after the queued records."""
+        self.summary = run_summary(self)
+        self._finish_status()
+        text = json.dumps(self.summary, indent=2, default=fields_of) + "\n"
+        writer = self.recording.writer
+        writer.write(self.recording.finish)
+        writer.write(lambda: self.recording.write_summary(text))
+        writer.close()
+
+    def _finish_status(self) -> None:
+        """Add the last status to the summary. A replay has none."""
+
+
+@dataclass(kw_only=True, eq=False)
+class Service(Loop):
+    """A loop over a live source, with deadlines, a status once a second, and reloads of the profile.
+
+    Attributes:
+        refusals: refused permissions, for the status.
+        metrics: file for Prometheus; None for none.
+        reloads, refused_reloads: number of times that the profile was loaded anew, and that it could not be used.
+    """
+
+    source: LiveStream
+    deadlines: Deadlines
+    refusals: Sequence[str] = ()
+    metrics: Path | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.reloads = 0
+        self.refused_reloads = 0
+        self._counter = FrameCounter(self.totals, self.clock())
+
+    def pace(self) -> dict[str, Any]:
+        """Figures of the deadlines for the summary."""
+        return fields_of(self.deadlines.figures())
+
+    def status(self) -> Status:
+        """The status now."""
+        return service_status(self, self._counter.report(self.clock()))
+
+    def _reload(self, notifier: Notifier) -> None:
+        notifier.reloading()
+        try:
+            self.stages.reload()
+        except ModtError as error:
+            self.refused_reloads += 1
+            log.error("%s; the profile before stays in use", error)
+        else:
+            self.reloads += 1
+            log.warning("profile loaded again")
+        notifier.ready()
+
+    def _report(self, notifier: Notifier) -> None:
+        """Show the status to systemd, in status.json and to Prometheus."""
+        status = self.status()
+        notifier.status(one_line(status))
+        self.recording.writer.write(lambda: self._write_status(status))
+
+    def _finish_status(self) -> None:
+        status = self.status()
+        self.summary |= {"status": status, "lateness": self.deadlines.late_or_later()}
+        self.recording.writer.write(lambda: self._write_status(status))
+
+    def _write_status(self, status: Status) -> None:
+        self.recording.write_status(json.dumps(status, indent=1, default=fields_of) + "\n")
+        if self.metrics is not None:
+            from modt.app.prometheus import write_metrics
+
+            write_metrics(self.metrics, asdict(status))
