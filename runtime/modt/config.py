@@ -18,10 +18,14 @@ if TYPE_CHECKING:
 
 BATCH = 8
 """Proposals of one network call: few enough for their features to stay in the cache."""
-NATIVE, NUMPY = "native", "numpy"
+NATIVE = "native"
+NUMPY = "numpy"
 KERNELS = ("auto", NATIVE, NUMPY)
-GRID_CELLS, MAX_CELLS = 200, 5e7
-"""Cells of both grids of the segmentation per metre of range at a cell of 1 m, and greatest number (200 MB)."""
+"""Names of the code for points."""
+GRID_CELLS = 200
+"""Cells of both grids of the segmentation per metre of range, at a cell of 1 m."""
+MAX_CELLS = 5e7
+"""Greatest number of cells of both grids (200 MB)."""
 REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 """Sensors whose reflectance a model may have learnt."""
 
@@ -75,7 +79,9 @@ def check(declared: Field[Any], value: object) -> None:
     Raises:
         ValueRangeError: it is not of its kind or out of range.
     """
-    key, kind, bounds = declared.name, str(declared.type), declared.metadata
+    key = declared.name
+    kind = str(declared.type)
+    bounds = declared.metadata
     if value is None and "None" in kind:
         return
     if "options" in bounds:
@@ -93,7 +99,8 @@ def _check_numbers(key: str, value: object, whole: bool, bounds: Mapping[str, An
     noun = "a whole number" if whole else "a number"
     span = f"{noun} from {bounds['low']:g} to {bounds['high']:g}"
     if "most" in bounds:
-        least, most = bounds["least"], bounds["most"]
+        least = bounds["least"]
+        most = bounds["most"]
         span = f"{most if least == most else f'{least} to {most}'} values, each {span}"
         if not least <= len(numbers) <= most:
             raise ValueRangeError(key, f"{len(numbers)} values", f"give {span}")
@@ -287,9 +294,14 @@ class SensorConfig(StageConfig):
         """Distance from which a third of a person is in view [m]; None if the mount or the beams are unknown."""
         if self.height_m is None or self.span_deg is None:
             return None
-        h, (low, high) = self.height_m, (math.tan(math.radians(deg)) for deg in self.span_deg)
-        seen = ((d / 10, min(h + d / 10 * high, PERSON_M) - max(h + d / 10 * low, 0.0)) for d in range(1, 201))
-        return next((d for d, seen_m in seen if seen_m >= PERSON_M / 3), None)
+        low, high = (math.tan(math.radians(deg)) for deg in self.span_deg)
+        for decimetres in range(1, 201):
+            distance_m = decimetres / 10
+            top_m = min(self.height_m + distance_m * high, PERSON_M)
+            bottom_m = max(self.height_m + distance_m * low, 0.0)
+            if top_m - bottom_m >= PERSON_M / 3:
+                return distance_m
+        return None
 
     @property
     def beams(self) -> Beams:

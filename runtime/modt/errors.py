@@ -18,10 +18,12 @@ class ModtError(Exception):
 
     def __init__(self, subject: object, cause: str, remedy: str) -> None:
         super().__init__(f"{subject}: {cause}; {remedy}")
-        self.subject, self.cause, self.remedy = str(subject), cause, remedy
+        self.subject = str(subject)
+        self.cause = cause
+        self.remedy = remedy
 
     def __reduce__(self) -> tuple[type[ModtError], tuple[str, str, str]]:
-        """Arguments from which a process makes this error again that waits for the process in which it was raised."""
+        """Class and arguments, by which an error crosses from one process to another."""
         return type(self), (self.subject, self.cause, self.remedy)
 
 

@@ -22,7 +22,9 @@ _MAX_HELPER_SHARE = 0.01
 """The process counts as single-threaded if other threads use at most this share of the CPU time of the loop."""
 SWITCH_S = 0.0005
 """Time for which another thread may keep the interpreter from the loop [s]; Python's default is 5 ms."""
-_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4  # mlockall(2)
+_MCL_CURRENT = 1  # mlockall(2)
+_MCL_FUTURE = 2
+_MCL_ONFAULT = 4
 _NICE = 23  # bit of CAP_SYS_NICE, capabilities(7)
 _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 

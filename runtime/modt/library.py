@@ -97,7 +97,7 @@ class TrackedObjects:
 
     def _repr_html_(self) -> str:
         """Table of the rows, for notebooks."""
-        names = "id", "object_class", "final", "points", "age", "speed_mps"
+        names = ("id", "object_class", "final", "points", "age", "speed_mps")
         rows = [[f"{row[n]:.1f}" if n == "speed_mps" else str(row[n]) for n in names] for row in self.as_dicts()]
         cells = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in rows)
         return f"<table><tr><th>{'</th><th>'.join(names)}</th></tr>{cells}</table>"
@@ -150,7 +150,9 @@ class Pipeline:
         self.mode = mode
         self._asked: profile.Names | ProfileConfig = config
         self._use(config)
-        self._index, self._stamp_s, self._warned = 0, -math.inf, False
+        self._index = 0
+        self._stamp_s = -math.inf  # of the last sweep
+        self._warned = False  # of stamps that are no seconds
 
     def __repr__(self) -> str:
         return f"<pipeline in mode {self.mode} after {self._index} frames>"
@@ -174,6 +176,25 @@ class Pipeline:
         pipeline._asked = names
         return pipeline
 
+    def _checked_stamp(self, stamp_s: float | None) -> float:
+        """Time of a sweep [s]."""
+        if stamp_s is None:
+            raise MisuseError("stamp None", "the points have no time", "give the time of the sweep [s]")
+        if wrong := no_seconds(stamp_s):
+            raise MisuseError("step", wrong, "give rising times [s]")
+        if stamp_s < self._stamp_s:
+            last = f"not after the last one, {self._stamp_s!r}"
+            raise MisuseError(f"stamp {stamp_s!r}", last, "give rising times [s]")
+        return float(stamp_s)
+
+    def _warn_of_unit(self, stamp_s: float) -> None:
+        """Warn once if the time since the last sweep is a period in another unit than seconds."""
+        passed_s = stamp_s - self._stamp_s
+        unit = unit_of(passed_s / self.config.sensor.period_s)
+        if unit and not self._warned:
+            self._warned = True
+            log.warning("stamps: %g s lie between two sweeps: are they in %s? Give seconds", passed_s, unit)
+
     def step(
         self,
         points: ArrayLike | Frame,
@@ -196,33 +217,23 @@ class Pipeline:
             ScanError: the columns are not x, y, z, reflectance.
         """
         if isinstance(points, Frame):
-            given = points
-            points, stamp_s, turn_s = given.points, given.stamp_s, given.turn_s
-            T_world_sensor = given.T_world_sensor if T_world_sensor is None else T_world_sensor
-        if stamp_s is None:
-            raise MisuseError("stamp None", "the points have no time", "give the time of the sweep [s]")
-        if wrong := no_seconds(stamp_s):
-            raise MisuseError("step", wrong, "give rising times [s]")
-        if stamp_s < self._stamp_s:
-            last = f"not after the last one, {self._stamp_s!r}"
-            raise MisuseError(f"stamp {stamp_s!r}", last, "give rising times [s]")
-        pose = None if T_world_sensor is None else np.array(T_world_sensor, np.float64)
-        if pose is not None and (pose.shape != (4, 4) or pose_defect(pose)):
-            cause = pose_defect(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"
-            raise MisuseError("T_world_sensor", str(cause), "give a rigid (4, 4) transform from sensor to world")
-        frame = Frame(self._index, float(stamp_s), _checked(points), pose, turn_s=turn_s)
+            stamp_s = points.stamp_s
+            turn_s = points.turn_s
+            T_world_sensor = points.T_world_sensor if T_world_sensor is None else T_world_sensor
+            points = points.points
+        stamp_s = self._checked_stamp(stamp_s)
+        pose = _checked_pose(T_world_sensor)
+        frame = Frame(self._index, stamp_s, _checked_points(points), pose, turn_s=turn_s)
         if self._index == 0:
             chosen = choose(self._asked, frame, None)
             if chosen.config != self.config:
                 self._use(chosen.config)
-        unit = unit_of((stamp_s - self._stamp_s) / self.config.sensor.period_s)
-        if unit and not self._warned:
-            self._warned = True
-            passed_s = stamp_s - self._stamp_s
-            log.warning("stamps: %g s lie between two sweeps: are they in %s? Give seconds", passed_s, unit)
-        self._index, self._stamp_s = self._index + 1, float(stamp_s)
+        self._warn_of_unit(stamp_s)
+        self._index += 1
+        self._stamp_s = stamp_s
         result = self._pipeline.step(frame, self._budget)
-        tracks, visible = result.tracks, result.tracks.proposal != NONE
+        tracks = result.tracks
+        visible = tracks.proposal != NONE
         return TrackedObjects(
             id=tracks.id,
             object_class=tracks.object_class,
@@ -242,7 +253,7 @@ class Pipeline:
         )
 
 
-def _checked(points: ArrayLike) -> Float32:
+def _checked_points(points: ArrayLike) -> Float32:
     """(N, 4) finite points. A missing fourth column is filled with unrecorded reflectance."""
     rows = np.array(points, np.float32)
     if rows.ndim != 2 or rows.shape[1] not in (3, 4):
@@ -250,3 +261,14 @@ def _checked(points: ArrayLike) -> Float32:
     if rows.shape[1] == 3:
         rows = np.column_stack([rows, np.full(len(rows), UNRECORDED, np.float32)])
     return sanitised(rows, "points")[0]
+
+
+def _checked_pose(T_world_sensor: ArrayLike | None) -> Float64 | None:
+    """(4, 4) pose of the sensor in the world."""
+    if T_world_sensor is None:
+        return None
+    pose = np.array(T_world_sensor, np.float64)
+    defect = pose_defect(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"
+    if defect:
+        raise MisuseError("T_world_sensor", defect, "give a rigid (4, 4) transform from sensor to world")
+    return pose

@@ -71,7 +71,9 @@ def read(text: str, origin: Path | str, name: str) -> Layer:
         cause = str(getattr(error, "problem", None) or "unreadable")
         raise MisuseError(place, f"no YAML ({cause})", "correct this line") from None
     stages = {f.name: f.default_factory for f in fields(ProfileConfig)}
-    extends, place, settings = tuple[str, ...](), str(origin), dict[str, dict[str, Any]]()
+    extends: tuple[str, ...] = ()
+    place = str(origin)
+    settings: dict[str, dict[str, Any]] = {}
     for key, node, line in _entries(root, origin, {EXTENDS: None, **stages}, "profile"):
         stage = stages.get(key)
         if isinstance(stage, type):
@@ -132,13 +134,23 @@ def _plain(node: yaml.Node, place: str) -> Any:
 def _entries(
     node: yaml.Node | None, origin: Path | str, known: Mapping[str, object], what: str, line: int = 1
 ) -> Iterator[tuple[str, yaml.Node, int]]:
+    """Key, value and line of each entry of a mapping. A loader of values has no lines, so the nodes are walked.
+
+    Args:
+        node: the mapping.
+        origin: file, for messages.
+        known: valid keys.
+        what: name of the mapping, for messages.
+        line: line of its key.
+    """
     if node is None or (isinstance(node, yaml.ScalarNode) and node.value == ""):
         return
     if not isinstance(node, yaml.MappingNode):
         raise MisuseError(f"{origin}:{line}", f"{what} is no mapping", "write key: value lines")
     seen: set[str] = set()
     for key_node, value in node.value:
-        key, at = str(key_node.value), key_node.start_mark.line + 1
+        key = str(key_node.value)
+        at = key_node.start_mark.line + 1
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1, cutoff=0.0)
             raise MisuseError(f"{origin}:{at}", f"unknown key '{key}'", f"did you mean '{near[0]}'?")

@@ -117,7 +117,8 @@ def chosen_kernels(wanted: str) -> Kernels:
 
 def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> SegmenterStage:
     """The first stage, the same in every mode."""
-    sensor, stage = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
+    sensor = profile.sensor
+    stage = Segmenter(profile.segmentation, sensor, fov, kernels)
     if sensor.blind_sectors_deg is None:
         return stage
     return BlindSectorFilter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))

@@ -19,12 +19,16 @@ from modt.energy.meters.meter import Kind
 from modt.errors import ModtError
 from modt.sources.live.live_stream import LiveStream
 
-OK, WARN, FAIL = "ok", "warn", "fail"
+OK = "ok"
+WARN = "warn"
+FAIL = "fail"
 REACH_S = 2.0
 """Time in which a sensor has to send a sweep [s]."""
 COMPILE = "install modt from a wheel for this machine, or where a C compiler is"
-_TIME_ERROR = 5  # adjtimex(2)
+_TIME_ERROR = 5
+"""State of adjtimex(2) in which the clock is not synchronised."""
 _SANE_YEAR = 2024
+"""An earlier year means that the clock has lost its battery."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +162,8 @@ def sensor(open_source: Callable[[], LiveStream], timeout_s: float = REACH_S) ->
 def _sensor_finding(name: str, health: dict[str, Any], points: int | None) -> Finding:
     if points is not None:
         return Finding(OK, "sensor", f"{name}: a sweep of {points} points")
-    messages, refused = health["messages"], health["refused_messages"]
+    messages = health["messages"]
+    refused = health["refused_messages"]
     if refused:
         remedy = "give the address of the sensor that sends here"
         return Finding(FAIL, "sensor", f"{name}: only unusable messages ({', '.join(refused)})", remedy)

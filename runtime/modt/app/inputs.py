@@ -23,8 +23,10 @@ from modt.sources.stream import Stream, StreamInfo
 if TYPE_CHECKING:
     from modt.sources.live.live_stream import LiveStream
 
-RECORDED, NONE = "recording", "none"
-"""Values of --odometry that are no addresses."""
+# Values of --odometry that are no addresses
+RECORDED = "recording"
+NONE = "none"
+
 log = logging.getLogger(__name__)
 
 

@@ -51,7 +51,8 @@ class SensorWatch:
         self._in_a_row += 1
         if self._in_a_row < SWEEPS:
             return False
-        self._usual, self._in_a_row = returns, 0
+        self._usual = returns
+        self._in_a_row = 0
         return True
 
 
@@ -78,7 +79,10 @@ class Stages:
     def __init__(
         self, request: inputs.Request, info: StreamInfo, ledger: Ledger, watch: SensorWatch | None = None
     ) -> None:
-        self.request, self.ledger, self._info, self._watch = request, ledger, info, watch
+        self.request = request
+        self.ledger = ledger
+        self._info = info
+        self._watch = watch
         self._mode = assembly.MODES[request.mode]
         self._first: Frame | None = None  # identifies the sensor
         self.misfits = 0
@@ -107,7 +111,8 @@ class Stages:
 
     def recognise(self, first: Frame, named: str | None = None) -> None:
         """Use the profile that fits the first sweep; `named` is the profile that the messages of the sensor name."""
-        self._first, self._info = first, replace(self._info, profile=named or self._info.profile)
+        self._first = first
+        self._info = replace(self._info, profile=named or self._info.profile)
         chosen = self._choose()
         if chosen.config == self.config:
             self.chosen = chosen
@@ -118,7 +123,7 @@ class Stages:
         """Process a frame; `reduced` leaves out distant points."""
         frame = self.odometry.place(frame)
         if reduced:
-            x, y = frame.points[:, 0], frame.points[:, 1]
+            x, y = frame.points[:, :2].T
             near = np.square(x) + np.square(y) <= (RANGE_SHARE * self.config.sensor.max_range_m) ** 2
             frame = replace(frame, points=frame.points[near])
         result = self.pipeline.step(frame, budget)
@@ -155,7 +160,9 @@ class Stages:
 
     def facts(self, core: int | None, command: Sequence[str]) -> dict[str, Any]:
         """Content of run.yaml."""
-        request, info, chosen = self.request, self.info, self.chosen
+        request = self.request
+        info = self.info
+        chosen = self.chosen
         return {
             "schema": "modt.run/1",
             "command": list(command),

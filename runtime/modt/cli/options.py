@@ -29,13 +29,12 @@ def capture(text: str) -> tuple[str, str]:
 def frames(text: str) -> tuple[int, int | None]:
     """Parse a range A:B, either end of which may be left out."""
     first, colon, last = text.partition(":")
-    try:
-        a, b = int(first or 0), int(last) if last else None
-    except ValueError:
-        a, b = -1, None
-    if not colon or a < 0 or (b is not None and b <= a):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a range; write A:B with 0 <= A < B, as in 0:50")
-    return a, b
+    with suppress(ValueError):
+        a = int(first or 0)
+        b = int(last) if last else None
+        if colon and a >= 0 and (b is None or b > a):
+            return a, b
+    raise argparse.ArgumentTypeError(f"{text!r} is not a range; write A:B with 0 <= A < B, as in 0:50")
 
 
 def core(text: str) -> int | None:

@@ -58,9 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
     info = loop.stages.info
     directory = loop.recording.directory
     shown = not arguments.quiet
-    if shown:
-        for note in (*info.notes, *info.pose_notes):
-            print(f"modt: {note}", file=sys.stderr)
+    if shown and (notes := [*info.notes, *info.pose_notes]):
+        print("\n".join(f"modt: {note}" for note in notes), file=sys.stderr)
     with bar(info.n_frames, "frame", shown=shown and sys.stderr.isatty()) as step:
         summary = loop.run(notifier, lambda r: step(f"{len(r.proposals)} proposals, {len(r.classified)} classified"))
     if shown:
@@ -69,6 +68,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"  results in {directory.path}; to look at them: modt view {directory.path}{kept}")
     stopped_by = loop.stop.signal
     if stopped_by is not None:
-        frames_done = f"after {summary['frames']} frames"
-        print(f"modt: stopped by {stopped_by} {frames_done}: {directory.path} is whole", file=sys.stderr)
+        after = f"after {summary['frames']} frames"
+        print(f"modt: stopped by {stopped_by} {after}: {directory.path} is whole", file=sys.stderr)
     return INTERRUPTED if stopped_by == "SIGINT" else 0

@@ -129,16 +129,29 @@ def _step(facts: Facts, before: History, start: float | None, end: float, second
         mark = "wrap"
     least_W = (joules - facts.resolution) / (seconds + tick_s)
     most_W = (joules + facts.resolution) / (seconds - tick_s) if seconds > tick_s else math.inf
-    known_W = SURGE * before.high_W if before.base is not None else math.inf
-    fault = ""
-    # A wrap that implies another power than was shown may as well be a reset.
-    if joules < -facts.resolution or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
-        fault = "reset" if facts.counts else "negative"
-    elif seconds * min(facts.max_W, known_W) >= (facts.wrap_J or math.inf):
-        fault = "ambiguous"
-    elif joules <= 0 and seconds > 10 * tick_s and facts.must_draw:
-        fault = "stuck"
-    elif least_W > facts.max_W:
-        fault = "implausible"
+    fault = _fault(facts, before, joules, seconds, tick_s, least_W, most_W, wrapped=bool(mark))
     watts = joules / seconds if seconds > 2 * tick_s and not fault and not mark else None
     return _Step(start, joules, watts, least_W, most_W, fault, mark)
+
+
+def _fault(
+    facts: Facts,
+    before: History,
+    joules: float,
+    seconds: float,
+    tick_s: float,
+    least_W: float,
+    most_W: float,
+    *,
+    wrapped: bool,
+) -> str:
+    """Fault of a change between two readings, "" without one."""
+    known_W = SURGE * before.high_W if before.base is not None else math.inf
+    # A wrap that implies another power than was shown may as well be a reset.
+    if joules < -facts.resolution or (wrapped and not (before.low_W <= most_W and least_W <= before.high_W)):
+        return "reset" if facts.counts else "negative"
+    if seconds * min(facts.max_W, known_W) >= (facts.wrap_J or math.inf):
+        return "ambiguous"
+    if joules <= 0 and seconds > 10 * tick_s and facts.must_draw:
+        return "stuck"
+    return "implausible" if least_W > facts.max_W else ""

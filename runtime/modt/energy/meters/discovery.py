@@ -54,34 +54,48 @@ def find_powercap(sys: Path) -> list[Candidate]:
             found.append(Candidate(name, (), f"counted by {zone.name.rpartition(':')[0]}", "none needed"))
         elif zone.name.startswith("intel-rapl-mmio") and label in registers:
             found.append(Candidate(name, (), "the same package again", "none needed: its duplicate is used"))
-        elif not (zone / "energy_uj").exists() and (zone / "power_uw").exists():
-            facts = Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED)
-            found.append(probe(name, (file_meter(facts, zone / "power_uw"),), "make its power_uw readable"))
-        elif label == "psys":
-            found.append(probe(name, (_rapl(zone, name, Scope.BOARD),), _RAPL_REMEDY))
-        elif label.startswith("package"):
+        elif label.startswith("package") and not _shows_power(zone):
             packages.append(_rapl(zone, name, Scope.CPU))
         else:
-            found.append(Candidate(name, (), "of unknown extent", "none: its scope is not documented"))
+            found.append(_other_zone(zone, name, label))
     return _packages(packages) + found
+
+
+def _other_zone(zone: Path, name: str, label: str) -> Candidate:
+    """A zone of SCMI, or the platform counter; any other one is of unknown extent."""
+    if _shows_power(zone):
+        facts = Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED)
+        return probe(name, (file_meter(facts, zone / "power_uw"),), "make its power_uw readable")
+    if label == "psys":
+        return probe(name, (_rapl(zone, name, Scope.BOARD),), _RAPL_REMEDY)
+    return Candidate(name, (), "of unknown extent", "none: its scope is not documented")
+
+
+def _shows_power(zone: Path) -> bool:
+    """Whether it is a zone of SCMI, which has no counter of energy."""
+    return not (zone / "energy_uj").exists() and (zone / "power_uw").exists()
 
 
 def _packages(meters: list[Meter]) -> list[Candidate]:
     """All packages as one candidate. A package whose readings lie between those of another shows the same counter."""
+    if not meters:
+        return []
     try:
-        pairs = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
+        rounds = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
     except MeterLostError:
-        pairs = []
-    found, own = list[Candidate](), list[int]()
+        rounds = []
+    used: list[int] = []
+    found: list[Candidate] = []
     for k, meter in enumerate(meters):
-        same = (j for j in own if pairs and all(a[j] - _SAME_J <= a[k] <= b[j] + _SAME_J for a, b in pairs))
-        twin = next(same, None)
+        # Counters count all the time: one that is read after another and shows the same lies between two readings.
+        twins = (j for j in used if rounds and all(a[j] - _SAME_J <= a[k] <= b[j] + _SAME_J for a, b in rounds))
+        twin = next(twins, None)
         if twin is None:
-            own.append(k)
+            used.append(k)
         else:
             cause = f"shows the counter of {meters[twin].facts.name}"
             found.append(Candidate(meter.facts.name, (), cause, "none needed: it is counted once"))
-    return [probe("RAPL packages", tuple(meters[k] for k in own), _RAPL_REMEDY), *found] if meters else []
+    return [probe("RAPL packages", tuple(meters[k] for k in used), _RAPL_REMEDY), *found]
 
 
 def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
@@ -136,12 +150,14 @@ def find_hwmon(sys: Path) -> list[Candidate]:
         return [Candidate("hwmon", (), "no power monitor under /sys/class/hwmon", remedy)]
     model = text_or_none(sys / "firmware/devicetree/base/model") or ""
     fitting = (b for b in BOARDS if rails.keys() >= {b.cpu, *b.whole} and (not model or re.search(b.model, model)))
-    board, remedy = next(fitting, None), "make the chip's inputs readable"
+    board = next(fitting, None)
+    remedy = "make the chip's inputs readable"
     found = [] if board is None else [_module(board, rails, remedy)]
     for label, meter in rails.items():
         if board is None or board.whole != (label,):
-            own = _scoped(meter, Scope.CPU_RAIL) if board is not None and label == board.cpu else meter
-            found.append(probe(own.facts.name, (own,), remedy))
+            of_cpu = board is not None and label == board.cpu
+            rail = _scoped(meter, Scope.CPU_RAIL) if of_cpu else meter
+            found.append(probe(rail.facts.name, (rail,), remedy))
     return found
 
 
@@ -175,7 +191,8 @@ def _rails(folder: Path, chip: str) -> dict[str, Meter]:
         if n > 3 or text_or_none(folder / f"in{n}_enable") == "0" or not voltage.exists() or label == "NC":
             continue
         computed = power.exists()
-        unit, step_W = "uW" if computed else "mV x mA", 5e-3  # 1 mA at 5 V
+        unit = "uW" if computed else "mV x mA"
+        step_W = 5e-3  # 1 mA at 5 V
         facts = Facts(f"hwmon {chip} {label}", unit, step_W, 500.0, Scope.RAIL, Kind.INTEGRATED)
         rails[label] = file_meter(facts, *((power,) if computed else (voltage, current)))
     return rails
@@ -184,11 +201,13 @@ def _rails(folder: Path, chip: str) -> dict[str, Meter]:
 def find_batteries(sys: Path) -> list[Candidate]:
     """A candidate for each battery of the machine itself; batteries of peripherals (scope Device) are left out."""
     supplies = sorted((sys / "class" / "power_supply").glob("*"))
-    own = [p for p in supplies if text_or_none(p / "type") == "Battery" and text_or_none(p / "scope") != "Device"]
-    if not own:
+    batteries = [
+        p for p in supplies if text_or_none(p / "type") == "Battery" and text_or_none(p / "scope") != "Device"
+    ]
+    if not batteries:
         remedy = "run from a battery with a fuel gauge"
         return [Candidate("battery", (), "none under /sys/class/power_supply", remedy)]
-    return [probe(f"battery {p.name}", (_battery(p),), "unplug the charger") for p in own]
+    return [probe(f"battery {p.name}", (_battery(p),), "unplug the charger") for p in batteries]
 
 
 def _battery(folder: Path) -> Meter:
