@@ -182,7 +182,7 @@ class Resolved:
         """Name of the last profile that sets a key of the sensor; None if none does."""
         return next((layer.name for layer in reversed(self.layers) if layer.of_sensor), None)
 
-    def over(self, base: ProfileConfig) -> ProfileConfig:
+    def applied_to(self, base: ProfileConfig) -> ProfileConfig:
         """Another configuration with the values of the layers.
 
         Raises:

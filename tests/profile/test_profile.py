@@ -127,8 +127,8 @@ def test_a_board_alone_goes_with_the_default_sensor():
     assert found.config == replace(profile.load(), energy=found.config.energy)
     assert found.config.energy.board == "Raspberry Pi 5"
     assert (found.sensor, found.used("as found")) == (None, ("as found", "raspberry-pi-5"))
-    assert found.over(sensor) == profile.load(["vlp-16", "raspberry-pi-5"])
-    assert found.over(sensor) == replace(sensor, energy=found.config.energy)
+    assert found.applied_to(sensor) == profile.load(["vlp-16", "raspberry-pi-5"])
+    assert found.applied_to(sensor) == replace(sensor, energy=found.config.energy)
 
 
 def test_a_shown_profile_can_be_read_and_says_who_set_each_key():

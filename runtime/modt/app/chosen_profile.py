@@ -60,9 +60,9 @@ def choose(requested: profile.Names | ProfileConfig, first: Frame | None, info: 
         return ChosenProfile(recognition.mounted(profiles.config), profiles.sensor, profiles.used(""), recognition)
     base = info.profile if info and info.profile else profile.DEFAULT
     name = base if info and info.profile else f"{base} (the default)"
-    recognition = _compared(first, _with_beams(profiles.over(profile.load(base)), info), name, replaced=True)
+    recognition = _compared(first, _with_beams(profiles.applied_to(profile.load(base)), info), name, replaced=True)
     sensor = FOUND if recognition.differences else base
-    config = _with_beams(profiles.over(recognition.fitted), info)
+    config = _with_beams(profiles.applied_to(recognition.fitted), info)
     return ChosenProfile(config, sensor, profiles.used(sensor), recognition)
 
 

@@ -134,11 +134,8 @@ class Loop:
                 self._process(received)
 
     def _sweeps(self, notifier: Notifier) -> Iterator[Received]:
-        """Sweeps as they arrive. Reloads, watchdog and reports are served between them."""
-        reported_s = float("-inf")
+        """Sweeps as they arrive. The watchdog, reports and reloads are served between them."""
         while self.stop.signal is None:
-            if self.stop.take_reload():
-                self._reload(notifier)
             try:
                 received = self.source.take(WAIT_S)
             except StreamEndedError:
@@ -151,10 +148,7 @@ class Loop:
             if received is not None and self.stop.signal is None:
                 yield received
             notifier.alive()
-            now_s = self.clock()
-            if now_s - reported_s >= REPORT_S:
-                reported_s = now_s
-                self.failures.contain("status", self._report, notifier)
+            self._serve(notifier)
 
     def _process(self, received: Received) -> None:
         """Process a frame. Its failure is contained: the tracks are those of the frame before."""
@@ -206,11 +200,8 @@ class Loop:
         for sink in self._ledger_sinks:
             sink.ledger(line)
 
-    def _reload(self, notifier: Notifier) -> None:
-        """Take over the profile from disk. A recording is replayed with one profile."""
-
-    def _report(self, notifier: Notifier) -> None:
-        """Show the status. A replay has none."""
+    def _serve(self, notifier: Notifier) -> None:
+        """Report the status and reload the profile, which a replay does not."""
 
     def pace(self) -> dict[str, Any]:
         """Figures of the pace for the summary."""
@@ -250,6 +241,7 @@ class Service(Loop):
         self.reloads = 0
         self.refused_reloads = 0
         self._counter = FrameCounter(self.totals, self.clock())
+        self._reported_s = float("-inf")
 
     def pace(self) -> dict[str, Any]:
         """Figures of the deadlines for the summary."""
@@ -258,6 +250,15 @@ class Service(Loop):
     def status(self) -> Status:
         """The status now."""
         return service_status(self, self._counter.report(self.clock()))
+
+    def _serve(self, notifier: Notifier) -> None:
+        """Report the status once a second, and reload the profile when a signal has asked for it."""
+        now_s = self.clock()
+        if now_s - self._reported_s >= REPORT_S:
+            self._reported_s = now_s
+            self.failures.contain("status", self._report, notifier)
+        if self.stop.take_reload():
+            self._reload(notifier)
 
     def _reload(self, notifier: Notifier) -> None:
         notifier.reloading()

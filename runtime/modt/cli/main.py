@@ -10,7 +10,7 @@ from importlib.metadata import entry_points
 
 from modt.cli.command import dispatch
 
-OWN = {
+ROBOT_COMMANDS = {
     "replay": "modt.cli.replay",
     "run": "modt.cli.run",
     "status": "modt.cli.status",
@@ -22,7 +22,7 @@ OWN = {
 
 def commands() -> dict[str, str]:
     """Module of every command by its name."""
-    return OWN | {entry.name: entry.value for entry in entry_points(group="modt.commands")}
+    return ROBOT_COMMANDS | {entry.name: entry.value for entry in entry_points(group="modt.commands")}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

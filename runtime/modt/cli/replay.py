@@ -66,8 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(summary_text(summary))
         kept = f"; those before are kept in {directory.previous}" if directory.previous else ""
         print(f"  results in {directory.path}; to look at them: modt view {directory.path}{kept}")
-    stopped_by = loop.stop.signal
-    if stopped_by is not None:
-        after = f"after {summary['frames']} frames"
-        print(f"modt: stopped by {stopped_by} {after}: {directory.path} is whole", file=sys.stderr)
-    return INTERRUPTED if stopped_by == "SIGINT" else 0
+    signal = loop.stop.signal
+    if signal:
+        frames = f"{summary['frames']} frames"
+        print(f"modt: stopped by {signal} after {frames}: {directory.path} is whole", file=sys.stderr)
+    return INTERRUPTED if signal == "SIGINT" else 0
