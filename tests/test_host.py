@@ -84,7 +84,8 @@ def machine(folder, *, runtime="950000", cgroup="", share=None, capabilities="0"
     return folder / "proc", folder / "cgroup"
 
 
-V1, V2 = "4:cpu,cpuacct:/robot\n1:name=systemd:/", "0::/system.slice/modt.service"
+V1 = "4:cpu,cpuacct:/robot\n1:name=systemd:/"
+V2 = "0::/system.slice/modt.service"
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,8 @@ def test_importing_the_package_loads_nothing_heavy_and_its_public_names_are_list
 @pytest.mark.parametrize("mode", assembly.MODES)
 def test_step_returns_what_the_pipeline_finds(frames, mode):
     library = modt.Pipeline.from_profile("vlp-16", mode=mode)
-    config, chosen = load("vlp-16"), assembly.MODES[mode]
+    config = load("vlp-16")
+    chosen = assembly.MODES[mode]
     pipeline = assembly.pipeline(chosen, config, FieldOfView())
     for frame in frames:
         found = library.step(frame.points, frame.stamp_s, frame.T_world_sensor)

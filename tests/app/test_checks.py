@@ -54,7 +54,8 @@ def sensor(sweeps, messages, **refused):
     return found
 
 
-MEASURED, ESTIMATED = candidate(Kind.MEASURED), candidate(Kind.ESTIMATED)
+MEASURED = candidate(Kind.MEASURED)
+ESTIMATED = candidate(Kind.ESTIMATED)
 DENIED = candidate(Kind.MEASURED, "Permission denied", "grant CAP_DAC_READ_SEARCH")
 SWEEP = Sweep(1.0, np.full((10, 4), 0.5, np.float32))
 

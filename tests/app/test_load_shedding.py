@@ -19,7 +19,9 @@ class Frames:
     """Frames at 10 Hz on a made-up clock."""
 
     def __init__(self):
-        self.shedding, self.now, self.changes = LoadShedding(), 0.0, []
+        self.shedding = LoadShedding()
+        self.now = 0.0
+        self.changes = []
 
     def run(self, seconds, share):
         end = self.now + seconds
@@ -65,7 +67,8 @@ def test_trials_that_fail_become_rare():
 
 def test_a_power_limit_is_kept_by_the_same_steps():
     """Watts fall by a fifth with each step."""
-    frames, over = Frames(), 0
+    frames = Frames()
+    over = 0
     for _second in range(120):
         frames.run(1.0, 0.3)
         watts = 7.0 - 1.4 * frames.shedding.step

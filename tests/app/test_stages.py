@@ -35,7 +35,9 @@ CALLS += ("classifier.classify", "fusion.fuse", "decision.decide", "tracker.conc
 @pytest.mark.parametrize("after", [False, True], ids=["before its work", "after it"])
 @pytest.mark.parametrize("call", CALLS)
 def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after, monkeypatch):
-    stages, failures, ids = stages_of(), 0, {}
+    stages = stages_of()
+    failures = 0
+    ids = {}
     stage, method = call.split(".")
     real = getattr(getattr(stages.pipeline, stage), method)
 
@@ -67,7 +69,8 @@ def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after, monkey
 
 @pytest.mark.parametrize("posed", [False, True])
 def test_a_clock_that_steps_costs_no_track(posed):
-    steady, stepping = stages_of(), stages_of()
+    steady = stages_of()
+    stepping = stages_of()
     pose = np.eye(4) if posed else None
     for given in frames()[:15]:
         frame = dataclasses.replace(given, T_world_sensor=pose, steady_s=given.stamp_s)
@@ -98,7 +101,8 @@ def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
     stages.reload()
     assert stages.budget.calls == 0
     after = stages.step(frames()[8], stages.budget, reduced=False)
-    kept, held = set(after.tracks.id.tolist()), set(before.tracks.id.tolist())
+    kept = set(after.tracks.id.tolist())
+    held = set(before.tracks.id.tolist())
     assert len(kept & held) >= 0.8 * len(held)
     own.write_text(text.replace("calls_per_frame", "calls_per_fraem"))
     with pytest.raises(MisuseError, match="calls_per_frame"):
@@ -112,7 +116,8 @@ def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
     stages = stages_of(profile=None)
     first, _ = tilted
     stages.recognise(first)
-    sensor, made = stages.config.sensor, stages.pipeline
+    sensor = stages.config.sensor
+    made = stages.pipeline
     assert sensor.pitch_deg == pytest.approx(12.5, abs=1.0)
     assert stages.step(first, stages.budget, reduced=False).frame.R_level_sensor is not None
     stages.reload()
@@ -121,7 +126,8 @@ def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
 
 
 def test_a_reduced_frame_holds_what_is_near():
-    stages, frame = stages_of(), frames()[0]
+    stages = stages_of()
+    frame = frames()[0]
     reach_m = RANGE_SHARE * stages.config.sensor.max_range_m
     result = stages.step(frame, UNLIMITED, reduced=True)
     distance_m = np.hypot(*result.frame.points[:, :2].T)
@@ -131,7 +137,8 @@ def test_a_reduced_frame_holds_what_is_near():
 
 @pytest.mark.slow
 def test_another_sensor_is_noticed_and_followed(caplog):
-    stages, before = stages_of(profile=None), next(iter(SyntheticStream("street", "hdl-64e", 0.1, 0)))
+    stages = stages_of(profile=None)
+    before = next(iter(SyntheticStream("street", "hdl-64e", 0.1, 0)))
     stages.recognise(before)
     stages.watch(before)
     assert stages.chosen.name == "hdl-64e"
@@ -146,7 +153,9 @@ def test_another_sensor_is_noticed_and_followed(caplog):
 
 
 def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatch):
-    stages, may_end, looks = stages_of(), threading.Event(), []
+    stages = stages_of()
+    may_end = threading.Event()
+    looks = []
 
     def look(frame):
         looks.append(frame.index)
@@ -176,7 +185,8 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
     ids=["fewer", "more", "for a moment", "none", "gradual"],
 )
 def test_sweeps_of_another_size_are_noticed_once_when_they_stay(sizes, noticed):
-    watch, points = SensorWatch(), np.zeros((1000, 4), np.float32)
+    watch = SensorWatch()
+    points = np.zeros((1000, 4), np.float32)
     points[:, 0] = 5.0
     assert [k for k, size in enumerate(sizes) if watch.changed(points[:size])] == noticed
 

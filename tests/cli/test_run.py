@@ -105,7 +105,8 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
 def test_a_reload_before_it_is_ready_does_not_end_it(start):
     service = start(ready=False)
     status = Path(f"/proc/{service.process.pid}/status")
-    hup, ignored = 1 << (signal.SIGHUP - 1), False
+    hup = 1 << (signal.SIGHUP - 1)
+    ignored = False
     while not ignored:
         ignored, handled = (
             bool(int(mask, 16) & hup) for mask in re.findall(r"Sig(?:Ign|Cgt):\t(\w+)", status.read_text())

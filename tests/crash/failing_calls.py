@@ -44,7 +44,9 @@ class File:
     """A file whose calls may fail."""
 
     def __init__(self, faults: Faults, file: Any, name: str) -> None:
-        self._faults, self._file, self._name = faults, file, name
+        self._faults = faults
+        self._file = file
+        self._name = name
 
     def __getattr__(self, name: str) -> Any:
         call = getattr(self._file, name)
@@ -75,9 +77,13 @@ class Faults:
     def __init__(self, folder: Path, failing: Mapping[int, int], lasting_s: float = 0.0) -> None:
         """`failing`: way to fail, by the number of a call; calls of its kind fail for `lasting_s` after it."""
         self.calls = list[str]()
-        self.now_s, self.calendar_s, self.last_s = 100.0, 1.7e9, -np.inf
+        self.now_s = 100.0
+        self.calendar_s = 1.7e9
+        self.last_s = -np.inf
         self.active = False
-        self._folder, self._failing, self._lasting_s = str(folder), failing, lasting_s
+        self._folder = str(folder)
+        self._failing = failing
+        self._lasting_s = lasting_s
         self._lasting = dict[str, tuple[float, int]]()
 
     def call(self, name: str, call: Callable[..., Any], *given: Any, **options: Any) -> Any:

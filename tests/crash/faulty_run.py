@@ -51,7 +51,8 @@ from tests.crash.failing_calls import Faults
 from tests.results import CAR, result
 from tests.sequences.makers import MAKERS
 
-TURNS, TURN_S = 40, 0.1
+TURNS = 40
+TURN_S = 0.1
 INFO = StreamInfo("sensor", "test", 0, None, TURN_S, None, has_poses=False)
 BACK_S = 2.0
 """Time from the end of a fault until everything is recorded [s]."""
@@ -76,7 +77,9 @@ class Turns(LiveStream):
 
     def __init__(self, faults: Faults, reader: PacketReader, send: Callable[[], None]) -> None:
         super().__init__(INFO, reader, clock=faults.monotonic, pause=lambda seconds: None)
-        self._faults, self._send, self.turn = faults, send, 0
+        self._faults = faults
+        self._send = send
+        self.turn = 0
 
     def start(self) -> None:
         """No effect."""
@@ -98,8 +101,10 @@ def stages_with(odometry: PoseSocket) -> Mock:
         odometry.place(frame)
         return result(frame.index, [5, 4], {0: 1, 1: 2}, {1: CAR})
 
-    request, config = SimpleNamespace(mode="accurate", fov="full"), ProfileConfig()
-    chosen, decision = SimpleNamespace(name="default", config=config), SimpleNamespace(frequency=np.full(4, 0.25))
+    request = SimpleNamespace(mode="accurate", fov="full")
+    config = ProfileConfig()
+    chosen = SimpleNamespace(name="default", config=config)
+    decision = SimpleNamespace(frequency=np.full(4, 0.25))
     pipeline = SimpleNamespace(segmenter=SimpleNamespace(facts=dict), decision=decision)
     stages = Mock(info=INFO, request=request, chosen=chosen, config=config, misfits=0, budget=UNLIMITED, step=step)
     stages.configure_mock(odometry=odometry, ledger=Ledger(), pipeline=pipeline)
@@ -111,7 +116,8 @@ class FaultyRun:
     """A service of `TURNS` turns of a sensor with odometry, records, sinks, metrics and a meter."""
 
     def __init__(self, folder: Path, failing: Mapping[int, int], lasting_s: float = 0.0) -> None:
-        self.out, self.faults = folder / "state" / "run", Faults(folder, failing, lasting_s)
+        self.out = folder / "state" / "run"
+        self.faults = Faults(folder, failing, lasting_s)
         self.unread = list[str]()
         self.frames: dict[int, float] = {}
         self._folder = folder
@@ -122,7 +128,8 @@ class FaultyRun:
         Raises:
             Exception: the error that has ended the run.
         """
-        faults, folder = self.faults, self._folder
+        faults = self.faults
+        folder = self._folder
         with ExitStack() as stack:
             sensor, odometry, notified, sender = (
                 stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))
@@ -133,7 +140,8 @@ class FaultyRun:
                 bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
             notified.bind(str(folder / "notify"))
             notified.setblocking(False)
-            posed, received = odometry.getsockname(), sensor.getsockname()
+            posed = odometry.getsockname()
+            received = sensor.getsockname()
             reader = PacketReader(sensor, VelodyneDecoder("sensor"), clock=faults.calendar)
             poses = PoseSocket(odometry, ProfileConfig().odometry, "odometry")
             maker = MAKERS["velodyne"]
@@ -161,7 +169,8 @@ class FaultyRun:
             )
             for name in ("write", "ledger"):
                 setattr(recording, name, Mock(wraps=getattr(recording, name)))
-            deadlines, stop = Deadlines(TURN_S, lambda: faults.now_s), Stop()
+            deadlines = Deadlines(TURN_S, lambda: faults.now_s)
+            stop = Stop()
             meter = Meter(
                 Facts("test", "J", 1e-6, 100.0, Scope.BOARD, Kind.MEASURED),
                 lambda: faults.call("meter", lambda: 5.0 * faults.now_s),

@@ -41,7 +41,8 @@ class Service:
     """A recording of ten frames a second, and the frames that it lost."""
 
     def __init__(self, folder):
-        self.time, self.n = Time(), 0
+        self.time = Time()
+        self.n = 0
         self.path = folder / "run"
         self.recording = begun(folder, time=self.time, disk_mb=10.0, keep="tracks")
 

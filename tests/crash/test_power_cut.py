@@ -12,7 +12,8 @@ import pytest
 from tests.results import ledger_line
 from tests.sinks.recordings import begun, frame, frames, parts
 
-FRAMES, A_SECOND = 50, 5
+FRAMES = 50
+A_SECOND = 5
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,15 @@ class PowerCuts:
     """
 
     def __init__(self, root: Path) -> None:
-        self.root, self.cuts, self.safe = root, list[tuple[str, State, int]](), 0
+        self.root = root
+        self.cuts = list[tuple[str, State, int]]()
+        self.safe = 0
         self._durable = self._live()
 
     def note(self) -> None:
         """Keep the states that a power cut could leave now."""
-        live, durable = self._live(), self._durable
+        live = self._live()
+        durable = self._durable
         synced = dict(durable.files)
         lost = State({**{number: {} for number in live.folders}, **durable.folders}, synced)
         states = {"lost": lost, "named": State(live.folders, synced), "kept": live}
@@ -66,7 +70,8 @@ class PowerCuts:
             self.note()
             result = call(*arguments, **options)
             if call.__name__ == "fsync":
-                number, live = os.fstat(arguments[0]).st_ino, self._live()
+                number = os.fstat(arguments[0]).st_ino
+                live = self._live()
                 if number in live.folders:
                     self._durable.folders[number] = live.folders[number]
                 else:
@@ -77,7 +82,8 @@ class PowerCuts:
         return watched
 
     def _live(self) -> State:
-        folders, files = {}, {}
+        folders = {}
+        files = {}
         for folder, names, found in os.walk(self.root):
             here = Path(folder)
             folders[here.stat().st_ino] = {name: (here / name).stat().st_ino for name in (*names, *found)}

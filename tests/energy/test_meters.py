@@ -61,7 +61,8 @@ def test_counters_are_compared_while_they_count(tmp_path, monkeypatch, mirrors):
     """
     for n in (0, 1):
         write_zone(powercap(tmp_path) / f"intel-rapl:{n}", f"package-0-die-{n}")
-    true_uJ, own = itertools.count(10**9, 50_000), meter_module.read_number
+    true_uJ = itertools.count(10**9, 50_000)
+    own = meter_module.read_number
 
     def read_number(path):
         if path.name != "energy_uj":

@@ -19,7 +19,8 @@ def facts(kind=Kind.MEASURED, wrap_J=RANGE_J, scope=Scope.CPU):
 
 def judged(meter, readings, seconds=1.0):
     """Energy and mark of each interval between readings a second apart."""
-    history, found = History(), []
+    history = History()
+    found = []
     for reading in readings:
         history, joules, mark = judge(meter, history, reading, seconds)
         found.append((joules if joules is None else round(joules, 6), mark))
@@ -86,7 +87,11 @@ def counted(random, energy_J):
     counter that stands still (and has, or has not, counted meanwhile), is gone, or begins anew far from its range.
     """
     most_J = 5 * float(energy_J.max())
-    value_J, held_J, left, stalled, rest = float(random.uniform(0, RANGE_J)), None, 0, False, 0
+    value_J = float(random.uniform(0, RANGE_J))
+    held_J = None
+    left = 0
+    stalled = False
+    rest = 0
     for true_J in energy_J.tolist():
         left = max(left - 1, 0)
         value_J = (value_J + true_J * (not (left and stalled))) % RANGE_J
@@ -98,7 +103,8 @@ def counted(random, energy_J):
             wild_J = value_J + most_J * random.uniform(1, 4) * random.choice([-1, 1])
             yield float(random.choice([0.0 if value_J > most_J else np.nan, wild_J, np.nan, 1e300]))
         elif fault in ("stick", "gone"):
-            left, held_J = int(random.integers(2, 5)), floor(value_J) if fault == "stick" else None
+            left = int(random.integers(2, 5))
+            held_J = floor(value_J) if fault == "stick" else None
             stalled = bool(held_J is not None and random.random() < 0.5)
             yield held_J
         else:
@@ -119,12 +125,15 @@ def test_no_joule_is_invented_and_none_is_lost_unmarked():
     for seed in range(300):
         random = np.random.default_rng(seed)
         power_W = random.uniform(1, 60) * random.uniform(0.6, 1.6, 40)
-        seconds, history = random.uniform(0.5, 2.0), History()
+        seconds = random.uniform(0.5, 2.0)
+        history = History()
         for k, reading in enumerate(counted(random, seconds * power_W)):
             history, joules, mark = judge(facts(), history, reading, seconds)
             assert (joules is None) == (mark not in ("", "wrap"))
             assert joules is None or joules == pytest.approx(seconds * power_W[k], abs=3e-4), (seed, k, mark)
-            intervals, measured, wraps = intervals + 1, measured + (joules is not None), wraps + (mark == "wrap")
+            intervals = intervals + 1
+            measured = measured + (joules is not None)
+            wraps = wraps + (mark == "wrap")
     assert measured > 0.5 * intervals
     assert wraps > 0
 

@@ -11,7 +11,8 @@ from modt.energy.windows import SCHEMA, Clocks, Windows
 
 from .meter_files import CALIBRATED, RANGE_UJ, window_of, write_files, write_zone
 
-STEP_UJ, IDLE_W = 61.035, 3.0
+STEP_UJ = 61.035
+IDLE_W = 3.0
 
 
 class Machine:
@@ -21,7 +22,8 @@ class Machine:
     """
 
     def __init__(self, sys, tick_ns=0):
-        self.true_J, self.tick_ns = 1e-6 * RANGE_UJ - 7.0, tick_ns
+        self.true_J = 1e-6 * RANGE_UJ - 7.0
+        self.tick_ns = tick_ns
         self.now_ns = self.cpu_ns = 1_000_000_000
         self.slept_ns = 0
         self.zone = sys / "class" / "powercap" / "intel-rapl:0"
@@ -93,7 +95,8 @@ def test_lost_meter_is_marked_and_resumes(machine):
     machine.zone.rename(machine.zone.with_name("gone"))
     lost = [machine.second() for _ in range(2)]
     machine.zone.with_name("gone").rename(machine.zone)
-    back, good = machine.second(), machine.second()
+    back = machine.second()
+    good = machine.second()
     assert [(line.energy_J, line.kind, line.marks) for line in lost] == [(None, "unavailable", ["lost"])] * 2
     assert (back.energy_J, back.marks) == (None, ["back"])
     assert good.energy_J == pytest.approx(3.5, abs=1e-3)
@@ -115,7 +118,8 @@ FRAMES = st.lists(st.tuples(st.floats(0, 0.6), st.floats(0, 0.6), st.integers(0,
 @given(FRAMES, st.integers(0, 300))
 def test_parts_of_every_window_sum_to_it(tmp_path_factory, frames, tick_ns):
     machine = Machine(tmp_path_factory.mktemp("sys"), tick_ns=tick_ns)
-    start, lines = machine.now_ns, []
+    start = machine.now_ns
+    lines = []
     for index, (busy, idle, items) in enumerate(frames):
         machine.ledger.run("tracking", machine.work, busy, busy, items)
         lines.append(machine.frame(index, idle))

@@ -109,7 +109,8 @@ def test_later_profiles_win_key_by_key(write):
 
 def test_a_profile_is_based_on_those_that_it_extends(write, tmp_path):
     write(mine="extends: [vlp-16, raspberry-pi-5]\nsensor: {height_m: 0.45}\n")
-    own, both = profile.load("mine.yaml"), profile.load(["vlp-16", "raspberry-pi-5"])
+    own = profile.load("mine.yaml")
+    both = profile.load(["vlp-16", "raspberry-pi-5"])
     assert own == replace(both, sensor=replace(both.sensor, height_m=0.45))
     assert profile.parse("extends: mine.yaml\n", "other.yaml") == own
     found = profile.resolve(["os1-32", "raspberry-pi-5"])
@@ -123,7 +124,8 @@ def test_a_profile_is_based_on_those_that_it_extends(write, tmp_path):
 
 
 def test_a_board_alone_goes_with_the_default_sensor():
-    found, sensor = profile.resolve("raspberry-pi-5"), profile.load("vlp-16")
+    found = profile.resolve("raspberry-pi-5")
+    sensor = profile.load("vlp-16")
     assert found.config == replace(profile.load(), energy=found.config.energy)
     assert found.config.energy.board == "Raspberry Pi 5"
     assert (found.sensor, found.used("as found")) == (None, ("as found", "raspberry-pi-5"))

@@ -16,8 +16,11 @@ class Slow:
     """A writer that waits for the test, and fails with the error that the test sets."""
 
     def __init__(self):
-        self.items, self.closed, self.failure = [], threading.Event(), None
-        self.entered, self.released = threading.Semaphore(0), threading.Semaphore(0)
+        self.items = []
+        self.closed = threading.Event()
+        self.failure = None
+        self.entered = threading.Semaphore(0)
+        self.released = threading.Semaphore(0)
 
     def write(self, item):
         self.entered.release()

@@ -54,7 +54,8 @@ def test_definitions_are_those_of_another_implementation():
 def test_results_are_in_the_frame_of_the_input_unless_another_is_named(option, received, expected):
     frame = dataclasses.replace(FRAME, frame=dataclasses.replace(FRAME.frame, frame_id=received))
     shown = published(frame, frame_id=option, world_frame_id="map", points=True)
-    odometry, (tf,) = shown["/modt/odometry"], shown["/tf"].transforms
+    odometry = shown["/modt/odometry"]
+    (tf,) = shown["/tf"].transforms
     stamped = [shown["/modt/detections"], shown["/modt/points"], *shown["/modt/markers"].markers]
     assert {message.header.frame_id for message in stamped} == {expected}
     assert {odometry.child_frame_id, tf.child_frame_id} == {expected}
@@ -77,7 +78,9 @@ def test_a_detection_has_its_box_and_the_reported_class_first_though_another_is_
     (found,) = detections(frame)
     hypotheses = [(r.hypothesis.class_id, r.hypothesis.score) for r in found.results]
     assert hypotheses == [("pedestrian", 0.3), ("background", 0.6), ("car", 0.1), ("cyclist", 0.0)]
-    at, turned, size = found.bbox.center.position, found.bbox.center.orientation, found.bbox.size
+    at = found.bbox.center.position
+    turned = found.bbox.center.orientation
+    size = found.bbox.size
     assert (at.x, at.y, at.z, size.x, size.y, size.z) == (10.0, -2.0, -1.0, 4.0, 1.8, 1.5)
     np.testing.assert_allclose([turned.x, turned.y, turned.z, turned.w], [0, 0, np.sin(0.25), np.cos(0.25)])
     assert found.results[0].pose.pose == found.bbox.center
@@ -91,7 +94,8 @@ def test_objects_are_cubes_with_labels_and_an_arrow_along_their_motion():
     shown = {(marker.ns, marker.id): marker for marker in rest}
     everybody = {(name, track) for name in ("objects", "labels") for track in (1, 12, 13)}
     assert shown.keys() == {*everybody, ("motion", 1), ("motion", 13)}
-    cube, label = shown["objects", 1], shown["labels", 1]
+    cube = shown["objects", 1]
+    label = shown["labels", 1]
     assert (cube.type, cube.scale.x, cube.scale.y, cube.scale.z) == (encoded.CUBE, 4.0, 2.0, 1.5)
     assert label.text == "car 1, 2.0 m/s"
     assert label.pose.position.z > cube.pose.position.z + cube.scale.z / 2
@@ -115,5 +119,6 @@ def test_points_of_a_tilted_sensor_are_as_it_sent_them_and_in_their_place_in_the
     points = read_cloud(topics["/modt/points"]).points
     np.testing.assert_allclose(points[:, :3], level.points[:, :3], atol=1e-4)
     T = read_odometry(topics["/modt/odometry"]).T_odom_child
-    inside, placed = points[:, :3].astype(np.float64), tilted.points[:, :3].astype(np.float64)
+    inside = points[:, :3].astype(np.float64)
+    placed = tilted.points[:, :3].astype(np.float64)
     np.testing.assert_allclose(transform(T, inside), transform(tilted.T_world_sensor, placed), atol=1e-3)

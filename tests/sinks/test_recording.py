@@ -70,7 +70,8 @@ def test_another_profile_changes_what_is_kept_and_the_description(tmp_path):
 
 
 def test_lines_that_the_writer_has_no_room_for_are_counted(tmp_path, monkeypatch):
-    recording, dropped = begun(tmp_path), []
+    recording = begun(tmp_path)
+    dropped = []
     monkeypatch.setattr(AtOnce, "write", lambda _, job: dropped.append(job))
     monkeypatch.setattr(AtOnce, "health", lambda _: {"dropped": len(dropped)}, raising=False)
     recording.write(frame(0))

@@ -49,7 +49,9 @@ def test_each_part_is_kept_under_the_next_number_and_the_oldest_go_first(tmp_pat
 
 
 def test_nothing_but_records_of_a_service_is_deleted(tmp_path):
-    replay, notes, foreign = tmp_path / "run~1", tmp_path / "run~2", tmp_path / "run~3"
+    replay = tmp_path / "run~1"
+    notes = tmp_path / "run~2"
+    foreign = tmp_path / "run~3"
     for folder in (replay, notes, foreign):
         folder.mkdir()
         fill(folder, 5000)

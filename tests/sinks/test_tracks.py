@@ -35,7 +35,8 @@ def test_a_record_counts_what_was_done_in_its_frame():
 )
 def test_a_possible_person_too_near_to_be_recognised_is_reported_as_uncertain(size, cut, posteriors, said):
     r = result(3, [7, 5], {0: 11}, posteriors, lost=(9,))
-    r.proposals.box[0, 3:6], r.proposals.cut[0] = size, cut
+    r.proposals.box[0, 3:6] = size
+    r.proposals.cut[0] = cut
     assert [track["uncertain"] for track in frame_record(r)["tracks"]] == [said, None]
     assert unknown_near(r).tolist() == [said is not None, False]
 
@@ -55,7 +56,8 @@ COUNTS = st.integers(0, 10**12)
 @st.composite
 def results(draw):
     """Frames of few or no tracks and proposals, with any numbers."""
-    tracked, lost = draw(st.integers(0, 4)), draw(st.integers(0, 3))
+    tracked = draw(st.integers(0, 4))
+    lost = draw(st.integers(0, 3))
     r = result(draw(COUNTS), [3] * tracked, {p: 7 + p for p in range(tracked)}, lost=tuple(range(90, 90 + lost)))
     t = r.tracks
     for column in (t.points, t.age, t.missed):
@@ -82,7 +84,8 @@ def question(t, k):
 def tracks_one_by_one(r):
     """The tracks of a record, slowly."""
     for k in range(len(r.tracks)):
-        t, proposal = r.tracks, int(r.tracks.proposal[k])
+        t = r.tracks
+        proposal = int(r.tracks.proposal[k])
         box = None if proposal == NONE else np.round(r.proposals.box[proposal], 3).tolist()
         yield {
             "id": int(t.id[k]),

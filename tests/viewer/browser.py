@@ -34,7 +34,9 @@ class Browser:
     """A browser at the other end of a socket."""
 
     def __init__(self, commands: socket.socket) -> None:
-        self._socket, self._buffer, self._number = commands, b"", 0
+        self._socket = commands
+        self._buffer = b""
+        self._number = 0
         self._socket.settimeout(WAIT_S)
         self.events: list[dict[str, Any]] = []
 
@@ -104,7 +106,8 @@ class Tab:
         self.value("0")  # receives the events so far
         found = []
         for event in self._browser.events:
-            method, params = event.get("method"), event.get("params", {})
+            method = event.get("method")
+            params = event.get("params", {})
             if event.get("sessionId") != self._session:
                 continue
             if method == "Runtime.exceptionThrown":

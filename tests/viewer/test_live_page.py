@@ -84,7 +84,8 @@ def test_connections_are_bounded(monkeypatch, request):
 
 def test_one_that_asks_too_slowly_is_left(live, monkeypatch):
     monkeypatch.setattr(live_server, "SEND_S", 0.2)
-    ends_s, closed = time.monotonic() + WAIT_S, False
+    ends_s = time.monotonic() + WAIT_S
+    closed = False
     with socket.create_connection(("127.0.0.1", live.port), 0.02) as slow, suppress(ConnectionError):
         slow.sendall(b"GET /")
         while not closed:
