@@ -44,6 +44,7 @@ NEAR = [RANGE_J - J for J in (100.0, 60.0, 20.0)]
         ([*KNOWN, math.inf, math.nan, 1200.0], [(None, "lost"), (None, "lost"), (None, "back")]),
         ([*KNOWN, 5.0, 45.0, 85.0], [(None, "reset"), (40.0, ""), (40.0, "")]),
         ([*KNOWN, 1380.0, 1680.0, 1690.0], [(None, "implausible"), (300.0, ""), (10.0, "")]),
+        ([*KNOWN, 1380.0, 1380.0], [(None, "implausible"), (None, "stuck")]),
         ([*KNOWN, 1082.0, 1085.0, 1088.0], [(None, "implausible"), (3.0, ""), (3.0, "")]),
         ([*KNOWN, 9000.0, 30_000.0, 1200.0], [(None, "implausible"), (None, "implausible"), (None, "back")]),
         ([*KNOWN, -40.0, RANGE_J + 1, 1200.0], [(None, "lost"), (None, "lost"), (None, "back")]),

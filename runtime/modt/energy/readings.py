@@ -68,12 +68,15 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
         return unsettled, None, "lost"
     if facts.kind is Kind.ESTIMATED:  # computed by a formula, which is never wrong
         return History(True, reading), None if before.base is None else reading - before.base, ""
-    step = _step(facts, before, before.base, reading, unsettled.base_s)
-    if step.fault != "stuck" and step.near(before.low_W, before.high_W):
-        return _accept(facts, before, step, reading, seconds, measured=before.accepted)
-    # The reading does not continue the accepted one. It may continue the doubtful one.
+    from_base = _step(facts, before, before.base, reading, unsettled.base_s)
+    step = from_base
     if before.doubtful is not None:
         step = _step(facts, before, before.doubtful, reading, before.doubtful_s + seconds)
+    # It may continue the accepted reading, unless the meter stands still since then.
+    if step.fault != "stuck" and from_base.near(before.low_W, before.high_W):
+        return _accept(facts, before, from_base, reading, seconds, measured=before.accepted)
+    # It may continue the doubtful reading instead, by the power that either that one or the meter before has shown.
+    if before.doubtful is not None:
         doubtful_W = before.doubtful_W
         agrees = doubtful_W is not None and not step.mark and step.near(doubtful_W, doubtful_W)
         if agrees or step.near(before.low_W, before.high_W):
@@ -113,45 +116,42 @@ def _accept(
 
 
 def _step(facts: Facts, before: History, start: float | None, end: float, seconds: float) -> _Step:
-    """Change from one reading of a counter to another. A power sample stands alone, as the joules of a second."""
-    mark = ""
+    """Change from one reading to another. A power sample stands alone."""
     if not facts.counts:
-        joules = end
-        seconds = 1.0
-        tick_s = 0.0
-    elif start is None:
+        return _power_step(facts, start, end)
+    if start is None:
         return _Step(start, 0.0, None, 0.0, 0.0, "first")
-    else:
-        joules = end - start
-        tick_s = TICK_S
+    joules = end - start
+    mark = ""
     if joules < 0 and facts.wrap_J:
         joules += facts.wrap_J
         mark = "wrap"
-    least_W = (joules - facts.resolution) / (seconds + tick_s)
-    most_W = (joules + facts.resolution) / (seconds - tick_s) if seconds > tick_s else math.inf
-    fault = _fault(facts, before, joules, seconds, tick_s, least_W, most_W, wrapped=bool(mark))
-    watts = joules / seconds if seconds > 2 * tick_s and not fault and not mark else None
+    # Each reading may be as old as a step of the counter.
+    least_W = (joules - facts.resolution) / (seconds + TICK_S)
+    most_W = (joules + facts.resolution) / (seconds - TICK_S) if seconds > TICK_S else math.inf
+    known_W = SURGE * before.high_W if before.base is not None else math.inf
+    fault = ""
+    # A wrap that implies another power than was shown may as well be a reset.
+    if joules < -facts.resolution or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
+        fault = "reset"
+    elif seconds * min(facts.max_W, known_W) >= (facts.wrap_J or math.inf):
+        fault = "ambiguous"
+    elif joules <= 0 and seconds > 10 * TICK_S and facts.must_draw:
+        fault = "stuck"
+    elif least_W > facts.max_W:
+        fault = "implausible"
+    watts = joules / seconds if seconds > 2 * TICK_S and not fault and not mark else None
     return _Step(start, joules, watts, least_W, most_W, fault, mark)
 
 
-def _fault(
-    facts: Facts,
-    before: History,
-    joules: float,
-    seconds: float,
-    tick_s: float,
-    least_W: float,
-    most_W: float,
-    *,
-    wrapped: bool,
-) -> str:
-    """Fault of a change between two readings, "" without one."""
-    known_W = SURGE * before.high_W if before.base is not None else math.inf
-    # A wrap that implies another power than was shown may as well be a reset.
-    if joules < -facts.resolution or (wrapped and not (before.low_W <= most_W and least_W <= before.high_W)):
-        return "reset" if facts.counts else "negative"
-    if seconds * min(facts.max_W, known_W) >= (facts.wrap_J or math.inf):
-        return "ambiguous"
-    if joules <= 0 and seconds > 10 * tick_s and facts.must_draw:
-        return "stuck"
-    return "implausible" if least_W > facts.max_W else ""
+def _power_step(facts: Facts, start: float | None, watts: float) -> _Step:
+    """A power sample as the joules of a second."""
+    fault = ""
+    if watts < -facts.resolution:
+        fault = "negative"
+    elif watts <= 0 and facts.must_draw:
+        fault = "stuck"
+    elif watts - facts.resolution > facts.max_W:
+        fault = "implausible"
+    bounds_W = (watts - facts.resolution, watts + facts.resolution)
+    return _Step(start, watts, None if fault else watts, *bounds_W, fault)
