@@ -1,4 +1,4 @@
-"""What is written about a run beside its frames: the status of a service, and the summary at the end."""
+"""The status of a service and the summary of a run, which are written beside its frames."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class KittiResults(LineFile[FrameResult]):
         if not len(rows):
             return ""
         boxes = result.proposals.box[tracks.proposal[rows]]
-        truncated = (result.proposals.cut[tracks.proposal[rows]] & Cut.SIDE > 0).astype(np.int64)
+        truncated = ((result.proposals.cut[tracks.proposal[rows]] & Cut.SIDE) > 0).astype(np.int64)
         camera = Mount(result.frame.R_level_sensor).camera(self._camera)
         T = camera.T_camera_sensor
         bottom = transform(T, boxes[:, :3] - np.array([0, 0, 0.5]) * boxes[:, 5:6])
@@ -52,12 +52,18 @@ class KittiResults(LineFile[FrameResult]):
         alpha = wrap(ry - np.arctan2(bottom[:, 0], bottom[:, 2]))
         score = tracks.posterior[rows, class_[rows]]
         image_box = _image_boxes(boxes, camera)
-        columns = (tracks.id[rows], class_[rows], truncated, alpha, image_box, boxes[:, 3:6], bottom, ry, score)
+        columns = (
+            *(tracks.id[rows], class_[rows], truncated, alpha),
+            *(*image_box.T, *boxes[:, 3:6].T, *bottom.T),
+            *(ry, score),
+        )
         return "".join(
-            f"{result.frame.index} {id_} {KITTI_TYPES[c]} {cut} -1 {a:.4f} "
-            f"{i[0]:.2f} {i[1]:.2f} {i[2]:.2f} {i[3]:.2f} {lwh[2]:.3f} {lwh[1]:.3f} {lwh[0]:.3f} "
-            f"{at[0]:.3f} {at[1]:.3f} {at[2]:.3f} {r:.4f} {s:.6f}\n"
-            for id_, c, cut, a, i, lwh, at, r, s in zip(*(c.tolist() for c in columns), strict=True)
+            f"{result.frame.index} {id_} {KITTI_TYPES[kind]} {cut} -1 {angle:.4f} "
+            f"{left:.2f} {top:.2f} {right:.2f} {low:.2f} {height:.3f} {width:.3f} {length:.3f} "
+            f"{x:.3f} {y:.3f} {z:.3f} {turned:.4f} {p:.6f}\n"
+            for id_, kind, cut, angle, left, top, right, low, length, width, height, x, y, z, turned, p in zip(
+                *(column.tolist() for column in columns), strict=True
+            )
         )
 
 
@@ -104,8 +110,14 @@ class PointLabels(Writer[FrameResult]):
 
 def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
     """(N,) label of each point of the frame."""
-    rows = result.tracks.row_of_proposal(len(result.proposals))
-    classes = result.tracks.object_class[rows]
-    code = np.minimum(np.arange(len(rows)) + 1, MAX_INSTANCE) << 16 | np.where(rows == NONE, 0, classes)
-    of_points = result.proposals.label(len(result.frame.points))
-    return np.append(code, 0).astype(np.uint32)[of_points]  # the last one stands for NONE
+    row_of_proposal = result.tracks.row_of_proposal(len(result.proposals))
+    tracked = row_of_proposal != NONE
+    class_of_proposal = np.zeros(len(tracked), np.int64)
+    class_of_proposal[tracked] = result.tracks.object_class[row_of_proposal[tracked]]
+    instance = np.minimum(np.arange(len(tracked)) + 1, MAX_INSTANCE)
+    label_of_proposal = (instance << 16) | class_of_proposal
+    proposal_of_point = result.proposals.label(len(result.frame.points))
+    inside = proposal_of_point != NONE
+    labels = np.zeros(len(inside), np.uint32)
+    labels[inside] = label_of_proposal[proposal_of_point[inside]]
+    return labels

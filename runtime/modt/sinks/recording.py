@@ -219,12 +219,13 @@ class Recording(Writer[FrameResult]):
             self._close_files()
 
     def _close_files(self) -> None:
-        for file in self._files.values():
-            with suppress(ModtError):
-                file.close()
+        files = self._files
         self._files = {}
         self._synced_files = 0
         self._begun = False
+        for file in files.values():
+            with suppress(ModtError):
+                file.close()
 
     def _redescribe(self) -> None:
         if self._begun:
