@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 from modt.energy.ledger import Ledger
 from modt.pipeline import SOURCE
@@ -53,10 +52,6 @@ class Playback:
         if frame is None:
             raise StreamEndedError
         return Received(frame, 0.0)
-
-    def health(self) -> dict[str, Any]:
-        """No counts: nothing is received."""
-        return {}
 
     def close(self) -> None:
         """No effect."""

@@ -6,10 +6,14 @@ import argparse
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from modt import host
 from modt.cli import options
 from modt.cli.command import INTERRUPTED
+
+if TYPE_CHECKING:
+    from modt.sinks.run_directory import RunDirectory
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -56,7 +60,6 @@ def run(arguments: argparse.Namespace) -> int:
     sinks = {address: open_sink(address) for address in dict.fromkeys(arguments.sink)}
     loop = replay(Request.of(arguments), sinks, arguments.out, pinned, ["modt", *sys.argv[1:]])
     info = loop.stages.info
-    directory = loop.recording.directory
     shown = not arguments.quiet
     if shown and (notes := [*info.notes, *info.pose_notes]):
         print("\n".join(f"modt: {note}" for note in notes), file=sys.stderr)
@@ -64,10 +67,15 @@ def run(arguments: argparse.Namespace) -> int:
         summary = loop.run(notifier, lambda r: step(f"{len(r.proposals)} proposals, {len(r.classified)} classified"))
     if shown:
         print(summary_text(summary))
-        kept = f"; those before are kept in {directory.previous}" if directory.previous else ""
-        print(f"  results in {directory.path}; to look at them: modt view {directory.path}{kept}")
+        print(_place(loop.recording.directory))
     signal = loop.stop.signal
     if signal:
-        frames = f"{summary['frames']} frames"
-        print(f"modt: stopped by {signal} after {frames}: {directory.path} is whole", file=sys.stderr)
+        whole = f"{summary['frames']} frames: {loop.recording.directory.path} is whole"
+        print(f"modt: stopped by {signal} after {whole}", file=sys.stderr)
     return INTERRUPTED if signal == "SIGINT" else 0
+
+
+def _place(directory: RunDirectory) -> str:
+    """Line about the place of the results."""
+    kept = f"; those before are kept in {directory.previous}" if directory.previous else ""
+    return f"  results in {directory.path}; to look at them: modt view {directory.path}{kept}"
