@@ -97,8 +97,6 @@ def test_lines_go_once_to_every_sink_asked_for_and_a_second_run_is_the_same_byte
     ("arguments", "words"),
     [
         (["nowhere"], ["nowhere", "no such file"]),
-        (["--profile", "hdl-64e", "--profile", "vlp-61"], ["vlp-61", "vlp-16"]),
-        (["--sink", "nothing://"], ["nothing", "stdout://"]),
         (["--profile", "bad.yaml"], ["bad.yaml:2", "cell_m", "out of range"]),
         (["--profile", "fake.yaml"], ["fake.onnx"]),
         (["--core", "4096"], ["core 4096", "--core none"]),

@@ -4,11 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from rosbags.typesys import get_types_from_msg
 
 from modt.geometry import rotation_zyx, se3, transform
 from modt.placement import Mount
-from modt.ros2.definitions import DEFINITIONS, schema
 from modt.ros2.odometry import StaticTransforms, read_odometry
 from modt.ros2.point_cloud2 import read_cloud
 from modt.sinks import messages as encoded
@@ -37,14 +35,6 @@ def test_topics_are_named_by_the_prefix_and_tf_and_points_are_asked_for():
     assert {topic.name for topic in encoded.topics("robot")} == always
     more = encoded.topics("robot", world_frame_id="map", points=True)
     assert {topic.name for topic in more} == {*always, "/tf", "/robot/points"}
-
-
-def test_definitions_are_those_of_another_implementation():
-    for name in DEFINITIONS:
-        parsed = get_types_from_msg(schema(name), name.replace("/", "/msg/"))
-        assert {kind: fields for kind, (_, fields) in parsed.items()} == {
-            kind: messages.store().fielddefs[kind][1] for kind in parsed
-        }
 
 
 @pytest.mark.parametrize(
