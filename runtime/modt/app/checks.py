@@ -160,6 +160,7 @@ def sensor(open_source: Callable[[], LiveStream], timeout_s: float = REACH_S) ->
 
 
 def _sensor_finding(name: str, health: dict[str, Any], points: int | None) -> Finding:
+    """The finding of a sensor, by the points of its first sweep, None without one."""
     if points is not None:
         return Finding(OK, "sensor", f"{name}: a sweep of {points} points")
     messages = health["messages"]

@@ -61,6 +61,7 @@ class Failures:
             return None
 
     def _count(self, error: Exception, where: str) -> None:
+        """Count a failure, and log the first of its kind with its traceback."""
         if not self._contained:
             raise error
         kind = f"{where}: {type(error).__name__}"

@@ -96,8 +96,8 @@ def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Pa
         raise MisuseError(text, f"option {query!r} is unknown", "write PATH or PATH?loop=yes")
     path = Path(place) if place else None
     recording = stream(Request(path=path))
-    again = loop == "yes"
-    return LiveStream(recording.info, PlayedReader(recording, loop=again), cores=cores), None if again else path
+    reader = PlayedReader(recording, loop=loop == "yes")
+    return LiveStream(recording.info, reader, cores=cores), None if loop == "yes" else path
 
 
 def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> PoseSource:

@@ -197,6 +197,7 @@ class Loop:
         self._on_frame(result)
 
     def _write_costs(self, line: LedgerLine | EnergyWindow) -> None:
+        """Hand a line of the ledger to the records and to the sinks that take them."""
         for sink in self._ledger_sinks:
             sink.ledger(line)
 
@@ -261,6 +262,7 @@ class Service(Loop):
             self._reload(notifier)
 
     def _reload(self, notifier: Notifier) -> None:
+        """Take over the profile from disk. An invalid one is refused, and counted."""
         notifier.reloading()
         try:
             self.stages.reload()

@@ -50,6 +50,7 @@ Sample = tuple[str, dict[str, str], float]
 
 
 def _samples(status: Mapping[str, Any]) -> Iterator[Sample]:
+    """Name, labels and value of every number of a status."""
     for key in ("time_s", "up_s", "period_s"):
         yield f"modt_{key}", {}, status[key]
     yield "modt_loop_step", {}, Step[status["loop"]["step"].upper()]
@@ -60,6 +61,7 @@ def _samples(status: Mapping[str, Any]) -> Iterator[Sample]:
 
 
 def _of_table(prefix: str, table: Mapping[str, Any], labels: dict[str, str]) -> Iterator[Sample]:
+    """Samples of a part of the status. The keys of a table inside it become a label."""
     for key, value in table.items():
         name = f"{prefix}_{key}" + ("_total" if COUNTERS.fullmatch(key) else "")
         if isinstance(value, bool | int | float):

@@ -65,6 +65,7 @@ class Notifier:
             self._socket.close()
 
     def _send(self, message: str) -> bool:
+        """Whether a message was sent, or nobody listens."""
         if self._address is None:
             return True
         try:

@@ -153,6 +153,7 @@ class Windows:
         return MeterEnergy(meter.facts.name, meter.facts.kind, meter.facts.scope, energy_J), mark
 
     def _open(self) -> None:
+        """Begin a window now."""
         self._begin_ns = self._clocks.monotonic_ns()
         self._boot_begin_ns = self._clocks.boot_ns()
         self._process_begin_ns = self._clocks.process_ns()

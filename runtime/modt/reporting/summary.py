@@ -127,6 +127,7 @@ def summary_text(summary: dict[str, Any]) -> str:
 
 
 def _around_lines(summary: dict[str, Any]) -> list[str]:
+    """Objects of each class around the robot, and the nearest of them."""
     lines = ["", "  Around the robot in the last frame: tracks by class, and the nearest return of each class"]
     for name in (CLASS_NAMES[c] for c in OBJECTS):
         seen = summary["around"].get(name, {"count": 0, "nearest_m": None})
@@ -136,6 +137,7 @@ def _around_lines(summary: dict[str, Any]) -> list[str]:
 
 
 def _count_lines(summary: dict[str, Any]) -> list[str]:
+    """Proposals, classifications and tracks."""
     frames = summary["frames"]
     tracks = summary["tracks"]
     objects = summary["foreground_tracks"]
@@ -167,6 +169,7 @@ def _time_lines(stages: dict[str, Any]) -> list[str]:
 
 
 def _fault_lines(faults: dict[str, Any]) -> list[str]:
+    """Faults of the source, if there are any."""
     lines = []
     if faults.get("count"):
         lines.append(f"  faulty scans: {faults['count']}, {faults['skipped']} of them skipped: {faults['first']}")

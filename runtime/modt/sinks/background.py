@@ -107,6 +107,7 @@ class Background(Generic[T]):
             log.warning("%s: does not end within %g s and is left alone", self.name, self._close_s)
 
     def _put(self, job: Callable[[], None]) -> None:
+        """Queue a job. A full queue drops its oldest one, a closed one the new one."""
         with self._changed:
             if self._end_s is not None:
                 self._dropped += 1
@@ -118,6 +119,7 @@ class Background(Generic[T]):
             self._changed.notify()
 
     def _work(self) -> None:
+        """Run the jobs, then close the writer. This is the thread."""
         with suppress(OSError):
             # The thread inherits the priority of the loop, which alone runs in real time.
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
@@ -146,6 +148,7 @@ class Background(Generic[T]):
             return self._jobs.popleft() if self._jobs and not late else None
 
     def _fail(self, error: Exception) -> None:
+        """Count a failure, log the first in a row, and pause."""
         self._failed += 1
         known = isinstance(error, (ModtError, OSError))
         cause = f"{error}" if known else f"{type(error).__name__}: {error}"

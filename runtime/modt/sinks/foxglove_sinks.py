@@ -209,6 +209,7 @@ class McapRecorder:
             self._output.path.unlink(missing_ok=True)
 
     def _begin_part(self) -> tuple[_Output, foxglove.MCAPWriter]:
+        """Make room for another part, and open it under the next number."""
         earlier = self._earlier()
         self._make_room([path for _, path in earlier])
         number = earlier[-1][0] + 1 if earlier else 0
@@ -224,6 +225,7 @@ class McapRecorder:
         return sorted((int(match[1] or 0), path) for match, path in found if match)
 
     def _make_room(self, parts: list[Path]) -> None:
+        """Delete the oldest parts until another one fits."""
         with writing(self._path):
             excess = sum(path.stat().st_size for path in parts) - self._max_bytes * (1 - 1 / PARTS)
             for path in parts:

@@ -119,6 +119,7 @@ class Datagrams:
         return {"written": self._written, "dropped": self._dropped, "failed": self._failed, "state": self._state}
 
     def _miss(self, error: OSError) -> None:
+        """Count a frame that was not sent, and log the first in a row."""
         cause = str(error.strerror or error)
         full = error.errno in _FULL
         self._dropped += full

@@ -186,6 +186,7 @@ class Recording(Writer[FrameResult]):
         return self._allowed_bytes >= 0
 
     def _append(self, name: str, text: str) -> None:
+        """Append a line to a file of the present part, or of the next one if that is full. A line that fails is lost."""
         if self._begun and self._bytes + len(text) > 1e6 * self.config.disk_mb / PARTS:
             self.finish()
         if not self._ready() or not self._attempt(lambda: self._line(name, text)):
@@ -219,6 +220,7 @@ class Recording(Writer[FrameResult]):
             self._close_files()
 
     def _close_files(self) -> None:
+        """End the present part. The next line begins another."""
         files = self._files
         self._files = {}
         self._synced_files = 0

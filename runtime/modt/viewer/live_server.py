@@ -132,6 +132,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.connection.shutdown(socket.SHUT_RDWR)
 
     def do_GET(self) -> None:
+        """Answer with the page or the events. Requests under another host name are refused."""
         self.late.cancel()
         name = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
         if self.server.names is not None and name not in self.server.names:
@@ -148,6 +149,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_error(404)
 
     def _events(self) -> None:
+        """Send events until the client leaves or the server ends."""
         number = self.server.enter()
         if number is None:
             self.send_error(503, "too many pages are open")

@@ -162,6 +162,7 @@ def find_hwmon(sys: Path) -> list[Candidate]:
 
 
 def _module(board: Board, rails: dict[str, Meter], remedy: str) -> Candidate:
+    """The supply of a board, refused if the rails that it feeds draw more."""
     whole = tuple(_scoped(rails[label], Scope.MODULE) for label in board.whole)
     summed = f"{board.name} module ({' + '.join(board.whole)})"
     module = probe(summed if len(whole) > 1 else whole[0].facts.name, whole, remedy)
