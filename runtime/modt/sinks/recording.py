@@ -186,7 +186,7 @@ class Recording(Writer[FrameResult]):
         return self._allowed_bytes >= 0
 
     def _append(self, name: str, text: str) -> None:
-        """Append a line to a file of the present part, or of the next one if that is full. A line that fails is lost."""
+        """Append a line to the present part, or to another one where it is full. A line that fails is lost."""
         if self._begun and self._bytes + len(text) > 1e6 * self.config.disk_mb / PARTS:
             self.finish()
         if not self._ready() or not self._attempt(lambda: self._line(name, text)):
