@@ -10,7 +10,8 @@ from modt import assets
 from modt.cli import main
 from modt.schemes import SENSORS
 from modt_commands import profile
-from modt_commands.completion import SHELLS, commands
+from modt_commands.completion import SHELLS, parsers
+from tools.docs.commands import commands
 
 
 def help_of(program, *arguments, capsys):
@@ -44,7 +45,9 @@ def test_run_shows_an_address_of_every_sensor(capsys):
 
 
 @pytest.mark.parametrize(
-    "parser", [command.parser for command in commands() if not command.names], ids=lambda parser: parser.prog
+    "parser",
+    [parser for program in parsers() for _, parser in commands(program)],
+    ids=lambda parser: parser.prog,
 )
 def test_every_command_has_examples_that_its_parser_takes(parser):
     lines = parser.format_help().partition("examples:\n")[2].splitlines()
@@ -79,9 +82,8 @@ def test_a_shell_completes_commands_options_and_values(words, offered, capsys):
     main.main(["completion", "bash"])
     script = capsys.readouterr().out
     typed = words.split(" ")
-    asked = (
-        f"COMP_WORDS=({shlex.join(typed)}); COMP_CWORD={len(typed) - 1}; _modt; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-    )
+    function = f"_shtab_{typed[0].replace('-', '')}"
+    asked = f'COMP_WORDS=({shlex.join(typed)}); COMP_CWORD={len(typed) - 1}; {function}; echo "${{COMPREPLY[@]}}"'
     done = subprocess.run(["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True, check=True)
     assert offered <= set(done.stdout.split())
     assert all(word.startswith(typed[-1]) for word in done.stdout.split())

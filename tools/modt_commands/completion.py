@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 
 from modt import assets
 from modt.cli import main as modt
 from modt.cli import options
+from modt.errors import MisuseError, install
 from modt_commands import profile as modt_profile
 
 SHELLS = ("bash", "zsh", "fish")
@@ -29,93 +29,45 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the script."""
-    print("\n".join(fish() if arguments.shell == "fish" else bash(arguments.shell)))
+    """Print the script.
+
+    Raises:
+        MisuseError: shtab is not installed.
+    """
+    try:
+        import shtab
+    except ModuleNotFoundError as error:
+        raise MisuseError("completion", f"needs {error.name}", install("completion")) from None
+    for parser in parsers():
+        _declare_values(parser)
+        # The prefix that shtab would choose for modt-profile is the one that it gives to `modt profile`.
+        prefix = parser.prog.replace("-", "")
+        print(shtab.complete(parser, arguments.shell, root_prefix=prefix))
     return 0
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A command or a group of commands.
-
-    Attributes:
-        words: the program and the names that lead to it.
-        summary: its line in the help above it.
-        parser: its parser.
-        names: commands of a group; none of a command.
-    """
-
-    words: str
-    summary: str
-    parser: argparse.ArgumentParser
-    names: tuple[str, ...] = ()
-
-
-def commands() -> Iterator[Command]:
-    """Every command, and every group after its commands."""
-    for prog, modules in (("modt", modt.commands()), ("modt-profile", modt_profile.COMMANDS)):
-        top = argparse.ArgumentParser(prog=prog)
-        choice = top.add_subparsers()
+def parsers() -> list[argparse.ArgumentParser]:
+    """The parser of each program, with those of all its commands."""
+    programs = []
+    for name, modules in (("modt", modt.commands()), ("modt-profile", modt_profile.COMMANDS)):
+        program = argparse.ArgumentParser(prog=name)
+        commands = program.add_subparsers()
         for module in dict.fromkeys(modules.values()):
-            import_module(module).add_parser(choice)
-        yield from _below(prog, "", top)
+            import_module(module).add_parser(commands)
+        programs.append(program)
+    return programs
 
 
-def _below(words: str, summary: str, parser: argparse.ArgumentParser) -> Iterator[Command]:
-    names: list[str] = []
-    for group in (action for action in parser._actions if isinstance(action, argparse._SubParsersAction)):
-        summaries = {action.dest: action.help or "" for action in group._choices_actions}
-        for name, inner in group.choices.items():
-            names.append(name)
-            yield from _below(f"{words} {name}", summaries[name], inner)
-    yield Command(words, summary, parser, tuple(names))
+def _declare_values(parser: argparse.ArgumentParser) -> None:
+    """State the values that the parsers leave open: files, and the names of the shipped profiles."""
+    from shtab import FILE
 
-
-def _values(action: argparse.Action) -> list[str]:
-    """Values of an option that can be listed."""
-    if "--profile" in action.option_strings:
-        return sorted(path.stem for path in assets.folder("profiles").glob("*.yaml"))
-    return [str(choice) for choice in action.choices or ()]
-
-
-def bash(shell: str) -> list[str]:
-    """Lines of the script; zsh runs it by its emulation of bash's completion."""
-    lines = ["autoload -U +X bashcompinit && bashcompinit"] if shell == "zsh" else []
-    lines += [
-        "_modt() {",
-        '  local word="${COMP_WORDS[COMP_CWORD]}" before="${COMP_WORDS[COMP_CWORD-1]}" words=""',
-        '  case "${COMP_WORDS[0]##*/} ${COMP_WORDS[*]:1:COMP_CWORD-1} " in',
-    ]
-    values: dict[str, str] = {}
-    for command in commands():
-        actions = command.parser._actions
-        offered = [*command.names, *(name for action in actions for name in action.option_strings)]
-        lines.append(f'    "{command.words} "*) words="{" ".join(offered)}" ;;')
-        for action in actions:
-            values.update({name: " ".join(_values(action)) for name in action.option_strings if _values(action)})
-    lines += ["  esac", '  case "$before" in']
-    lines += [f'    {name}) words="{known}" ;;' for name, known in values.items()]
-    lines += [
-        "  esac",
-        '  COMPREPLY=($(compgen -W "$words" -- "$word"))',
-        "}",
-        "complete -o default -F _modt modt modt-profile",
-    ]
-    return lines
-
-
-def fish() -> list[str]:
-    """Lines of the script."""
-    lines = []
-    for command in commands():
-        prog, *path = command.words.split()
-        names = command.names
-        given = [f"__fish_seen_subcommand_from {name}" for name in path]
-        not_yet = [f"not __fish_seen_subcommand_from {' '.join(names)}"] if names else []
-        when = f'-n "{"; and ".join([*given, *not_yet])}" ' if given or not_yet else ""
-        lines += [f"complete -c {prog} {when}-f -a {name}" for name in names]
-        for action in command.parser._actions:
-            for name in (name for name in action.option_strings if name.startswith("--")):
-                known = f' -x -a "{" ".join(_values(action))}"' if _values(action) else ""
-                lines.append(f"complete -c {prog} {when}-l {name[2:]}{known}")
-    return lines
+    profiles = sorted(path.stem for path in assets.folder("profiles").glob("*.yaml"))
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                _declare_values(command)
+        elif "--profile" in action.option_strings:
+            action.choices = profiles
+        elif action.type is Path:
+            action.complete = FILE  # type: ignore[attr-defined]

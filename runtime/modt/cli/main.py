@@ -22,7 +22,7 @@ ROBOT_COMMANDS = {
 
 def commands() -> dict[str, str]:
     """Module of every command by its name."""
-    return ROBOT_COMMANDS | {entry.name: entry.value for entry in entry_points(group="modt.commands")}
+    return ROBOT_COMMANDS | {entry.name: entry.value for entry in sorted(entry_points(group="modt.commands"))}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
