@@ -26,9 +26,9 @@ def test_the_page_has_the_figures_and_their_plots(drives, tmp_path, chromium):
     with chromium.tab((tmp_path / "page.html").as_uri(), width=390, ready=LOADED) as tab:
         assert not tab.value(WIDE)
         assert done.stdout.strip() in tab.value("document.querySelector('pre').textContent")
-        titles = tab.value("[...document.querySelectorAll('.plots h2')].map((title) => title.textContent)")
+        titles = tab.value("[...document.querySelectorAll('.plots h3')].map((title) => title.textContent)")
         assert len([title for title in titles if "by range" in title]) == 2
-        assert tab.value("document.querySelectorAll('polyline').length") >= 3
+        assert tab.value("document.querySelectorAll('.plots svg').length") == len(titles) == 4
 
 
 def evaluated(capsys, *arguments):

@@ -186,8 +186,8 @@ def test_how_the_class_of_a_track_was_decided(run, records, chromium):
     with chromium.tab((run / f"track-{id_}.html").as_uri(), width=390, ready=LOADED) as tab:
         assert not tab.value(WIDE)
         text = tab.value("document.body.innerText")
-        plots = "[...document.querySelectorAll('section > svg')]"
-        drawn = tab.value(f"{plots}.map((svg) => svg.querySelectorAll('circle').length)")
+        pictures = "[...document.querySelectorAll('.picture svg')]"
+        drawn = tab.value(f"{pictures}.map((svg) => svg.querySelectorAll('use').length)")
     assert f"classifications {len(seen)} " in " ".join(text.split()), text[:600]
     for track in seen:
         posterior = ", ".join(f"{c} {100 * p:.1f} %" for c, p in zip(CLASS_NAMES, track["posterior"], strict=True))

@@ -1,7 +1,5 @@
 """The page of a track, on its class."""
 
-import re
-from html import unescape
 from types import SimpleNamespace
 
 from modt.classes import CLASS_NAMES
@@ -29,35 +27,33 @@ def row(at, posterior, name, state, final):
 
 
 def shown(history):
-    """Text of the page by frame, that of the tiles by name."""
+    """Sentences of the page by frame, and its tiles by name."""
     run = SimpleNamespace(
         facts={"stream": {"name": "x"}, "mode": "accurate"},
         numbers=[100 + k for k in range(len(history))],
         states=STATES,
         frames=[{}] * len(history),
     )
-    text = track_page(run, [row(at, *entry) for at, entry in enumerate(history)], {})
-    plain = unescape(re.sub(r"<[^>]+>", " ", text))
-    frames = dict(re.findall(r"Frame (\d+)\s+(.*?)(?=\s+Frame|\s*$)", plain, re.DOTALL))
-    tiles = {name: (value, note) for name, value, note in re.findall(
-        r'<div class="tile"><small>(.*?)</small><b>(.*?)</b><small>(.*?)</small>', text)}  # fmt: skip
-    return frames, tiles, plain
+    page = track_page(run, [row(at, *entry) for at, entry in enumerate(history)], {})
+    track, *events = page.sections
+    frames = {event.title: " ".join(event.lines) for event in events}
+    return frames, {name: (value, note) for name, value, note in track.tiles}
 
 
 def test_each_change_of_standing_is_shown_with_its_probability():
-    frames, _, _ = shown(HISTORY)
-    assert "Reported as background 80.0 %" in frames["100"]
-    assert "settled: car 90.0 %" in frames["101"]
-    assert re.search(r"Reported as cyclist\W+45\.0 %", frames["102"])
-    assert "The class is open" in frames["102"]
-    assert "settled: cyclist 75.0 %" in frames["103"]
-    assert "104" not in frames, "nothing changed"
-    assert "car +0.5, pedestrian -0.2, cyclist +1.5" in frames["101"], "of the motion"
+    frames, _ = shown(HISTORY)
+    assert "Reported as background 80.0 %" in frames["Frame 100"]
+    assert "settled: car 90.0 %" in frames["Frame 101"]
+    assert "Reported as cyclist? 45.0 %" in frames["Frame 102"]
+    assert "The class is open" in frames["Frame 102"]
+    assert "settled: cyclist 75.0 %" in frames["Frame 103"]
+    assert "Frame 104" not in frames, "nothing changed"
+    assert "car +0.5, pedestrian -0.2, cyclist +1.5" in frames["Frame 101"], "of the motion"
 
 
 def test_a_class_is_settled_from_where_it_stays_to_the_end():
-    _, tiles, _ = shown(HISTORY)
+    _, tiles = shown(HISTORY)
     assert tiles["settled from frame"][0] == "103"
     assert tiles["reported at the end"] == ("cyclist", "posterior cyclist 85.0 %")
-    _, tiles, _ = shown(HISTORY[:3])
+    _, tiles = shown(HISTORY[:3])
     assert tiles["settled from frame"][0] == "never"

@@ -140,7 +140,8 @@ def list_unlabelled(arguments: argparse.Namespace) -> None:
     """
     from modt.sinks.output import writing
     from modt_evaluation.unlabelled import listing, unlabelled, write_table
-    from modt_viewer.crop_picture import save_mover_page
+    from modt_profiling.reporting.document import save
+    from modt_viewer.crop_picture import mover_page
 
     folder: Path = arguments.unlabelled
     record, truth = opened(arguments, *arguments.pairs)
@@ -153,6 +154,6 @@ def list_unlabelled(arguments: argparse.Namespace) -> None:
     table = folder / "further.csv"
     write_table(table, movers)
     if truth.scans is not None:
-        save_mover_page(folder / "tracks.html", movers, truth.scans)
+        save(folder / "tracks.html", mover_page(movers, truth.scans))
     print("\n".join(listing(movers)))
     print(f"\npictures and rows in {folder}: keep the rows of real road users, then give --further {table}")

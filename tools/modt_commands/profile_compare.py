@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_profiling.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
     from modt_profiling.comparison.prediction_report import against, observed_tree, read_prediction
     from modt_profiling.energy.named_meter import choose_meter
-    from modt_profiling.reporting.document import document_page, save
+    from modt_profiling.reporting.document import save
     from modt_profiling.reporting.quantity import to_json
 
     request = inputs.Request.of(arguments)
@@ -81,6 +81,6 @@ def run(arguments: argparse.Namespace) -> int:
         tree["against"] = against(prediction, tree["modes"], tree["savings"])
     document = compare_document(tree)
     if arguments.html is not None:
-        save(arguments.html, document_page(document, compare_plots(tree)))
+        save(arguments.html, document.page(compare_plots(tree)))
     print(json.dumps(to_json(tree), indent=2) if arguments.json else document.text())
     return 0

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt.sinks.records import records_of
-    from modt_profiling.reporting.document import document_page, save
+    from modt_profiling.reporting.document import save
     from modt_profiling.reporting.quantity import to_json
     from modt_profiling.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
 
@@ -41,8 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(path, "is a file", "give the directory of a run")
     with records_of(path), np.errstate(over="raise", invalid="raise"):
         tree = run_tree(path)
-        document, plots = run_document(tree), [*run_plots(tree), *lateness_plots(path)]
+        document = run_document(tree)
+        page = document.page([*run_plots(tree), *lateness_plots(path)])
     if arguments.html is not None:
-        save(arguments.html, document_page(document, plots))
+        save(arguments.html, page)
     print(json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else document.text())
     return 0

@@ -1,9 +1,9 @@
-"""Points of a proposal or a track, from the side and from the top, as SVG, and a page of those without a label."""
+"""Points of a proposal or a track, from the side and from the top, and a page of the tracks without a label."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,67 +12,81 @@ from modt.types import Bool, Float32, Float64
 from modt_evaluation.overlap import inside
 from modt_evaluation.run_record import FramesByNumber
 from modt_evaluation.unlabelled import Mover
-from modt_profiling.reporting.document import page, save
+from modt_profiling.reporting.document import Page, Plot, Section
+
+if TYPE_CHECKING:  # Matplotlib is an extra
+    from matplotlib.axes import Axes
 
 MARGIN_M = 0.02
 """Margin around the box, because recorded boxes are rounded."""
-MOST = 600
-"""Most points drawn."""
-PICTURES, ROOM_M = 10, 1.0
-"""Frames drawn of a track without a label, and the margin shown around its box."""
-_STYLE = 'style="display:inline-block;width:auto;max-width:100%;margin-right:24px;overflow:visible"'
+MAX_POINTS = 600
+"""Greatest number of points drawn."""
+MAX_PICTURES = 10
+"""Greatest number of frames drawn of a track without a label."""
+SURROUNDINGS_M = 1.0
+"""Margin shown around the box of a track without a label."""
+INCH_PER_M = 0.8
+"""Scale of the pictures."""
+EDGE_IN = 0.4
+"""Room around the points for the title of a picture."""
+MIN_WIDTH_IN = 1.4
+"""Least width of a picture, which its title needs."""
 
 
-def crop_picture(box: Sequence[float], points: Float32, room_m: float = MARGIN_M, metre_px: float = 80.0) -> str:
-    """Two pictures of the points in a box and up to room_m around: x, y, z of its centre, l, w, h [m], yaw [rad]."""
-    x, y, z, length, width, height, yaw = box
-    held = points[inside(points, np.array(box), room_m, -room_m), :3].astype(np.float64)
-    held = held[np.linspace(0, len(held) - 1, min(len(held), MOST)).astype(np.int64)]
-    own, placed = inside(held, np.array(box), MARGIN_M, -MARGIN_M), held - [x, y, z]
-    c, s = np.cos(yaw), np.sin(yaw)
-    along, across = c * placed[:, 0] + s * placed[:, 1], c * placed[:, 1] - s * placed[:, 0]
-    views = ((-placed[:, 2], height, "from the side"), (-across, width, "from the top"))
-    return "".join(
-        _picture(metre_px * np.stack([along, v], axis=1), own, metre_px * np.array([length, tall]), name)
-        for v, tall, name in views
-    )
+def crop_pictures(
+    box: Sequence[float], points: Float32, around_m: float = MARGIN_M, inch_per_m: float = INCH_PER_M
+) -> list[Plot]:
+    """Two pictures of the points in a box and around it.
 
-
-def _picture(uv: Float64, own: Bool, size: Float64, name: str) -> str:
-    wide, high = np.maximum(2 * np.abs(uv).max(axis=0, initial=0.0), size) + 32.0
-    dots = "".join(
-        f'<circle class="c{0 if inner else 5}" cx="{u:.1f}" cy="{v:.1f}" r="1.5"/>'
-        for (u, v), inner in zip(uv.tolist(), own.tolist(), strict=True)
-    )
-    frame = (
-        f'<rect fill="none" class="grid" x="{-size[0] / 2:.1f}" y="{-size[1] / 2:.1f}" '
-        f'width="{size[0]:.1f}" height="{size[1]:.1f}"/>'
-    )
-    wide = max(wide, 130)
-    view = f"{-wide / 2:.1f} {-high / 2:.1f} {wide:.1f} {high + 18:.1f}"
-    caption = f'<text class="mid" y="{high / 2 + 12:.1f}">{name}</text>'
-    extent = f'width="{wide:.0f}" height="{high + 18:.0f}"'
-    return f'<svg {_STYLE} {extent} viewBox="{view}" role="img">{frame}{dots}{caption}</svg>'
-
-
-def save_mover_page(path: Path, movers: Sequence[Mover], stream: Stream) -> None:
-    """Write a page with up to PICTURES frames of each track without a label.
-
-    Raises:
-        ModtError: it cannot be written.
+    Args:
+        box: x, y, z of its centre, l, w, h [m], yaw [rad].
+        points: (N, 4) points of the sweep.
+        around_m: distance from the box up to which points are drawn.
+        inch_per_m: scale.
     """
-    shown = [np.unique(np.linspace(0, len(m.frame) - 1, PICTURES).astype(int)).tolist() for m in movers]
-    asked = sorted((int(mover.frame[k]), n, k) for n, mover in enumerate(movers) for k in shown[n])
-    blocks, sweeps = [f"<h2>Track {mover.track}</h2>" for mover in movers], FramesByNumber(stream)
-    for number, n, k in asked:
-        sweep, box = sweeps.get(number), movers[n].box[k].tolist()
+    x, y, z, length, width, height, yaw = box
+    near = points[inside(points, np.array(box), around_m, -around_m), :3].astype(np.float64)
+    drawn = near[np.linspace(0, len(near) - 1, min(len(near), MAX_POINTS)).astype(np.int64)]
+    in_box = inside(drawn, np.array(box), MARGIN_M, -MARGIN_M)
+    offset = drawn - [x, y, z]
+    along = np.cos(yaw) * offset[:, 0] + np.sin(yaw) * offset[:, 1]
+    across = np.cos(yaw) * offset[:, 1] - np.sin(yaw) * offset[:, 0]
+    return [
+        _picture("from the side", np.stack([along, offset[:, 2]], axis=1), in_box, (length, height), inch_per_m),
+        _picture("from the top", np.stack([along, across], axis=1), in_box, (length, width), inch_per_m),
+    ]
+
+
+def _picture(title: str, uv: Float64, in_box: Bool, size: tuple[float, float], inch_per_m: float) -> Plot:
+    """The (n, 2) points uv [m] about the centre of a box of a size [m], in grey those that lie outside it."""
+    extent_m = np.maximum(2 * np.abs(uv).max(axis=0, initial=0.0), size)
+    width_in, height_in = (inch_per_m * extent_m + EDGE_IN).tolist()
+
+    def draw(axes: Axes) -> None:
+        axes.set_axis_off()
+        axes.set_aspect("equal")
+        axes.set_title(title)
+        left, low = -size[0] / 2, -size[1] / 2
+        axes.plot([left, -left, -left, left, left], [low, low, -low, -low, low], color="C5", linewidth=0.5)
+        for colour, shown in (("C0", in_box), ("C5", ~in_box)):
+            axes.plot(uv[shown, 0], uv[shown, 1], ".", color=colour, markersize=2.5)
+
+    return Plot("", "", draw, (max(width_in, MIN_WIDTH_IN), height_in))
+
+
+def mover_page(movers: Sequence[Mover], stream: Stream) -> Page:
+    """Page with up to MAX_PICTURES frames of each track without a label."""
+    shown = [np.unique(np.linspace(0, len(m.frame) - 1, MAX_PICTURES).astype(int)).tolist() for m in movers]
+    wanted = sorted((int(mover.frame[k]), n, k) for n, mover in enumerate(movers) for k in shown[n])
+    sections: list[list[Section]] = [[Section(f"Track {mover.track}")] for mover in movers]
+    sweeps = FramesByNumber(stream)
+    for number, n, k in wanted:
+        sweep = sweeps.get(number)
         if sweep is not None:
+            box = movers[n].box[k].tolist()
             title = f"Frame {number}, {np.hypot(*box[:2]):.0f} m away"
-            blocks[n] += f"<p>{title}</p>{crop_picture(box, sweep.points, ROOM_M, 40.0)}"
+            pictures = crop_pictures(box, sweep.points, SURROUNDINGS_M, INCH_PER_M / 2)
+            sections[n].append(Section(lines=[title], pictures=pictures))
     about = f"{stream.info.name}: points in the box, and grey those around"
-    save(
-        path,
-        page(
-            "Tracks that move like road users and have no label", about, (f"<section>{b}</section>" for b in blocks)
-        ),
-    )
+    title = "Tracks that move like road users and have no label"
+    return Page(title, about, [section for of_mover in sections for section in of_mover])

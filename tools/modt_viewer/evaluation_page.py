@@ -3,35 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from modt.classes import CLASS_NAMES, CLASSES
 from modt_evaluation.evaluation import ALL, RANGES_M, Evaluation
 from modt_evaluation.report import report
-from modt_profiling.reporting import svg
-from modt_profiling.reporting.document import Plot, page, plots, preformatted, tiles
+from modt_profiling.reporting.document import Page, Plot, Section
+
+if TYPE_CHECKING:  # Matplotlib is an extra
+    from matplotlib.axes import Axes
 
 _COLOURS = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)}
 _MIDDLE_M = {name: (low + high) / 2 for name, (low, high) in RANGES_M.items() if name != ALL}
-_BY_RANGE = {
-    "precision": "Precision of the reported class, by range",
-    "recall": "Recall with the right class, by range",
-}
+"""Middle of each band of range [m]."""
 
 
-def evaluation_page(sensors: Mapping[str, Evaluation]) -> str:
-    """HTML of the evaluation of each sensor, with the text of the report."""
-    blocks = []
-    for name, found in sensors.items():
-        blocks += [
-            f"<h2>{name}</h2>",
-            tiles(_facts(found)),
-            plots(_plots(found)),
-            preformatted(report({name: found})),
-        ]
+def evaluation_page(sensors: Mapping[str, Evaluation]) -> Page:
+    """Page of the evaluation of each sensor, with the text of the report."""
+    sections = [
+        Section(name, tiles=[*_facts(found)], plots=_plots(found), preformatted=report({name: found}))
+        for name, found in sensors.items()
+    ]
     frames = max(found.frames for found in sensors.values())
-    return page("Evaluation", f"{', '.join(sensors)}; {frames} frames", blocks)
+    return Page("Evaluation", f"{', '.join(sensors)}; {frames} frames", sections)
 
 
 def _facts(found: Evaluation) -> Iterator[tuple[str, str, str]]:
@@ -45,28 +39,38 @@ def _facts(found: Evaluation) -> Iterator[tuple[str, str, str]]:
             yield "length of an object's track", f"{length.life:.1f} frames", f"of {length.ideal:.1f} ideal"
 
 
-def _plots(found: Evaluation) -> Iterator[Plot]:
-    scores = found.ranges[ALL].classification
-    for key, title in _BY_RANGE.items():
-        traces = []
-        for name in scores:
-            shares = {middle: getattr(found.ranges[b].classification[name], key) for b, middle in _MIDDLE_M.items()}
-            known = {middle: 100 * share for middle, share in shares.items() if share is not None}
-            traces.append(_trace(name, list(known), list(known.values())))
-        yield title, svg.lines(traces, "range [m]", "%"), "of bands of 20 m"
-    curves = [
-        _trace(n, [100 * r for _, _, r in s.curve], [100 * p for _, p, _ in s.curve]) for n, s in scores.items()
+def _plots(found: Evaluation) -> list[Plot]:
+    def curves(axes: Axes) -> None:
+        for name, score in found.ranges[ALL].classification.items():
+            recall = [100 * recall for _, _, recall in score.curve]
+            precision = [100 * precision for _, precision, _ in score.curve]
+            axes.plot(recall, precision, color=_COLOURS[name], label=name)
+        axes.set(xlabel="recall [%]", ylabel="precision [%]", ylim=(0.0, None))
+
+    def lengths(axes: Axes) -> None:
+        kinds = [kind for kind in (ALL, *CLASS_NAMES) if kind in found.tracks]
+        axes.bar(kinds, [found.tracks[kind].life.ratio or 0.0 for kind in kinds])
+        axes.set(ylabel="share")
+
+    return [
+        _by_range(found, "precision", "Precision of the reported class, by range"),
+        _by_range(found, "recall", "Recall with the right class, by range"),
+        Plot("Precision over recall", "by posterior", curves),
+        Plot("Length of tracks, of the ideal", "" if found.tracks else "labels without identities", lengths),
     ]
-    yield "Precision over recall", svg.lines(curves, "recall [%]", "precision [%]"), "by posterior"
-    kinds = [kind for kind in (ALL, *CLASS_NAMES) if kind in found.tracks]
-    lengths = np.array([found.tracks[kind].life.ratio or 0.0 for kind in kinds])
-    edges = np.arange(len(kinds) + 1, dtype=np.float64) - 0.5
-    note = ", ".join(f"{k}: {kind}" for k, kind in enumerate(kinds)) or "labels without identities"
-    yield "Length of tracks, of the ideal", svg.bars(edges, lengths, "objects", "share"), note
 
 
-def _trace(name: str, x: list[float], y: list[float]) -> svg.Trace:
-    return svg.Trace(name, np.array(x, float), np.array(y, float), colour=_COLOURS[name])
+def _by_range(found: Evaluation, share: str, title: str) -> Plot:
+    """Precision or recall of each class over the range."""
+
+    def draw(axes: Axes) -> None:
+        for name in found.ranges[ALL].classification:
+            shares = {m: getattr(found.ranges[band].classification[name], share) for band, m in _MIDDLE_M.items()}
+            known = {middle_m: 100 * value for middle_m, value in shares.items() if value is not None}
+            axes.plot([*known], [*known.values()], "o-", color=_COLOURS[name], label=name)
+        axes.set(xlabel="range [m]", ylabel="%", ylim=(0.0, None))
+
+    return Plot(title, "of bands of 20 m", draw)
 
 
 def _percent(share: float | None) -> str:

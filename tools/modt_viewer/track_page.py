@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +13,12 @@ from modt.sinks.tracks import BOX_KEYS
 from modt.sources.stream import Stream
 from modt.types import Float32
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_profiling.reporting import svg
-from modt_profiling.reporting.document import Plot, page, plots, tiles
-from modt_viewer.crop_picture import crop_picture
+from modt_profiling.reporting.document import Page, Plot, Section
+from modt_viewer.crop_picture import crop_pictures
 from modt_viewer.recorded_run import RecordedRun
+
+if TYPE_CHECKING:  # Matplotlib is an extra
+    from matplotlib.axes import Axes
 
 Row = dict[str, float]
 
@@ -43,25 +45,39 @@ def views(run: RecordedRun, rows: list[Row], stream: Stream | None) -> dict[int,
     return {wanted[frame.index]: frame.points for frame in frames if frame.index in wanted}
 
 
-def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> str:
-    """HTML of the page that explains the class of a track."""
-    first, last = rows[0], rows[-1]
-    number = {int(row["at"]): run.numbers[int(row["at"])] for row in rows}
+def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> Page:
+    """Page that explains the class of a track."""
+    track = Section(tiles=_facts(run, rows), plots=_plots(run, rows))
+    about = f"{run.facts['stream']['name']}, mode {run.facts['mode']}: from proposal to class"
+    return Page(f"Track {rows[0]['id']:g}", about, [track, *_events(run, rows, sweeps)])
+
+
+def _facts(run: RecordedRun, rows: list[Row]) -> list[tuple[str, str, str]]:
+    """Name, value and note of what is known of a track at its end."""
+    last = rows[-1]
+    numbers = [_number(run, row) for row in rows]
     classified = [row for row in rows if row["classified"]]
-    spent_mJ = sum(run.frames[int(row["at"])].get("call_mJ", 0.0) for row in classified)
+    spent_mJ = sum(_call_mJ(run, row) for row in classified)
     settled = settled_from(rows)
-    facts = [
+    return [
         ("reported at the end", CLASS_NAMES[int(last["class"])], f"posterior {_reported(last)}"),
-        ("followed", f"{len(rows)} frames", f"{number[int(first['at'])]} to {number[int(last['at'])]}"),
+        ("tracked", f"{len(rows)} frames", f"{numbers[0]} to {numbers[-1]}"),
         ("classifications", f"{len(classified)}", f"{sum(r['seen'] > 0 for r in rows)} by tracking by detection"),
         ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated"),
         ("settled from frame", "never", "its class may change in the next frame")
         if settled is None
-        else ("settled from frame", f"{number[int(settled['at'])]}", f"{_reported(settled)} then"),
+        else ("settled from frame", f"{_number(run, settled)}", f"{_reported(settled)} then"),
     ]
-    blocks = [tiles(facts), plots(_plots(run, rows)), *_events(run, rows, sweeps)]
-    about = f"{run.facts['stream']['name']}, mode {run.facts['mode']}: from proposal to class"
-    return page(f"Track {first['id']:g}", about, blocks)
+
+
+def _number(run: RecordedRun, row: Row) -> int:
+    """Number of the frame of a row."""
+    return run.numbers[int(row["at"])]
+
+
+def _call_mJ(run: RecordedRun, row: Row) -> float:
+    """Energy of one classification in the frame of a row."""
+    return float(run.frames[int(row["at"])].get("call_mJ", 0.0))
 
 
 def settled_from(rows: list[Row]) -> Row | None:
@@ -74,52 +90,65 @@ def settled_from(rows: list[Row]) -> Row | None:
     return settled
 
 
-def _plots(run: RecordedRun, rows: list[Row]) -> Iterator[Plot]:
-    frame = np.array([run.numbers[int(row["at"])] for row in rows], float)
-    posterior, motion = (
-        [
-            svg.Trace(c, frame, np.array([row[f"{key}_{c}"] for row in rows]), colour=spec.colour)
-            for c, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)
-        ]
-        for key in ("p", "motion")
-    )
-    yield (
-        "Posterior",
-        svg.lines(posterior, "frame", "probability"),
-        "after each frame, of views, box sizes and motion",
-    )
-    yield "Motion", svg.lines(motion[1:], "frame", "log-likelihood"), "of its motion, over that of background"
-    points = svg.Trace("", frame, np.array([row["points"] for row in rows]))
-    yield "Points", svg.lines([points], "frame", "points"), "of its last proposal"
+def _plots(run: RecordedRun, rows: list[Row]) -> list[Plot]:
+    frames = [_number(run, row) for row in rows]
+    colours = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)}
+
+    def posterior(axes: Axes) -> None:
+        for name in CLASS_NAMES:
+            axes.plot(frames, [row[f"p_{name}"] for row in rows], color=colours[name], label=name)
+        axes.set(xlabel="frame", ylabel="probability", ylim=(0.0, 1.0))
+
+    def motion(axes: Axes) -> None:
+        for name in CLASS_NAMES[1:]:
+            axes.plot(frames, [row[f"motion_{name}"] for row in rows], color=colours[name], label=name)
+        axes.set(xlabel="frame", ylabel="log-likelihood")
+
+    def points(axes: Axes) -> None:
+        axes.plot(frames, [row["points"] for row in rows])
+        axes.set(xlabel="frame", ylabel="points", ylim=(0.0, None))
+
+    return [
+        Plot("Posterior", "after each frame, of views, box sizes and motion", posterior),
+        Plot("Motion", "of its motion, over that of background", motion),
+        Plot("Points", "of its last proposal", points),
+    ]
 
 
-def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> Iterator[str]:
-    """A block for each classification and each change of the state or of the class that is reported."""
+def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> Iterator[Section]:
+    """A section for each frame with a classification or a change of the state or of the class that is reported."""
     before: Row | None = None
     for row in rows:
-        at, sentences = int(row["at"]), []
-        if row["classified"]:
-            posterior = ", ".join(f"{c} {100 * row[f'p_{c}']:.1f} %" for c in CLASS_NAMES)
-            motion = ", ".join(f"{c} {row[f'motion_{c}']:+.1f}" for c in CLASS_NAMES[1:])
-            where = f"{np.hypot(row['x'], row['y']):.0f} m away, {row['l']:.1f} × {row['w']:.1f} × {row['h']:.1f} m"
-            call_mJ = run.frames[at].get("call_mJ", 0.0)
-            sentences.append(f"Classified, {row['points']:g} points, {where}, {call_mJ:.1f} mJ.")
-            sentences.append(f"Posterior: {posterior}.")
-            sentences.append(f"Motion, log-likelihood over background: {motion}.")
-        if before is None or row["state"] != before["state"]:
-            state = run.states[int(row["state"])].replace("_", " ")
-            sentences.append(f"Begins as {state}." if before is None else f"Becomes {state}.")
-        if before is None or row["class"] != before["class"]:
-            sentences.append(f"Reported as {_reported(row)}.")
-        if row["final"] and not (before and before["final"]):
-            sentences.append(f"The class is settled: {_reported(row)}. A better view may still change it.")
-        if before and before["final"] and not row["final"]:
-            sentences.append("The class is open.")
+        sentences = [*_classification(run, row), *_changes(run, row, before)]
         if sentences:
-            pictures = crop_picture([row[key] for key in BOX_KEYS], sweeps[at]) if at in sweeps else ""
-            lines = "<br>".join(map(escape, sentences))
-            yield f"<section><h2>Frame {run.numbers[at]}</h2><p>{lines}</p>{pictures}</section>"
+            sweep = sweeps.get(int(row["at"]))
+            pictures = [] if sweep is None else crop_pictures([row[key] for key in BOX_KEYS], sweep)
+            yield Section(f"Frame {_number(run, row)}", sentences, pictures=pictures)
         before = row
+
+
+def _classification(run: RecordedRun, row: Row) -> Iterator[str]:
+    """Sentences on the classification of a track in a frame, none where it is not classified."""
+    if row["classified"]:
+        posterior = ", ".join(f"{c} {100 * row[f'p_{c}']:.1f} %" for c in CLASS_NAMES)
+        motion = ", ".join(f"{c} {row[f'motion_{c}']:+.1f}" for c in CLASS_NAMES[1:])
+        where = f"{np.hypot(row['x'], row['y']):.0f} m away, {row['l']:.1f} × {row['w']:.1f} × {row['h']:.1f} m"
+        yield f"Classified, {row['points']:g} points, {where}, {_call_mJ(run, row):.1f} mJ."
+        yield f"Posterior: {posterior}."
+        yield f"Motion, log-likelihood over background: {motion}."
+
+
+def _changes(run: RecordedRun, row: Row, before: Row | None) -> Iterator[str]:
+    """Sentences on what differs from the frame before."""
+    if before is None or row["state"] != before["state"]:
+        state = run.states[int(row["state"])].replace("_", " ")
+        yield f"Begins as {state}." if before is None else f"Becomes {state}."
+    if before is None or row["class"] != before["class"]:
+        yield f"Reported as {_reported(row)}."
+    if row["final"] and not (before and before["final"]):
+        yield f"The class is settled: {_reported(row)}. A better view may still change it."
+    if before and before["final"] and not row["final"]:
+        yield "The class is open."
 
 
 def _reported(row: Row) -> str:

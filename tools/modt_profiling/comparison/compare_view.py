@@ -8,7 +8,7 @@ import numpy as np
 
 from modt.energy.meters.meter import Kind
 from modt_profiling.comparison.prediction_report import against_table
-from modt_profiling.reporting import energy_plots, svg
+from modt_profiling.reporting import energy_plots
 from modt_profiling.reporting.document import Document, Plot, Table
 
 
@@ -82,7 +82,7 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
     top_mJ = max(float(sums.max(initial=0.0)) for sums in sums_mJ.values())
     points = {mode: (modes[mode]["N_go"], s["gamma_measured_cpu"]) for mode, s in tree["savings"].items()}
     frames = np.arange(tree["frames"], dtype=float)
-    classified = [svg.Trace(mode, frames, np.array(series[mode]["classified"], float)) for mode in series]
+    classified = {mode: series[mode]["classified"] for mode in series}
     return [
         energy_plots.cumulative_energy(sums_mJ, np.ones(len(frames)), f"E1: {base}; {basis}"),
         energy_plots.gamma_curve(tree["unit_costs"]["a"], modes[base]["proposals"], points, "dots: of CPU time"),
@@ -91,5 +91,5 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
             for mode, mJ in energy_mJ.items()
         ),
         *(energy_plots.length_histogram(f"{mode}: lengths of tracks", series[mode]["lives"]) for mode in others),
-        ("Classifications a frame", svg.lines(classified, "frame", "classified"), "counted"),
+        energy_plots.proposal_counts("Classifications a frame", frames, classified),
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,9 +10,11 @@ from modt.energy.meters.meter import Kind
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
 from modt.types import Float64
 from modt_profiling.energy.savings import EnergyModel, Reconciliation
-from modt_profiling.reporting import svg
 from modt_profiling.reporting.document import Plot, Table
 from modt_profiling.reporting.quantity import Quantity, estimate
+
+if TYPE_CHECKING:  # Matplotlib is an extra
+    from matplotlib.axes import Axes
 
 SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
 TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]
@@ -51,43 +53,66 @@ def basis(gross_J: Quantity) -> str:
 
 def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64, note: str, top_mJ: float = 0.0) -> Plot:
     """Stacked energy of the stages over (points,) frames; charts to be compared have one `top_mJ`."""
-    return (title, svg.areas(frames, energy_mJ, "frame", "mJ a frame", top_mJ), note)
+
+    def draw(axes: Axes) -> None:
+        if energy_mJ:
+            axes.stackplot(frames, *energy_mJ.values(), labels=[*energy_mJ])
+        axes.set(xlabel="frame", ylabel="mJ a frame", ylim=(0.0, 1.05 * top_mJ if top_mJ else None))
+
+    return Plot(title, note, draw)
 
 
 def cumulative_energy(energy_mJ: dict[str, Float64], each: Float64, note: str, dashed: str = "") -> Plot:
     """Energy a frame summed over points of so many frames each, a line a run; the one named is dashed."""
-    traces = [
-        svg.Trace(name, np.cumsum(each), 1e-3 * np.cumsum(each * mJ), dashed=name == dashed)
-        for name, mJ in energy_mJ.items()
-    ]
-    return ("Cumulative energy, E1 against E2", svg.lines(traces, "frame", "J"), note)
+
+    def draw(axes: Axes) -> None:
+        for name, mJ in energy_mJ.items():
+            axes.plot(np.cumsum(each), 1e-3 * np.cumsum(each * mJ), "--" if name == dashed else "-", label=name)
+        axes.set(xlabel="frame", ylabel="J", ylim=(0.0, None))
+
+    return Plot("Cumulative energy, E1 against E2", note, draw)
+
+
+def proposal_counts(title: str, frames: Float64, counts: dict[str, list[float]], budget: float | None = None) -> Plot:
+    """Counts over (points,) frames, a line each, and a budget as a dashed level where there is one."""
+
+    def draw(axes: Axes) -> None:
+        for name, values in counts.items():
+            axes.plot(frames, values, label=name)
+        if budget is not None:
+            axes.axhline(budget, linestyle="--", color="C2", label="budget")
+        axes.set(xlabel="frame", ylabel="proposals", ylim=(0.0, None))
+
+    return Plot(title, "counted", draw)
 
 
 def length_histogram(title: str, lengths: dict[str, list[int]]) -> Plot:
     """Histogram of track lengths [frames], by the occurrences of each length."""
-    length = np.array(lengths["values"], float)
-    edges = np.linspace(0.5, max(length.max(initial=1.0), 1.0) + 0.5, 31)
-    heights = np.histogram(length, edges, weights=np.array(lengths["counts"], float))[0]
-    return (title, svg.bars(edges, heights, "frames seen", "tracks"), "counted")
+    longest = max([1, *lengths["values"]])
+
+    def draw(axes: Axes) -> None:
+        axes.hist(lengths["values"], np.linspace(0.5, longest + 0.5, 31), weights=lengths["counts"])
+        axes.set(xlabel="frames seen", ylabel="tracks")
+
+    return Plot(title, "counted", draw)
 
 
 def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quantity]], note: str) -> Plot:
     """Equation 3 over N_go at a and n, the short form, and (N_go, gamma) of each run."""
-    traces = []
-    if a.value is not None and n.value is not None:
-        length = np.geomspace(1.0, _MAX_N_GO, 100)
+    length = np.geomspace(1.0, _MAX_N_GO, 100)
+
+    def draw(axes: Axes) -> None:
+        axes.set(xlabel="N_go [frames]", ylabel="gamma", xscale="log", yscale="log")
+        if a.value is None or n.value is None:
+            return
         curve = np.array([EnergyModel(1.0, a.value, n.value, n_go).gamma for n_go in length.tolist()])
         short = length[length <= 10 * curve[-1]]
-        traces = [
-            svg.Trace("Equation 3 at this a and n", length, curve),
-            svg.Trace("gamma = N_go", short, short, dashed=True),
-        ]
-        traces += [
-            svg.Trace(name, np.array([x.value], float), np.array([y.value], float), dots=True)
-            for name, (x, y) in runs.items()
-        ]
-    note = f"dashed: gamma = N_go; line: Equation 3; {note}"
-    return ("Gamma against N_go", svg.lines(traces, "N_go [frames]", "gamma", log=True), note)
+        axes.plot(length, curve, label="Equation 3 at this a and n")
+        axes.plot(short, short, "--", label="gamma = N_go")
+        for name, (n_go, gamma) in runs.items():
+            axes.plot(np.array([n_go.value], float), np.array([gamma.value], float), label=name)
+
+    return Plot("Gamma against N_go", f"dashed: gamma = N_go; line: Equation 3; {note}", draw)
 
 
 def gamma_terms(title: str, saving: dict[str, Any]) -> Table:

@@ -30,12 +30,15 @@ class Quantity:
 
     def scaled(self, factor: float, unit: str) -> Quantity:
         """The same in another unit."""
-        value, low, high = (None if v is None else factor * v for v in (self.value, self.low, self.high))
-        return replace(self, value=value, unit=unit, low=low, high=high)
+
+        def scale(number: float | None) -> float | None:
+            return None if number is None else factor * number
+
+        return replace(self, value=scale(self.value), unit=unit, low=scale(self.low), high=scale(self.high))
 
     def marked(self) -> str:
         """Mark of its kind (LEGEND), value and unit."""
-        return "unavailable" if self.value is None else _MARKS[self.kind] + self._number()
+        return self.number() if self.value is None else _MARKS[self.kind] + self.number()
 
     def text(self) -> str:
         """Mark, value, unit, and the interval if its ends differ in the digits shown."""
@@ -47,12 +50,9 @@ class Quantity:
         low, high = format_number(self.low), format_number(self.high)
         return f"{low} to {high}" if low != high else ""
 
-    def with_kind(self) -> str:
-        """Value, unit and kind in brackets."""
-        return "unavailable" if self.value is None else f"{self._number()} ({self.kind})"
-
-    def _number(self) -> str:
-        return f"{format_number(self.value)} {self.unit}".rstrip()
+    def number(self) -> str:
+        """Value and unit, without its kind."""
+        return "unavailable" if self.value is None else f"{format_number(self.value)} {self.unit}".rstrip()
 
 
 def quantity(

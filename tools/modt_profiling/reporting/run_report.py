@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,12 +26,15 @@ from modt.types import Float64
 from modt_profiling.energy.board_fit import nonnegative_fit
 from modt_profiling.energy.run_energy import EnergySums, run_energy
 from modt_profiling.energy.savings import OtherCosts, UnitCosts, reconcile
-from modt_profiling.reporting import energy_plots, svg
+from modt_profiling.reporting import energy_plots
 from modt_profiling.reporting.document import Cell, Document, Plot, Table
 from modt_profiling.reporting.energy_plots import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt_profiling.reporting.quantity import Quantity, estimate, quantity
 from modt_profiling.reporting.records import read_ledger, read_records, read_windows
 from modt_profiling.reporting.run_sums import COLUMNS, FrameSums, run_facts
+
+if TYPE_CHECKING:  # Matplotlib is an extra
+    from matplotlib.axes import Axes
 
 SCHEMA = "modt.report/2"
 _CONVENTIONAL = "conventional"
@@ -239,24 +242,25 @@ def _stages(tree: dict[str, Any]) -> Table:
 
 def run_plots(tree: dict[str, Any]) -> list[Plot]:
     """Plots over frames, over N_go and over the lengths of tracks."""
-    series, saved = tree["series"], tree["saved"]
+    series = tree["series"]
+    saved = tree["saved"]
     each = np.array(series["frames"], float)
     frames = np.cumsum(each) - each
-    parts_mJ, basis = energy_plots.stage_energy_mJ(series), energy_plots.basis(tree["gross_J"])
-    baseline, run_mJ = "E1, tracking-by-detection (computed)", np.sum([*parts_mJ.values()], axis=0)
+    parts_mJ = energy_plots.stage_energy_mJ(series)
+    basis = energy_plots.basis(tree["gross_J"])
+    baseline = "E1, tracking-by-detection (computed)"
+    run_mJ = np.sum([*parts_mJ.values()], axis=0)
     run_ms = np.sum([*series["cpu_ms"].values()], axis=0)
     further_ms = np.array(series["e1_cpu_ms"]) - run_ms  # CPU time of the classifications that E1 adds
     energy_mJ = {baseline: run_mJ + series["stage_W"][CLASSIFICATION] * further_ms, "E2, this run": run_mJ}
-    budget = [svg.Trace(key, frames, np.array(series[key], float)) for key in ("classified", "deferred")]
-    if series["budget"] is not None:
-        budget.append(svg.Trace("budget", frames[[0, -1]], np.full(2, float(series["budget"])), dashed=True))
+    used = {name: series[name] for name in ("classified", "deferred")}
     point = {tree["mode"]: (saved["N_go"], saved["gamma_of_this_run"])}
     return [
         energy_plots.stage_energy("Energy by stage", parts_mJ, frames, basis),
         energy_plots.cumulative_energy(energy_mJ, each, f"E2: {basis}; E1: estimated", dashed=baseline),
         energy_plots.gamma_curve(saved["a"], saved["proposals"], point, "dot: this run"),
         energy_plots.length_histogram("Lengths of tracks", series["lives"]),
-        ("Use of the budget", svg.lines(budget, "frame", "proposals"), "counted"),
+        energy_plots.proposal_counts("Use of the budget", frames, used, series["budget"]),
     ]
 
 
@@ -266,6 +270,11 @@ def lateness_plots(run: Path) -> list[Plot]:
     late = json.loads(path.read_text(encoding="utf-8")).get("lateness", {}) if path.is_file() else {}
     if not late.get("frames"):
         return []
-    trace = svg.Trace("", np.array(late["ms"], float), np.array(late["frames"], float))
-    plot = svg.lines([trace], "from the arrival of the sweep [ms]", "frames as late or later", log=True)
-    return [("Lateness", plot, "measured")]
+    ms = np.array(late["ms"], float)
+    frames = np.array(late["frames"], float)
+
+    def draw(axes: Axes) -> None:
+        axes.loglog(ms, frames)
+        axes.set(xlabel="from the arrival of the sweep [ms]", ylabel="frames as late or later")
+
+    return [Plot("Lateness", "measured", draw)]
