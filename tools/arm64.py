@@ -27,7 +27,9 @@ else:
     import tomli as tomllib
 
 ROOT = Path(__file__).resolve().parents[1]
-SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates,gcc,libc6-dev"
+SUITE = "bookworm"
+PYTHON = "3.11"
+PACKAGES = "python3,ca-certificates,gcc,libc6-dev"
 PLATFORM = "aarch64-manylinux_2_28"
 LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
 LEFT_OUT = {"cyclonedds", "ruff", "mypy"}

@@ -29,7 +29,8 @@ LOCK = ROOT / "systemd" / "requirements.txt"
 EXTRAS = ("velodyne", "ros2", "foxglove")
 """Extras of the service's environment. `ouster` is left out because it brings a web server and a viewer."""
 FAST = "not slow and not install and not kitti"
-OLDEST, NEWEST = "lowest-direct", "highest"
+OLDEST = "lowest-direct"
+NEWEST = "highest"
 EPOCH = "1700000000"
 
 

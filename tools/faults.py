@@ -34,14 +34,16 @@ def main() -> None:
     from tests.crash.faulty_run import FaultyRun
 
     logging.disable(logging.CRITICAL)
-    rng, began_s = np.random.default_rng(given.seed), time.perf_counter()
+    rng = np.random.default_rng(given.seed)
+    began_s = time.perf_counter()
     broken = Counter[str]()
     calls = list[str]()
     for n in range(given.runs + 1):
         failing: dict[int, int] = {}
         lasting_s = 0.0
         if n:
-            single, ways = n <= given.runs // 2, int(rng.integers(1000))
+            single = n <= given.runs // 2
+            ways = int(rng.integers(1000))
             # Half of the runs fail one call, evenly over the kinds of them; the other half two.
             kinds = sorted({*calls})
             chosen = [kinds[n % len(kinds)]] if single else rng.choice(kinds, 2)

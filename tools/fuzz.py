@@ -37,7 +37,8 @@ Feed = Callable[[bytes], None]
 class Witness:
     """Number of inputs that a process has read, and the last input, in memory that outlives it."""
 
-    HEAD, MOST_BYTES = struct.Struct("<QQ"), 1 << 24
+    HEAD = struct.Struct("<QQ")
+    MOST_BYTES = 1 << 24
 
     def __init__(self) -> None:
         self._memory = mmap.mmap(-1, self.HEAD.size + self.MOST_BYTES)

@@ -47,7 +47,8 @@ def main() -> None:
     warnings.simplefilter("error")
     logging.lastResort = None
     logging.disable(logging.CRITICAL if given.live is None else logging.NOTSET)
-    began_s, block = time.monotonic(), BLOCK if given.live is None else 20
+    began_s = time.monotonic()
+    block = BLOCK if given.live is None else 20
     for done in range(0, given.n, block):
         if time.process_time() > given.seconds:
             break

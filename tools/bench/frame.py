@@ -38,7 +38,8 @@ FIRST = 10
 """Frames left out while tracks begin."""
 MODES = ("accurate", "efficient")
 PART = "segmentation in it"
-BASELINE, YARDSTICK = "Patchwork++: ground alone", "sorting 100,000 numbers"
+BASELINE = "Patchwork++: ground alone"
+YARDSTICK = "sorting 100,000 numbers"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "segmentation.md"
 _NUMBERS = np.random.default_rng(0).random(100_000)
 

@@ -25,7 +25,9 @@ from tools.options import parser
 
 ROOT = Path(__file__).resolve().parents[2]
 NATIVE = "native"
-SUMS, PAGE, LOCK = "SHA256SUMS", "release.md", "requirements.txt"
+SUMS = "SHA256SUMS"
+PAGE = "release.md"
+LOCK = "requirements.txt"
 
 
 def build_wheel(out: Path, target: str | None) -> Path:

@@ -34,8 +34,12 @@ HOG_PRIORITY = 20
 """Real-time priority of a hog, a process that computes on the core of the loop; above the priority of the loop."""
 FULL_DISK = "full disk"
 """The one fault that may cost records."""
-BLOCKS, BLOCK_BYTES, CELL = 12, 100, np.dtype([("distance", "<u2"), ("reflectance", "u1")])
-"""A Velodyne's packet: blocks, each of a head of four bytes and 32 returns."""
+BLOCKS = 12
+"""Blocks of a Velodyne's packet."""
+BLOCK_BYTES = 100
+"""Bytes of a block: a head of four bytes and 32 returns."""
+CELL = np.dtype([("distance", "<u2"), ("reflectance", "u1")])
+"""A return in a block."""
 
 
 class World:
@@ -47,7 +51,9 @@ class World:
 
     def __init__(self, core: int | None, hogs: int, *, fifo: bool) -> None:
         self.disk_full = self.meter_lost = self.stage_broken = False
-        self._core, self._n_hogs, self._fifo = core, hogs, fifo
+        self._core = core
+        self._n_hogs = hogs
+        self._fifo = fifo
         self._hogs: list[subprocess.Popen[bytes]] = []
 
     def set_hogs(self, on: bool) -> None:
@@ -66,7 +72,9 @@ class World:
 
     def install(self) -> None:
         """Put the switches of disk and stages into this process."""
-        write, step, world = LineFile.write, Pipeline.step, self
+        write = LineFile.write
+        step = Pipeline.step
+        world = self
 
         def full(file: LineFile[Any], item: Any) -> None:
             with writing(file.path):
@@ -128,7 +136,8 @@ def _few_lasers(payload: bytes, _rng: np.random.Generator) -> bytes:
 
 
 def _lie(payload: bytes, rng: np.random.Generator) -> bytes:
-    stamps, ahead_us = VelodyneStamps(), 59_000_000 * int(rng.random() < 0.3)
+    stamps = VelodyneStamps()
+    ahead_us = 59_000_000 * int(rng.random() < 0.3)
     return stamps.stamped(payload, (stamps.stamp_us(payload) + ahead_us) % stamps.wrap_us)
 
 

@@ -24,9 +24,14 @@ from tools.options import parser
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = Path(__file__).with_name("proof_steps.py")
-SCANS, PROFILE = "srv/modt/scans", "srv/modt/robot.yaml"
-PYTHON, LIBRARIES, PACKAGE = "/opt/modt/python", "/opt/modt/libraries", "/opt/modt/package"
-"""Places of the interpreter, its libraries and this checkout in the copy. The unit cannot see a home directory."""
+SCANS = "srv/modt/scans"
+PROFILE = "srv/modt/robot.yaml"
+PYTHON = "/opt/modt/python"
+"""Place of the interpreter in the copy. The unit cannot see a home directory."""
+LIBRARIES = "/opt/modt/libraries"
+"""Place of its libraries."""
+PACKAGE = "/opt/modt/package"
+"""Place of this checkout."""
 INTERPRETER = f"{PYTHON}/bin/python{sys.version_info.major}.{sys.version_info.minor}"
 LIMIT_S = 120.0
 """Time after which the proof ends without a verdict [s]."""
@@ -103,7 +108,9 @@ def main(arguments: list[str] | None = None) -> int:
         (base / "boot.sh").write_text(script)
         namespaces = ["--mount", "--pid", "--fork", "--kill-child", "--ipc", "--uts", "--cgroup", "--net"]
         command = ["unshare", *namespaces, "sh", str(base / "boot.sh")]
-        report, end_s, text = base / "report" / "report.txt", time.monotonic() + LIMIT_S, ""
+        report = base / "report" / "report.txt"
+        end_s = time.monotonic() + LIMIT_S
+        text = ""
         system = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         try:
             while time.monotonic() < end_s and system.poll() is None and not text.endswith(END):

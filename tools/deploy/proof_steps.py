@@ -43,7 +43,8 @@ tries = {
 }
 print(json.dumps({name: tried(what) for name, what in tries.items()}))
 """
-ALLOWED, REFUSED = "write its state", "not permitted to this copy of the system"
+ALLOWED = "write its state"
+REFUSED = "not permitted to this copy of the system"
 
 
 class Report:
@@ -109,7 +110,8 @@ def reload(text: str) -> str:
 
 def steps(folder: Path) -> None:
     """All steps in order."""
-    report, profile = Report(folder), PROFILE.read_text()
+    report = Report(folder)
+    profile = PROFILE.read_text()
     begin_s = time.monotonic()
     systemctl("start", UNIT)
     ready_s = time.monotonic() - begin_s

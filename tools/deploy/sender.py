@@ -27,7 +27,8 @@ from tools.send.ideal_packets import packets_of
 from tools.send.loops import VelodyneStamps, turn_loop
 from tools.send.packets import send
 
-MODEL, FRAMES = "vlp-16", 50
+MODEL = "vlp-16"
+FRAMES = 50
 
 
 class Faulty:
@@ -38,12 +39,15 @@ class Faulty:
     """
 
     def __init__(self) -> None:
-        self.fault, self._set_s, self._rng = NO_FAULT, 0.0, np.random.default_rng(0)
+        self.fault = NO_FAULT
+        self._set_s = 0.0
+        self._rng = np.random.default_rng(0)
 
     def applied(self, packets: Iterable[Timed]) -> Iterator[Timed]:
         """The packets as the sensor and the network leave them."""
         for seed in count():
-            fault, self._set_s = self.fault, self._set_s + self.fault.clock_s
+            fault = self.fault
+            self._set_s += self.fault.clock_s
             of_fault = takewhile(lambda _, now=fault: self.fault is now, packets)  # type: ignore[misc]
             changed = ((at_s, self._changed(fault, payload)) for at_s, payload in of_fault)
             yield from replace(fault.network, seed=seed).applied(changed)

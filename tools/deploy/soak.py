@@ -40,9 +40,18 @@ from modt.types import FrameResult
 from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT, Fault, World
 from tools.options import parser
 
-WARM_UP_S, REST_S, SETTLE_S = 15.0, 4.0, 2.5
-"""Time before the first fault, between two faults, and after a fault while a missed deadline is its effect [s]."""
-MAX_RECOVERY_S, MAX_MISSED, MAX_GROWTH = 1.0, 0.001, 0.05
+WARM_UP_S = 15.0
+"""Time before the first fault [s]."""
+REST_S = 4.0
+"""Least time between two faults [s]."""
+SETTLE_S = 2.5
+"""Time after a fault in which a missed deadline is its effect [s]."""
+MAX_RECOVERY_S = 1.0
+"""Greatest time from the end of a fault to whole results [s]."""
+MAX_MISSED = 0.001
+"""Greatest share of the frames that may miss their deadline between faults."""
+MAX_GROWTH = 0.05
+"""Greatest growth of the resident memory over the soak, as a share."""
 STALL = 1.5
 """A longer time between two results, in periods, is a stall."""
 
@@ -95,7 +104,10 @@ class FaultyReader:
     def __init__(
         self, reader: SweepReader, sender: subprocess.Popen[str], world: World, seconds: float, seed: int
     ) -> None:
-        self.reception, self._reader, self._sender, self._world = reader.reception, reader, sender, world
+        self.reception = reader.reception
+        self._reader = reader
+        self._sender = sender
+        self._world = world
         self._rng = np.random.default_rng(seed)
         self._begin_s = self._rest_s = time.monotonic()
         self._rest_s += WARM_UP_S
@@ -147,7 +159,8 @@ class FaultyReader:
             self._send(NO_FAULT)
             self._now.fault.switch(self._world, False)
             self._now.end_s = time.monotonic()  # a hog is gone
-            self._now, self._rest_s = None, now_s + REST_S + float(self._rng.uniform(0, 2))
+            self._now = None
+            self._rest_s = now_s + REST_S + float(self._rng.uniform(0, 2))
 
     def _send(self, fault: Fault) -> None:
         """Make the sender apply a fault to its packets."""
@@ -166,7 +179,8 @@ def judge(witness: Witness, episodes: list[Episode], session: Service) -> list[s
     """Print the figures; returns the broken promises."""
     wrong: list[str] = []
     times_s = np.array(witness.times_s)
-    whole, gaps_s = times_s[np.array(witness.full)], np.diff(times_s)
+    whole = times_s[np.array(witness.full)]
+    gaps_s = np.diff(times_s)
     stalls_s = times_s[1:][gaps_s > STALL * np.median(gaps_s)]
     print(f"{'fault':<16}{'times':>6}{'counted':>8}{'recovery':>10}  (s, worst)")
     for fault in FAULTS:
@@ -241,7 +255,8 @@ def main(arguments: list[str] | None = None) -> int:
         sender.stdout.readline()
         source = open_sensor(f"velodyne://127.0.0.1:{port}", others)
         reader = FaultyReader(source.reader, sender, world, 60 * given.minutes, given.seed)
-        source.reader, witness = reader, Witness()
+        source.reader = reader
+        witness = Witness()
         request = Request(profile=[given.profile] if given.profile else ())
         session = build.service(request, source, {"witness": witness}, given.out, None, core, ["soak"])
     witness.session = reader.session = session

@@ -34,15 +34,22 @@ MARK = "tools.docs.figures"
 DRIVE = "0005"
 SENSORS = {"hdl-64e": "HDL-64E", "os1-64": "OS1-64", "vlp-16": "VLP-16", "mid-360": "Mid-360"}
 """Simulated sensors of the table, and their names in it."""
-SEEDS, SCENES, SECONDS = range(450, 453), ("street", "crossing"), 6.0
-"""Simulated drives of each sensor. No choice of this project is made on them."""
+SCENES = ("street", "crossing")
+SEEDS = range(450, 453)
+"""Seeds of the simulated drives of each sensor. No choice of this project is made on them."""
+SECONDS = 6.0
+"""Duration of each of them [s]."""
 PANDASET_PROFILE = "pandar64"
-MODE, BASELINE, BESIDE = "accurate", "conventional", ("accurate", "efficient")
+MODE = "accurate"
+BASELINE = "conventional"
+BESIDE = ("accurate", "efficient")
 FIRST = 10
 """Frames whose CPU time is left out, while tracks begin."""
 PROFILES = ((), ("paper",))
-SIMULATED, SIMULATED_S = 12, 2.0
-"""Number of simulated drives of the page on the paper, and the length of each [s]."""
+SIMULATED = 12
+"""Number of simulated drives of the page on the paper."""
+SIMULATED_S = 2.0
+"""Duration of each of them [s]."""
 
 
 def readme(kitti: Path, further: Path | None, pandaset: Path | None) -> str:
@@ -67,7 +74,8 @@ def on_kitti(drive: drives.Drive) -> Iterator[str]:
     modes = {name: assembly.MODES[name] for name in (BASELINE, *BESIDE)}
     pipelines = {name: assembly.pipeline(mode, drive.profile, drive.fov) for name, mode in modes.items()}
     cpu_ns: dict[str, list[int]] = {name: [] for name in modes}
-    judged, rng = [], np.random.default_rng(0)
+    judged = []
+    rng = np.random.default_rng(0)
     for frame, truth in drive.frames:
         for name in rng.permutation(list(modes)).tolist():
             began_ns = time.thread_time_ns()
@@ -77,7 +85,8 @@ def on_kitti(drive: drives.Drive) -> Iterator[str]:
                 judged.append(JudgedFrame.of_result(result, truth, drive.fov))
     scores = evaluation([collect(judged, drive.rules)]).ranges[ALL].classification
     of = [scores[c] for c in CLASS_NAMES[1:]]
-    precision, recall = _shares([s.average_precision for s in of]), _shares([s.objects_called for s in of])
+    precision = _shares([s.average_precision for s in of])
+    recall = _shares([s.objects_called for s in of])
     yield f"On drive {DRIVE} of KITTI, in the camera's view, average precision is {precision} and the recall of all"
     yield f"{' / '.join(str(s.objects) for s in of)} labelled objects {recall}. CPU time there, relative to mode"
     shares = [f"{sum(cpu_ns[name][FIRST:]) / sum(cpu_ns[BASELINE][FIRST:]):.2f} (`{name}`)" for name in BESIDE]
@@ -85,7 +94,8 @@ def on_kitti(drive: drives.Drive) -> Iterator[str]:
 
 
 def _row(name: str, found: Evaluation) -> str:
-    whole, tracks = found.ranges[ALL], found.tracks.get(ALL)
+    whole = found.ranges[ALL]
+    tracks = found.tracks.get(ALL)
     detected = [whole.segmentation[c].recall if c in whole.segmentation else None for c in CLASS_NAMES[1:]]
     scores = [whole.classification[c] for c in CLASS_NAMES[1:]]
     length = None if tracks is None else tracks.life.ratio

@@ -19,12 +19,20 @@ from modt_evaluation.experiments.markdown import commit
 from tools.docs.sections import DOCS, replace_section, write
 from tools.study import drives
 
-PAGE, MARK = DOCS / "paper.md", "tools.docs.paired_modes"
+PAGE = DOCS / "paper.md"
+MARK = "tools.docs.paired_modes"
 SENSORS = "vlp-16", "os1-64", "hdl-64e", "mid-360", "pandar64", "xt-32"
 
-BASELINE, MODES = "conventional", ("accurate", "efficient")
-SCENES, SEEDS, SECONDS = ("street", "crossing"), range(1100, 1104), 6.0
-"""Drives of each sensor. PERSON_GROWTH of `modt.tracking.track_table` was added after a look at the first of them."""
+BASELINE = "conventional"
+MODES = ("accurate", "efficient")
+SCENES = ("street", "crossing")
+SEEDS = range(1100, 1104)
+"""Seeds of the drives of each sensor.
+
+The first was looked at when the growth of people's boxes was added to the tracks.
+"""
+SECONDS = 6.0
+"""Duration of each drive [s]."""
 RESAMPLES = 200
 """Draws of the drives of each sensor, with replacement, from which an interval is taken."""
 Rows = Mapping[str, Sequence[DriveRows]]

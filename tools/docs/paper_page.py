@@ -81,7 +81,8 @@ def _behind(rows: Sequence[Row]) -> Iterator[str]:
     for row in rows:
         if row.paper is None or row.value is None:
             continue
-        low, high = row.quantity.startswith(_BETTER_LOW), row.quantity.startswith(_BETTER_HIGH)
+        low = row.quantity.startswith(_BETTER_LOW)
+        high = row.quantity.startswith(_BETTER_HIGH)
         if (low and row.value > _MARGIN * row.paper) or (high and row.value < row.paper):
             place = f"{EXPERIMENTS[row.experiment].title.partition(':')[0]}, {row.streams}, {_profile(row.profile)}"
             words = f"{row.quantity} {number(row.value)}, not {number(row.paper)}"

@@ -16,7 +16,8 @@ def replace_section(text: str, mark: str, section: str) -> str:
     Raises:
         ValueError: one of the marks is missing.
     """
-    begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
+    begin = f"<!-- {mark} -->"
+    end = f"<!-- end of {mark} -->"
     before, rest = text.split(begin)
     _, after = rest.split(end)
     return f"{before}{begin}\n{section}\n{end}{after}"

@@ -73,7 +73,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
     loaded = choose(request.profile, scans[0], stream.info).config
     meters = choose_meter(discover(loaded.energy), arguments.meter).meters
-    meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
+    meter = meters[0].facts
+    ledger = Ledger()
+    limits = loaded.classification
     network = PointNet(limits, loaded.sensor)
     segmenter = assembly.segmenter(loaded, FieldOfView(), assembly.chosen_kernels(loaded.segmentation.kernels))
     windows = Windows(meters, Clocks(), Conditions(pinned or 0), math.inf)

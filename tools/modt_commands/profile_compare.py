@@ -51,7 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
     asked = {**identity(request, stream.info), "fov": request.fov, "asked": list(request.frames)}
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info).config
-    board, info = loaded.energy, stream.info
+    board = loaded.energy
+    info = stream.info
     meters = choose_meter(discover(board), arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
     comparison = Comparison(request, loaded, pinned, meters if metered else ())

@@ -74,7 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
     if n_frames is None:
         n_frames = sum(1 for _ in islice(stream, MOST_FRAMES))
     step = max(1, min(n_frames, MOST_FRAMES) // arguments.sweeps)
-    stamps_s, sweeps = [], []
+    stamps_s = []
+    sweeps = []
     for number, frame in enumerate(islice(stream, step * arguments.sweeps)):
         stamps_s.append(frame.stamp_s)
         if number % step == 0:

@@ -15,7 +15,8 @@ from modt_commands import profile_fit, profile_schema
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the group with its commands, and the list."""
-    what, beside = "profiles of sensors and boards", "For the energy of runs see `modt-profile`."
+    what = "profiles of sensors and boards"
+    beside = "For the energy of runs see `modt-profile`."
     p = commands.add_parser("profile", help=what, description=f"Write and show {what}.", epilog=beside)
     p.set_defaults(run=lambda _: show_help(p))
     group = p.add_subparsers(dest="profile_command", metavar="COMMAND")
@@ -52,7 +53,8 @@ def run_show(arguments: argparse.Namespace) -> int:
 def shown(found: profile.Resolved) -> str:
     """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
     assumed = () if found.sensor else profile.resolve(profile.DEFAULT).layers
-    text, layers = "", (*reversed(found.layers), *reversed(assumed))
+    text = ""
+    layers = (*reversed(found.layers), *reversed(assumed))
     for stage, values in profile.dump(found.config).items():
         text += f"{stage}:\n"
         for key, value in values.items():

@@ -50,12 +50,15 @@ def run(arguments: argparse.Namespace) -> int:
     motions = [camera_poses(arguments.poses, arguments.oxts, sequence, len(sequences)) for sequence in sequences]
     with writing(arguments.out):
         arguments.out.mkdir(parents=True, exist_ok=True)
-    frames, ids, spent_s = 0, 0, 0.0
+    frames = 0
+    ids = 0
+    spent_s = 0.0
     for sequence, poses in zip(sequences, motions, strict=True):
         began = time.process_time()
         text, n = track_sequence(sequence, poses, arguments.period, arguments.sure, online=arguments.online)
         spent_s += time.process_time() - began
-        frames, ids = frames + sequence.n_frames, ids + n
+        frames += sequence.n_frames
+        ids += n
         lines = LineFile[str](arguments.out / f"{sequence.name}.txt")
         lines.write(text)
         lines.close()

@@ -49,7 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     """
     from modt_viewer.view import default_name, save_track_page, save_view
 
-    directory, capture = arguments.run_directory, arguments.capture
+    directory = arguments.run_directory
+    capture = arguments.capture
     if arguments.track is not None:
         out = arguments.out or directory / f"track-{arguments.track}.html"
         save_track_page(directory, arguments.track, capture, out)

@@ -66,7 +66,8 @@ def _picture(title: str, uv: Float64, in_box: Bool, size: tuple[float, float], i
         axes.set_axis_off()
         axes.set_aspect("equal")
         axes.set_title(title)
-        left, low = -size[0] / 2, -size[1] / 2
+        left = -size[0] / 2
+        low = -size[1] / 2
         axes.plot([left, -left, -left, left, left], [low, low, -low, -low, low], color="C5", linewidth=0.5)
         for colour, shown in (("C0", in_box), ("C5", ~in_box)):
             axes.plot(uv[shown, 0], uv[shown, 1], ".", color=colour, markersize=2.5)

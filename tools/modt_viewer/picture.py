@@ -68,7 +68,8 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
         cells: cells of the sweep, None without points.
     """
     figure.clear()
-    axes, reach = figure.add_axes((0, 0, 1, 1)), reach_m(run.tracks)
+    axes = figure.add_axes((0, 0, 1, 1))
+    reach = reach_m(run.tracks)
     axes.set_axis_off()
     side = reach * SIZE_IN[1] / SIZE_IN[0]  # a metre is as long as along x
     axes.set(xlim=(-reach, reach), ylim=(-side, side))
@@ -97,13 +98,15 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     rows = run.tracks[run.tracks[:, COLUMNS.index("at")] == at]
     rows = rows[np.argsort(rows[:, COLUMNS.index("class")], kind="stable")]
     of = {name: column / SCALE.get(name, 1) for name, column in zip(COLUMNS, rows.T, strict=True)}
-    kind, is_object = of["class"].astype(int), of["class"] > 0
+    kind = of["class"].astype(int)
+    is_object = of["class"] > 0
     false = is_object & np.isin(of["id"], run.frames[at].get("false", ()))
     names = [entry["name"] for entry in theme.classes()]
     fill = to_rgba_array([entry["colour"] for entry in theme.classes()])[kind]
     wrong = LEGEND["false"]["colour"]
     edge = to_rgba_array([entry["colour"] for entry in theme.states(run.states)])[of["state"].astype(int)]
-    box, xy = corners(np.stack([of[key] for key in BOX_KEYS], axis=1)), np.column_stack([of["x"], of["y"]])
+    box = corners(np.stack([of[key] for key in BOX_KEYS], axis=1))
+    xy = np.column_stack([of["x"], of["y"]])
     boxes = PolyCollection(box, gid="tracks", linestyles=np.where(of["seen"] > 0, "-", "--").tolist())
     boxes.set_facecolor(np.column_stack([fill[:, :3], np.where(is_object, 0.35, 0.1)]))
     boxes.set_edgecolor(np.where(false[:, None], to_rgba(wrong), edge))
@@ -135,7 +138,8 @@ def _truth(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     labels = []
     for o in run.frames[at].get("truth", ()):
         box = corners(np.array([[o["x"], o["y"], 0.0, o["l"], o["w"], 0.0, o["yaw"]]]))[0]
-        colour, missed = LEGEND[o["outcome"]]["colour"], o["outcome"] == "missed"
+        colour = LEGEND[o["outcome"]]["colour"]
+        missed = o["outcome"] == "missed"
         axes.add_patch(Polygon(box, fill=False, edgecolor=colour, linewidth=3.0 if missed else 1.2, linestyle=":"))
         if missed:
             labels.append((o["x"], box[:, 1].max(), f"missed {theme.classes()[o['class']]['name']}", colour))
@@ -144,7 +148,8 @@ def _truth(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
 
 def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
     """(n, 2) past positions of a track, as seen from the sensor now."""
-    now, world = run.tracks[:, COLUMNS.index("at")], COLUMNS.index("world_x")
+    now = run.tracks[:, COLUMNS.index("at")]
+    world = COLUMNS.index("world_x")
     rows = run.tracks[(run.tracks[:, 0] == id_) & (now <= at) & (now >= at - TRAIL)]
     x, y, yaw = run.poses[at]
     c, s = np.cos(yaw), np.sin(yaw)

@@ -60,11 +60,15 @@ class RecordedRun:
         config = profile.parse(to_yaml(opened.facts["profile"]), run / RUN)
         with records_of(run / LEDGER):
             costs = _costs(run / LEDGER, config.energy)
-        frames, rows, states, poses = list[dict[str, Any]](), list[Float64](), list[str](), list[Float64]()
+        frames = list[dict[str, Any]]()
+        rows = list[Float64]()
+        states = list[str]()
+        poses = list[Float64]()
         boxes: dict[int, Float64] = {}
         for number, (place, record) in enumerate(opened.records()):
             try:
-                result, classifications = recorded_result(record), int(record["classifications"])
+                result = recorded_result(record)
+                classifications = int(record["classifications"])
                 rows.append(frame_rows(number, result, states, boxes))
                 poses.append(planar(result.T_world_sensor))
                 counts = {
@@ -157,12 +161,14 @@ def frame_rows(at: int, result: FrameResult, states: list[str], boxes: dict[int,
         boxes: last box of each track in the world so far, by its id; those of the result are added.
     """
     states += [name for name in result.state_names if name not in states]
-    number, tracks = np.array([states.index(name) for name in result.state_names], np.int64), result.tracks
+    number = np.array([states.index(name) for name in result.state_names], np.int64)
+    tracks = result.tracks
     for id_, lost, box in zip(tracks.id.tolist(), (tracks.proposal == NONE).tolist(), tracks.box, strict=True):
         box[:] = boxes.get(id_, box) if lost else box
         boxes[id_] = box
     rows = result_rows(result)
-    rows[:, COLUMNS.index("at")], rows[:, COLUMNS.index("state")] = at, number[tracks.state]
+    rows[:, COLUMNS.index("at")] = at
+    rows[:, COLUMNS.index("state")] = number[tracks.state]
     return rows
 
 

@@ -79,9 +79,15 @@ if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.figure import Figure
 
 Capture = Sequence[tuple[str, str]]
-PLAYER, PICTURE, PIXELS, GIF, MP4 = ".html", ".svg", ".png", ".gif", ".mp4"
-PICTURE_WIDTH, FILM_WIDTH = 1280, 960
-"""Widths of pictures and films [pixel]."""
+PLAYER = ".html"
+PICTURE = ".svg"
+PIXELS = ".png"
+GIF = ".gif"
+MP4 = ".mp4"
+PICTURE_WIDTH = 1280
+"""Width of a picture [pixel]."""
+FILM_WIDTH = 960
+"""Width of a film [pixel]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +120,8 @@ class View:
             from modt_viewer.picture import draw, new_figure
         except ModuleNotFoundError as error:
             raise MisuseError(self.out, f"needs {error.name}", install("view")) from None
-        figure, numbers = new_figure(width), self.run.numbers[self.at :][:n]
+        figure = new_figure(width)
+        numbers = self.run.numbers[self.at :][:n]
         cells = self.cells(numbers)
         for at in range(self.at, self.at + len(numbers)):
             draw(figure, self.run, at, self.grid.step_cm, None if cells is None else next(cells))
@@ -129,7 +136,8 @@ class View:
 
 def _player(view: View) -> None:
     """Write the page of a run, which opens at a frame."""
-    run, poses = view.run, view.run.poses.round(4).tolist()
+    run = view.run
+    poses = view.run.poses.round(4).tolist()
     cells = view.cells(run.numbers, int(POINT_BYTES / CELL_BYTES / len(poses)))
     about = f"mode {run.facts['mode']}, field of view {run.facts.get('fov', 'full')}, profile {run.sensor}"
     if cells is None:

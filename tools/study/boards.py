@@ -80,10 +80,12 @@ def measured_rating() -> int:
 def work_of(sensor: str, mode_name: str, seeds: Sequence[int], seconds: float) -> Work:
     """Count and time the frames of simulated streets."""
     rows: list[tuple[float, float, float, float]] = []
-    mode, config = assembly.MODES[mode_name], profile.load(sensor)
+    mode = assembly.MODES[mode_name]
+    config = profile.load(sensor)
     for seed in seeds:
         frames = list(SyntheticStream("street", sensor, seconds, seed))
-        pipeline, budget = assembly.pipeline(mode, config, FieldOfView()), mode.budget(config)
+        pipeline = assembly.pipeline(mode, config, FieldOfView())
+        budget = mode.budget(config)
         gc.collect()
         for number, frame in enumerate(frames):
             start = time.thread_time_ns()

@@ -35,7 +35,8 @@ class Drive:
 
 def simulated(scene: str, sensor: str, seconds: float, seed: int) -> Drive:
     """A simulated drive, labelled all round."""
-    stream, frames = SyntheticStream(scene, sensor, seconds, seed), []
+    stream = SyntheticStream(scene, sensor, seconds, seed)
+    frames = []
     for frame, truth in stream.sweeps():
         names = [kind.name for kind in truth.kinds]
         frames.append((frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), names, truth.boxes)))
@@ -51,7 +52,8 @@ def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None)
         further: table of objects that the labels leave out (docs/evaluation.md).
     """
     scans = path / "scans"
-    stream, truth = open_stream(scans if scans.is_dir() else path), open_truth(path)
+    stream = open_stream(scans if scans.is_dir() else path)
+    truth = open_truth(path)
     if further is not None:
         truth = with_further(truth, further, KITTI_TYPES)
     fov = FieldOfView() if stream.info.camera is None else FieldOfView.of_camera(stream.info.camera)
@@ -62,7 +64,8 @@ def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None)
 def judged(drive: Drive, mode_name: str, number: int = 0) -> DriveRows:
     """Run a drive in a mode and judge it. Drives that are pooled need different numbers."""
     mode = assembly.MODES[mode_name]
-    pipeline, budget = assembly.pipeline(mode, drive.profile, drive.fov), mode.budget(drive.profile)
+    pipeline = assembly.pipeline(mode, drive.profile, drive.fov)
+    budget = mode.budget(drive.profile)
     results = ((pipeline.step(frame, budget), truth) for frame, truth in drive.frames)
     frames = (JudgedFrame.of_result(result, truth, drive.fov) for result, truth in results)
     return collect(frames, drive.rules, number)

@@ -30,8 +30,12 @@ from modt.sources.stream import Stream
 from modt.types import Float64
 from tools.options import parser
 
-VN, VE, VU = 6, 7, 10
-"""Columns of an OXTS record: velocities to the north, east and up [m/s]."""
+VN = 6
+"""Column of an OXTS record: velocity to the north [m/s]."""
+VE = 7
+"""Column of an OXTS record: velocity to the east [m/s]."""
+VU = 10
+"""Column of an OXTS record: velocity up [m/s]."""
 KISS_RANGE_M = (2.0, 80.0)
 
 
@@ -60,10 +64,12 @@ def drift(estimate: Float64, reference: Float64) -> dict[str, float]:
 
 def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     """(n, 4, 4) poses estimated from proposals, without odometry."""
-    profile, mode = load(), assembly.MODES["efficient"]
+    profile = load()
+    mode = assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline, budget = assembly.pipeline(mode, profile, fov), mode.budget(profile)
+    pipeline = assembly.pipeline(mode, profile, fov)
+    budget = mode.budget(profile)
     return np.array([pipeline.step(frame, budget).T_world_sensor for frame in map(NoPoses().place, stream)])
 
 
@@ -77,7 +83,8 @@ def by_kiss_icp(stream: Stream) -> Float64:
     config.data.min_range, config.data.max_range = KISS_RANGE_M
     config.mapping.voxel_size = KISS_RANGE_M[1] / 100
     config.registration.max_num_threads = 1
-    odometry, poses = KissICP(config), []
+    odometry = KissICP(config)
+    poses = []
     for frame in stream:
         xyz = frame.points[:, :3].astype(np.float64)
         # Firing time, 0 to 1 over the sweep; the sweep begins and ends behind the sensor.

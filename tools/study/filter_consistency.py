@@ -58,13 +58,17 @@ class BodyTrack:
 
 def body_tracks(stream: SyntheticStream, profile_name: str) -> list[BodyTrack]:
     """Tracks that were on one body for at least MIN_FRAMES frames, in mode `efficient`."""
-    profile, mode, world = load(profile_name), assembly.MODES["efficient"], stream.simulator.world
-    pipeline, budget = assembly.pipeline(mode, profile, FieldOfView()), mode.budget(profile)
+    profile = load(profile_name)
+    mode = assembly.MODES["efficient"]
+    world = stream.simulator.world
+    pipeline = assembly.pipeline(mode, profile, FieldOfView())
+    budget = mode.budget(profile)
     records: dict[tuple[int, int, bool], list[tuple[Float64, Float64, Float64]]] = defaultdict(list)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, budget)
         body, share = majority_bodies(result.proposals, truth.instance)
-        tracks, poses = result.tracks, world.poses(frame.stamp_s)
+        tracks = result.tracks
+        poses = world.poses(frame.stamp_s)
         for row in np.flatnonzero((tracks.proposal >= 0) & (tracks.hits >= MIN_HITS)):
             k = int(body[tracks.proposal[row]])
             if k >= 0 and share[tracks.proposal[row]] >= MIN_SHARE:
@@ -134,11 +138,13 @@ class Consistency:
 def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
     """Summary of the errors (n, 2) and covariances (n, 2, 2) of the tracks."""
     each = [normalised(e, p) for e, p in zip(error, P, strict=True)]
-    n, all_ = len(each), np.concatenate(each)
+    n = len(each)
+    all_ = np.concatenate(each)
     low, high = chi2(DEGREES * n).ppf([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]) / n
     beyond = float((all_ > chi2(DEGREES).ppf(CONFIDENCE)).mean())
     rms = float(np.sqrt((np.concatenate(error) ** 2).sum(axis=1).mean()))
-    mean, median = float(np.mean([e.mean() for e in each])), float(np.median(all_))
+    mean = float(np.mean([e.mean() for e in each]))
+    median = float(np.median(all_))
     return Consistency(n, len(all_), mean, median, float(low), float(high), beyond, rms)
 
 

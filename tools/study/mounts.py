@@ -45,9 +45,11 @@ PLACES = ("yard", "corridor", "hall", "crowd", "ramp")
 
 def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig, mount: Mount) -> DriveRows:
     """Run a drive in a mode and judge it in the level frame."""
-    frames, mode = list(stream.sweeps()), assembly.MODES[mode_name]
+    frames = list(stream.sweeps())
+    mode = assembly.MODES[mode_name]
     config = recognise(frames[0][0].points, config).mounted(config)
-    pipeline, budget = assembly.pipeline(mode, config, FieldOfView()), mode.budget(config)
+    pipeline = assembly.pipeline(mode, config, FieldOfView())
+    budget = mode.budget(config)
 
     def judged() -> Iterator[JudgedFrame]:
         for frame, truth in frames:

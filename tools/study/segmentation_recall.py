@@ -25,7 +25,8 @@ from tools.train.labelled_scans import THINNED, Scan, argoverse_scans, pandaset_
 from tools.train.synthetic_scans import simulated_scans
 
 MIN_POINTS = 20
-SCENES, TIMES_S = ("street", "crossing", "yard"), (0.0, 2.0)
+SCENES = ("street", "crossing", "yard")
+TIMES_S = (0.0, 2.0)
 
 
 @dataclass
@@ -48,7 +49,8 @@ class Tally:
         config = scan.profile
         proposals = Segmenter(config.segmentation, config.sensor, scan.fov).segment(scan.points)
         label = proposals.label(len(scan.points))
-        self.proposals, self.scans = self.proposals + len(proposals), self.scans + 1
+        self.proposals += len(proposals)
+        self.scans += 1
         for kind, own in zip(scan.kinds, scan.objects, strict=True):
             if len(own) < MIN_POINTS or not (scan.fov.depth(scan.points[own]) > 0).mean() > 0.5:
                 continue

@@ -20,15 +20,18 @@ MIN_POINTS = 6
 """Minimum number of points of an augmented crop; a step that would leave fewer is skipped."""
 
 
-BEAM_STEPS, BEAM_STEP_SHARE = (1, 2, 4), (0.5, 0.3, 0.2)
-"""Every n-th beam of a crop is kept, with each n for a share of the crops."""
+BEAM_STEPS = (1, 2, 4)
+"""Every n-th beam of a crop is kept."""
+BEAM_STEP_SHARE = (0.5, 0.3, 0.2)
+"""Share of the crops with each of these n."""
 MAX_ELEVATION_DEG = 2.0
 """Greatest angle between two beams that are kept."""
 
 
 def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sensors]:
     """Augment each crop once; the crops and the sensors that would measure them so, none finer than its own."""
-    n, count = len(crops), crops.count
+    n = len(crops)
+    count = crops.count
     owner = np.repeat(np.arange(n), count)
     xyz = crops.xyz.astype(np.float64)
     centre = np.stack([np.add.reduceat(xyz[:, k], crops.offsets[:-1]) / count for k in range(3)], axis=1)
@@ -114,7 +117,8 @@ def _occlude(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Bo
     a = _relative_position(across, owner, keep, n)
     z = _relative_position(xyz[:, 2], owner, keep, n)
     side = np.where(left[owner], a, 1 - a) > cut[owner]
-    foot, top = z > cut[owner], z < 1 - 0.5 * cut[owner]
+    foot = z > cut[owner]
+    top = z < 1 - 0.5 * cut[owner]
     post = np.abs(a - (0.2 + 0.6 * cut)[owner]) > 0.08
     chosen: Bool = np.choose(kind[owner], [np.ones(len(owner), np.bool_), side, foot, top, post])
     return chosen
@@ -122,7 +126,8 @@ def _occlude(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Bo
 
 def _relative_position(value: Float64, owner: Int, keep: Bool, n: int) -> Float64:
     """(K,) values scaled to 0 (minimum of the crop) to 1 (maximum)."""
-    low, high = np.full(n, np.inf), np.full(n, -np.inf)
+    low = np.full(n, np.inf)
+    high = np.full(n, -np.inf)
     np.minimum.at(low, owner[keep], value[keep])
     np.maximum.at(high, owner[keep], value[keep])
     scaled: Float64 = (value - low[owner]) / np.maximum(high - low, 1e-6)[owner]

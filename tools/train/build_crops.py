@@ -45,7 +45,8 @@ CELL_SCALES = (0.75, 1.4)
 """Cell sizes relative to the profile's, for training alone."""
 SYNTHETIC_CELL_SCALES = (0.75, 1.0, 1.0, 1.4)
 """Cell sizes of simulated sweeps, in turn, relative to the profile's."""
-SCENES, TIMES_S = ("street", "crossing"), (0.0, 2.5)
+SCENES = ("street", "crossing")
+TIMES_S = (0.0, 2.5)
 PASTES = 120
 """Pasting attempts in each scan of KITTI."""
 MIN_HOST_POINTS = 60_000
@@ -53,10 +54,14 @@ MIN_HOST_POINTS = 60_000
 SEEDS_APART = 100_000
 """Number of worlds between the first ones of two seeds."""
 MAX_POINTS = 1200
-UNLABELLED_SHARE, FOREIGN_SHARE = 0.2, 0.2
-"""A greater share of points without a label makes a proposal unknown, of another object's points partial."""
-MIN_BOX_POINTS, MIN_DETECTABLE_POINTS = 5, 10
-"""Minimum points of an object for training, and for the ground truth of the validation."""
+UNLABELLED_SHARE = 0.2
+"""A greater share of points without a label makes a proposal unknown."""
+FOREIGN_SHARE = 0.2
+"""A greater share of another object's points makes a proposal partial."""
+MIN_BOX_POINTS = 5
+"""Minimum points of an object for training."""
+MIN_DETECTABLE_POINTS = 10
+"""Minimum points of an object for the ground truth of the validation."""
 TALL_M = 1.85
 """Minimum height of a van."""
 
@@ -88,9 +93,11 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
     size = proposals.count
     kind = np.full(len(proposals), ObjectClass.BACKGROUND, np.int64)
     outside = np.bincount(number[scan.unlabelled & (number >= 0)], minlength=len(proposals))
-    partial, tall = np.zeros(len(proposals), np.bool_), np.zeros(len(proposals), np.bool_)
+    partial = np.zeros(len(proposals), np.bool_)
+    tall = np.zeros(len(proposals), np.bool_)
     unknown = outside > UNLABELLED_SHARE * size
-    held, whole_of = np.zeros((len(proposals), N_CLASSES)), np.full(len(scan.objects), NONE)
+    held = np.zeros((len(proposals), N_CLASSES))
+    whole_of = np.full(len(scan.objects), NONE)
     valid = points_in_view(scan) >= MIN_DETECTABLE_POINTS
     for k, (members, object_class, box) in enumerate(zip(scan.objects, scan.kinds, scan.boxes, strict=True)):
         if len(members) < MIN_BOX_POINTS:
@@ -130,7 +137,8 @@ class CropWriter:
 
     def add(self, scan: Scan, variant: int, scale: float = 1.0, *, validation: bool = False) -> None:
         """Add the proposals of a scan at `scale` times the profile's cell size; for validation with its objects."""
-        stage, sensor = scan.profile.segmentation, scan.profile.sensor
+        stage = scan.profile.segmentation
+        sensor = scan.profile.sensor
         stage = dataclasses.replace(stage, cell_m=stage.cell_m * scale)
         proposals = Segmenter(stage, sensor, scan.fov).segment(scan.points)
         labels = label(scan, proposals)
@@ -146,7 +154,8 @@ class CropWriter:
         row |= {key: np.full(n, getattr(scan, key)) for key in ("name", "drive", "sensor")}
         row |= dataclasses.asdict(Sensors.of(sensor, proposals.box[kept], ground_z_m(proposals, kept, sensor)))
         if validation:
-            kinds, points = np.array(scan.kinds, np.int64), points_in_view(scan)
+            kinds = np.array(scan.kinds, np.int64)
+            points = points_in_view(scan)
             objects = np.flatnonzero((kinds > ObjectClass.BACKGROUND) & (points >= MIN_DETECTABLE_POINTS))
             own = labels.whole[objects]
             truth = {
@@ -197,7 +206,8 @@ def kitti_crops(path: Path, root: Path) -> None:
         path: file to write (.npz).
         root: KITTI's root, with argoverse2/ and pandaset/ beside object/.
     """
-    writer, scans = CropWriter(), list(kitti(root))
+    writer = CropWriter()
+    scans = list(kitti(root))
     for scan in scans:
         add_labelled(writer, scan)
         for step in THINNED:
@@ -206,7 +216,8 @@ def kitti_crops(path: Path, root: Path) -> None:
         writer.add(scan, CLUSTERED)
     for scan in (*argoverse_scans(root / "argoverse2"), *pandaset_scans(root / "pandaset")):
         add_labelled(writer, scan)
-    cuts, rng = cut_objects(scans), np.random.default_rng(0)
+    cuts = cut_objects(scans)
+    rng = np.random.default_rng(0)
     for scan in scans:
         if len(scan.points) > MIN_HOST_POINTS:
             for made in paste_objects(scan, cuts, PASTES, rng):
@@ -231,7 +242,8 @@ def synthetic_crops(path: Path, worlds: int, labels: Path | None = None) -> None
         labels: folder with label_2/ and frame_to_raw.tsv; as many worlds again are built from these label files of
             KITTI, whose ranges, headings and occlusions are those of real objects.
     """
-    sensors, seeds = tuple(SENSORS), range(SEEDS_APART, SEEDS_APART + worlds)
+    sensors = tuple(SENSORS)
+    seeds = range(SEEDS_APART, SEEDS_APART + worlds)
     scans = simulated_scans(SCENES, seeds[: worlds // 2], TIMES_S, camera=False, sensors=sensors)
     if labels:
         scans = chain(scans, scans_from_labels(label_files(labels), seeds, sensors))

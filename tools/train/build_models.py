@@ -21,8 +21,10 @@ from tools.train.build_crops import kitti_crops, near_crops, own_crops, syntheti
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
 """Simulated worlds of each kind."""
-NEAR_WORLDS, NEAR_STEPS = {1: 3000, 2: 550}, 4000
-"""Seed and number of the worlds near the sensor, first for training, then for the card; training steps."""
+NEAR_WORLDS = {1: 3000, 2: 550}
+"""Seed and number of the worlds near the sensor, first for training, then for the card."""
+NEAR_STEPS = 4000
+"""Training steps of the network for near crops."""
 KITTI_DATA = (
     "106 + 2 and 53 more object frames and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; SemanticKITTI "
     "labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 sweeps of Argoverse 2 (B. "
@@ -80,7 +82,8 @@ def main() -> None:
         synthetic_crops(free, WORLDS)
     if args.scans:
         own_crops(own, args.scans, profile.load(args.profile), Path(args.profile).stem)
-        crops, data = [own, real, placed] if args.kitti else [own, free], f"scans of {args.scans.name}; "
+        crops = [own, real, placed] if args.kitti else [own, free]
+        data = f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA
         build(crops, near, args.work / "pointnet-scans.onnx", args.steps, data, licence)

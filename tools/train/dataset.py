@@ -26,8 +26,10 @@ SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
 """Variants of crops: real scans under the default segmentation; real scans under other cell sizes; real scans with
 pasted objects; synthetic sweeps. All but the first are for training alone."""
 
-FOLDS, SEED = 3, 1
-"""Folds of the cross-validation, and seed of the first one and of the training on all crops."""
+FOLDS = 3
+"""Folds of the cross-validation."""
+SEED = 1
+"""Seed of the first fold, and of the training on all crops."""
 CLASS_SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Share of each class in a batch; objects are rarer, background is more varied."""
 VARIANT_SHARE = np.array(
@@ -204,7 +206,8 @@ def folds(data: Dataset, k: int) -> Int:
     weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
     np.add.at(weight, (drive, label), 1.0)
     weight /= weight.sum(axis=0).clip(1)
-    load, fold = np.zeros((k, N_CLASSES)), np.full(len(weight), NONE)
+    load = np.zeros((k, N_CLASSES))
+    fold = np.full(len(weight), NONE)
     validation = np.unique(data.drive[data.variant == data.variant.min()])
     for drive in validation[np.argsort(-weight[validation].max(axis=1), kind="stable")]:
         fold[drive] = np.argmin((load + weight[drive]).max(axis=1) + load.sum(axis=1) * 1e-3)

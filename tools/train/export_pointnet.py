@@ -29,7 +29,8 @@ from tools.train.scores import MIN_OBJECT_POINTS, PRECISIONS
 Layer = tuple[NDArray[Any], NDArray[Any]]
 """(in, out) weight and (out,) bias."""
 N_SHARED = 3
-OPSET, IR = 17, 8
+OPSET = 17
+IR = 8
 
 
 def to_lists(layers: Layers) -> list[list[Any]]:
@@ -78,7 +79,8 @@ def graph(layers: Sequence[Layer], *, pool_first: bool = True, half: bool = Fals
     write = GraphWriter(half=half)
     value = write.add("Transpose", "points", perm=[0, 2, 1]) if pool_first else "points"
     for i, (weight, bias) in enumerate(layers):
-        columns, last_shared = pool_first and i < N_SHARED, i == N_SHARED - 1
+        columns = pool_first and i < N_SHARED
+        last_shared = i == N_SHARED - 1
         weights = write.constant(f"weight{i}", weight.T.copy() if columns else weight)
         value = write.add("MatMul", *((weights, value) if columns else (value, weights)))
         if columns and last_shared:
@@ -107,7 +109,8 @@ def graph(layers: Sequence[Layer], *, pool_first: bool = True, half: bool = Fals
 
 def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str) -> str:
     """Model card in Markdown."""
-    calibration, frequency = report["calibration"], report["class_frequency"]
+    calibration = report["calibration"]
+    frequency = report["class_frequency"]
     lines = [
         f"# {name}",
         "",

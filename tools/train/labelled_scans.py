@@ -57,8 +57,10 @@ PANDASET_UNKNOWN = (
     "Personal Mobility Device", "Tram / Subway",
 )  # fmt: skip
 """Types that are between the classes."""
-TWO_WHEELERS, RIDDEN_M = ("Bicycle", "Motorcycle", "TYPE_CYCLIST"), 1.5
-"""Cuboids of both parked and ridden ones; these are taller than RIDDEN_M."""
+TWO_WHEELERS = ("Bicycle", "Motorcycle", "TYPE_CYCLIST")
+"""Types of cuboids of both parked and ridden two-wheelers."""
+RIDDEN_M = 1.5
+"""Height above which a two-wheeler is ridden."""
 MISMATCHED = ("002894",)
 """Scans of `training_more` whose labels belong to others: boxes in plain view are empty, and cars have no box."""
 THINNED = {2: 0.12, 4: 0.14}
@@ -173,10 +175,12 @@ def object_scan(path: Path, label: Path, camera: Camera | None, drive: str) -> S
     points = np.fromfile(path, np.float32).reshape(-1, 4)
     labels = read_labels(label, camera or AT_SENSOR, tracking=False)
     objects = [item for item in labels if item.type_ != DONT_CARE]
-    fov, unlabelled = FieldOfView(), np.zeros(len(points), np.bool_)
+    fov = FieldOfView()
+    unlabelled = np.zeros(len(points), np.bool_)
     if camera:
         edges = np.array([item.image_box for item in labels if item.type_ == DONT_CARE]).reshape(-1, 4)
-        fov, unlabelled = FieldOfView.of_camera(camera), Regions(edges, camera).contains(points)
+        fov = FieldOfView.of_camera(camera)
+        unlabelled = Regions(edges, camera).contains(points)
     boxes = on_bottom(np.array([item.box for item in objects]).reshape(-1, 7))
     kinds = [KITTI_CLASS.get(item.type_, ObjectClass.BACKGROUND) for item in objects]
     return scan_from_boxes(path.stem, drive, points, boxes, kinds, fov, unlabelled)
@@ -200,7 +204,8 @@ def folder_scans(folder: Path, sensor: str, config: ProfileConfig) -> Iterator[S
     if not paths:
         raise MisuseError(folder, "no scans", "give a folder with velodyne/*.bin and label_2/*.txt")
     for path in paths:
-        label, calib = folder / "label_2" / f"{path.stem}.txt", folder / "calib" / f"{path.stem}.txt"
+        label = folder / "label_2" / f"{path.stem}.txt"
+        calib = folder / "calib" / f"{path.stem}.txt"
         drive = path.stem.rpartition("_")[0] or path.stem
         camera = camera_of_sequence(calib) if calib.parent.is_dir() else None
         yield replace(object_scan(path, label, camera, drive), sensor=sensor, profile=config)
@@ -212,7 +217,8 @@ def semantic_scans(folder: Path) -> Iterator[Scan]:
         path = label.parents[1] / "velodyne" / f"{label.stem}.bin"
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         semantic, instance = np.divmod(np.fromfile(label, np.uint32).astype(np.int64), 1 << 16)[::-1]
-        kinds, objects = [], []
+        kinds = []
+        objects = []
         for number in np.unique(instance[instance > 0] << 16 | semantic[instance > 0]):
             kind = SEMANTIC_CLASS.get(int(number & 0xFFFF))
             own = np.flatnonzero((instance << 16 | semantic) == number)

@@ -20,21 +20,28 @@ from tools.options import parser
 from tools.study.drives import Drive, simulated
 
 CELLS = len(YOUNG_S) + 1 + len(MOVED_M)
-WEIGHT, MOST = 0.5, 1.5
-"""Weight of the witness beside network and box, and its greatest absolute log likelihood ratio."""
+WEIGHT = 0.5
+"""Weight of the motion beside network and box."""
+MOST = 1.5
+"""Greatest absolute log likelihood ratio of the motion."""
 SMOOTHING = 200
 """Counts of a class over all lengths that are added to those of one length."""
-FRAGMENTS, JOINT_SMOOTHING = 0, 50
-"""Length for which the length itself is evidence, since hardly any object is never seen longer, and counts that are
-added to a class there, over all lengths."""
-SCENES, SEEDS, SECONDS = ("street", "crossing"), range(800, 806), 8.0
-"""Drives that are counted, by every sensor; the seeds are not those of any published figure."""
+FRAGMENTS = 0
+"""Length for which the length itself is evidence, since hardly any object is never seen longer."""
+JOINT_SMOOTHING = 50
+"""Counts that are added to a class there, over all lengths."""
+SCENES = ("street", "crossing")
+SEEDS = range(800, 806)
+"""Seeds of the drives that are counted, by every sensor; they are not those of any published figure."""
+SECONDS = 8.0
+"""Duration of each drive [s]."""
 
 
 def counted(drive: Drive, number: int) -> Int:
     """(4, CELLS, 4) tracks of a drive, frame by frame, by length, cell and true class."""
     mode = assembly.MODES["accurate"]
-    pipeline, budget = assembly.pipeline(mode, drive.profile, drive.fov), mode.budget(drive.profile)
+    pipeline = assembly.pipeline(mode, drive.profile, drive.fov)
+    budget = mode.budget(drive.profile)
     results = [pipeline.step(frame, budget) for frame, _ in drive.frames]
     judged = (JudgedFrame.of_result(r, truth, drive.fov) for r, (_, truth) in zip(results, drive.frames, strict=True))
     rows = collect(judged, drive.rules, number).proposals

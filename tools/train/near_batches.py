@@ -21,12 +21,22 @@ from tools.train.near_scans import HEIGHT_M, MIN_RANGE_M, RANGE_M
 
 SHARE = np.array([0.5, 0.08, 0.38, 0.04])
 """Shares of the classes in a batch."""
-NEAR_BATCH, CUT_BATCH = 72, 40
-"""Simulated crops of a batch, and crops of the streets that are cut near; some show too little and are left out."""
-CUT_RANGE_M, CUT_POINTS, MAX_POINTS = 25.0, 60, 800
-"""Crops of the streets that are cut near: how far they may be, points that they need, and points used of each."""
-HIDDEN_SHARE, MAX_HIDDEN, MIN_POINTS = 0.2, 0.45, 8
-"""Crops hidden at a side, how much of one may be hidden, and points that are left of it."""
+NEAR_BATCH = 72
+"""Simulated crops of a batch."""
+CUT_BATCH = 40
+"""Crops of the streets in a batch that are cut near; some show too little and are left out."""
+CUT_RANGE_M = 25.0
+"""Greatest distance of a crop of the streets that is cut near."""
+CUT_POINTS = 60
+"""Least number of points of a crop of the streets that is cut near."""
+MAX_POINTS = 800
+"""Points used of a crop of the streets that is cut near, at most."""
+HIDDEN_SHARE = 0.2
+"""Share of the crops that are hidden at a side."""
+MAX_HIDDEN = 0.45
+"""Greatest share of the width of a crop that is hidden."""
+MIN_POINTS = 8
+"""Points of a hidden crop that must be left, else it stays whole."""
 MAX_HEIGHT_M = SegmentationConfig().max_height_m
 MIN_CUT_POINTS = 20
 """A crop with fewer points between the beams is left out."""
@@ -54,7 +64,8 @@ class NearSource:
     """
 
     def __init__(self, near: Dataset, streets: Dataset) -> None:
-        self._near, self._streets = near, streets
+        self._near = near
+        self._streets = streets
         self._flags = cut_flags(near)
         self._pools = _by_class(near, np.flatnonzero(near.trainable))
         shown = streets.trainable & (distance_m(streets.crops) < CUT_RANGE_M) & (streets.crops.count >= CUT_POINTS)
@@ -96,18 +107,23 @@ def varied(crops: Crops, rng: Generator) -> tuple[Crops, Int]:
 
     Half of those hidden are as if cut by the view, the others by what stands before them.
     """
-    n, owner, starts = len(crops), np.repeat(np.arange(len(crops)), crops.count), crops.offsets[:-1]
+    n = len(crops)
+    owner = np.repeat(np.arange(len(crops)), crops.count)
+    starts = crops.offsets[:-1]
     if not n:
         return crops, np.zeros(0, np.int64)
     xyz = crops.xyz.astype(np.float64)
     middle = np.add.reduceat(xyz[:, :2], starts) / crops.count[:, None]
     c, s = (middle / np.hypot(*middle.T)[:, None])[owner].T
-    along, across = c * xyz[:, 0] + s * xyz[:, 1], c * xyz[:, 1] - s * xyz[:, 0]
+    along = c * xyz[:, 0] + s * xyz[:, 1]
+    across = c * xyz[:, 1] - s * xyz[:, 0]
     across *= rng.choice([-1.0, 1.0], n)[owner]
-    xyz[:, 0], xyz[:, 1] = c * along - s * across, s * along + c * across
+    xyz[:, 0] = c * along - s * across
+    xyz[:, 1] = s * along + c * across
     xyz += rng.normal(0, 0.006, xyz.shape)
     xyz[:, 2] += rng.normal(0, 0.015, n)[owner]
-    low, high = np.minimum.reduceat(across, starts), np.maximum.reduceat(across, starts)
+    low = np.minimum.reduceat(across, starts)
+    high = np.maximum.reduceat(across, starts)
     hidden = np.where(rng.random(n) < HIDDEN_SHARE, rng.uniform(0.0, MAX_HIDDEN, n), 0.0)
     keep = (across - low[owner]) >= (hidden * (high - low))[owner]
     keep &= rng.random(len(owner)) < rng.uniform(0.4, 1.0, n)[owner]
@@ -128,9 +144,11 @@ def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sen
     Returns:
         crops, the sensors that would measure them so, (R,) rows of the crops given, and (R,) flags of Cut.
     """
-    n, owner = len(crops), np.repeat(np.arange(len(crops)), crops.count)
+    n = len(crops)
+    owner = np.repeat(np.arange(len(crops)), crops.count)
     low, high = SPANS[rng.integers(len(SPANS), size=n)].T
-    mount_m, near_m = rng.uniform(*HEIGHT_M, n), np.exp(rng.uniform(*LOG_RANGE, n))
+    mount_m = rng.uniform(*HEIGHT_M, n)
+    near_m = np.exp(rng.uniform(*LOG_RANGE, n))
     xyz = crops.xyz.astype(np.float64)
     distance = np.hypot(xyz[:, 0], xyz[:, 1])
     nearest = np.minimum.reduceat(distance, crops.offsets[:-1])
@@ -140,7 +158,8 @@ def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sen
     xyz[:, :2] += ((near_m - nearest)[:, None] * unit)[owner]
     xyz[:, 2] -= (sensors.ground_z_m + mount_m)[owner]
     tangent = xyz[:, 2] / np.maximum(np.hypot(xyz[:, 0], xyz[:, 1]), 0.1)
-    above, below = tangent > high[owner], tangent < low[owner]
+    above = tangent > high[owner]
+    below = tangent < low[owner]
     keep = ~above & ~below
     cut = Cut.TOP * np.maximum.reduceat(above, crops.offsets[:-1])
     cut |= Cut.BOTTOM * np.maximum.reduceat(below, crops.offsets[:-1])

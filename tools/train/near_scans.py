@@ -24,24 +24,34 @@ from modt_simulation.yard import enclose, floor
 from tools.train.labelled_scans import Scan
 from tools.train.synthetic_scans import labelled_scan
 
-HEIGHT_M, RANGE_M = (0.2, 1.0), (0.5, 6.0)
-"""Heights of the sensor's mount, and distances of people and things around it."""
+HEIGHT_M = (0.2, 1.0)
+"""Least and greatest height of the sensor's mount."""
+RANGE_M = (0.5, 6.0)
+"""Least and greatest distance of people and things around it."""
 SLOTS = 14
 """Directions in which something may stand."""
-PERSON_SHARE, CAR_SHARE, EMPTY_SHARE = 0.32, 0.05, 0.15
-"""Shares of the directions in which a person, a car or nothing stands."""
+PERSON_SHARE = 0.32
+"""Share of the directions in which a person stands."""
+CAR_SHARE = 0.05
+"""Share of the directions in which a car stands."""
+EMPTY_SHARE = 0.15
+"""Share of the directions in which nothing stands."""
 ROBOT_M = (0.4, 0.4)
 """Length and width of the robot, which nothing overlaps."""
-MIN_RANGE_M, LOW_CLEARANCE_M = 0.2, 0.12
-"""Nearest range used; lowest point of an object above ground, of a sensor below LOW_M."""
+MIN_RANGE_M = 0.2
+"""Nearest range used."""
 LOW_M = 0.5
+"""Height of the mount below which a sensor is low."""
+LOW_CLEARANCE_M = 0.12
+"""Least height above the ground of a point of an object, for a low sensor."""
 
 
 def near_scene(rng: Generator, height_m: float) -> World:
     """A robot at rest among people, furniture, bins, posts, trees and cars."""
     builder = SceneBuilder(rng, 4.0)
     for k in range(SLOTS):
-        draw, bearing = rng.random(), 2 * np.pi * (k + rng.uniform(-0.25, 0.25)) / SLOTS
+        draw = rng.random()
+        bearing = 2 * np.pi * (k + rng.uniform(-0.25, 0.25)) / SLOTS
         distance = float(np.exp(rng.uniform(*np.log(RANGE_M))))
         x, y = distance * np.cos(bearing), distance * np.sin(bearing)
         turn = float(rng.uniform(-np.pi, np.pi))
@@ -75,26 +85,32 @@ def _person(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
 
 def _post(rng: Generator) -> Solids:
     """A post, a pillar or a pipe."""
-    radius, tall = rng.uniform(0.02, 0.2), rng.uniform(0.5, 3.0)
+    radius = rng.uniform(0.02, 0.2)
+    tall = rng.uniform(0.5, 3.0)
     return cylinder((0.0, 0.0, tall / 2), radius, tall, Material.METAL)
 
 
 def _posts(rng: Generator) -> Solids:
     """Two to four posts or legs beside one another, at any distance."""
-    radius, tall, gap = rng.uniform(0.015, 0.12), rng.uniform(0.4, 2.5), rng.uniform(0.12, 0.9)
+    radius = rng.uniform(0.015, 0.12)
+    tall = rng.uniform(0.4, 2.5)
+    gap = rng.uniform(0.12, 0.9)
     places = [(0.0, 0.0), (gap, 0.0), (0.0, gap), (gap, gap)][: int(rng.integers(2, 5))]
     return Solids.join([cylinder((x, y, tall / 2), radius, tall, Material.METAL) for x, y in places])
 
 
 def _crate(rng: Generator) -> Solids:
     """A crate, a cupboard, a machine or a piece of wall."""
-    long, deep, tall = rng.uniform(0.15, 1.6), rng.uniform(0.1, 0.8), rng.uniform(0.3, 2.2)
+    long = rng.uniform(0.15, 1.6)
+    deep = rng.uniform(0.1, 0.8)
+    tall = rng.uniform(0.3, 2.2)
     return box((0.0, 0.0, tall / 2), (long, deep, tall), Material.WOOD)
 
 
 def _bench(rng: Generator) -> Solids:
     """A slab on two broad feet."""
-    long, tall = rng.uniform(0.5, 1.6), rng.uniform(0.35, 1.1)
+    long = rng.uniform(0.5, 1.6)
+    tall = rng.uniform(0.35, 1.1)
     feet = [box((s * long / 3, 0.0, tall / 2), (0.12, 0.35, tall), Material.WOOD) for s in (-1, 1)]
     return Solids.join([*feet, box((0.0, 0.0, tall), (long, 0.4, 0.06), Material.WOOD)])
 

@@ -20,8 +20,10 @@ from modt.classification.box_classifier import Layers
 from modt.types import Float64, Int
 from tools.train.export_pointnet import Layer
 
-SHARED, HEAD = (3, 32, 64, 512), (512, 256, 128, 4)
-"""Widths of the layers over points, and of those after the maximum."""
+SHARED = (3, 32, 64, 512)
+"""Widths of the layers over points."""
+HEAD = (512, 256, 128, 4)
+"""Widths of the layers after the maximum."""
 DROPOUT = 0.3
 """Share of the last hidden layer that a training step leaves out."""
 HIDDEN = (32, 32)
@@ -71,7 +73,8 @@ class PositiveScaleNorm(nn.Module):
 
     def folded(self, weight: Tensor) -> tuple[Tensor, Tensor]:
         """Weight (out, in) and bias (out,) of the preceding bias-free layer with the normalisation folded in."""
-        mean, var = self.norm.running_mean, self.norm.running_var
+        mean = self.norm.running_mean
+        var = self.norm.running_var
         assert mean is not None
         assert var is not None
         scale = self.log_scale.double().exp() / torch.sqrt(var.double() + self.norm.eps)
@@ -120,7 +123,8 @@ def train_mlp(batch: Callable[[], Batch], sample: Float64, steps: int, rate: flo
         rate: maximum learning rate.
         decay: weight decay.
     """
-    mean, scale = sample.mean(axis=0), sample.std(axis=0)
+    mean = sample.mean(axis=0)
+    scale = sample.std(axis=0)
     scale = np.where(scale > 0, scale, 1.0)  # of a feature that never varies
     linear = [nn.Linear(a, b) for a, b in pairwise((sample.shape[1], *HIDDEN, N_CLASSES))]
     net = nn.Sequential(*[part for layer in linear for part in (layer, nn.Tanh())][:-1])

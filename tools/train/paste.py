@@ -20,7 +20,9 @@ from modt.types import Bool, Float32, Float64, Int
 from modt_evaluation.overlap import PAD_M
 from tools.train.labelled_scans import Scan
 
-MIN_POINTS, CLEARANCE_M, OCCLUSION_MARGIN_M = 8, 0.4, 0.4
+MIN_POINTS = 8
+CLEARANCE_M = 0.4
+OCCLUSION_MARGIN_M = 0.4
 CLASS_SHARE = {ObjectClass.CAR: 0.36, ObjectClass.PEDESTRIAN: 0.36, ObjectClass.CYCLIST: 0.28}
 SAME_RANGE_SHARE = 0.5
 """Share of objects that keep their range."""
@@ -71,7 +73,9 @@ def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generat
             cut = candidates[rng.integers(len(candidates))]
             by_drive.setdefault(cut.drive, []).append(cut)
     for drive, chosen in by_drive.items():
-        points, boxes, kinds = scan.points, [], []
+        points = scan.points
+        boxes = []
+        kinds = []
         objects: list[Int] = []
         for cut in chosen:
             placed = _place(cut, points, scan.profile.sensor, rng)
@@ -118,19 +122,23 @@ def _place(
     if abs(ground - cut.box[2]) > 0.3 + 0.02 * rho * factor or np.mean(near[:, 2] > ground + CLEARANCE_M) > 0.05:
         return None
     points = cut.points.copy()
-    points[:, 0], points[:, 1] = c * xy[:, 0] - s * xy[:, 1], s * xy[:, 0] + c * xy[:, 1]
+    points[:, 0] = c * xy[:, 0] - s * xy[:, 1]
+    points[:, 1] = s * xy[:, 0] + c * xy[:, 1]
     points[:, 2] += ground - cut.box[2]
     cells = _cells(points, sensor)
     if factor > 1.03:
         _, first = np.unique(cells, return_index=True)
-        points, cells = points[first], cells[first]
+        points = points[first]
+        cells = cells[first]
     sector = np.flatnonzero(_around(scene, points))
     beside = scene[sector]
     scene_cells = _cells(beside, sensor)
-    distance, scene_distance = np.linalg.norm(points[:, :3], axis=1), np.linalg.norm(beside[:, :3], axis=1)
+    distance = np.linalg.norm(points[:, :3], axis=1)
+    scene_distance = np.linalg.norm(beside[:, :3], axis=1)
     front = np.flatnonzero((scene_distance < distance.min() - OCCLUSION_MARGIN_M) & (scene_distance > 2.0))
     visible = ~np.isin(cells, _dilate(scene_cells[front]))
-    points, cells = points[visible], cells[visible]
+    points = points[visible]
+    cells = cells[visible]
     if visible.sum() < max(MIN_POINTS, 0.2 * len(visible)):
         return None
     hidden = np.zeros(len(scene), np.bool_)

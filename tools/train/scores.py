@@ -90,5 +90,6 @@ def recall_at(
     least = threshold[enough[-1]] if len(enough) else np.inf
     found = wanted & (row != NONE)
     called = int((score[row[found]] >= least).sum())
-    n, with_own = int(wanted.sum()), int(found.sum())
+    n = int(wanted.sum())
+    with_own = int(found.sum())
     return {"objects": n, "of_all": round(called / n, 4), "of_found": round(called / max(with_own, 1), 4)}

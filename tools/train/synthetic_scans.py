@@ -85,7 +85,8 @@ def label_scene(path: Path, seed: int, sensor: str = profile.DEFAULT) -> Simulat
     Raises:
         MisuseError: the file is unreadable or no label file.
     """
-    labels, model = read_labels(path, AT_SENSOR, tracking=False), model_of(sensor)
+    labels = read_labels(path, AT_SENSOR, tracking=False)
+    model = model_of(sensor)
     rng = np.random.default_rng([seed, 0])
     street = residential(rng, 60.0)
     builder = SceneBuilder(rng, model.period_s)

@@ -30,8 +30,10 @@ from tools.train.held_out import Calibration, Model, fit_pool, out_of_fold
 from tools.train.network import Batch, train_mlp
 from tools.train.scores import by_sensor
 
-STEPS, AUGMENTED_BATCHES = 2000, 250
-"""Steps of the training; batches that are augmented for it, since augmentation costs more than a step."""
+STEPS = 2000
+"""Steps of the training."""
+AUGMENTED_BATCHES = 250
+"""Batches that are augmented for the training, since augmentation costs more than a step."""
 MAX_POINTS = 400
 """Maximum number of points of a crop before augmentation."""
 THRESHOLDS = (0.005, 0.01, 0.02, 0.05, 0.1)
@@ -78,7 +80,8 @@ def cross_validate(
         return lambda rows: logits(layers, dataset_features(data, rows))
 
     held = out_of_fold(data, k, model)
-    valid, box = held.validation, held.probability
+    valid = held.validation
+    box = held.probability
     weights, pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
     return held.calibration, {
         "weights": asdict(weights),

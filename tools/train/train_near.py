@@ -42,8 +42,10 @@ FREQUENCY = np.array([0.86, 0.03, 0.1, 0.01])
 """Frequency of the classes among proposals near a small robot."""
 RATE = 5e-4
 """Greatest learning rate."""
-BOUND_CROPS, BOUND_STEPS = 60_000, 3000
-"""Number of crops for the training of the classifier of bounds, and its steps."""
+BOUND_CROPS = 60_000
+"""Number of crops for the training of the classifier of bounds."""
+BOUND_STEPS = 3000
+"""Steps of that training."""
 SMOOTHING = 0.01
 """Label smoothing: probability spread evenly over the classes."""
 EVERY = 100
@@ -85,7 +87,8 @@ def layers_of(model: onnx.ModelProto) -> list[Layer]:
 def train(first: list[Layer], source: NearSource, steps: int, seed: int) -> tuple[Student, float]:
     """The network after training from its first layers on, and its loss at the end."""
     torch.manual_seed(seed)
-    rng, net = np.random.default_rng(seed), Student(first)
+    rng = np.random.default_rng(seed)
+    net = Student(first)
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=1e-3)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, total_steps=steps, pct_start=max(0.1, 2 / steps))
     shift = torch.from_numpy(np.log(SHARE / FREQUENCY).astype(np.float32))
@@ -108,7 +111,9 @@ def train_bounds(source: NearSource, seed: int) -> Layers:
     """The classifier of boxes that are cut, whose posteriors hold for FREQUENCY."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    features, labels, n = [], [], 0
+    features = []
+    labels = []
+    n = 0
     while n < BOUND_CROPS:
         near = source.draw(rng)
         found = crop_features(near.crops, near.sensors)
@@ -116,7 +121,8 @@ def train_bounds(source: NearSource, seed: int) -> Layers:
         features.append(bound_features(found[rows], near.cut[rows]))
         labels.append(near.label[rows])
         n += len(rows)
-    feature, label = np.concatenate(features), np.concatenate(labels)
+    feature = np.concatenate(features)
+    label = np.concatenate(labels)
 
     def batch() -> Batch:
         chosen = rng.integers(0, len(label), 512)
@@ -153,7 +159,9 @@ def table(first: Student, net: Student, boxes: MlpBoxClassifier, log_frequency: 
         held: crops that nothing was trained on.
     """
     rows = np.flatnonzero(held.trainable)
-    cut, distance, person = cut_flags(held)[rows], distance_m(held.crops)[rows], held.label[rows] == 2
+    cut = cut_flags(held)[rows]
+    distance = distance_m(held.crops)[rows]
+    person = held.label[rows] == 2
     by_network = network_posterior(net, held, rows)
     by_box = log_softmax(boxes.log_probability(dataset_features(held, rows), cut), axis=1)
     pool = log_pool(by_network, by_box, np.zeros_like(by_box), log_frequency, boxes.weights)
@@ -183,8 +191,11 @@ def main() -> None:
     started = time.process_time()
     model = onnx.load(str(args.model))
     metadata = {entry.key: entry.value for entry in model.metadata_props}
-    streets, near, held = load(*args.crops), load(args.near), load(args.held)
-    source, first = NearSource(near, streets), layers_of(model)
+    streets = load(*args.crops)
+    near = load(args.near)
+    held = load(args.held)
+    source = NearSource(near, streets)
+    first = layers_of(model)
     bounds = train_bounds(source, args.seed)
     net, loss = train(first, source, args.steps, args.seed)
     network = graph(net.layers())

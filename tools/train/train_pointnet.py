@@ -41,16 +41,20 @@ from tools.train.held_out import Model, out_of_fold
 from tools.train.network import PointNet
 from tools.train.scores import by_sensor
 
-POINTS, MAX_POINTS = 128, 400
-"""Maximum number of points of a crop in a batch, and before augmentation."""
+POINTS = 128
+"""Maximum number of points of a crop in a batch."""
+MAX_POINTS = 400
+"""Maximum number of points of a crop before augmentation."""
 MIN_FREQUENCY = 1e-4
 """Frequency stated for a class without a crop in the validation."""
 PRINTED_STEPS = 1000
 """Steps between two printed losses."""
 SMOOTHING = 0.02
 """Label smoothing: probability spread evenly over the classes."""
-BOX_STEPS, MIN_WORTH = 600, 0.03
-"""Training steps of the box classifier that rates how often to draw background, and the least relative rate."""
+BOX_STEPS = 600
+"""Training steps of the box classifier that rates how often to draw background."""
+MIN_WORTH = 0.03
+"""Least relative rate at which background is drawn."""
 
 
 def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]:
@@ -82,7 +86,8 @@ def batch_loss(
     """Loss of a network on a batch of augmented crops."""
     drawn = draw_batch(pools, rng)
     crops, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
-    scores, label = net(*tensors(subsample(crops, POINTS, rng), sensors)), torch.from_numpy(data.label[drawn])
+    scores = net(*tensors(subsample(crops, POINTS, rng), sensors))
+    label = torch.from_numpy(data.label[drawn])
     return torch.nn.functional.cross_entropy(scores, label, label_smoothing=smoothing)
 
 
@@ -150,7 +155,8 @@ def main() -> None:
         for sensor in sorted(REFLECTANCE_SCALES)
     )
     trained = [pair for pair in each if pair]
-    reflectance, report["reflectance"] = [layers for layers, _ in trained], [facts for _, facts in trained]
+    reflectance = [layers for layers, _ in trained]
+    report["reflectance"] = [facts for _, facts in trained]
     layers = held.calibration.fold_into(net.layers())
     export(args.out, layers, boxes, reflectance, report, args.data, args.licence)
 

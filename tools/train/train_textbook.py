@@ -31,9 +31,14 @@ from tools.train.network import PointNet
 from tools.train.train_pointnet import batch_loss, logits
 
 EPOCHS = {40: "pointnet-paper-40", 100: "pointnet-paper"}
-FOLDS, HELD_OUT = 5, 4
-RATE, DECAY, DECAY_EPOCHS = 1e-3, 0.7, 20
-"""Learning rate of Adam, its decay, and the epochs between two decays, as PointNet's authors have them."""
+FOLDS = 5
+HELD_OUT = 4
+RATE = 1e-3
+"""Learning rate of Adam at the start; this and the next two are those of PointNet's authors."""
+DECAY = 0.7
+"""Factor on the learning rate at each decay."""
+DECAY_EPOCHS = 20
+"""Epochs between two decays."""
 
 
 def crops_of_epoch(data: Dataset) -> int:
@@ -43,7 +48,8 @@ def crops_of_epoch(data: Dataset) -> int:
 
 def trained(net: PointNet, data: Dataset, epochs: int) -> Iterator[tuple[int, float]]:
     """Train a network; yields the epochs done, and the mean loss of the last one."""
-    rng, fold = np.random.default_rng(SEED), folds(data, FOLDS)
+    rng = np.random.default_rng(SEED)
+    fold = folds(data, FOLDS)
     pools = sampling_pools(data, np.flatnonzero(data.trainable & (fold[data.drive] != HELD_OUT)))
     optimiser = torch.optim.Adam(net.parameters(), RATE)
     schedule = torch.optim.lr_scheduler.StepLR(optimiser, DECAY_EPOCHS, DECAY)
@@ -62,12 +68,14 @@ def trained(net: PointNet, data: Dataset, epochs: int) -> Iterator[tuple[int, fl
 
 def held_out_scores(net: PointNet, data: Dataset) -> dict[str, tuple[list[int], dict[str, float]]]:
     """Objects and average precision by class, by sensor, of the drives that are held out."""
-    valid, fold = Validation.of(data), folds(data, FOLDS)
+    valid = Validation.of(data)
+    fold = folds(data, FOLDS)
     rows = np.flatnonzero(fold[data.drive[valid.rows]] == HELD_OUT)
     probability = softmax(logits(net.eval(), data, valid.rows[rows]), axis=1)
     scores = {}
     for s in np.unique(valid.sensor[rows]).tolist():
-        mine, truth = valid.sensor[rows] == s, valid.truth
+        mine = valid.sensor[rows] == s
+        truth = valid.truth
         objects = truth.label[(truth.sensor == s) & (fold[truth.drive] == HELD_OUT)]
         number = np.bincount(objects, minlength=len(CLASS_NAMES))
         precision = average_precision(probability[mine], valid.label[rows][mine], number)
@@ -116,7 +124,9 @@ def main() -> None:
     args = options.parse_args()
     make_torch_deterministic()
     torch.manual_seed(SEED)
-    data, started, net = load(args.data), time.process_time(), PointNet()
+    data = load(args.data)
+    started = time.process_time()
+    net = PointNet()
     for epoch, loss in trained(net, data, max(EPOCHS)):
         print(epoch, round(loss, 4), round(time.process_time() - started), flush=True)
         if epoch not in EPOCHS:
@@ -124,7 +134,8 @@ def main() -> None:
         facts = {"epochs": epoch, "loss": loss, "crops": crops_of_epoch(data), "sha256": data.sha256}
         facts |= {"cpu_s": round(time.process_time() - started), "scores": held_out_scores(net, data)}
         network = graph(net.eval().layers(), pool_first=False, half=True)
-        model, out = network.SerializeToString(deterministic=True), args.out / f"{EPOCHS[epoch]}.onnx"
+        model = network.SerializeToString(deterministic=True)
+        out = args.out / f"{EPOCHS[epoch]}.onnx"
         out.write_bytes(model)
         out.with_suffix(".md").write_text(card(out.stem, model, facts), encoding="utf-8")
 

@@ -66,7 +66,8 @@ def compare_tree(
         | {"gamma_calibrated": estimate(_calibrated(baseline, runs[mode], basis))}
         for mode in modes[1:]
     }
-    meter, board = basis.meter, basis.board
+    meter = basis.meter
+    board = basis.board
     metered = all(e["gross_J"].kind is not Kind.ESTIMATED for e in energy.values())
     return {
         "schema": SCHEMA,

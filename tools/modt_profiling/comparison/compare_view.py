@@ -14,7 +14,8 @@ from modt_profiling.reporting.document import Document, Plot, Table
 
 def compare_document(tree: dict[str, Any]) -> Document:
     """The energy saved, whether the counts explain it, and the distribution of the energy."""
-    meter, results = tree["meter"], []
+    meter = tree["meter"]
+    results = []
     for mode, s in tree["savings"].items():
         energy = f"gamma {s['gamma_net'].marked()} without idling, {s['gamma_gross'].marked()} with idling"
         results += [
@@ -54,7 +55,8 @@ def _modes(tree: dict[str, Any]) -> Table:
 
 def _verdict(saving: dict[str, Any]) -> str:
     """Whether counts and unit costs explain the ratio, with the deviation and its interval."""
-    deviation, short = saving["deviation"], saving["short_form_error"]
+    deviation = saving["deviation"]
+    short = saving["short_form_error"]
     closes = "closes within 5 %" if abs(deviation.value) <= 0.05 else "does NOT close within 5 %"
     interval = f"{100 * deviation.low:+.1f} to {100 * deviation.high:+.1f}"
     return (
@@ -65,7 +67,8 @@ def _verdict(saving: dict[str, Any]) -> str:
 
 
 def _against_meter(saving: dict[str, Any]) -> str:
-    deviation, calibrated = saving["deviation_net"].value, saving["gamma_calibrated"]
+    deviation = saving["deviation_net"].value
+    calibrated = saving["gamma_calibrated"]
     text = "" if calibrated.value is None else f"; gamma by calibrated joules is {calibrated.marked()}"
     if saving["gamma_gross"].kind is Kind.ESTIMATED or deviation is None:
         return text
@@ -74,7 +77,8 @@ def _against_meter(saving: dict[str, Any]) -> str:
 
 def compare_plots(tree: dict[str, Any]) -> list[Plot]:
     """Plots over frames, over N_go and over track length."""
-    series, modes = tree["series"], tree["modes"]
+    series = tree["series"]
+    modes = tree["modes"]
     base, *others = series
     basis = energy_plots.basis(modes[base]["gross_J"])
     energy_mJ = {mode: energy_plots.stage_energy_mJ(series[mode]) for mode in series}

@@ -25,7 +25,8 @@ class RecordingFusion:
     """A fusion that records which tracks have asked for a class."""
 
     def __init__(self, fusion: Fusion) -> None:
-        self.fuse, self._asks = fusion.fuse, fusion.asks
+        self.fuse = fusion.fuse
+        self._asks = fusion.asks
         self._asked: set[int] = set()
         self._known: set[int] = set()
 
@@ -99,7 +100,8 @@ class ModeRun:
             self.lengths.add(self._alive[id_])
 
     def _count(self, result: FrameResult, line: LedgerLine) -> None:
-        tracks, work = result.tracks, line.stages.get(CLASSIFICATION, StageWork())
+        tracks = result.tracks
+        work = line.stages.get(CLASSIFICATION, StageWork())
         visible = tracks.proposal != NONE
         alive, seen, classified = (set(ids.tolist()) for ids in (tracks.id, tracks.id[visible], result.classified))
         self._counts.append(
@@ -118,7 +120,8 @@ class ModeRun:
         )
         self._end(self._alive.keys() - alive)
         self._alive = {id_: self._alive.get(id_, 0) + (id_ in seen) for id_ in alive}
-        self._classified, self._seen = (self._classified | classified) & alive, seen
+        self._classified = (self._classified | classified) & alive
+        self._seen = seen
 
 
 Repetition = dict[str, ModeRun]

@@ -36,7 +36,8 @@ class RunCosts:
 
         Under a budget of CPU time the work of a frame may differ between repetitions.
         """
-        counts, cost = np.stack([run.counts() for run in runs]), np.stack([run.cpu_s() for run in runs])
+        counts = np.stack([run.counts() for run in runs])
+        cost = np.stack([run.cpu_s() for run in runs])
         middle = np.argsort(cost.sum(axis=2), axis=0, kind="stable")[(len(runs) - 1) // 2]
         frames = np.arange(len(middle))
         return cls(counts[middle, frames], cost[middle, frames])
@@ -58,7 +59,8 @@ class GammaEstimate:
 
 def unit_costs(load_varied_run: RunCosts) -> UnitCosts:
     """Costs of units of work, from a run whose classification load varied from frame to frame."""
-    cost, load = load_varied_run.cost, load_varied_run.counts[:, _LOAD].astype(float)
+    cost = load_varied_run.cost
+    load = load_varied_run.counts[:, _LOAD].astype(float)
     solved = nonnegative_fit(load.T @ load, load.T @ cost[:, CLASS])
     return UnitCosts(float(cost[:, SEG].mean()), float(cost[:, TRACK].sum(axis=1).mean()), *solved.tolist())
 
@@ -73,7 +75,8 @@ def estimate_gamma(
     n = len(baseline.counts)
 
     def reconciled_and_measured(frames: Int) -> tuple[Reconciliation, float]:
-        a, b = baseline.take(frames), run.take(frames)
+        a = baseline.take(frames)
+        b = run.take(frames)
         costs = unit_costs(load_varied_run.take(frames))
         reconciled = reconcile(total(a.counts), total(b.counts), costs, other_costs(a), other_costs(b))
         return reconciled, float(a.cost.sum() / b.cost.sum())

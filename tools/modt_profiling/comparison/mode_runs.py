@@ -89,13 +89,17 @@ def _tracked(request: inputs.Request, profile: ProfileConfig, frames: int | None
     fov = inputs.field_of_view(request, inputs.stream(request).info)
     pipeline = assembly.pipeline(assembly.MODES[mode], profile, fov)
     fusion = RecordingFusion(pipeline.fusion)
-    pipeline, size, rows = replace(pipeline, fusion=fusion), padded_size(profile.classification), []
+    pipeline = replace(pipeline, fusion=fusion)
+    size = padded_size(profile.classification)
+    rows = []
     alive: set[int] = set()
     for frame in islice(inputs.stream(request), frames):
         result = pipeline.step(frame, Budget(calls=0))
-        before, alive = alive, set(result.tracks.id.tolist())
+        before = alive
+        alive = set(result.tracks.id.tolist())
         count = result.proposals.count
-        started, asked = len(alive - before), fusion.first_asked(alive)
+        started = len(alive - before)
+        asked = fusion.first_asked(alive)
         rows.append((len(frame.points), len(count), len(alive), started, size(count), asked))
     return np.array(rows, np.int64).reshape(-1, len(OBSERVED) + 1)
 

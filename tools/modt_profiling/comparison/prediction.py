@@ -93,7 +93,8 @@ class Rates:
         observed = np.concatenate([stream.observed for stream in streams]).astype(float)
         *modes, _ = runs
         _, n, alive, _, all_points = observed.T[: len(OBSERVED)]
-        asking, size = [n, *observed.T[len(OBSERVED) :]], float(all_points.sum() / max(n.sum(), 1.0))
+        asking = [n, *observed.T[len(OBSERVED) :]]
+        size = float(all_points.sum() / max(n.sum(), 1.0))
         every_frame = np.ones(len(n))
         every = _joined([*runs.values()])
         points = _column(every, "sweep_points")
@@ -130,7 +131,8 @@ def expect(rates: Rates, observed: Int, frames: int) -> Expected:
     e_seg = float(rates.segmentation @ [1.0, sweep_points])
     asking = dict(zip(rates.views, [n, *asked], strict=True))
     most = n * next(iter(rates.views.values())).each
-    cost, loads = {}, {}
+    cost = {}
+    loads = {}
     for mode, views in rates.views.items():
         items = min(views.each * asking[mode], most)
         points = items * views.size * all_points / max(n, 1e-9)
@@ -194,7 +196,8 @@ def _errors(streams: Sequence[Stream]) -> Iterator[Float64]:
         quarters = np.array_split(np.arange(len(streams[0].observed)), _PARTS)
         streams = [streams[0].take(part) for part in quarters]
     for k, left_out in enumerate(streams):
-        rates, seen = Rates.fit([*streams[:k], *streams[k + 1 :]]), left_out.observed
+        rates = Rates.fit([*streams[:k], *streams[k + 1 :]])
+        seen = left_out.observed
         yield np.log(expect(rates, seen, len(seen)).values / measured(left_out))
 
 
@@ -223,8 +226,10 @@ def _fit(columns: Sequence[Float64], cost: Float64) -> Float64:
     Least squares of errors relative to what a first fit expects: noise is a share of the work, and many calls at once
     would else decide what few cost.
     """
-    X, y = np.stack(columns, axis=1), cost.sum(axis=1)
+    X = np.stack(columns, axis=1)
+    y = cost.sum(axis=1)
     expected = X @ nonnegative_fit(X.T @ X, X.T @ y)
     some = expected > 0
-    X, y = X[some] / expected[some, None], y[some] / expected[some]
+    X = X[some] / expected[some, None]
+    y = y[some] / expected[some]
     return nonnegative_fit(X.T @ X, X.T @ y)

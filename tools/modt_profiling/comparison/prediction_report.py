@@ -80,7 +80,8 @@ def observed_tree(observed: Int) -> dict[str, list[int]]:
 
 def prediction_tree(found: Forecast, net_W: float, about: dict[str, Any]) -> dict[str, Any]:
     """A prediction with its interval, its rivals and what it is about (stream, frames, field of view)."""
-    expected, values = found.expected, found.expected.values.tolist()
+    expected = found.expected
+    values = found.expected.values.tolist()
     bounds = list(zip(found.low.tolist(), found.high.tolist(), strict=True))
     modes = [*expected.cost]
     costs = dict(zip(modes, zip(values, bounds, strict=True), strict=False))
@@ -172,15 +173,18 @@ def against_table(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def _row(name: str, plain: dict[str, Any], measured: Quantity, unit: str = "") -> dict[str, Any]:
-    predicted, true = from_json(plain | {"unit": unit}), measured.value
-    low, high = predicted.low, predicted.high
+    predicted = from_json(plain | {"unit": unit})
+    true = measured.value
+    low = predicted.low
+    high = predicted.high
     off = None if predicted.value is None or not true else predicted.value / true - 1.0
     within = None if low is None or high is None or true is None else low <= true <= high
     return {"name": name, "predicted": predicted, "measured": measured, "off": estimate(off), "within": within}
 
 
 def _saved(tree: dict[str, Any], mode: str) -> str:
-    e1, e2 = next(iter(tree["net_J"].values())).value, tree["net_J"][mode].value
+    e1 = next(iter(tree["net_J"].values())).value
+    e2 = tree["net_J"][mode].value
     return estimate(1e3 * (e1 - e2), "mJ").marked()
 
 

@@ -67,7 +67,8 @@ class Workload:
 
     def _varied(self, frames: Iterator[Frame], seconds: float, random: np.random.Generator) -> EnergyWindow:
         """A window of random load: share of waiting, classifications a frame, largest or smallest proposals first."""
-        load, waiting = int(random.integers(0, 60)), float(random.uniform(0.0, 0.9))
+        load = int(random.integers(0, 60))
+        waiting = float(random.uniform(0.0, 0.9))
         order = -1 if random.random() < 0.5 else 1
 
         def task() -> None:

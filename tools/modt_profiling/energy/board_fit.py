@@ -101,7 +101,8 @@ def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: i
         FitError: too few windows, collinear regressors, or a coefficient whose whole interval is negative.
     """
     good = usable_windows(lines)
-    n, p = len(good), len(REGRESSORS)
+    n = len(good)
+    p = len(REGRESSORS)
     if n < 2 * p:
         raise FitError(f"{n} usable windows are too few for {p} coefficients; record at least {2 * p}")
     X = np.array([[regressor.count(line) for regressor in REGRESSORS] for line in good])

@@ -43,7 +43,8 @@ class EnergySums:
         self.gross_J = self.error2_J2 = 0.0
         self.parts_J: Counter[str] = Counter()
         self._cpu_ns: Counter[str] = Counter()  # CPU time of each stage
-        self.kind, self.meter = Kind.ESTIMATED, ""
+        self.kind = Kind.ESTIMATED
+        self.meter = ""
         self.conditions: Mapping[str, Any] = {}  # conditions of the last window
         self.marks: set[str] = set()
 

@@ -168,7 +168,8 @@ def reconcile(
     model = paper = EnergyModel(costs.seg, e_class, baseline.n, run.n_go)
     repeats = run.classified - run.classified_tracks - run.reacquired
     view_cost_ratio = costs.e_class(run) / e_class if e_class and run.classified else 1.0
-    extra1, extra2 = other1.track - costs.track, other2.track - costs.track
+    extra1 = other1.track - costs.track
+    extra2 = other2.track - costs.track
     steps: dict[str, dict[str, float]] = {
         "tracks that end unclassified": {"classified_share": run.classified_tracks / tracks},
         "further views of a track": {"repeats": repeats / tracks},
@@ -180,6 +181,7 @@ def reconcile(
     }
     terms = [GammaTerm("segmentation is not free (Equation 3 in full)", paper.gamma - paper.n_go, paper.gamma)]
     for name, change in steps.items():
-        before, model = model.gamma, replace(model, **change)
+        before = model.gamma
+        model = replace(model, **change)
         terms.append(GammaTerm(name, model.gamma - before, model.gamma))
     return Reconciliation(model, paper, tuple(terms))

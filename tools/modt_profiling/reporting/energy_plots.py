@@ -16,7 +16,8 @@ from modt_profiling.reporting.quantity import Quantity, estimate
 if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.axes import Axes
 
-SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
+SEG = STAGES.index(SEGMENTATION)
+CLASS = STAGES.index(CLASSIFICATION)
 TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]
 SCHEDULE = [STAGES.index(SCHEDULING), STAGES.index(FUSION)]
 
@@ -125,7 +126,8 @@ def gamma_terms(title: str, saving: dict[str, Any]) -> Table:
 
 def conditions_text(conditions: dict[str, Any]) -> str:
     """Governor, frequency and core, where available."""
-    governor, frequency = conditions.get("governor"), conditions.get("frequency_MHz")
+    governor = conditions.get("governor")
+    frequency = conditions.get("frequency_MHz")
     return (
         f"governor {governor or 'unavailable'}, "
         f"frequency {'unavailable' if frequency is None else f'{frequency:.0f} MHz'}, core {conditions.get('core')}"

@@ -47,7 +47,8 @@ class Quantity:
 
     def interval(self) -> str:
         """Ends of the interval; empty if they do not differ in the digits shown."""
-        low, high = format_number(self.low), format_number(self.high)
+        low = format_number(self.low)
+        high = format_number(self.high)
         return f"{low} to {high}" if low != high else ""
 
     def number(self) -> str:
@@ -76,10 +77,11 @@ def from_json(plain: dict[str, Any]) -> Quantity:
     Raises:
         KeyError, ValueError: it is none.
     """
-    value, *bounds = numbers = plain["value"], plain.get("low"), plain.get("high")
+    numbers = (plain["value"], plain.get("low"), plain.get("high"))
     if not all(number is None or isinstance(number, int | float) for number in numbers):
         raise ValueError(f"{numbers} for a number and its bounds")
-    return Quantity(value, plain["unit"], Kind(plain["kind"]), *bounds)
+    value, low, high = numbers
+    return Quantity(value, plain["unit"], Kind(plain["kind"]), low, high)
 
 
 def format_number(value: float | None, digits: int = 3) -> str:

@@ -51,7 +51,8 @@ def run_tree(run: Path) -> dict[str, Any]:
         MisuseError: not a run directory, or without a complete frame so far.
     """
     facts = run_facts(run)
-    limits, mode = facts["profile"]["classification"], facts["mode"]
+    limits = facts["profile"]["classification"]
+    mode = facts["mode"]
     board = EnergyConfig(**{key: facts["profile"]["energy"][key] for key in _BOARD})
     sums = FrameSums(padded_size(ClassificationConfig(**{key: limits[key] for key in _LIMITS})))
     for line, record in zip(_frames(run), read_records(run / TRACKS, FRAME_SCHEMA), strict=False):
@@ -96,7 +97,9 @@ def _frames(run: Path) -> Iterator[LedgerLine]:
 
 def _energy(sums: EnergySums, idle_W: float) -> dict[str, Any]:
     """Energy a frame [J] and power [W], and their distribution."""
-    frames, seconds, gross_J = sums.frames, 1e-9 * sums.wall_ns, sums.gross_J
+    frames = sums.frames
+    seconds = 1e-9 * sums.wall_ns
+    gross_J = sums.gross_J
     error_J = 1.96 * float(np.sqrt(sums.error2_J2))
     bounds = ((gross_J - error_J) / frames, (gross_J + error_J) / frames)
     return {
@@ -184,7 +187,9 @@ def _saved(mode: str, sums: FrameSums, energy: EnergySums) -> tuple[dict[str, An
 
 def run_document(tree: dict[str, Any]) -> Document:
     """Energy a frame and power, their distribution, the energy saved, and what gamma is made of."""
-    saved, meter, ledger = tree["saved"], tree["meter"], tree["ledger"]
+    saved = tree["saved"]
+    meter = tree["meter"]
+    ledger = tree["ledger"]
     of_e1 = "E1 is computed from this run's own costs; modt-profile compare runs the baseline"
     if tree["mode"] == "conventional":
         of_e1 = "this is tracking-by-detection itself: nothing was saved; run the other modes, or compare"
@@ -228,7 +233,8 @@ def run_document(tree: dict[str, Any]) -> Document:
 
 def _stages(tree: dict[str, Any]) -> Table:
     keys = {"cpu_ms": "cpu", "wall_ms": "wall", "calls": "calls", "items": "items", "points": "points"}
-    parts, times = tree["parts_J"], tree["cpu"]
+    parts = tree["parts_J"]
+    times = tree["cpu"]
     whole = sum(part.value or 0.0 for part in parts.values()) or 1.0
     rows: list[list[Cell]] = []
     for name in dict.fromkeys([*STAGES, *times, *parts]):

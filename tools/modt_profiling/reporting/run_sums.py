@@ -20,7 +20,8 @@ from modt.sinks.run_directory import RUN
 from modt.types import Float64, Int
 from modt_profiling.energy.savings import Counts
 
-SCHEMA, GIVE = "modt.run/1", "give the directory of a run"
+SCHEMA = "modt.run/1"
+GIVE = "give the directory of a run"
 POINTS = 512
 """Points held at most; an even number."""
 
@@ -47,7 +48,8 @@ class FrameSeries:
     """Sums of columns over points of equally many frames; when all points are full, neighbours become one."""
 
     def __init__(self, columns: int, points: int = POINTS) -> None:
-        self.frames_a_point, self.count = 1, 0
+        self.frames_a_point = 1
+        self.count = 0
         self._sums = np.zeros((points, columns))
 
     def add(self, row: Sequence[float] | Float64) -> None:
@@ -98,7 +100,8 @@ class FrameSums:
         self.lengths = Histogram()  # frames with a proposal, of the tracks that ended
         self.foreground = self.tracks = self.classified_tracks = 0
         # products of calls, items and points with one another, and with CPU time [s]
-        self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)
+        self.load_gram = np.zeros((3, 3))
+        self.load_moment = np.zeros(3)
         self._length: dict[int, int] = {}  # frames with a proposal by track alive
         self._viewed: set[int] = set()
 

@@ -17,7 +17,9 @@ MIN_SHARE = 0.8  # least share of the sweeps in which a fixed cell has a return
 MIN_CLEARANCE_M = 0.3  # least height above the ground
 MAX_ABOVE_M = 1.0  # greatest height above the sensor: a ceiling is higher
 MAX_FIXED_SHARE = 0.5  # greatest share of fixed cells out of reach, in a recording that moves
-MARGIN_DEG, MARGIN_M = 1.0, 0.2  # added around the visible parts
+# added around the visible parts
+MARGIN_DEG = 1.0
+MARGIN_M = 0.2
 JOIN_DEG = 6.0  # sectors nearer than this are one
 MIN_SWEEPS = 5
 

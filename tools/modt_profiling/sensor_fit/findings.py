@@ -54,18 +54,18 @@ def apply(config: ProfileConfig, findings: Iterable[Finding]) -> ProfileConfig:
 
 def pattern_findings(pattern: BeamPattern) -> Iterator[Finding]:
     """Keys of a pattern of beams."""
-    found, reliable = pattern.elevations_deg, True
+    found = pattern.elevations_deg
+    reliable = True
     if len(found):
-        spacing, azimuth = (
-            f"{len(found)} beams from {found[-1]:.2f} to {found[0]:.2f} deg",
-            "most frequent step along a beam",
-        )
+        spacing = f"{len(found)} beams from {found[-1]:.2f} to {found[0]:.2f} deg"
+        azimuth = "most frequent step along a beam"
         reliable = pattern.contrast > RELIABLE_CONTRAST
         spacing += (
             "" if reliable else "; blurred, perhaps by compensation for motion: take a recording at a walking pace"
         )
     else:
-        spacing, azimuth = "no beams: spacing of the returns of a sweep, in any direction", "the same"
+        spacing = "no beams: spacing of the returns of a sweep, in any direction"
+        azimuth = "the same"
     evidence = {
         "elevations_deg": f"{spacing}; a beam that met nothing is not among them",
         "elevation_step_deg": spacing,

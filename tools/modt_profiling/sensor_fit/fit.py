@@ -28,8 +28,10 @@ MAX_RANGE_M = 100.0
 MAX_MIN_RANGE_M = 2.0
 EMPTY_SECTOR_DEG = 10.0
 """Least sector without a return that is mentioned."""
-MOST_FLOORS, LEVEL_DEG = 10, 1.0
-"""Sweeps whose floor is fitted, and tilt of a sensor that counts as level."""
+MOST_FLOORS = 10
+"""Sweeps whose floor is fitted."""
+LEVEL_DEG = 1.0
+"""Tilt of a sensor that counts as level."""
 
 Finder = Callable[[Recording, ProfileConfig], Iterable[Finding]]
 """Finds keys in a recording, given the profile with the keys that earlier finders have set."""
@@ -116,7 +118,8 @@ FINDERS: tuple[Finder, ...] = (
 
 def fit(recording: Recording, finders: Sequence[Finder] = FINDERS) -> tuple[ProfileConfig, list[Finding]]:
     """Profile of a recording's sensor, and the findings that it is made of."""
-    config, findings = ProfileConfig(), list[Finding]()
+    config = ProfileConfig()
+    findings = list[Finding]()
     for finder in finders:
         found = list(finder(recording, config))
         config = apply(config, found)
