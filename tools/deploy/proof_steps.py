@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 UNIT = "modt.service"
@@ -111,13 +112,27 @@ def reload(text: str) -> str:
 def steps(folder: Path) -> None:
     """All steps in order."""
     report = Report(folder)
-    profile = PROFILE.read_text()
+    starts(report)
+    is_confined(report)
+    reloads(report)
+    comes_back(report)
+    stops(report)
+    probe(report)
+    with (folder / "report.txt").open("a") as file:
+        file.write(END)
+
+
+def starts(report: Report) -> None:
+    """Start the unit."""
     begin_s = time.monotonic()
     systemctl("start", UNIT)
-    ready_s = time.monotonic() - begin_s
-    report.add("starts, and notifies that it is ready", active(), figure(ready_s))
+    report.add("starts, and notifies that it is ready", active(), figure(time.monotonic() - begin_s))
     took_s = until(lambda: "Hz" in shown("StatusText"), 10.0)
     report.add("reports its status", took_s is not None, shown("StatusText"))
+
+
+def is_confined(report: Report) -> None:
+    """Look at the user, the filter of system calls, the priority and the memory of the process."""
     pid = shown("MainPID")
     status = Path(f"/proc/{pid}/status").read_text()
     fields = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
@@ -131,27 +146,39 @@ def steps(folder: Path) -> None:
     permitted = resource.getrlimit(resource.RLIMIT_MEMLOCK)[1] == resource.RLIM_INFINITY
     locked = fields["VmLck"].strip() if permitted else REFUSED
     report.add("keeps its memory", locked != "0 kB", locked)
+
+
+def reloads(report: Report) -> None:
+    """Reload a valid and an invalid profile."""
+    pid = shown("MainPID")
+    profile = PROFILE.read_text()
     loop = reload(profile + "\nscheduler: {calls_per_frame: 3}\n")
     report.add("reloads a profile", "'reloads': 1" in loop and shown("MainPID") == pid)
     loop = reload(profile + "\nscheduler: {calls_per_fraem: 3}\n")
     report.add("refuses an invalid profile", "'refused_reloads': 1" in loop and shown("MainPID") == pid)
     PROFILE.write_text(profile)
-    os.kill(int(pid), signal.SIGSTOP)
-    took_s = until(lambda: restarted(pid), 40.0)
-    report.add("is killed when it hangs, and comes back", took_s is not None, figure(took_s))
-    pid = shown("MainPID")
-    os.kill(int(pid), signal.SIGKILL)
-    took_s = until(lambda: restarted(pid), 10.0)
-    report.add("comes back after kill -9", took_s is not None, figure(took_s))
+
+
+def comes_back(report: Report) -> None:
+    """Hang the process, then kill it."""
+    for what, stop, limit_s in (
+        ("is killed when it hangs, and comes back", signal.SIGSTOP, 40.0),
+        ("comes back after kill -9", signal.SIGKILL, 10.0),
+    ):
+        pid = shown("MainPID")
+        os.kill(int(pid), stop)
+        took_s = until(partial(restarted, pid), limit_s)
+        report.add(what, took_s is not None, figure(took_s))
     kept = sorted(path.name for path in RECORDS.resolve().parent.iterdir())
     report.add("keeps the records of all three", {"run", "run~1", "run~2"} <= set(kept), " ".join(kept))
+
+
+def stops(report: Report) -> None:
+    """Stop the unit."""
     begin_s = time.monotonic()
     systemctl("stop", UNIT)
     stop_s = time.monotonic() - begin_s
     report.add("stops within a second", stop_s < 1.0 and shown("Result") == "success", figure(stop_s))
-    probe(report)
-    with (folder / "report.txt").open("a") as file:
-        file.write(END)
 
 
 def probe(report: Report) -> None:

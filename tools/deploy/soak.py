@@ -21,7 +21,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,17 +58,16 @@ STALL = 1.5
 
 @dataclass(slots=True)
 class Episode:
-    """One occurrence of a fault: times [s], its counter before and after, and the time to recover [s]."""
+    """One occurrence of a fault: times [s], and its counter before and after."""
 
     fault: Fault
     begin_s: float
     before: int
     end_s: float = float("inf")
     after: int = 0
-    recovery_s: float = float("inf")
 
 
-class Witness:
+class ResultLog:
     """A sink that notes when results come, what has been missed, the memory and the open descriptors."""
 
     def __init__(self) -> None:
@@ -168,58 +167,74 @@ class FaultyReader:
         print(fault.name, file=self._sender.stdin, flush=True)
 
 
-def free_port() -> int:
-    """A UDP port that nobody has bound."""
+def start_sender(drive: Path | None) -> tuple[subprocess.Popen[str], int]:
+    """A process that sends packets, and the free UDP port to which it sends them."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bound:
         bound.bind(("127.0.0.1", 0))
-        return int(bound.getsockname()[1])
+        port = int(bound.getsockname()[1])
+    command = [sys.executable, "-m", "tools.deploy.sender", str(port), *([str(drive)] if drive else [])]
+    sender = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert sender.stdout is not None
+    sender.stdout.readline()
+    return sender, port
 
 
-def judge(witness: Witness, episodes: list[Episode], session: Service) -> list[str]:
+def judge(log: ResultLog, episodes: list[Episode], session: Service) -> list[str]:
     """Print the figures; returns the broken promises."""
-    wrong: list[str] = []
-    times_s = np.array(witness.times_s)
-    whole = times_s[np.array(witness.full)]
+    print(f"{'fault':<16}{'times':>6}{'counted':>8}{'recovery':>10}  (s, worst)")
+    wrong = [line for fault in FAULTS for line in _of_fault(fault, log, episodes)]
+    return [*wrong, *_between_faults(log, episodes, session), *_of_memory(log)]
+
+
+def _of_fault(fault: Fault, log: ResultLog, episodes: list[Episode]) -> Iterator[str]:
+    """Print how often a fault occurred, and whether it was counted and overcome."""
+    times_s = np.array(log.times_s)
+    whole_s = times_s[np.array(log.full)]
     gaps_s = np.diff(times_s)
     stalls_s = times_s[1:][gaps_s > STALL * np.median(gaps_s)]
-    print(f"{'fault':<16}{'times':>6}{'counted':>8}{'recovery':>10}  (s, worst)")
-    for fault in FAULTS:
-        own = [e for e in episodes if e.fault is fault and np.isfinite(e.end_s)]
-        for e in own:
-            after = whole[whole > e.end_s]
-            e.recovery_s = float(after[0] - e.end_s) if len(after) else float("inf")
-        worst = max((e.recovery_s for e in own), default=0.0)
-        silent = [e for e in own if e.after <= e.before]
-        if fault.silent_if_steady:
-            silent = [e for e in silent if ((stalls_s > e.begin_s) & (stalls_s < e.end_s)).any()]
-        print(f"{fault.name:<16}{len(own):>6}{sum(e.after - e.before for e in own):>8}{worst:>10.2f}")
-        if silent:
-            wrong.append(f"{fault.name}: {len(silent)} of {len(own)} were not counted")
-        if worst > MAX_RECOVERY_S:
-            wrong.append(f"{fault.name}: recovery took {worst:.1f} s")
+    occurred = [e for e in episodes if e.fault is fault and np.isfinite(e.end_s)]
+    recoveries_s = [float(whole_s[whole_s > e.end_s].min(initial=np.inf)) - e.end_s for e in occurred]
+    worst_s = max(recoveries_s, default=0.0)
+    silent = [e for e in occurred if e.after <= e.before]
+    if fault.silent_if_steady:
+        silent = [e for e in silent if ((stalls_s > e.begin_s) & (stalls_s < e.end_s)).any()]
+    print(f"{fault.name:<16}{len(occurred):>6}{sum(e.after - e.before for e in occurred):>8}{worst_s:>10.2f}")
+    if silent:
+        yield f"{fault.name}: {len(silent)} of {len(occurred)} were not counted"
+    if worst_s > MAX_RECOVERY_S:
+        yield f"{fault.name}: recovery took {worst_s:.1f} s"
+
+
+def _between_faults(log: ResultLog, episodes: list[Episode], session: Service) -> Iterator[str]:
+    """Print the deadlines that were missed between faults, and what the recording has lost."""
+    times_s = np.array(log.times_s)
     clear = np.ones(len(times_s), np.bool_)
     for e in episodes:
         clear &= (times_s < e.begin_s) | (times_s > e.end_s + SETTLE_S)
-    missed = int(np.diff(witness.missed, prepend=0)[clear].sum())
+    missed = int(np.diff(log.missed, prepend=0)[clear].sum())
+    share = missed / max(int(clear.sum()), 1)
     recording = session.recording.health()
     lost = recording.lost_lines - sum(e.after - e.before for e in episodes if e.fault.name == FULL_DISK)
-    memory_mb, late_mb = _thirds(witness.resident_mb)
-    growth = late_mb / memory_mb - 1
-    descriptors, late = _thirds(witness.descriptors)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
-    share = missed / max(int(clear.sum()), 1)
     print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.status().loop}")
-    print(f"memory {max(witness.resident_mb):.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
-    print(f"descriptors {max(witness.descriptors)} at most, {descriptors:.0f} midway, {late:.0f} at the end")
+    print(f"recording {recording}")
     if share > MAX_MISSED:
-        wrong.append(f"{missed} deadlines missed between faults")
+        yield f"{missed} deadlines missed between faults"
     if lost:
-        wrong.append(f"{lost} records lost but on a full disk")
+        yield f"{lost} records lost but on a full disk"
+
+
+def _of_memory(log: ResultLog) -> Iterator[str]:
+    """Print the memory and the descriptors."""
+    memory_mb, late_mb = _thirds(log.resident_mb)
+    growth = late_mb / memory_mb - 1
+    descriptors, late = _thirds(log.descriptors)
+    print(f"memory {max(log.resident_mb):.0f} MB at most, growth {100 * growth:.1f} %")
+    print(f"descriptors {max(log.descriptors)} at most, {descriptors:.0f} midway, {late:.0f} at the end")
     if growth > MAX_GROWTH:
-        wrong.append(f"memory grew by {100 * growth:.1f} %")
+        yield f"memory grew by {100 * growth:.1f} %"
     if late > descriptors:
-        wrong.append(f"{late - descriptors:.0f} descriptors leaked")
-    return wrong
+        yield f"{late - descriptors:.0f} descriptors leaked"
 
 
 def _thirds(values: Sequence[float]) -> tuple[float, float]:
@@ -247,19 +262,15 @@ def main(arguments: list[str] | None = None) -> int:
     world = World(core, given.hogs, fifo=given.fifo)
     world.install()
     build.discover = lambda board: world.meters(time.monotonic)  # type: ignore[attr-defined,assignment,misc]
-    port = str(free_port())
-    command = [sys.executable, "-m", "tools.deploy.sender", port, *([str(given.drive)] if given.drive else [])]
+    log = ResultLog()
     with host.threads_on(others):
-        sender = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert sender.stdout is not None
-        sender.stdout.readline()
+        sender, port = start_sender(given.drive)
         source = open_sensor(f"velodyne://127.0.0.1:{port}", others)
         reader = FaultyReader(source.reader, sender, world, 60 * given.minutes, given.seed)
         source.reader = reader
-        witness = Witness()
         request = Request(profile=[given.profile] if given.profile else ())
-        session = build.service(request, source, {"witness": witness}, given.out, None, core, ["soak"])
-    witness.session = reader.session = session
+        session = build.service(request, source, {"results": log}, given.out, None, core, ["soak"])
+    log.session = reader.session = session
     try:
         session.run(Notifier())
     finally:
@@ -267,7 +278,7 @@ def main(arguments: list[str] | None = None) -> int:
         sender.kill()
         sender.wait()
     reader.ask()
-    wrong = judge(witness, reader.episodes, session)
+    wrong = judge(log, reader.episodes, session)
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"peak memory {peak_mb:.0f} MB")
     print("verdict: " + ("; ".join(wrong) or "good"))

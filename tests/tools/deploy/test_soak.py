@@ -10,7 +10,7 @@ import pytest
 from tests.sources.packets.simulated import packets
 from tools.deploy.faults import FAULTS, FULL_DISK, NO_FAULT
 from tools.deploy.sender import Faulty
-from tools.deploy.soak import Episode, Witness, judge
+from tools.deploy.soak import Episode, ResultLog, judge
 from tools.send.loops import VelodyneStamps
 
 
@@ -44,8 +44,8 @@ def test_the_clock_of_the_sensor_is_set_once_by_its_fault():
         assert step_us - stamps.wrap_us // 2 == 1e6 * faulty.fault.clock_s
 
 
-def witness(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0, stall_s=0.0):
-    seen, times_s = Witness(), 0.1 * np.arange(1, 2000)
+def result_log(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0, stall_s=0.0):
+    seen, times_s = ResultLog(), 0.1 * np.arange(1, 2000)
     seen.times_s = (times_s + stall_s * (times_s > 49.0)).tolist()
     seen.full = [not 50 < t < full_from for t in times_s]
     seen.missed = [sum(at <= t for at in missed_at) for t in times_s]
@@ -61,18 +61,18 @@ FIRST = FAULTS[0].name
 @pytest.mark.parametrize(
     ("seen", "fault", "counted", "lost", "wrong"),
     [
-        (witness(), FIRST, 1, 0, None),
-        (witness(missed_at=(49.0, 51.0)), FIRST, 1, 0, None),
-        (witness(), FIRST, 0, 0, "were not counted"),
-        (witness(full_from=55.0), FIRST, 1, 0, "recovery took 5.0 s"),
-        (witness(missed_at=(30.0,)), FIRST, 1, 0, None),
-        (witness(missed_at=(30.0, 31.0)), FIRST, 1, 0, "2 deadlines missed between faults"),
-        (witness(growth=0.3), FIRST, 1, 0, "memory grew"),
-        (witness(leaks=3), FIRST, 1, 0, "descriptors leaked"),
-        (witness(), FULL_DISK, 7, 7, None),
-        (witness(), FULL_DISK, 7, 8, "1 records lost but on a full disk"),
-        (witness(), "hog", 0, 0, None),
-        (witness(stall_s=0.3), "hog", 0, 0, "hog: 1 of 1 were not counted"),
+        (result_log(), FIRST, 1, 0, None),
+        (result_log(missed_at=(49.0, 51.0)), FIRST, 1, 0, None),
+        (result_log(), FIRST, 0, 0, "were not counted"),
+        (result_log(full_from=55.0), FIRST, 1, 0, "recovery took 5.0 s"),
+        (result_log(missed_at=(30.0,)), FIRST, 1, 0, None),
+        (result_log(missed_at=(30.0, 31.0)), FIRST, 1, 0, "2 deadlines missed between faults"),
+        (result_log(growth=0.3), FIRST, 1, 0, "memory grew"),
+        (result_log(leaks=3), FIRST, 1, 0, "descriptors leaked"),
+        (result_log(), FULL_DISK, 7, 7, None),
+        (result_log(), FULL_DISK, 7, 8, "1 records lost but on a full disk"),
+        (result_log(), "hog", 0, 0, None),
+        (result_log(stall_s=0.3), "hog", 0, 0, "hog: 1 of 1 were not counted"),
     ],
 )
 def test_the_verdict_names_each_shortcoming(seen, fault, counted, lost, wrong, capsys):
