@@ -7,7 +7,6 @@ import sys
 from itertools import chain
 from pathlib import Path
 
-import pytest
 import yaml
 from packaging.requirements import Requirement
 
@@ -19,56 +18,11 @@ else:
     import tomli as tomllib
 
 ROOT = Path(__file__).resolve().parents[1]
-WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 
 PROJECT_FILE = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PROJECT = PROJECT_FILE["project"]
 FOLDERS, TEXTS = ("docs", "runtime", "tools", "systemd"), {".md", ".py", ".conf", ".service", ".yaml", ".txt"}
 CLONE = "in a clone of modt"
-
-
-def commands(target: str) -> set[str]:
-    """Commands of the Makefile for a target and for the phony targets that it needs."""
-    text = (ROOT / "Makefile").read_text()
-    rule = re.search(rf"^{target}:(.*)\n((?:\t.*\n)*)", text, re.MULTILINE)
-    assert rule, f"no target '{target}'"
-    needed = [name for name in rule[1].split() if "$" not in name]
-    return {line.strip() for line in rule[2].splitlines()}.union(*map(commands, needed))
-
-
-def test_two_halves_have_every_test_once():
-    text = (ROOT / "Makefile").read_text()
-    registered = {line.partition(":")[0] for line in PROJECT_FILE["tool"]["pytest"]["ini_options"]["markers"]}
-    assert set(re.findall(r"not (\w+)", text)) == registered
-    folders = re.search(r"^ONE +:= (.*)$", text, re.MULTILINE)[1].split()
-    assert all((ROOT / folder).is_dir() for folder in folders)
-    for target, chosen in (("test", ""), ("quick", "$(QUICK) ")):
-        assert commands(f"{target}-one") == {f"$(PYTEST) {chosen}$(ONE)"}
-        assert commands(f"{target}-other") == {f"$(PYTEST) {chosen}tests $(ONE:%=--ignore=%)"}
-
-
-def parsed(path: Path):
-    return yaml.safe_load(path.read_text())
-
-
-@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.name)
-def test_workflows_run_the_two_commands_from_the_lowest_python_on_and_may_only_read(path):
-    lowest, workflow = PROJECT["requires-python"].removeprefix(">="), parsed(path)
-    assert workflow["permissions"] == {"contents": "read"}
-    for job in workflow["jobs"].values():
-        pythons = [tuple(map(int, version.split("."))) for version in job["strategy"]["matrix"]["python"]]
-        assert min(pythons) == tuple(map(int, lowest.split(".")))
-        assert [step["run"] for step in job["steps"] if "run" in step] == ["make replay", "make test"]
-        used = [step["uses"] for step in job["steps"] if "uses" in step]
-        assert used
-        assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@v\d+", action)] == []
-
-
-def test_hooks_run_what_make_test_runs_before_pytest():
-    hooks = [hook for repo in parsed(ROOT / ".pre-commit-config.yaml")["repos"] for hook in repo["hooks"]]
-    run = set().union(*(commands(hook["entry"].removeprefix("make ")) for hook in hooks))
-    assert commands("test") - run == {"$(HALVES) test-one test-other"}
-    assert run <= commands("test")
 
 
 def test_the_lock_of_the_service_holds_each_dependency_within_its_bounds_and_with_hashes():
@@ -84,7 +38,7 @@ def test_the_lock_of_the_service_holds_each_dependency_within_its_bounds_and_wit
 
 
 def test_citation_and_changelog_name_this_version_and_the_paper():
-    citation = parsed(ROOT / "CITATION.cff")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     heading = re.search(r"^## \[(.+)\] - ", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert heading[1] == citation["version"] == modt.__version__
     (paper,) = citation["references"]

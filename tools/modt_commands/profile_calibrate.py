@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,7 +43,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Calibrate."""
-    pinned = host.pin_to_core(arguments.core)
+    core = host.pin_to_core(arguments.core)
     host.keep_freed_pages()
     # NumPy is imported from here on, after the process is pinned.
     from dataclasses import replace
@@ -52,50 +51,20 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt import profile
-    from modt.app import assembly, inputs
-    from modt.app.chosen_profile import choose
-    from modt.classification.pointnet import PointNet
-    from modt.classification.scheduler import padded_size
-    from modt.energy.ledger import Ledger
-    from modt.energy.meters.discovery import discover
-    from modt.energy.meters.meter import Conditions
-    from modt.energy.windows import Clocks, Windows
-    from modt.geometry import FieldOfView
+    from modt.app.inputs import Request
     from modt.sinks.output import writing
-    from modt_profiling.comparison.window_fit_calibration import Workload
+    from modt_profiling.comparison.window_fit_calibration import open_workload
     from modt_profiling.energy.board_fit import FitError
-    from modt_profiling.energy.named_meter import choose_meter
 
-    request = inputs.Request.of(arguments)
-    stream = inputs.stream(request)
-    scans = list(stream)
-    if not scans:
-        raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
-    loaded = choose(request.profile, scans[0], stream.info).config
-    meters = choose_meter(discover(loaded.energy), arguments.meter).meters
-    meter = meters[0].facts
-    ledger = Ledger()
-    limits = loaded.classification
-    network = PointNet(limits, loaded.sensor)
-    segmenter = assembly.segmenter(loaded, FieldOfView(), assembly.chosen_kernels(loaded.segmentation.kernels))
-    windows = Windows(meters, Clocks(), Conditions(pinned or 0), math.inf)
-    workload = Workload(scans, segmenter.segment, network.classify, padded_size(limits), ledger, windows)
+    workload, config = open_workload(Request.of(arguments), arguments.meter, core)
+    meter = workload.meter
     try:
         found = workload.calibrate(arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))
     except FitError as error:
         raise ModtError(meter.name, str(error), "use a better meter, or more and longer windows") from None
-    energy = replace(
-        loaded.energy,
-        board=arguments.board,
-        meter=f"{meter.name} ({meter.kind})",
-        idle_W=round(max(found.fit["idle_W"].value, 0.0), 6),
-        busy_W=round(found.busy_W, 6),
-        seg_J=found.fit["seg_J"].value,
-        class_J=found.fit["class_J"].value,
-        point_J=found.fit["point_J"].value,
-    )
+    energy = replace(config.energy, board=arguments.board, meter=f"{meter.name} ({meter.kind})", **found.board)
     with writing(arguments.out):
-        board = profile.dump(replace(loaded, energy=energy))["energy"]
+        board = profile.dump(replace(config, energy=energy))["energy"]
         arguments.out.write_text(profile.to_yaml({"energy": board}), encoding="utf-8")
     print(text(found, meter.name, meter.kind, arguments.out))
     return 0

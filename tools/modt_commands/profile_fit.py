@@ -4,21 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from modt.cli import options
 from modt.errors import MisuseError, ModtError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from modt.config import ProfileConfig
-    from modt_profiling.sensor_fit.findings import Finding, Recording
-
 MOST_FRAMES = 1000
 """Frames of a recording of which the sweeps are taken."""
-MIN_PROPOSALS = 1000
-"""Least number of proposals for a reliable frequency of the classes."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -40,51 +31,24 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.set_defaults(run=run)
 
 
-def class_frequencies(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
-    """The frequency of the classes among the proposals of a recording, as the decision estimates it."""
-    from modt.app import assembly
-    from modt.geometry import FieldOfView
-    from modt.types import Frame
-    from modt_profiling.sensor_fit.findings import Finding
-
-    pipeline = assembly.pipeline(assembly.MODES["conventional"], config, FieldOfView())
-    found = 0
-    for number, points in enumerate(recording.sweeps):
-        found += len(pipeline.step(Frame(number, recording.stamps_s[0] + number, points)).proposals)
-    frequency = tuple(round(float(share), 4) for share in pipeline.decision.frequency[1:])
-    evidence = f"cars, pedestrians, cyclists among {found} proposals, by their posteriors"
-    yield Finding("decision", "frequency", frequency, evidence, reliable=found >= MIN_PROPOSALS)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Fit a profile and write it."""
-    from itertools import islice
-
     from modt.sinks.output import writing
     from modt.sources.recognise import open_stream
-    from modt_profiling.sensor_fit.findings import Recording, doubts, profile_text
-    from modt_profiling.sensor_fit.fit import FINDERS, fit
+    from modt_profiling.sensor_fit.findings import doubts, profile_text
+    from modt_profiling.sensor_fit.fit import FINDERS, find_class_frequency, fit, spread_sweeps
 
     stream = open_stream(arguments.path, capture=dict(arguments.capture))
     name = arguments.name or stream.info.name.replace(" ", "-")
     out: Path = arguments.out or Path(f"{name}.yaml")
     if out.exists():
         raise MisuseError(out, "exists already", "remove it, or give another --out")
-    n_frames = stream.info.n_frames
-    if n_frames is None:
-        n_frames = sum(1 for _ in islice(stream, MOST_FRAMES))
-    step = max(1, min(n_frames, MOST_FRAMES) // arguments.sweeps)
-    stamps_s = []
-    sweeps = []
-    for number, frame in enumerate(islice(stream, step * arguments.sweeps)):
-        stamps_s.append(frame.stamp_s)
-        if number % step == 0:
-            sweeps.append(frame.points[(frame.points[:, :2] != 0).any(axis=1)])
-    if not sum(map(len, sweeps)):
+    recording = spread_sweeps(stream, arguments.sweeps, MOST_FRAMES)
+    if not sum(map(len, recording.sweeps)):
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
-    _, findings = fit(Recording(sweeps, stamps_s), (*FINDERS, class_frequencies))
-    title = f"{name}, fitted by `modt profile fit` to {len(sweeps)} of {len(stamps_s)} sweeps of {stream.info.name}."
-    text = profile_text(title, findings)
+    _, findings = fit(recording, (*FINDERS, find_class_frequency))
+    swept = f"{len(recording.sweeps)} of {len(recording.stamps_s)} sweeps of {stream.info.name}"
+    text = profile_text(f"{name}, fitted by `modt profile fit` to {swept}.", findings)
     with writing(out):
         out.write_text(text, encoding="utf-8")
     print(text)

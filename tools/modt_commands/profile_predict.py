@@ -8,7 +8,6 @@ from pathlib import Path
 
 from modt import host
 from modt.cli import options
-from modt.errors import MisuseError
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -31,41 +30,16 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Predict."""
-    pinned = host.pin_to_core(arguments.core)
+    core = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    import numpy as np
-
-    from modt.app import inputs
-    from modt.app.chosen_profile import choose
+    from modt.app.inputs import Request
     from modt.sinks.output import writing
-    from modt_profiling.comparison.mode_runs import identity, observe
-    from modt_profiling.comparison.prediction import forecast
-    from modt_profiling.comparison.prediction_report import prediction_document, prediction_tree, read_calibration
+    from modt_profiling.comparison.predict import predict
+    from modt_profiling.comparison.prediction_report import prediction_document
     from modt_profiling.reporting.quantity import to_json
 
-    request = inputs.Request.of(arguments)
-    stream = inputs.stream(request)
-    info = stream.info
-    itself = identity(request, info)
-    calibration = [read_calibration(path, itself, request.fov) for path in arguments.calibration]
-    loaded = choose(request.profile, next(iter(stream), None), info).config
-    share = 3 if arguments.observe == "third" and info.n_frames is not None else 1
-    first = None if info.n_frames is None else -(-info.n_frames // share)
-    seen = observe(request, loaded, first)
-    if len(seen) < 2:
-        raise MisuseError(info.name, "no two usable frames", "give a stream that modt replay can work on")
-    frames = info.n_frames or len(seen)
-    about = {
-        **itself,
-        "fov": request.fov,
-        "asked": list(request.frames),
-        "frames": frames,
-        "seen": len(seen),
-        "calibration": [name for name, _ in calibration],
-        "core": pinned,
-    }
-    found = forecast([stream for _, stream in calibration], seen, frames, np.random.default_rng(0))
-    tree = prediction_tree(found, loaded.energy.active_W, about)
+    observe_all = arguments.observe == "all"
+    tree = predict(Request.of(arguments), arguments.calibration, observe_all=observe_all, core=core)
     text = json.dumps(to_json(tree), indent=2)
     if arguments.out is not None:
         with writing(arguments.out):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -9,10 +10,20 @@ from itertools import cycle
 
 import numpy as np
 
+from modt.app import assembly, inputs
+from modt.app.chosen_profile import choose
+from modt.classification.pointnet import PointNet
+from modt.classification.scheduler import padded_size
+from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, StageWork
-from modt.energy.windows import EnergyWindow, Windows
+from modt.energy.meters.discovery import discover
+from modt.energy.meters.meter import Conditions, Facts
+from modt.energy.windows import Clocks, EnergyWindow, Windows
+from modt.errors import ModtError
+from modt.geometry import FieldOfView
 from modt.types import Float32, Float64, Frame, Int, Proposals
 from modt_profiling.energy.board_fit import CLASS, IDLE, SEG, Fit, fit, unit_energy_J, usable_windows
+from modt_profiling.energy.named_meter import choose_meter
 
 _BURSTS = 5
 """Bursts of each stage; the median counts."""
@@ -28,6 +39,15 @@ class Calibration:
     class_fit_J: float  # energy of one classification of mean size by the fit
     busy_W: float  # idle power plus energy above idling over CPU time
 
+    @property
+    def board(self) -> dict[str, float]:
+        """Powers and energies by the keys of a profile's stage `energy`."""
+        return {
+            "idle_W": round(max(self.fit["idle_W"].value, 0.0), 6),
+            "busy_W": round(self.busy_W, 6),
+            **{key: self.fit[key].value for key in ("seg_J", "class_J", "point_J")},
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class Workload:
@@ -39,6 +59,7 @@ class Workload:
     size: Callable[[Int], int]  # points that the network processes for proposals of (R,) points
     ledger: Ledger
     windows: Windows  # closed explicitly
+    meter: Facts
 
     def calibrate(self, windows: int, window_s: float, burst_s: float, random: np.random.Generator) -> Calibration:
         """Run the windows of varied load, fit them, and run the bursts.
@@ -97,3 +118,30 @@ class Workload:
         if len(which):
             self.ledger.run("classification", self.classify, frame.points, proposals, which)
             self.ledger.count("classification", points=self.size(proposals.count[which]))
+
+
+def open_workload(
+    request: inputs.Request, meter_name: str | None, core: int | None
+) -> tuple[Workload, ProfileConfig]:
+    """The work of a stream, and the profile of its sensor.
+
+    Raises:
+        ModtError: no usable frame, or no such meter.
+    """
+    stream = inputs.stream(request)
+    frames = list(stream)
+    if not frames:
+        raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
+    profile = choose(request.profile, frames[0], stream.info).config
+    meters = choose_meter(discover(profile.energy), meter_name).meters
+    kernels = assembly.chosen_kernels(profile.segmentation.kernels)
+    workload = Workload(
+        frames,
+        segment=assembly.segmenter(profile, FieldOfView(), kernels).segment,
+        classify=PointNet(profile.classification, profile.sensor).classify,
+        size=padded_size(profile.classification),
+        ledger=Ledger(),
+        windows=Windows(meters, Clocks(), Conditions(core or 0), math.inf),
+        meter=meters[0].facts,
+    )
+    return workload, profile

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
+from modt.app import assembly
 from modt.config import ProfileConfig
+from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
 from modt.sensor_fit.beams import find_beams
 from modt.sensor_fit.tilt import find_floor, ground_height_m
-from modt.types import Float32
+from modt.sources.stream import Stream
+from modt.types import Float32, Frame
 from modt_profiling.sensor_fit.body import BODY_REACH_M, find_body
 from modt_profiling.sensor_fit.findings import (
     Finding,
@@ -32,6 +36,9 @@ MOST_FLOORS = 10
 """Sweeps whose floor is fitted."""
 LEVEL_DEG = 1.0
 """Tilt of a sensor that counts as level."""
+
+MIN_PROPOSALS = 1000
+"""Least number of proposals for a reliable frequency of the classes."""
 
 Finder = Callable[[Recording, ProfileConfig], Iterable[Finding]]
 """Finds keys in a recording, given the profile with the keys that earlier finders have set."""
@@ -110,10 +117,40 @@ def empty_sectors(points: Float32) -> str:
 
 
 FINDERS: tuple[Finder, ...] = (
-    *(find_period, find_pattern, find_mount),
-    *(find_body_and_range, find_height, find_reflectance),
+    find_period,
+    find_pattern,
+    find_mount,
+    find_body_and_range,
+    find_height,
+    find_reflectance,
 )
 """Finders in order: each uses the keys of those before it."""
+
+
+def find_class_frequency(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
+    """Frequency of the classes among the proposals of a recording, as the decision estimates it."""
+    pipeline = assembly.pipeline(assembly.MODES["conventional"], config, FieldOfView())
+    proposals = 0
+    for number, points in enumerate(recording.sweeps):
+        proposals += len(pipeline.step(Frame(number, recording.stamps_s[0] + number, points)).proposals)
+    frequency = tuple(round(float(share), 4) for share in pipeline.decision.frequency[1:])
+    evidence = f"cars, pedestrians, cyclists among {proposals} proposals, by their posteriors"
+    yield Finding("decision", "frequency", frequency, evidence, reliable=proposals >= MIN_PROPOSALS)
+
+
+def spread_sweeps(stream: Stream, number: int, max_frames: int) -> Recording:
+    """Sweeps of a stream, spread evenly over its first max_frames frames, without points above the sensor itself."""
+    n_frames = stream.info.n_frames
+    if n_frames is None:
+        n_frames = sum(1 for _ in islice(stream, max_frames))
+    step = max(1, min(n_frames, max_frames) // number)
+    stamps_s = []
+    sweeps = []
+    for index, frame in enumerate(islice(stream, step * number)):
+        stamps_s.append(frame.stamp_s)
+        if index % step == 0:
+            sweeps.append(frame.points[(frame.points[:, :2] != 0).any(axis=1)])
+    return Recording(sweeps, stamps_s)
 
 
 def fit(recording: Recording, finders: Sequence[Finder] = FINDERS) -> tuple[ProfileConfig, list[Finding]]:
