@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modt.config import ProfileConfig
-from modt.errors import MisuseError, ModtError, install
+from modt.errors import MisuseError, ModtError
 from modt.geometry import FieldOfView
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.segmenter import Segmenter
@@ -27,6 +27,7 @@ from modt_evaluation.run_record import FramesByNumber
 from modt_evaluation.truth import by_stamp
 from modt_evaluation.truth_files import labels_beside, open_truth
 from modt_profiling.reporting.document import save
+from modt_profiling.reporting.view_extra import importing
 from modt_viewer.recorded_run import RecordedRun, reach_m
 from modt_viewer.track_page import rows_of, track_page, views
 from modt_viewer.truth_marks import LEGEND, truth_marks
@@ -116,10 +117,8 @@ class View:
         Raises:
             MisuseError: Matplotlib or Pillow is not installed.
         """
-        try:
+        with importing(self.out):
             from modt_viewer.picture import draw, new_figure
-        except ModuleNotFoundError as error:
-            raise MisuseError(self.out, f"needs {error.name}", install("view")) from None
         figure = new_figure(width)
         numbers = self.run.numbers[self.at :][:n]
         cells = self.cells(numbers)

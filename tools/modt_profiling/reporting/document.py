@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modt.errors import MisuseError, install
 from modt.sinks.output import writing
 from modt_profiling.reporting.quantity import LEGEND, Quantity, aligned
+from modt_profiling.reporting.view_extra import importing
 
 if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.axes import Axes
@@ -111,9 +111,7 @@ def save(path: Path, page: Page) -> None:
         MisuseError: the extra `view` is not installed.
         ModtError: the page cannot be written.
     """
-    try:
+    with importing(path):
         from modt_profiling.reporting.html_page import html
-    except ModuleNotFoundError as error:
-        raise MisuseError(path, f"needs {error.name}", install("view")) from None
     with writing(path):
         path.write_text(html(page), encoding="utf-8")
