@@ -6,7 +6,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 
-.PHONY: replay test test-one test-other quick quick-one quick-other check format hooks clean
+.PHONY: replay test quick check format hooks clean
 
 replay: $(VENV)/.run
 	$(BIN)/modt replay --out runs/embedded
@@ -14,29 +14,14 @@ replay: $(VENV)/.run
 	$(BIN)/modt view runs/embedded
 	@echo "To look at it: open runs/embedded/view.html in a browser"
 
-# The tests run in two halves at a time. Those that exchange ROS 2 messages stand in one of them.
-HALVES := $(MAKE) --no-print-directory --jobs=2 --output-sync=target
-PYTEST := $(BIN)/python -m pytest -p no:cacheprovider
-ONE    := tests/app tests/classification tests/modt_commands tests/modt_evaluation tests/modt_profiling tests/modt_simulation tests/modt_viewer tests/extending tests/fuzz tests/segmentation tests/sensor_fit
-QUICK  := -m "not slow and not command and not install and not kitti"
+# Two processes share the tests file by file; those that exchange ROS 2 messages stay in one of them (tests/conftest.py).
+PYTEST := $(BIN)/python -m pytest -p no:cacheprovider --numprocesses=2 --dist=loadgroup
 
 test: check
-	$(HALVES) test-one test-other
-
-test-one: $(VENV)/.test
-	$(PYTEST) $(ONE)
-
-test-other: $(VENV)/.test
-	$(PYTEST) tests $(ONE:%=--ignore=%)
+	$(PYTEST)
 
 quick: $(VENV)/.test
-	$(HALVES) quick-one quick-other
-
-quick-one: $(VENV)/.test
-	$(PYTEST) $(QUICK) $(ONE)
-
-quick-other: $(VENV)/.test
-	$(PYTEST) $(QUICK) tests $(ONE:%=--ignore=%)
+	$(PYTEST) -m "not slow and not command and not install and not kitti"
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .

@@ -16,6 +16,13 @@ settings.register_profile("modt", deadline=None, suppress_health_check=[HealthCh
 settings.load_profile("modt")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the tests of a file in one process, and those that exchange ROS 2 messages in one process of all."""
+    for item in items:
+        group = "ros2" if "loopback" in getattr(item, "fixturenames", ()) else str(item.path)
+        item.add_marker(pytest.mark.xdist_group(group))
+
+
 @pytest.fixture(scope="session")
 def kitti_root() -> Path:
     """Real data in KITTI's layout."""

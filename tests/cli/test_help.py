@@ -29,7 +29,7 @@ def help_of(program, *arguments, capsys):
         (profile.main, [], profile.COMMANDS),
         (main.main, ["profile"], ("fit", "show", "schema")),
     ],
-    ids=str,
+    ids=["modt", "modt-profile", "modt profile"],
 )
 def test_a_bare_command_prints_its_help_with_every_command_and_fails(program, words, names, capsys):
     assert program(words) == 2

@@ -31,11 +31,10 @@ SOURCES = {
     "tracking": lambda root: open_stream(layouts.tracking(root)),
     "odometry": lambda root: open_stream(layouts.odometry(root)),
     "bare": lambda root: open_stream(layouts.bare(root)),
-    "street": lambda root: SyntheticStream("street", "hdl-64e", 0.4, seed=3),
     "bag": lambda root: open_stream(bags.write_rosbag2(root / "bag", bags.by_time(bags.clouds(), bags.poses()))),
     "clouds": clouds,
     "capture": capture,
-    "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
+    "simulated": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
 }
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from modt.app import assembly
 from modt.geometry import FieldOfView, transform
@@ -32,6 +33,7 @@ class NearestCentroid:
         return observations.centroid
 
 
+@pytest.mark.slow
 def test_the_tracker_follows_by_the_association_it_is_given():
     profile = load("vlp-16")
     pipeline = assembly.pipeline(assembly.MODES["accurate"], profile, FieldOfView())

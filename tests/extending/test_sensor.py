@@ -44,6 +44,7 @@ def a_stream_of_the_sensor(monkeypatch):
     return SyntheticStream("street", "my-lidar", 1.0, seed=0)
 
 
+@pytest.mark.slow
 def test_a_simulated_drive_of_the_sensor_runs_with_its_profile(stream, tmp_path):
     path = tmp_path / "my-lidar.yaml"
     path.write_text(PROFILE)

@@ -2,6 +2,8 @@
 
 import csv
 
+import pytest
+
 from modt.app.build import replay
 from modt.app.inputs import Request
 from modt.app.systemd import Notifier
@@ -23,6 +25,7 @@ class ObjectTable(LineFile[FrameResult]):
         return "".join(f"{result.frame.index},{tracks.id[k]},{CLASS_NAMES[tracks.object_class[k]]}\n" for k in rows)
 
 
+@pytest.mark.slow
 def test_a_replay_writes_every_frame_to_the_sink_and_books_it(tmp_path):
     sink, results = ObjectTable(tmp_path / "objects.csv"), []
     request = Request(profile=["vlp-16"], mode="efficient", frames=(0, 5))

@@ -34,6 +34,7 @@ def test_sectors_go_counter_clockwise(bounds_deg, inside_deg, outside_deg):
     assert not sectors.contain(at(outside_deg, 1.9)).any()
 
 
+@pytest.mark.slow
 def test_the_robot_itself_is_no_proposal():
     points = with_mast(recording("vlp-16"), 150.0, 1.9).sweeps[0]
     config = profile.load("vlp-16")

@@ -11,6 +11,7 @@ from modt_simulation.simulator import N_SLICES, slice_delay_s
 from modt_simulation.synthetic_stream import SCENES, SyntheticStream
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_same_seed_gives_the_same_bytes_in_any_order(scene):
     a, b = (SyntheticStream(scene, "vlp-16", 0.4, seed=5) for _ in range(2))

@@ -290,6 +290,7 @@ def test_observed_tracks(kernels, seed, n, dt_s):
     assert same(*tables)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "fov"), [("vlp-16", FULL), ("hdl-64e", FULL), ("mid-360", FRONT)])
 def test_tracks_of_simulated_sweeps(kernels, name, fov):
     config, runs = profile.load(name), []

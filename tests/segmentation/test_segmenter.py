@@ -111,6 +111,7 @@ def test_neither_the_order_of_the_points_nor_an_estimated_sensor_height_changes_
     assert (straight == labels(points, height_m=None)).mean() > 0.999
 
 
+@pytest.mark.slow
 def test_memory_of_a_dense_sweep_is_bounded():
     boxes = [(8.0 + 3 * i, (-1) ** i * (3.0 + i), *CAR) for i in range(8)] + [(0.0, 20.0, 90.0, 1.0, 0.0, 6.0)]
     points, _ = scans.scan(boxes, elevation=np.deg2rad(np.linspace(-24, 14, 128)), step_deg=0.176)

@@ -24,6 +24,7 @@ def agree(found_deg, true_deg):
     assert (error_deg < np.maximum(0.1, np.gradient(true_deg) / 4)).mean() >= 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SENSORS)
 def test_beams_of_a_sensor_are_found(name):
     found = find_beams(recording(name).sweeps)
@@ -45,6 +46,7 @@ def test_beams_are_found_in_sweeps_that_are_blurred_by_compensation_for_motion()
     agree(find_beams(blurred).elevations_deg, np.rad2deg(sensor("pandar64").elevation_rad))
 
 
+@pytest.mark.slow
 def test_a_sensor_without_beams_has_the_spacing_of_its_returns():
     found = find_beams(recording("mid-360").sweeps)
     assert len(found.elevations_deg) == 0

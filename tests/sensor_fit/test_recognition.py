@@ -14,6 +14,7 @@ from modt_simulation.sensors import SENSORS
 from tests.sensor_fit.recordings import recording, with_scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SENSORS)
 def test_a_sensor_fits_its_profile(name):
     config = profile.load(name)

@@ -76,6 +76,7 @@ def test_a_mount_that_a_profile_states_is_kept_and_another_one_named():
     assert any("pitched by 15" in difference for difference in found.differences)
 
 
+@pytest.mark.slow
 def test_a_fitted_profile_has_the_mount_and_the_height_of_a_level_sensor():
     tilted = stream("yard", "vlp-16", (10.0, 12.0))
     frames = [tilted.simulator.sweep(5 * k)[0] for k in range(4)]

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from modt.errors import MisuseError
-from tools.__main__ import ROOT, commands, main
+from tools.__main__ import commands, main
 
 COMMANDS = dict(commands())
 
@@ -21,10 +21,7 @@ def test_the_table_has_a_summary_of_each_command(capsys):
 
 
 @pytest.mark.parametrize("module", COMMANDS)
-def test_a_command_has_help_and_is_named_by_its_usage(module, monkeypatch, capsys):
-    source = (ROOT.parent / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
-    usages = [line.split()[2] for line in source.splitlines() if line.startswith("    python -m tools.")]
-    assert set(usages) <= {module}
+def test_a_command_has_help(module, monkeypatch, capsys):
     try:
         command = importlib.import_module(module)
     except (ModuleNotFoundError, MisuseError) as missing:

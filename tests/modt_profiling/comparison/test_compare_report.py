@@ -123,15 +123,16 @@ def test_estimated_energy_is_watts_times_cpu_time_and_measured_energy_that_of_th
         assert mJ.mean() == pytest.approx(1e3 * metered["stages"][stage]["energy_J"].value)
 
 
-@pytest.mark.parametrize("mode", MODES[1:])
-def test_known_costs_are_reconciled(estimated, mode):
-    saving, expected = estimated["savings"][mode], MEAN_MS["conventional"] / MEAN_MS[mode]
-    assert saving["gamma_measured_cpu"].value == pytest.approx(expected)
-    assert saving["deviation"].value == pytest.approx(0.0, abs=1e-6)
-    assert saving["gamma_net"].value == pytest.approx(expected)
-    assert 1.0 < saving["gamma_gross"].value < saving["gamma_net"].value
-    calibrated = tree_of(False, coefficients=(3.0 * 10.975e-3, 3.0 * 1.5e-3, 0.0))["savings"][mode]
-    assert calibrated["gamma_calibrated"].value == pytest.approx(expected)
+def test_known_costs_are_reconciled(estimated):
+    calibrated = tree_of(False, coefficients=(3.0 * 10.975e-3, 3.0 * 1.5e-3, 0.0))
+    for mode in MODES[1:]:
+        saving = estimated["savings"][mode]
+        expected = MEAN_MS["conventional"] / MEAN_MS[mode]
+        assert saving["gamma_measured_cpu"].value == pytest.approx(expected)
+        assert saving["deviation"].value == pytest.approx(0.0, abs=1e-6)
+        assert saving["gamma_net"].value == pytest.approx(expected)
+        assert 1.0 < saving["gamma_gross"].value < saving["gamma_net"].value
+        assert calibrated["savings"][mode]["gamma_calibrated"].value == pytest.approx(expected)
 
 
 def test_the_report_says_whether_it_tests_the_physics(estimated, measured):

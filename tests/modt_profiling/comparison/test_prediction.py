@@ -69,9 +69,15 @@ CALIBRATION = [stream(1, 30, 15.0, 110_000), stream(2, 50, 25.0, 90_000), stream
 TEST = stream(9, 40, 30.0, 60_000)
 
 
-def predicted(calibration: list[Stream] = CALIBRATION, seen: Stream = TEST, share: float = 1 / 3):
-    observed = seen.observed[: int(FRAMES * share)]
-    return forecast(calibration, observed, FRAMES, np.random.default_rng(0))
+def predicted(calibration: list[Stream], seen: Stream = TEST):
+    """Forecast from a third of the frames."""
+    return forecast(calibration, seen.observed[: FRAMES // 3], FRAMES, np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def prediction():
+    """Forecast of the test's stream by all calibrations."""
+    return predicted(CALIBRATION)
 
 
 def covers(found, values: np.ndarray) -> np.ndarray:
@@ -96,31 +102,31 @@ def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation():
     assert Rates.fit(streams[:1]).segmentation[0] == 0.0
 
 
-@pytest.mark.parametrize("calibration", [CALIBRATION, CALIBRATION[:1]])
-def test_another_stream_is_predicted(calibration):
-    found, truth = predicted(calibration), measured(TEST)
+def test_another_stream_is_predicted(prediction):
+    truth = measured(TEST)
     assert truth[GAMMA].min() > 2.5
-    np.testing.assert_allclose(found.expected.values, truth, rtol=0.12)
-    assert covers(found, truth).all()
+    for found in (prediction, predicted(CALIBRATION[:1])):
+        np.testing.assert_allclose(found.expected.values, truth, rtol=0.12)
+        assert covers(found, truth).all()
 
 
-def test_it_is_nearer_than_simple_guesses():
-    found, truth = predicted(), measured(TEST)
-    equation = found.expected.equation
+def test_it_is_nearer_than_simple_guesses(prediction):
+    truth = measured(TEST)
+    equation = prediction.expected.equation
     for k in (3, 4):
-        error = abs(np.log(found.expected.values[k] / truth[k]))
-        rivals = (equation.n_go, equation.gamma, found.copied[k])
+        error = abs(np.log(prediction.expected.values[k] / truth[k]))
+        rivals = (equation.n_go, equation.gamma, prediction.copied[k])
         assert all(error < 0.5 * abs(np.log(rival / truth[k])) for rival in rivals)
 
 
-def test_it_misses_where_tracks_are_ten_times_as_many_or_cost_twice_as_much():
+def test_it_misses_where_tracks_are_ten_times_as_many_or_cost_twice_as_much(prediction):
     broken = Stream(TEST.runs, TEST.observed.copy())
     broken.observed[:, [OBSERVED.index("tracks"), -2, -1]] *= 10
-    assert not covers(predicted(seen=broken), measured(TEST))[GAMMA].any()
+    assert not covers(predicted(CALIBRATION, broken), measured(TEST))[GAMMA].any()
     dear = Stream({name: RunCosts(each.counts, each.cost.copy()) for name, each in TEST.runs.items()}, TEST.observed)
     for each in dear.runs.values():
         each.cost[:, STAGES.index("tracking")] *= 2
-    assert not covers(predicted(), measured(dear)).any()
+    assert not covers(prediction, measured(dear)).any()
 
 
 def test_a_stream_without_proposals_saves_nothing():

@@ -14,7 +14,7 @@ from modt_evaluation.experiments.study import DEFAULT, Row
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.recorded import written
 from tools.docs import figures, paired_modes
-from tools.docs.paired_modes import BASELINE, MODES, difference, interval
+from tools.docs.paired_modes import BASELINE, difference, interval
 from tools.docs.paper_page import section
 from tools.study import drives
 
@@ -78,15 +78,3 @@ def perfect(drive: DriveRows) -> DriveRows:
     proposals = drive.proposals.copy()
     proposals["posterior"] = np.eye(4)[proposals["label"]]
     return replace(drive, proposals=proposals)
-
-
-@pytest.mark.slow
-def test_the_section_has_a_row_for_each_mode_and_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(paired_modes, "SENSORS", ("vlp-16",))
-    monkeypatch.setattr(paired_modes, "SEEDS", [3])
-    monkeypatch.setattr(paired_modes, "SECONDS", 0.3)
-    monkeypatch.setattr(paired_modes, "RESAMPLES", 3)
-    text = list(paired_modes.table())
-    assert [line.split(" | ")[0].strip("| ") for line in text[4:]] == [
-        part for mode in MODES for part in (f"**`{mode}`, mean and 95 % interval**", f"`{mode}`, vlp-16")
-    ]

@@ -1,6 +1,7 @@
 """Counting of the motion witness's table."""
 
 import numpy as np
+import pytest
 
 from tools.study.drives import simulated
 from tools.train.motion_witness import CELLS, FRAGMENTS, MOST, WEIGHT, counted, log_likelihood_ratio
@@ -22,6 +23,7 @@ def test_an_object_that_is_hardly_ever_so_short_is_none_there():
     np.testing.assert_allclose(ratio[FRAGMENTS, 0], 0.0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_every_judged_track_of_a_drive_is_counted_once():
     counts = counted(simulated("crossing", "vlp-16", 0.5, 900), 0)
     assert counts[:, 3:].sum() < counts.sum()  # hardly anything has gone far within half a second
