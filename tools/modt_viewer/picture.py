@@ -23,6 +23,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from PIL import Image
 
+from modt.classes import CLASS_NAMES
 from modt.errors import MisuseError, ModtError
 from modt.geometry import corners
 from modt.sinks.output import writing
@@ -45,6 +46,9 @@ _TEXT_PT = 9.5
 _PANEL = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
 _LEAST_PT = 0.8
 """Least width of a point."""
+MIN_SPEED_MPS = 0.5
+"""Speed from which on an object has a line to where it goes."""
+FALSE_COLOUR = LEGEND["false"]["colour"]
 _DATES_S = 1e8
 """Stamps from here on count from 1970."""
 Label = tuple[float, float, str, str]
@@ -93,43 +97,85 @@ def _points(axes: Axes, cells: Cells, step_cm: int) -> None:
         axes.plot(x[group], y[group], "s", color=colour, **style)
 
 
+class ShownTracks:
+    """The M tracks of a frame as they are drawn, background first.
+
+    Attributes:
+        column: (M,) values by the names of COLUMNS.
+        ids: (M,) numbers.
+        kind: (M,) classes.
+        is_object: (M,) of a class other than background.
+        is_false: (M,) objects that are reported as a wrong class.
+        outline: (M, 4, 2) corners of the boxes.
+        xy: (M, 2) centres of the boxes.
+        class_colour, state_colour: (M, 4).
+    """
+
+    def __init__(self, run: RecordedRun, at: int) -> None:
+        rows = run.tracks[run.tracks[:, COLUMNS.index("at")] == at]
+        rows = rows[np.argsort(rows[:, COLUMNS.index("class")], kind="stable")]
+        self.column = {name: values / SCALE.get(name, 1) for name, values in zip(COLUMNS, rows.T, strict=True)}
+        self.ids = rows[:, COLUMNS.index("id")]
+        self.kind = self.column["class"].astype(int)
+        self.is_object = self.kind > 0
+        self.is_false = self.is_object & np.isin(self.ids, run.frames[at].get("false", ()))
+        self.outline = corners(np.stack([self.column[key] for key in BOX_KEYS], axis=1))
+        self.xy = np.column_stack([self.column["x"], self.column["y"]])
+        state = self.column["state"].astype(int)
+        self.class_colour = to_rgba_array([entry["colour"] for entry in theme.classes()])[self.kind]
+        self.state_colour = to_rgba_array([entry["colour"] for entry in theme.states(run.states)])[state]
+
+
 def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
-    """Boxes, trails, speeds and rings of the tracks; the labels of the objects."""
-    rows = run.tracks[run.tracks[:, COLUMNS.index("at")] == at]
-    rows = rows[np.argsort(rows[:, COLUMNS.index("class")], kind="stable")]
-    of = {name: column / SCALE.get(name, 1) for name, column in zip(COLUMNS, rows.T, strict=True)}
-    kind = of["class"].astype(int)
-    is_object = of["class"] > 0
-    false = is_object & np.isin(of["id"], run.frames[at].get("false", ()))
-    names = [entry["name"] for entry in theme.classes()]
-    fill = to_rgba_array([entry["colour"] for entry in theme.classes()])[kind]
-    wrong = LEGEND["false"]["colour"]
-    edge = to_rgba_array([entry["colour"] for entry in theme.states(run.states)])[of["state"].astype(int)]
-    box = corners(np.stack([of[key] for key in BOX_KEYS], axis=1))
-    xy = np.column_stack([of["x"], of["y"]])
-    boxes = PolyCollection(box, gid="tracks", linestyles=np.where(of["seen"] > 0, "-", "--").tolist())
-    boxes.set_facecolor(np.column_stack([fill[:, :3], np.where(is_object, 0.35, 0.1)]))
-    boxes.set_edgecolor(np.where(false[:, None], to_rgba(wrong), edge))
-    boxes.set_linewidth(np.where(false, 4.0, np.where(is_object, 2.0, 0.8)))
-    classified = of["classified"] > 0
-    width = 2 * np.maximum(axes.viewLim.width / (2 * REACH_M), 0.7 * of["l"][classified])
-    place = {"offsets": xy[classified], "offset_transform": axes.transData, "units": "xy"}
-    rings = EllipseCollection(width, width, 0, facecolors="none", edgecolors=INK, gid="classified", **place)
-    trails = [_trail(run, at, id_) for id_ in rows[is_object, 0].tolist()]
-    moves = is_object & (of["world_speed_mps"] > 0.5)
-    heading = of["world_heading"] - run.poses[at, 2]
-    ahead = xy + of["world_speed_mps"][:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
-    lines = LineCollection([*trails, *np.stack([xy, ahead], axis=1)[moves]], linewidths=1.5)
-    lines.set_color(np.concatenate([fill[is_object], edge[moves]]))
-    for shapes in (boxes, rings, lines):
-        axes.add_collection(shapes)
+    """Draw boxes, rings, trails and speeds of the tracks; returns the labels of the objects."""
+    tracks = ShownTracks(run, at)
+    axes.add_collection(_boxes(tracks))
+    axes.add_collection(_rings(axes, tracks))
+    axes.add_collection(_motions(run, at, tracks))
+    return _track_labels(tracks)
+
+
+def _boxes(tracks: ShownTracks) -> PolyCollection:
+    """Boxes filled by class and outlined by state, dashed where a track is not seen."""
+    dashes = np.where(tracks.column["seen"] > 0, "-", "--").tolist()
+    boxes = PolyCollection(tracks.outline, gid="tracks", linestyles=dashes)
+    boxes.set_facecolor(np.column_stack([tracks.class_colour[:, :3], np.where(tracks.is_object, 0.35, 0.1)]))
+    boxes.set_edgecolor(np.where(tracks.is_false[:, None], to_rgba(FALSE_COLOUR), tracks.state_colour))
+    boxes.set_linewidth(np.where(tracks.is_false, 4.0, np.where(tracks.is_object, 2.0, 0.8)))
+    return boxes
+
+
+def _rings(axes: Axes, tracks: ShownTracks) -> EllipseCollection:
+    """A ring around each track that is classified in this frame."""
+    classified = tracks.column["classified"] > 0
+    width = 2 * np.maximum(axes.viewLim.width / (2 * REACH_M), 0.7 * tracks.column["l"][classified])
+    place = {"offsets": tracks.xy[classified], "offset_transform": axes.transData, "units": "xy"}
+    return EllipseCollection(width, width, 0, facecolors="none", edgecolors=INK, gid="classified", **place)
+
+
+def _motions(run: RecordedRun, at: int, tracks: ShownTracks) -> LineCollection:
+    """Trails of the objects, and their ways in the next second."""
+    speed_mps = tracks.column["world_speed_mps"]
+    moves = tracks.is_object & (speed_mps > MIN_SPEED_MPS)
+    heading = tracks.column["world_heading"] - run.poses[at, 2]
+    ahead = tracks.xy + speed_mps[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+    trails = [_trail(run, at, id_) for id_ in tracks.ids[tracks.is_object].tolist()]
+    lines = LineCollection([*trails, *np.stack([tracks.xy, ahead], axis=1)[moves]], linewidths=1.5)
+    lines.set_color(np.concatenate([tracks.class_colour[tracks.is_object], tracks.state_colour[moves]]))
+    return lines
+
+
+def _track_labels(tracks: ShownTracks) -> list[Label]:
+    """Number, class and probability of each object, with a question mark below one half."""
     labels = []
-    for k in np.flatnonzero(is_object).tolist():
-        name = names[kind[k]]
-        probability = of[f"p_{name}"][k]
+    for k in np.flatnonzero(tracks.is_object).tolist():
+        name = CLASS_NAMES[tracks.kind[k]]
+        probability = tracks.column[f"p_{name}"][k]
         doubt = "?" if probability < 0.5 else ""
-        text = f"{'false: ' if false[k] else ''}#{rows[k, 0]} {name}{doubt} {100 * probability:.0f} %"
-        labels.append((xy[k, 0], box[k, :, 1].max(), text, wrong if false[k] else INK))
+        wrong = "false: " if tracks.is_false[k] else ""
+        text = f"{wrong}#{tracks.ids[k]} {name}{doubt} {100 * probability:.0f} %"
+        colour = FALSE_COLOUR if tracks.is_false[k] else INK
+        labels.append((tracks.xy[k, 0], tracks.outline[k, :, 1].max(), text, colour))
     return labels
 
 
@@ -137,7 +183,7 @@ def _truth(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     """Outlines of the labelled objects; the labels of those that are missed."""
     labels = []
     for o in run.frames[at].get("truth", ()):
-        box = corners(np.array([[o["x"], o["y"], 0.0, o["l"], o["w"], 0.0, o["yaw"]]]))[0]
+        (box,) = corners(np.array([[o["x"], o["y"], 0.0, o["l"], o["w"], 0.0, o["yaw"]]]))
         colour = LEGEND[o["outcome"]]["colour"]
         missed = o["outcome"] == "missed"
         axes.add_patch(Polygon(box, fill=False, edgecolor=colour, linewidth=3.0 if missed else 1.2, linestyle=":"))

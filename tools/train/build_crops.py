@@ -26,7 +26,7 @@ from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
 from modt_simulation.sensors import SENSORS
-from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, VARIANT_NAMES, Sensors
+from tools.train.dataset import CLUSTERED, MAJORITY, PASTED, SHIPPED, SYNTHETIC, VARIANT_NAMES, Sensors
 from tools.train.labelled_scans import (
     THINNED,
     Scan,
@@ -75,7 +75,7 @@ class Labels:
         partial: (R,) fragment or merged objects.
         unknown: (R,) excluded from validation: outside the annotated regions, or an object with too few points.
         tall: (R,) vehicles of at least TALL_M; rare, and different in shape from other cars.
-        owner: (R,) class whose objects hold more than half of its points, whole or not.
+        majority: (R,) class whose objects hold more than half of its points, whole or not.
         whole: (B,) the proposal of each object, NONE where it has none of its own.
     """
 
@@ -83,7 +83,7 @@ class Labels:
     partial: Bool
     unknown: Bool
     tall: Bool
-    owner: Int
+    majority: Int
     whole: Int
 
 
@@ -102,18 +102,18 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
     for k, (members, object_class, box) in enumerate(zip(scan.objects, scan.kinds, scan.boxes, strict=True)):
         if len(members) < MIN_BOX_POINTS:
             continue
-        own = number[members]
-        shared = np.bincount(own[own >= 0], minlength=len(proposals))
+        proposal_of_member = number[members]
+        shared = np.bincount(proposal_of_member[proposal_of_member >= 0], minlength=len(proposals))
         held[:, object_class] += shared
-        whole = (shared > 0.5 * size) & (shared > 0.5 * len(own))
+        whole = (shared > 0.5 * size) & (shared > 0.5 * len(members))
         kind[whole] = object_class
         tall[whole] = object_class == ObjectClass.CAR and box[5] > TALL_M
         partial |= (shared > FOREIGN_SHARE * size) & ~whole
         partial[whole] = False
         unknown[whole] = not valid[k]
         whole_of[k] = np.flatnonzero(whole)[0] if whole.any() else NONE
-    owner = np.where(held.max(axis=1) > 0.5 * size, held.argmax(axis=1), ObjectClass.BACKGROUND)
-    return Labels(kind, partial, unknown, tall, owner, whole_of)
+    majority = np.where(held.max(axis=1) > 0.5 * size, held.argmax(axis=1), ObjectClass.BACKGROUND)
+    return Labels(kind, partial, unknown, tall, majority, whole_of)
 
 
 def reflectance_of(proposals: Proposals) -> Float64:
@@ -125,7 +125,7 @@ def reflectance_of(proposals: Proposals) -> Float64:
 
 def points_in_view(scan: Scan) -> Int:
     """(B,) points of each object in the annotated field of view."""
-    return np.array([(scan.fov.depth(scan.points[own]) > 0).sum() for own in scan.objects], np.int64)
+    return np.array([(scan.fov.depth(scan.points[members]) > 0).sum() for members in scan.objects], np.int64)
 
 
 class CropWriter:
@@ -150,18 +150,18 @@ class CropWriter:
         row |= {"label": labels.kind[kept].astype(np.int8)}
         row |= {"partial": labels.partial[kept], "unknown": labels.unknown[kept], "tall": labels.tall[kept]}
         row |= {"variant": np.full(n, variant, np.int8), "reflectance": reflectance_of(proposals)[kept]}
-        row |= {"owner": labels.owner[kept].astype(np.int8)}
+        row |= {MAJORITY: labels.majority[kept].astype(np.int8)}
         row |= {key: np.full(n, getattr(scan, key)) for key in ("name", "drive", "sensor")}
         row |= dataclasses.asdict(Sensors.of(sensor, proposals.box[kept], ground_z_m(proposals, kept, sensor)))
         if validation:
             kinds = np.array(scan.kinds, np.int64)
             points = points_in_view(scan)
             objects = np.flatnonzero((kinds > ObjectClass.BACKGROUND) & (points >= MIN_DETECTABLE_POINTS))
-            own = labels.whole[objects]
+            proposal = labels.whole[objects]
             truth = {
                 "label": kinds[objects],
                 "points": points[objects],
-                "row": np.where(own < 0, own, own + self.rows),
+                "row": np.where(proposal == NONE, NONE, proposal + self.rows),
             }
             truth |= {key: np.full(len(objects), getattr(scan, key)) for key in ("drive", "sensor")}
             row |= {f"truth_{key}": value for key, value in truth.items()}

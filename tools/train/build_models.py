@@ -71,7 +71,10 @@ def main() -> None:
     options.add_argument("--profile", default=profile.DEFAULT, help="of their sensor")
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
-    free, placed, real, own = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti", "scans"))
+    free = args.work / "synthetic.npz"
+    placed = args.work / "placed.npz"
+    real = args.work / "kitti.npz"
+    scans = args.work / "scans.npz"
     near = [args.work / f"near-{seed}.npz" for seed in NEAR_WORLDS]
     for path, (seed, worlds) in zip(near, NEAR_WORLDS.items(), strict=True):
         near_crops(path, worlds, seed)
@@ -81,8 +84,8 @@ def main() -> None:
     if args.kitti is None or args.scans is None:
         synthetic_crops(free, WORLDS)
     if args.scans:
-        own_crops(own, args.scans, profile.load(args.profile), Path(args.profile).stem)
-        crops = [own, real, placed] if args.kitti else [own, free]
+        own_crops(scans, args.scans, profile.load(args.profile), Path(args.profile).stem)
+        crops = [scans, real, placed] if args.kitti else [scans, free]
         data = f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA

@@ -45,6 +45,8 @@ Pools = list[tuple[Int, Float64 | None]]
 """Rows of each class, and the probability of each row, None where they are equal."""
 CHUNK = 2000
 """Crops processed at a time."""
+MAJORITY = "owner"
+"""Column of a file that holds the majority; files of this name have the hashes that stand on the cards."""
 NOT_CONCATENATED = ("offsets", "provenance", "truth_row")
 
 
@@ -112,7 +114,7 @@ class Dataset:
     Attributes:
         crops: R crops.
         sensors: sensors of the crops.
-        label, owner, partial, unknown, tall: (R,) as in tools.train.build_crops.Labels.
+        label, majority, partial, unknown, tall: (R,) as in tools.train.build_crops.Labels.
         variant, drive: (R,) variant and drive of each crop.
         sensor: (R,) index into `sensor_names`, for each crop.
         reflectance: (R, 5) statistics of the returns; NaN where unknown or measured by another sensor.
@@ -125,7 +127,7 @@ class Dataset:
     crops: Crops
     sensors: Sensors
     label: Int
-    owner: Int
+    majority: Int
     partial: Bool
     unknown: Bool
     tall: Bool
@@ -172,7 +174,7 @@ def load(*paths: Path) -> Dataset:
         crops=Crops(joined["xyz"], np.append(0, np.cumsum(count))),
         sensors=Sensors(joined["ground_z_m"], joined["azimuth_deg"], joined["elevation_deg"]),
         label=joined["label"].astype(np.int64),
-        owner=joined["owner"].astype(np.int64),
+        majority=joined[MAJORITY].astype(np.int64),
         partial=joined["partial"],
         unknown=joined["unknown"],
         tall=joined["tall"],
@@ -226,12 +228,12 @@ def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> Po
     worth = np.ones(len(data)) if worth is None else worth
     pools: Pools = []
     for c in range(N_CLASSES):
-        own = rows[data.label[rows] == c]
-        group = 2 * data.variant[own] + data.tall[own]
+        of_class = rows[data.label[rows] == c]
+        group = 2 * data.variant[of_class] + data.tall[of_class]
         share = np.outer(VARIANT_SHARE[c], [1 - TALL_SHARE, TALL_SHARE]).ravel()
-        total = np.bincount(group, worth[own], minlength=len(share))
-        weight = worth[own] * (share / np.where(total > 0, total, 1.0))[group]
-        pools.append((own, weight / weight.sum()))
+        total = np.bincount(group, worth[of_class], minlength=len(share))
+        weight = worth[of_class] * (share / np.where(total > 0, total, 1.0))[group]
+        pools.append((of_class, weight / weight.sum()))
     return pools
 
 
@@ -239,7 +241,7 @@ def draw_batch(pools: Pools, rng: Generator, n: int = BATCH_SIZE, share: Float64
     """(n,) rows, classes by their shares; none of a class without rows."""
     number = rng.multinomial(n, share / share.sum())
     drawn = zip(pools, number, strict=True)
-    return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in drawn if len(own)])
+    return np.concatenate([rng.choice(rows, k, p=p) for (rows, p), k in drawn if len(rows)])
 
 
 def crop_features(crops: Crops, sensors: Sensors) -> Float64:

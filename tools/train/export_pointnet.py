@@ -243,8 +243,8 @@ def export(
     if reflectance:
         metadata[reflectance_classifier.METADATA_KEY] = json.dumps(
             {
-                facts["sensor"]: classifier_entry(own, PoolWeights.from_dict(facts["weights"]))
-                for own, facts in zip(reflectance, report["reflectance"], strict=True)
+                facts["sensor"]: classifier_entry(layers_of_sensor, PoolWeights.from_dict(facts["weights"]))
+                for layers_of_sensor, facts in zip(reflectance, report["reflectance"], strict=True)
             }
         )
     weights = PoolWeights.from_dict(report["boxes"]["weights"])

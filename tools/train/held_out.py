@@ -27,11 +27,6 @@ class Calibration:
     temperature: float
     offset: Float64
 
-    @classmethod
-    def identity(cls) -> Calibration:
-        """Calibration without effect."""
-        return cls(1.0, np.zeros(N_CLASSES))
-
     def apply(self, logits: Float64, base: Float64 | float = 0.0) -> Float64:
         """(R, 4) probabilities of logits (R, 4), added to calibrated logits `base`."""
         probability: Float64 = softmax(base + logits / self.temperature + self.offset, axis=1)
@@ -73,7 +68,7 @@ class Validation:
 
     Attributes:
         rows: (R,) rows of the data set.
-        label, owner: (R,) class, and class whose objects hold most of the points.
+        label, majority: (R,) class, and class whose objects hold most of the points.
         clear: (R,) clearly one object, or clearly none.
         sensor: (R,) as in the data set.
         sensor_names: names of the sensors of the data set.
@@ -82,7 +77,7 @@ class Validation:
 
     rows: Int
     label: Int
-    owner: Int
+    majority: Int
     clear: Bool
     sensor: Int
     sensor_names: tuple[str, ...]
@@ -98,7 +93,7 @@ class Validation:
         return cls(
             rows,
             data.label[rows],
-            data.owner[rows],
+            data.majority[rows],
             ~data.partial[rows],
             data.sensor[rows],
             data.sensor_names,
@@ -158,8 +153,8 @@ def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> H
     out = np.zeros((len(valid.rows), N_CLASSES))
     for i in range(k):
         model = train(fold[data.drive] != i, i)
-        mine = np.flatnonzero(fold[data.drive[valid.rows]] == i)
-        out[mine] = model(valid.rows[mine])
+        in_fold = np.flatnonzero(fold[data.drive[valid.rows]] == i)
+        out[in_fold] = model(valid.rows[in_fold])
     return HeldOut(valid, out, fit_calibration(out, valid.label, valid.weight))
 
 

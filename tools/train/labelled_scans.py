@@ -102,7 +102,7 @@ class Scan:
     def only(self, kept: Bool) -> Scan:
         """The scan with the points of a mask (N,) alone."""
         row = np.cumsum(kept) - 1
-        objects = tuple(row[own[kept[own]]] for own in self.objects)
+        objects = tuple(row[members[kept[members]]] for members in self.objects)
         return replace(self, points=self.points[kept], objects=objects, unlabelled=self.unlabelled[kept])
 
 
@@ -221,10 +221,10 @@ def semantic_scans(folder: Path) -> Iterator[Scan]:
         objects = []
         for number in np.unique(instance[instance > 0] << 16 | semantic[instance > 0]):
             kind = SEMANTIC_CLASS.get(int(number & 0xFFFF))
-            own = np.flatnonzero((instance << 16 | semantic) == number)
+            members = np.flatnonzero((instance << 16 | semantic) == number)
             if kind is not None:
                 kinds.append(kind)
-                objects.append(own)
+                objects.append(members)
         unknown = np.isin(semantic, SEMANTIC_UNKNOWN)
         name = f"odometry/{label.parents[1].name}/{label.stem}"
         boxes = np.full((len(kinds), 7), np.nan)

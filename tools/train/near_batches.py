@@ -108,29 +108,31 @@ def varied(crops: Crops, rng: Generator) -> tuple[Crops, Int]:
     Half of those hidden are as if cut by the view, the others by what stands before them.
     """
     n = len(crops)
-    owner = np.repeat(np.arange(len(crops)), crops.count)
+    crop_of_point = np.repeat(np.arange(len(crops)), crops.count)
     starts = crops.offsets[:-1]
     if not n:
         return crops, np.zeros(0, np.int64)
     xyz = crops.xyz.astype(np.float64)
     middle = np.add.reduceat(xyz[:, :2], starts) / crops.count[:, None]
-    c, s = (middle / np.hypot(*middle.T)[:, None])[owner].T
+    c, s = (middle / np.hypot(*middle.T)[:, None])[crop_of_point].T
     along = c * xyz[:, 0] + s * xyz[:, 1]
     across = c * xyz[:, 1] - s * xyz[:, 0]
-    across *= rng.choice([-1.0, 1.0], n)[owner]
+    across *= rng.choice([-1.0, 1.0], n)[crop_of_point]
     xyz[:, 0] = c * along - s * across
     xyz[:, 1] = s * along + c * across
     xyz += rng.normal(0, 0.006, xyz.shape)
-    xyz[:, 2] += rng.normal(0, 0.015, n)[owner]
+    xyz[:, 2] += rng.normal(0, 0.015, n)[crop_of_point]
     low = np.minimum.reduceat(across, starts)
     high = np.maximum.reduceat(across, starts)
     hidden = np.where(rng.random(n) < HIDDEN_SHARE, rng.uniform(0.0, MAX_HIDDEN, n), 0.0)
-    keep = (across - low[owner]) >= (hidden * (high - low))[owner]
-    keep &= rng.random(len(owner)) < rng.uniform(0.4, 1.0, n)[owner]
-    few = np.bincount(owner[keep], minlength=n) < MIN_POINTS
-    keep |= few[owner]
+    keep = (across - low[crop_of_point]) >= (hidden * (high - low))[crop_of_point]
+    keep &= rng.random(len(crop_of_point)) < rng.uniform(0.4, 1.0, n)[crop_of_point]
+    few = np.bincount(crop_of_point[keep], minlength=n) < MIN_POINTS
+    keep |= few[crop_of_point]
     cut = Cut.SIDE * ((hidden > 0) & ~few & (rng.random(n) < 0.5))
-    return Crops(xyz[keep].astype(np.float32), np.append(0, np.cumsum(np.bincount(owner[keep], minlength=n)))), cut
+    return Crops(
+        xyz[keep].astype(np.float32), np.append(0, np.cumsum(np.bincount(crop_of_point[keep], minlength=n)))
+    ), cut
 
 
 def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sensors, Int, Int]:
@@ -145,7 +147,7 @@ def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sen
         crops, the sensors that would measure them so, (R,) rows of the crops given, and (R,) flags of Cut.
     """
     n = len(crops)
-    owner = np.repeat(np.arange(len(crops)), crops.count)
+    crop_of_point = np.repeat(np.arange(len(crops)), crops.count)
     low, high = SPANS[rng.integers(len(SPANS), size=n)].T
     mount_m = rng.uniform(*HEIGHT_M, n)
     near_m = np.exp(rng.uniform(*LOG_RANGE, n))
@@ -155,17 +157,17 @@ def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sen
     bearing = np.arctan2(xyz[:, 1], xyz[:, 0])
     first = bearing[crops.offsets[:-1]]
     unit = np.stack([np.cos(first), np.sin(first)], axis=1)
-    xyz[:, :2] += ((near_m - nearest)[:, None] * unit)[owner]
-    xyz[:, 2] -= (sensors.ground_z_m + mount_m)[owner]
+    xyz[:, :2] += ((near_m - nearest)[:, None] * unit)[crop_of_point]
+    xyz[:, 2] -= (sensors.ground_z_m + mount_m)[crop_of_point]
     tangent = xyz[:, 2] / np.maximum(np.hypot(xyz[:, 0], xyz[:, 1]), 0.1)
-    above = tangent > high[owner]
-    below = tangent < low[owner]
+    above = tangent > high[crop_of_point]
+    below = tangent < low[crop_of_point]
     keep = ~above & ~below
     cut = Cut.TOP * np.maximum.reduceat(above, crops.offsets[:-1])
     cut |= Cut.BOTTOM * np.maximum.reduceat(below, crops.offsets[:-1])
-    count = np.bincount(owner[keep], minlength=n)
+    count = np.bincount(crop_of_point[keep], minlength=n)
     rows = np.flatnonzero((count >= MIN_CUT_POINTS) & (cut > 0))
-    kept = keep & np.isin(owner, rows)
+    kept = keep & np.isin(crop_of_point, rows)
     wider = np.square(np.maximum(nearest, 1.0) / np.maximum(near_m, 1.0))  # each point covers the same area
     near = replace(sensors, ground_z_m=-mount_m, elevation_deg=sensors.elevation_deg * wider)
     out = Crops(xyz[kept].astype(np.float32), np.append(0, np.cumsum(count[rows])))

@@ -42,7 +42,7 @@ class MaxPooledLinear(torch.autograd.Function):
     def forward(ctx: Any, x: Tensor, weight: Tensor, count: Tensor) -> Tensor:
         """(R, out) of (K, in) points of R crops, an (out, in) weight and (R,) points of each crop."""
         y = (x.detach() @ weight.detach().T).numpy()
-        maxima = np.stack([own.max(axis=0) for own in np.split(y, np.cumsum(count.numpy())[:-1])])
+        maxima = np.stack([crop.max(axis=0) for crop in np.split(y, np.cumsum(count.numpy())[:-1])])
         ctx.saved = x.detach().numpy(), weight.detach().numpy(), y, maxima, count.numpy()
         return torch.from_numpy(maxima)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -21,8 +22,17 @@ from modt_evaluation.overlap import PAD_M
 from tools.train.labelled_scans import Scan
 
 MIN_POINTS = 8
+"""Least number of visible points of a pasted object."""
+MIN_GROUND_POINTS = 5
+"""Least number of scene points by which the ground of a place is known."""
 CLEARANCE_M = 0.4
+"""Points of the scene that are higher above the ground than this occupy a place."""
+MAX_OCCUPIED_SHARE = 0.05
+"""Greatest share of such points at a free place."""
 OCCLUSION_MARGIN_M = 0.4
+"""Points of the scene that are nearer than the object by this distance hide it."""
+THINNED_FROM = 1.03
+"""Factor on the range from which on an object is thinned to the resolution of the sensor."""
 CLASS_SHARE = {ObjectClass.CAR: 0.36, ObjectClass.PEDESTRIAN: 0.36, ObjectClass.CYCLIST: 0.28}
 SAME_RANGE_SHARE = 0.5
 """Share of objects that keep their range."""
@@ -48,10 +58,10 @@ class ObjectCut:
 def cut_objects(scans: Iterable[Scan]) -> list[ObjectCut]:
     """Labelled objects with a box and at least 2 * MIN_POINTS points."""
     return [
-        ObjectCut(scan.points[own], box, kind, scan.drive)
+        ObjectCut(scan.points[members], box, kind, scan.drive)
         for scan in scans
-        for own, kind, box in zip(scan.objects, scan.kinds, scan.boxes, strict=True)
-        if kind != ObjectClass.BACKGROUND and len(own) >= 2 * MIN_POINTS and np.isfinite(box).all()
+        for members, kind, box in zip(scan.objects, scan.kinds, scan.boxes, strict=True)
+        if kind != ObjectClass.BACKGROUND and len(members) >= 2 * MIN_POINTS and np.isfinite(box).all()
     ]
 
 
@@ -81,12 +91,12 @@ def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generat
             placed = _place(cut, points, scan.profile.sensor, rng)
             if placed is None:
                 continue
-            own, box, hidden = placed
+            pasted, box, hidden = placed
             renumber = np.cumsum(~hidden) - 1
             objects = [renumber[o[~hidden[o]]] for o in objects]
             kept = points[~hidden]
-            objects.append(np.arange(len(kept), len(kept) + len(own)))
-            points = np.concatenate([kept, own])
+            objects.append(np.arange(len(kept), len(kept) + len(pasted)))
+            points = np.concatenate([kept, pasted])
             boxes.append(box)
             kinds.append(cut.kind)
         if objects:
@@ -111,40 +121,53 @@ def _place(
     angle = rng.uniform(-np.pi, np.pi)
     rho = float(np.hypot(*cut.box[:2]))
     factor = 1.0 if rng.random() < SAME_RANGE_SHARE else float(min(rng.uniform(1.0, 2.2), max(60.0 / rho, 1.0)))
-    c, s = np.cos(angle), np.sin(angle)
-    xy = cut.points[:, :2] + (factor - 1) * cut.box[:2]
-    foot = cut.box[:2] * factor
-    target = np.array([c * foot[0] - s * foot[1], s * foot[0] + c * foot[1]])
-    near = scene[np.hypot(scene[:, 0] - target[0], scene[:, 1] - target[1]) < max(cut.box[3] / 2 + PAD_M, 1.5)]
-    if len(near) < 5:
-        return None
-    ground = float(np.percentile(near[:, 2], 10))
-    if abs(ground - cut.box[2]) > 0.3 + 0.02 * rho * factor or np.mean(near[:, 2] > ground + CLEARANCE_M) > 0.05:
+    target = np.array(_rotated(*(cut.box[:2] * factor), angle))
+    ground = _free_ground(cut, scene, target, 0.3 + 0.02 * rho * factor)
+    if ground is None:
         return None
     points = cut.points.copy()
-    points[:, 0] = c * xy[:, 0] - s * xy[:, 1]
-    points[:, 1] = s * xy[:, 0] + c * xy[:, 1]
+    xy = cut.points[:, :2] + (factor - 1) * cut.box[:2]
+    points[:, 0], points[:, 1] = _rotated(xy[:, 0], xy[:, 1], angle)
     points[:, 2] += ground - cut.box[2]
-    cells = _cells(points, sensor)
-    if factor > 1.03:
-        _, first = np.unique(cells, return_index=True)
+    if factor > THINNED_FROM:
+        _, first = np.unique(_cells(points, sensor), return_index=True)
         points = points[first]
-        cells = cells[first]
+    visible, hidden = _occlusion(points, scene, sensor)
+    if visible.sum() < max(MIN_POINTS, 0.2 * len(visible)):
+        return None
+    box = np.array([*target, ground, *cut.box[3:6], cut.box[6] + angle])
+    return points[visible], box, hidden
+
+
+def _rotated(x: Any, y: Any, angle: float) -> tuple[Any, Any]:
+    """Coordinates rotated about the sensor."""
+    c, s = np.cos(angle), np.sin(angle)
+    return c * x - s * y, s * x + c * y
+
+
+def _free_ground(cut: ObjectCut, scene: Float32, target: Float64, max_step_m: float) -> float | None:
+    """Height of the ground at a place; None where it is unknown, higher or lower by a step, or occupied."""
+    near = scene[np.hypot(scene[:, 0] - target[0], scene[:, 1] - target[1]) < max(cut.box[3] / 2 + PAD_M, 1.5)]
+    if len(near) < MIN_GROUND_POINTS:
+        return None
+    ground = float(np.percentile(near[:, 2], 10))
+    occupied = np.mean(near[:, 2] > ground + CLEARANCE_M) > MAX_OCCUPIED_SHARE
+    return None if occupied or abs(ground - cut.box[2]) > max_step_m else ground
+
+
+def _occlusion(points: Float32, scene: Float32, sensor: SensorConfig) -> tuple[Bool, Bool]:
+    """(n,) points of an object that nothing of the scene stands before, and (N,) points of the scene behind them."""
+    cells = _cells(points, sensor)
     sector = np.flatnonzero(_around(scene, points))
     beside = scene[sector]
     scene_cells = _cells(beside, sensor)
     distance = np.linalg.norm(points[:, :3], axis=1)
     scene_distance = np.linalg.norm(beside[:, :3], axis=1)
-    front = np.flatnonzero((scene_distance < distance.min() - OCCLUSION_MARGIN_M) & (scene_distance > 2.0))
-    visible = ~np.isin(cells, _dilate(scene_cells[front]))
-    points = points[visible]
-    cells = cells[visible]
-    if visible.sum() < max(MIN_POINTS, 0.2 * len(visible)):
-        return None
+    in_front = (scene_distance < distance.min() - OCCLUSION_MARGIN_M) & (scene_distance > 2.0)
+    visible = ~np.isin(cells, _dilate(scene_cells[in_front]))
     hidden = np.zeros(len(scene), np.bool_)
-    hidden[sector] = np.isin(scene_cells, _dilate(cells)) & (scene_distance > distance.mean())
-    box = np.array([*target, ground, *cut.box[3:6], cut.box[6] + angle])
-    return points, box, hidden
+    hidden[sector] = np.isin(scene_cells, _dilate(cells[visible])) & (scene_distance > distance.mean())
+    return visible, hidden
 
 
 def _around(scene: Float32, points: Float32) -> Bool:

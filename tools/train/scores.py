@@ -33,7 +33,7 @@ def by_sensor(log_probability: Float64, valid: Validation, rows: Bool) -> dict[s
     }
 
 
-def sensor_scores(log_probability: Float64, valid: Validation, mine: Bool) -> dict[str, Any]:
+def sensor_scores(log_probability: Float64, valid: Validation, of_sensor: Bool) -> dict[str, Any]:
     """Scores of the crops of a mask (R,).
 
     Keys: `average_precision` over all objects; `log_loss`; `temperature`, by which the logits of this sensor are
@@ -41,18 +41,18 @@ def sensor_scores(log_probability: Float64, valid: Validation, mine: Bool) -> di
     of MIN_OBJECT_POINTS points, found and called right: `of_all` and `of_found`, those with a proposal of their own.
     """
     score = log_softmax(log_probability, axis=1)
-    clear = mine & valid.clear
+    clear = of_sensor & valid.clear
     label = valid.label[clear]
     adapted = score[clear] + shift(np.bincount(label, minlength=N_CLASSES) / len(label), valid.class_frequency)
     error = top_calibration_error(softmax(adapted, axis=1), label)
     truth = valid.truth
-    objects = np.isin(truth.sensor, np.unique(valid.sensor[mine]))
+    objects = np.isin(truth.sensor, np.unique(valid.sensor[of_sensor]))
     number = np.bincount(truth.label[objects] if objects.any() else label, minlength=N_CLASSES)
-    rows = np.flatnonzero(mine)
+    rows = np.flatnonzero(of_sensor)
     probability = np.exp(score[rows])
     recall = {
         str(precision): {
-            name: recall_at(precision, score[:, c], valid.owner == c, mine, wanted, truth.row)
+            name: recall_at(precision, score[:, c], valid.majority == c, of_sensor, wanted, truth.row)
             for c, name in enumerate(CLASS_NAMES[1:], 1)
             if (wanted := objects & (truth.label == c) & (truth.points >= MIN_OBJECT_POINTS)).any()
         }
@@ -73,7 +73,7 @@ def shift(frequency: Float64, assumed: Float64) -> Float64:
 
 
 def recall_at(
-    precision: float, score: Float64, right: Bool, mine: Bool, wanted: Bool, row: Int
+    precision: float, score: Float64, right: Bool, considered: Bool, wanted: Bool, row: Int
 ) -> dict[str, float | int]:
     """Recall of a class at the least score whose proposals have a precision.
 
@@ -81,11 +81,11 @@ def recall_at(
         precision: to be reached.
         score: (R,) score of the class.
         right: (R,) crops that lie on an object of the class.
-        mine: (R,) crops to look at.
+        considered: (R,) crops to look at.
         wanted: (T,) objects to find.
         row: (T,) crop that is the whole object, NONE where it has none.
     """
-    threshold, reached, _ = precision_recall(score[mine], right[mine], 1)
+    threshold, reached, _ = precision_recall(score[considered], right[considered], 1)
     enough = np.flatnonzero(reached >= precision)
     least = threshold[enough[-1]] if len(enough) else np.inf
     found = wanted & (row != NONE)

@@ -46,7 +46,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
     rng = np.random.default_rng(seed)
     pools = sampling_pools(data, rows)
     drawn = [draw_batch(pools, rng) for _ in range(AUGMENTED_BATCHES)]
-    feature = np.concatenate([_augmented_features(data, own, rng) for own in drawn])
+    feature = np.concatenate([_augmented_features(data, rows, rng) for rows in drawn])
     label = data.label[np.concatenate(drawn)]
 
     def batch() -> Batch:

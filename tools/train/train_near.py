@@ -169,10 +169,10 @@ def table(first: Student, net: Student, boxes: MlpBoxClassifier, log_frequency: 
     lines = ["| distance, cut above or below | people | network before | network | box | pool |", "|" + "---|" * 6]
     for low, high in RANGES_M:
         for word, is_cut in (("cut", True), ("not cut", False)):
-            own = (distance > low) & (distance <= high) & ((cut & (Cut.TOP | Cut.BOTTOM) > 0) == is_cut)
-            if person[own].any():
-                cells = [score(p[own], person[own]) for p in answers]
-                lines.append(f"| {low} to {high} m, {word} | {person[own].sum()} | {' | '.join(cells)} |")
+            near = (distance > low) & (distance <= high) & ((cut & (Cut.TOP | Cut.BOTTOM) > 0) == is_cut)
+            if person[near].any():
+                cells = [score(p[near], person[near]) for p in answers]
+                lines.append(f"| {low} to {high} m, {word} | {person[near].sum()} | {' | '.join(cells)} |")
     return lines
 
 

@@ -32,8 +32,8 @@ def features_of(data: Dataset) -> Float64:
 
 def on_scale(data: Dataset, sensor: str) -> Dataset:
     """The data set with the reflectance of one sensor alone."""
-    own = np.array([name.split(",")[0] == sensor for name in data.sensor_names])[data.sensor]
-    return replace(data, reflectance=np.where(own[:, None], data.reflectance, np.nan))
+    of_sensor = np.array([name.split(",")[0] == sensor for name in data.sensor_names])[data.sensor]
+    return replace(data, reflectance=np.where(of_sensor[:, None], data.reflectance, np.nan))
 
 
 def has_reflectance(data: Dataset, rows: Int) -> Bool:

@@ -74,11 +74,11 @@ def held_out_scores(net: PointNet, data: Dataset) -> dict[str, tuple[list[int], 
     probability = softmax(logits(net.eval(), data, valid.rows[rows]), axis=1)
     scores = {}
     for s in np.unique(valid.sensor[rows]).tolist():
-        mine = valid.sensor[rows] == s
+        of_sensor = valid.sensor[rows] == s
         truth = valid.truth
         objects = truth.label[(truth.sensor == s) & (fold[truth.drive] == HELD_OUT)]
         number = np.bincount(objects, minlength=len(CLASS_NAMES))
-        precision = average_precision(probability[mine], valid.label[rows][mine], number)
+        precision = average_precision(probability[of_sensor], valid.label[rows][of_sensor], number)
         scores[valid.sensor_names[s]] = number[1:].tolist(), precision
     return scores
 

@@ -21,7 +21,7 @@ def data_of(crops: Crops, label: Int, **columns: Any) -> Dataset:
     false, zero = np.zeros(n, np.bool_), np.zeros(n, np.int64)
     table: dict[str, Any] = {
         "sensors": Sensors.of(SensorConfig(), np.ones((n, 7)), np.full(n, -1.73)),
-        "owner": label,
+        "majority": label,
     }
     table |= {"partial": false, "unknown": false, "tall": false, "variant": zero, "drive": zero, "sensor": zero}
     table |= {"reflectance": np.full((n, N_REFLECTANCE), np.nan), "truth": truth_of(zero[:0], zero[:0])}

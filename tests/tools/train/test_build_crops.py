@@ -29,7 +29,7 @@ def test_a_proposal_takes_the_class_of_the_object_it_overlaps_by_more_than_half(
     assert labels.kind.tolist() == [ObjectClass.CAR, 0, 0, 0]
     assert labels.partial.tolist() == [False, True, True, True]
     assert labels.unknown.tolist() == [True, False, False, False]  # nine points are too few to be judged by
-    assert labels.owner.tolist() == [ObjectClass.CAR, 0, ObjectClass.CYCLIST, ObjectClass.CYCLIST]
+    assert labels.majority.tolist() == [ObjectClass.CAR, 0, ObjectClass.CYCLIST, ObjectClass.CYCLIST]
     assert labels.whole.tolist() == [0, NONE, NONE]
 
 

@@ -16,6 +16,9 @@ from tools.train.held_out import Calibration, Validation, fit_calibration, fit_p
 from tools.train.scores import by_sensor, recall_at, shift
 
 
+IDENTITY = Calibration(1.0, np.zeros(4))
+
+
 def single_points(label: Int, **columns: Any) -> Dataset:
     """Crops of one point each."""
     return data_of(Crops(np.zeros((len(label), 3), np.float32), np.arange(len(label) + 1)), label, **columns)
@@ -79,14 +82,14 @@ def test_the_box_tells_objects_from_background_alone():
 def test_calibration_recovers_temperature_and_class_offsets():
     rng = np.random.default_rng(0)
     true = rng.normal([2.0, 0, 0, 0], 2.0, (6000, 4))
-    share = Calibration.identity().apply(true)
+    share = IDENTITY.apply(true)
     label = np.array([rng.choice(4, p=p) for p in share])
     distorted = 3 * (true - [2.0, 0, 0, 0])
     found = fit_calibration(distorted, label, np.full(6000, 1 / 6000))
     assert found.temperature == pytest.approx(3.0, rel=0.1)
     assert found.offset[1:] == pytest.approx(np.full(3, -2.0), abs=0.2)
     assert top_calibration_error(found.apply(distorted), label) < 0.02
-    assert top_calibration_error(Calibration.identity().apply(distorted), label) > 0.1
+    assert top_calibration_error(IDENTITY.apply(distorted), label) > 0.1
 
 
 def test_calibration_folds_into_the_last_layer():
@@ -96,7 +99,7 @@ def test_calibration_folds_into_the_last_layer():
     *hidden, folded = calibration.fold_into([(weight, bias), (weight, bias)])
     np.testing.assert_allclose(hidden[0][0], weight, atol=1e-6)
     np.testing.assert_allclose(
-        Calibration.identity().apply(x @ folded[0] + folded[1]), calibration.apply(x @ weight + bias), atol=1e-5
+        IDENTITY.apply(x @ folded[0] + folded[1]), calibration.apply(x @ weight + bias), atol=1e-5
     )
 
 
