@@ -11,19 +11,53 @@ must be readable throughout. Prints each broken promise with the calls that brea
 from __future__ import annotations
 
 import logging
-import shutil
 import sys
 import tempfile
 import time
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tools.options import parser
 
+if TYPE_CHECKING:
+    from tests.crash.faulty_run import FaultyRun
+
 LASTING_S = 2.0
 MOST_PRINTED = 40
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Calls of a run that fail, by their numbers, each with the way in which it does, and for how long [s]."""
+
+    ways: dict[int, int]
+    lasting_s: float = 0.0
+
+
+def plan(n: int, runs: int, calls: list[str], rng: np.random.Generator) -> Plan:
+    """The plan of a run: half of the runs fail one call, evenly over the kinds of calls, the other half two."""
+    if not n:
+        return Plan({})
+    single = n <= runs // 2
+    ways = int(rng.integers(1000))
+    kinds = sorted({*calls})
+    chosen = [kinds[n % len(kinds)]] if single else rng.choice(kinds, 2)
+    at = [int(rng.choice([k for k, name in enumerate(calls) if name == one])) for one in chosen]
+    return Plan({k: ways + i for i, k in enumerate(at)}, LASTING_S * (rng.random() < 0.3))
+
+
+def outcome(run: FaultyRun) -> str:
+    """The promise that a run breaks, empty if it keeps all."""
+    try:
+        run.run()
+        run.check()
+    except Exception as error:
+        return f"{type(error).__name__}: {str(error).splitlines()[0][:150] if str(error) else ''}"
+    return ""
 
 
 def main() -> None:
@@ -39,35 +73,19 @@ def main() -> None:
     broken = Counter[str]()
     calls = list[str]()
     for n in range(given.runs + 1):
-        failing: dict[int, int] = {}
-        lasting_s = 0.0
-        if n:
-            single = n <= given.runs // 2
-            ways = int(rng.integers(1000))
-            # Half of the runs fail one call, evenly over the kinds of them; the other half two.
-            kinds = sorted({*calls})
-            chosen = [kinds[n % len(kinds)]] if single else rng.choice(kinds, 2)
-            at = [int(rng.choice([k for k, name in enumerate(calls) if name == one])) for one in chosen]
-            failing = {k: ways + i for i, k in enumerate(at)}
-            lasting_s = LASTING_S * (rng.random() < 0.3)
-        folder = Path(tempfile.mkdtemp(prefix="modt-faults-"))
-        run = FaultyRun(folder, failing, lasting_s)
-        try:
-            run.run()
-            run.check()
-        except Exception as error:
-            names = ", ".join(f"{calls[k] if calls else ''} ({k}, {way})" for k, way in failing.items())
-            what = f"{type(error).__name__}: {str(error).splitlines()[0][:150] if str(error) else ''}"
+        planned = plan(n, given.runs, calls, rng)
+        with tempfile.TemporaryDirectory(prefix="modt-faults-") as folder:
+            run = FaultyRun(Path(folder), planned.ways, planned.lasting_s)
+            what = outcome(run)
+        if what:
             broken[what] += 1
             if broken.total() <= MOST_PRINTED:
-                print(f"broken by {names} for {lasting_s:g} s: {what}", flush=True)
+                names = ", ".join(f"{calls[k] if calls else ''} ({k}, {way})" for k, way in planned.ways.items())
+                print(f"broken by {names} for {planned.lasting_s:g} s: {what}", flush=True)
         calls = calls or run.faults.calls
-        shutil.rmtree(folder)
         if n % 100 == 0:
-            print(
-                f"{n} runs of {len(calls)} calls, {time.perf_counter() - began_s:.0f} s, {broken.total()} broken",
-                flush=True,
-            )
+            spent_s = time.perf_counter() - began_s
+            print(f"{n} runs of {len(calls)} calls, {spent_s:.0f} s, {broken.total()} broken", flush=True)
     print("\n".join(f"{number} times {what}" for what, number in broken.most_common()) or "every promise was kept")
     sys.exit(bool(broken))
 

@@ -34,7 +34,7 @@ MEMORY = Path("/dev/shm")
 Feed = Callable[[bytes], None]
 
 
-class Witness:
+class InputLog:
     """Number of inputs that a process has read, and the last input, in memory that outlives it."""
 
     HEAD = struct.Struct("<QQ")
@@ -43,7 +43,7 @@ class Witness:
     def __init__(self) -> None:
         self._memory = mmap.mmap(-1, self.HEAD.size + self.MOST_BYTES)
 
-    def see(self, raw: bytes) -> None:
+    def note(self, raw: bytes) -> None:
         """Note an input that is about to be read."""
         kept = raw[: self.MOST_BYTES]
         self.HEAD.pack_into(self._memory, 0, self.executions + 1, len(kept))
@@ -70,7 +70,7 @@ class Job:
     out: Path
     folder: Path
     coverage: bool
-    witness: Witness
+    log: InputLog
 
 
 def main() -> None:
@@ -95,7 +95,7 @@ def main() -> None:
         for old in (*out.glob("*.txt"), *out.glob("*.input")):
             old.unlink()
         with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
-            job = Job(TARGETS[name], arguments.seconds, arguments.seed, out, Path(folder), coverage, Witness())
+            job = Job(TARGETS[name], arguments.seconds, arguments.seed, out, Path(folder), coverage, InputLog())
             found += _supervise(job)
     sys.exit(1 if found else 0)
 
@@ -121,13 +121,13 @@ def _supervise(job: Job) -> int:
         process.join()
     seconds = time.monotonic() - began
     findings = sorted(job.out.glob("*.txt"))
-    done = f"{job.witness.executions} executions in {seconds:.0f} s"
+    done = f"{job.log.executions} executions in {seconds:.0f} s"
     print(f"{job.target.name}: {done}, {len(findings)} findings", flush=True)
     for text in findings:
         print("  " + text.read_text().partition("\n")[0])
     if ended != 0:
         last = job.out / "last.input"
-        last.write_bytes(job.witness.last)
+        last.write_bytes(job.log.last)
         print(f"  the process {'did not answer' if ended is None else f'ended by {ended}'}; its last input is {last}")
     return len(findings) + (ended != 0)
 
@@ -153,7 +153,7 @@ def _fuzz(job: Job) -> None:
             def feed(raw: bytes) -> None:
                 if time.monotonic() > ends:
                     os._exit(0)  # exit handlers of libraries may wait for threads that a fork does not have
-                job.witness.see(raw)
+                job.log.note(raw)
                 found = execute(call, raw, job.target.refusals)
                 if found is not None and found.place not in places:
                     places.add(found.place)
@@ -169,7 +169,7 @@ def _fuzz(job: Job) -> None:
 
 
 def _by_coverage(job: Job, seeds: Any, feed: Feed) -> None:
-    """Feed mutations, half of them by atheris, half by the project's own, which also change words of a text."""
+    """Feed mutations, half of them by atheris, half by the project, which also change words of a text."""
     import atheris
 
     from tests.fuzz.mutation import mutated

@@ -57,7 +57,7 @@ class Faulty:
         stamp_us = stamps.stamp_us(payload) + round(1e6 * self._set_s)
         return fault.packet(stamps.stamped(payload, stamp_us % stamps.wrap_us), self._rng)
 
-    def follow(self, names: Iterable[str]) -> None:
+    def apply_named(self, names: Iterable[str]) -> None:
         """Take each fault that is named; end the process with the names."""
         faults = {fault.name: fault for fault in FAULTS}
         for name in names:
@@ -83,7 +83,7 @@ def main() -> None:
     recording = stream(Request(path=args.drive, frames=(0, FRAMES)))
     payloads = [payload for _, payload in packets_of(list(recording), MODEL, recording.info.period_s)]
     faulty = Faulty()
-    Thread(target=faulty.follow, args=(sys.stdin,), daemon=True).start()
+    Thread(target=faulty.apply_named, args=(sys.stdin,), daemon=True).start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to:
         to.connect(("127.0.0.1", args.port))
         print("sending", flush=True)

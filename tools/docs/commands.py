@@ -40,7 +40,7 @@ def page() -> str:
     lines = ["## Shared options", "", "| option | | of |", "|---|---|---|"]
     for option in (option for option, n in number.items() if n > 1):
         name, text = (cell.replace("|", r"\|") for cell in option)
-        users = ", ".join(prog.split()[-1] for prog, own in rows.items() if option in own)
+        users = ", ".join(prog.split()[-1] for prog, cells_of in rows.items() if option in cells_of)
         lines.append(f"| {name} | {text} | {users} |")
     for summary, parser in found:
         lines += ["", f"## {parser.prog}", "", f"{summary[0].upper()}{summary[1:]}.", ""]

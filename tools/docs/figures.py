@@ -109,11 +109,11 @@ def _shares(values: Sequence[float | None]) -> str:
 
 def paper_page(drive: KittiDrive, further: Path | None) -> str:
     """Section of docs/paper.md."""
-    own: list[Drive] = [drive, *simulated_drives(SIMULATED, SIMULATED_S)]
+    shown: list[Drive] = [drive, *simulated_drives(SIMULATED, SIMULATED_S)]
     if further is not None:
-        own.insert(1, completed([drive], further))
+        shown.insert(1, completed([drive], further))
     about = f"{sources(PROFILES)}; made by `python -m tools.docs.figures`."
-    return section(Study(chosen(NAMES), own, PROFILES).rows(1, lambda name: None), about)
+    return section(Study(chosen(NAMES), shown, PROFILES).rows(1, lambda name: None), about)
 
 
 def main() -> None:

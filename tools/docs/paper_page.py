@@ -36,14 +36,14 @@ def _precisions(rows: Sequence[Row]) -> Iterator[str]:
         stated = [paper.figure(name, "", v, None, f"AP {c}") for c in CLASSES for v in (DETECTION, TRACKING)]
         values = [None if found is None else found[0] for found in stated]
         yield _line(f"**{title}, the paper, eight drives**", zip(values[::2], values[1::2], strict=True))
-        own = [row for row in rows if row.experiment == name]
-        for streams, profile in dict.fromkeys((row.streams, row.profile) for row in own):
-            of = {
+        of_table = [row for row in rows if row.experiment == name]
+        for streams, profile in dict.fromkeys((row.streams, row.profile) for row in of_table):
+            value_of = {
                 (row.variant, row.quantity): row.value
-                for row in own
+                for row in of_table
                 if (row.streams, row.profile) == (streams, profile)
             }
-            pairs = [(of.get((DETECTION, f"AP {c}")), of.get((TRACKING, f"AP {c}"))) for c in CLASSES]
+            pairs = [(value_of.get((DETECTION, f"AP {c}")), value_of.get((TRACKING, f"AP {c}"))) for c in CLASSES]
             yield _line(f"{title}, {streams}, {_profile(profile)}", pairs)
 
 
@@ -58,16 +58,18 @@ def _line(
 
 def _tracks(rows: Sequence[Row]) -> Iterator[str]:
     """Table VI on recorded drives, judged by the labels alone."""
-    own = [row for row in rows if row.experiment == "table6" and row.kind == KITTI]
+    of_table = [row for row in rows if row.experiment == "table6" and row.kind == KITTI]
     yield f"| tracks | {' | '.join(_TRACKS)} |"
     yield "|---|" + "---|" * len(_TRACKS)
-    for streams in dict.fromkeys(row.streams for row in own if row.paper is not None):
-        here = [row for row in own if row.streams == streams]
-        stated = {row.quantity: row.paper for row in here}
+    for streams in dict.fromkeys(row.streams for row in of_table if row.paper is not None):
+        of_streams = [row for row in of_table if row.streams == streams]
+        stated = {row.quantity: row.paper for row in of_streams}
         yield _cells(f"**Table VI, the paper, {streams}**", stated)
-        for profile, variant in dict.fromkeys((row.profile, row.variant) for row in here):
-            of = {row.quantity: row.value for row in here if (row.profile, row.variant) == (profile, variant)}
-            yield _cells(f"{streams}, {_profile(profile)}, mode {variant}", of)
+        for profile, variant in dict.fromkeys((row.profile, row.variant) for row in of_streams):
+            value_of = {
+                row.quantity: row.value for row in of_streams if (row.profile, row.variant) == (profile, variant)
+            }
+            yield _cells(f"{streams}, {_profile(profile)}, mode {variant}", value_of)
 
 
 def _cells(name: str, of: dict[str, float | None]) -> str:

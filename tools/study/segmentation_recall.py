@@ -51,11 +51,11 @@ class Tally:
         label = proposals.label(len(scan.points))
         self.proposals += len(proposals)
         self.scans += 1
-        for kind, own in zip(scan.kinds, scan.objects, strict=True):
-            if len(own) < MIN_POINTS or not (scan.fov.depth(scan.points[own]) > 0).mean() > 0.5:
+        for kind, members in zip(scan.kinds, scan.objects, strict=True):
+            if len(members) < MIN_POINTS or not (scan.fov.depth(scan.points[members]) > 0).mean() > 0.5:
                 continue
-            shared = np.bincount(label[own] + 1, minlength=len(proposals) + 1)[1:]
-            union = proposals.count + len(own) - shared
+            shared = np.bincount(label[members] + 1, minlength=len(proposals) + 1)[1:]
+            union = proposals.count + len(members) - shared
             self.objects[kind] += 1
             self.detected[kind] += bool(len(union)) and (shared / union).max() > 0.5
 

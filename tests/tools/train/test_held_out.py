@@ -15,7 +15,6 @@ from tools.train.dataset import CLUSTERED, SHIPPED, SYNTHETIC, Dataset, folds
 from tools.train.held_out import Calibration, Validation, fit_calibration, fit_pool, out_of_fold
 from tools.train.scores import by_sensor, recall_at, shift
 
-
 IDENTITY = Calibration(1.0, np.zeros(4))
 
 

@@ -103,15 +103,8 @@ def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: i
     good = usable_windows(lines)
     n = len(good)
     p = len(REGRESSORS)
-    if n < 2 * p:
-        raise FitError(f"{n} usable windows are too few for {p} coefficients; record at least {2 * p}")
-    X = np.array([[regressor.count(line) for regressor in REGRESSORS] for line in good])
+    X, scale = _scaled_counts(good)
     y = np.array([line.energy_J for line in good], np.float64)
-    scale = np.linalg.norm(X, axis=0)
-    if not scale.all():
-        missing = ", ".join(r.name for r, s in zip(REGRESSORS, scale, strict=True) if not s)
-        raise FitError(f"nothing was counted for {missing}; vary its load")
-    X /= scale
     condition = float(np.linalg.cond(X))
     if condition > _MAX_CONDITION:
         raise FitError("the counts always varied together; vary rate and classification load independently")
@@ -120,13 +113,7 @@ def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: i
     # Resampling few windows underestimates the spread: widen by the ratio of Student's t to the normal quantile.
     wider = np.sqrt(n / (n - p)) * stats.t.ppf(_TAILS[1], n - p) / stats.norm.ppf(_TAILS[1])
     margin = wider * np.quantile(spread, _TAILS, axis=0)
-    negative = ", ".join(
-        f"{r.name} is {v:.3g} ({a:.3g} to {b:.3g})"
-        for r, v, a, b in zip(REGRESSORS, free / scale, *((free + margin) / scale), strict=True)
-        if b < 0
-    )
-    if negative:
-        raise FitError(f"{negative}, but work gives no energy back: the readings do not follow the load")
+    _refuse_negative(free / scale, *((free + margin) / scale))
     value = optimize.nnls(X, y)[0]
     residual = y - X @ value
     low, high = np.maximum(value + margin, 0.0)
@@ -142,6 +129,35 @@ def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: i
         explained=1.0 - float(residual @ residual) / variance if variance else 1.0,
         condition=condition,
     )
+
+
+def _scaled_counts(windows: Sequence[Line]) -> tuple[Float64, Float64]:
+    """(n, p) counts of REGRESSORS in the windows, divided by (p,) their norms.
+
+    Raises:
+        FitError: too few windows, or nothing was counted.
+    """
+    least = 2 * len(REGRESSORS)
+    if len(windows) < least:
+        few = f"{len(windows)} usable windows are too few for {len(REGRESSORS)} coefficients"
+        raise FitError(f"{few}; record at least {least}")
+    X = np.array([[regressor.count(line) for regressor in REGRESSORS] for line in windows])
+    scale = np.linalg.norm(X, axis=0)
+    if not scale.all():
+        missing = ", ".join(r.name for r, s in zip(REGRESSORS, scale, strict=True) if not s)
+        raise FitError(f"nothing was counted for {missing}; vary its load")
+    return X / scale, scale
+
+
+def _refuse_negative(value: Float64, low: Float64, high: Float64) -> None:
+    """Raises FitError where the whole interval of a coefficient is negative."""
+    negative = ", ".join(
+        f"{r.name} is {v:.3g} ({a:.3g} to {b:.3g})"
+        for r, v, a, b in zip(REGRESSORS, value, low, high, strict=True)
+        if b < 0
+    )
+    if negative:
+        raise FitError(f"{negative}, but work gives no energy back: the readings do not follow the load")
 
 
 def _bootstrap(X: Float64, y: Float64, random: np.random.Generator, resamples: int) -> Float64:

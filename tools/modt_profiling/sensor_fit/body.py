@@ -54,12 +54,12 @@ def find_body(sweeps: Sequence[Float32], height_m: float) -> Body | None:
     away = (range_m > BODY_REACH_M) & clear
     if not away.any() or fixed[away].mean() > MAX_FIXED_SHARE:
         return None
-    own = fixed & clear & (range_m < BODY_REACH_M)
-    if not own.any():
+    on_robot = fixed & clear & (range_m < BODY_REACH_M)
+    if not on_robot.any():
         return Body(np.zeros((0, 2)), 0.0)
     column: Bool = np.zeros(COLUMNS, np.bool_)
-    column[cells[own] % COLUMNS] = True
-    return Body(_sectors(column), float(range_m[own].max()) + MARGIN_M)
+    column[cells[on_robot] % COLUMNS] = True
+    return Body(_sectors(column), float(range_m[on_robot].max()) + MARGIN_M)
 
 
 def _nearest(points: Float32) -> Float64:

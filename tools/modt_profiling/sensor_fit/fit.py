@@ -90,14 +90,14 @@ def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator
     range_m = np.hypot(points[:, 0], points[:, 1])
     height_m = ground_height_m(recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M))
     body = None if height_m is None else find_body(recording.sweeps, height_m)
-    own = np.zeros(len(points), np.bool_)
+    on_robot = np.zeros(len(points), np.bool_)
     if body is not None and len(body.sectors_deg):
         bounds = tuple(np.round(body.sectors_deg, 1).ravel().tolist())
         evidence = "returns that move with the sensor; a wall along the way would look like that too"
         yield Finding("sensor", "blind_sectors_deg", bounds, evidence, reliable=False)
         yield Finding("sensor", "blind_range_m", round(body.range_m, 2), "farthest of these")
-        own = BlindSectors(bounds, body.range_m).contain(points)
-    nearest = min(MAX_MIN_RANGE_M, float(np.floor(10 * np.quantile(range_m[~own], 0.001))) / 10)
+        on_robot = BlindSectors(bounds, body.range_m).contain(points)
+    nearest = min(MAX_MIN_RANGE_M, float(np.floor(10 * np.quantile(range_m[~on_robot], 0.001))) / 10)
     evidence = f"of 0.1 % of the returns, at most {MAX_MIN_RANGE_M:g}"
     if body is None:
         evidence += "; whether they are on the robot is not known: the recording stands still or is too short"
