@@ -15,7 +15,8 @@ from modt.tracking.tracker import Tracker
 from modt.types import NONE
 from modt_simulation.synthetic_stream import SyntheticStream
 
-GATE_M, SIGMA_M = 2.0, 0.3
+GATE_M = 2.0
+SIGMA_M = 0.3
 
 
 class NearestCentroid:
@@ -25,7 +26,8 @@ class NearestCentroid:
         distance = np.linalg.norm(tracks.x[:, None, :2] - observations.centroid[None], axis=2)
         rows, columns = np.nonzero(distance < GATE_M)
         kept = assign(rows, columns, distance[rows, columns], GATE_M)
-        rows, columns = rows[kept], columns[kept]
+        rows = rows[kept]
+        columns = columns[kept]
         covariance = SIGMA_M**2 * np.eye(2)[None].repeat(len(rows), axis=0)
         return Matches(rows, columns, observations.centroid[columns], covariance, np.zeros((len(rows), 4)))
 

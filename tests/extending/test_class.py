@@ -21,7 +21,8 @@ ROW = '    ObjectClass.CYCLIST: ClassSpec(("Cyclist",)'
 def a_package_with_trucks(tmp_path):
     """A copy of the package whose table of classes has one row more."""
     source = tmp_path / "source"
-    root, unneeded = Path(__file__).parents[2], shutil.ignore_patterns("__pycache__")
+    root = Path(__file__).parents[2]
+    unneeded = shutil.ignore_patterns("__pycache__")
     for package in (root / "runtime" / "modt", *(root / "tools").glob("modt_*")):
         shutil.copytree(package, source / package.relative_to(root), ignore=unneeded)
     (source / "models").mkdir()

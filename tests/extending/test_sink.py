@@ -27,7 +27,8 @@ class ObjectTable(LineFile[FrameResult]):
 
 @pytest.mark.slow
 def test_a_replay_writes_every_frame_to_the_sink_and_books_it(tmp_path):
-    sink, results = ObjectTable(tmp_path / "objects.csv"), []
+    sink = ObjectTable(tmp_path / "objects.csv")
+    results = []
     request = Request(profile=["vlp-16"], mode="efficient", frames=(0, 5))
     loop = replay(request, {"objects": sink}, tmp_path / "run", None, ["test"])
     summary = loop.run(Notifier(), results.append)

@@ -70,7 +70,9 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path, capsys):
         (tmp_path / name / "tracks.jsonl").write_text("".join(tracks))
         return tmp_path / name
 
-    bare, cut, empty = copy("bare"), copy("cut"), copy("empty", [])
+    bare = copy("bare")
+    cut = copy("cut")
+    empty = copy("empty", [])
     shutil.rmtree(bare / "labels")
     (cut / "labels" / "000003.label").unlink()
     longer = copy("longer", [*lines, lines[-1].replace('"frame":4', '"frame":9')])

@@ -143,7 +143,8 @@ def copies(recorded, tmp_path):
     described = yaml.safe_load((run / "run.yaml").read_text())
     described["stream"]["path"] += "_gone"
     (made["gone"] / "run.yaml").write_text(yaml.safe_dump(described))
-    described["stream"]["path"], described["service"] = None, True
+    described["stream"]["path"] = None
+    described["service"] = True
     (made["live"] / "run.yaml").write_text(yaml.safe_dump(described))
     shutil.rmtree(made["bare"] / "labels")
     (made["odd"] / "tracks.jsonl").write_text(json.dumps({"schema": SCHEMA, "frame": 1, "tracks": [{}]}) + "\n")

@@ -23,7 +23,8 @@ def test_a_fitted_profile_is_that_of_the_sensor_and_is_not_overwritten(scans, tm
     assert "16 beams" in said
     assert "to be checked: sensor.period_s" in said
     assert "to be checked: decision.frequency" in said, "it rests on few proposals"
-    found, own = profile.load(str(tmp_path / "puck.yaml")), profile.load("vlp-16")
+    found = profile.load(str(tmp_path / "puck.yaml"))
+    own = profile.load("vlp-16")
     assert found.sensor.elevation_step_deg == pytest.approx(own.sensor.elevation_step_deg, rel=0.02)
     assert found.sensor.height_m == pytest.approx(own.sensor.height_m, abs=0.1)
     assert 0 < sum(found.decision.frequency) < 0.8

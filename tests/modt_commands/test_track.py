@@ -45,7 +45,8 @@ def test_results_are_read_back(tmp_path, capsys):
 
 
 def test_poses_place_detections_in_the_world(tmp_path):
-    source, poses = tmp_path / "a.txt", tmp_path / "poses.txt"
+    source = tmp_path / "a.txt"
+    poses = tmp_path / "poses.txt"
     write(source, T_world_level=turning)
     T_camera = [inverse(T_LEVEL_CAMERA) @ turning(i) @ T_LEVEL_CAMERA for i in range(20)]
     np.savetxt(poses, [T[:3].ravel() for T in T_camera])

@@ -157,7 +157,8 @@ def test_a_frame_as_a_picture(run, records):
 
 def test_a_doubtful_class_has_a_question_mark_in_pages_and_pictures(run, records, tmp_path, chromium):
     pytest.importorskip("matplotlib")
-    doubtful, (frame, *_) = shutil.copytree(run, tmp_path / "doubtful"), records[9:]
+    doubtful = shutil.copytree(run, tmp_path / "doubtful")
+    frame = records[9]
     for track in frame["tracks"]:
         track["posterior"] = [0.6, *(0.4 * (track["class"] == name) for name in CLASS_NAMES[1:])]
     (doubtful / "tracks.jsonl").write_text(json.dumps(frame) + "\n")
@@ -253,7 +254,8 @@ def outcomes(frames):
 def test_truth_beside_the_source_is_marked_and_drawn(labelled, tmp_path, chromium):
     exact, drive = labelled
     assert here("replay", drive, "--profile", "vlp-16", "--quiet", "--out", tmp_path / "boxes") == 0
-    frames, by_boxes = viewed(exact), viewed(tmp_path / "boxes")
+    frames = viewed(exact)
+    by_boxes = viewed(tmp_path / "boxes")
     assert {"found", "missed"} <= set(outcomes(frames))
     assert np.mean([a == b for a, b in zip(outcomes(frames), outcomes(by_boxes), strict=True)]) > 0.95
     shown = chromium.opened(exact / "view.html", "slide:14")
@@ -274,7 +276,8 @@ def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled,
     (live / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in moved))
     viewed(live)
     assert "a live source cannot be read again" in capsys.readouterr().err + caplog.text
-    by_stamp, by_number = viewed(live, "--truth", drive), viewed(exact)
+    by_stamp = viewed(live, "--truth", drive)
+    by_number = viewed(exact)
     assert "truth" not in by_stamp.pop()
     by_number.pop()
     assert np.mean([a == b for a, b in zip(outcomes(by_stamp), outcomes(by_number), strict=True)]) > 0.95
@@ -282,7 +285,8 @@ def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled,
 
 
 def test_misuse_is_one_line_with_the_remedy(run, tmp_path, capsys):
-    another, empty = tmp_path / "another", tmp_path / "empty"
+    another = tmp_path / "another"
+    empty = tmp_path / "empty"
     another.mkdir()
     empty.mkdir()
     (another / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 2)

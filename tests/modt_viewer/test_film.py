@@ -11,7 +11,9 @@ pytest.importorskip("matplotlib", reason="needs the extra [view]")
 from modt.errors import ModtError  # noqa: E402
 from modt_viewer import picture  # noqa: E402
 
-N, WIDTH, SIZE = 5, 128, (128, 91)
+N = 5
+WIDTH = 128
+SIZE = (128, 91)
 BLUE = (0, 0, 255)
 
 

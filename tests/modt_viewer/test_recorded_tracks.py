@@ -42,9 +42,11 @@ def recorded(at, *tracks, **more):
 
 
 def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
-    seen, lost = track(3, (4, 0, -1, 4.5, 1.8, 1.5, 0.5), (0, 4, 0, 1.0)), track(3, None, (0, 6, 0, 1.0), "lost")
+    seen = track(3, (4, 0, -1, 4.5, 1.8, 1.5, 0.5), (0, 4, 0, 1.0))
+    lost = track(3, None, (0, 6, 0, 1.0), "lost")
     records = [recorded(0, *posts(0.0), seen, classified=[3]), recorded(1, lost, *posts(1.0))]
-    states, boxes = list[str](), dict[int, np.ndarray]()
+    states = list[str]()
+    boxes = dict[int, np.ndarray]()
     table = track_table(frame_rows(at, record, states, boxes) for at, record in enumerate(records))
     assert states == ["tracked", "lost"]
     rows = [dict(zip(COLUMNS, row, strict=True)) for row in table.tolist()]
@@ -64,7 +66,8 @@ def rows(x, y=0.0, seen=1):
     return table
 
 
-FAR, LOST = rows([60]), rows([60] * 50, seen=0)
+FAR = rows([60])
+LOST = rows([60] * 50, seen=0)
 
 
 @pytest.mark.parametrize(
@@ -106,9 +109,10 @@ def test_an_object_is_drawn_where_the_sensor_sees_it():
     boxes = [[14, 2, 0, 4, 2, 1.5, 0.1], [15, 2, 0, 1, 1, 1.5, 0], [16, 2, 0, 4, 2, 1.5, 0], [0, 0, 0, 1, 1, 1, 0]]
     truth = FrameTruth.of(KITTI_TYPES, [1, 2, 3, 4], ["Car", "Pedestrian", "Car", "Tram"], boxes, T_box_sensor=T)
     rows = np.zeros(4, [("reported", int), ("class", int), ("to_segment", bool), ("to_classify", bool)])
-    rows["class"], rows["reported"], rows["to_segment"], rows["to_classify"] = (
-        truth.object_class, [1, 1, -1, 1], [1, 1, 0, 1], [1, 1, 1, 1],
-    )  # fmt: skip
+    rows["class"] = truth.object_class
+    rows["reported"] = [1, 1, -1, 1]
+    rows["to_segment"] = [1, 1, 0, 1]
+    rows["to_classify"] = [1, 1, 1, 1]
     objects = _objects(truth, rows)
     assert [(o["class"], o["outcome"]) for o in objects] == [(1, "found"), (2, "missed"), (1, "not judged")]
     assert [objects[0][key] for key in ("x", "y", "l", "w", "yaw")] == pytest.approx([4, 2, 4, 2, 0.1])

@@ -31,14 +31,16 @@ class LiveSequences(RuleBasedStateMachine):
     )
     def begin(self, source, odometry, others) -> None:
         self.world = LiveWorld(source, odometry)
-        self._cpu_s, self._messages = cpu_s(), 0
+        self._cpu_s = cpu_s()
+        self._messages = 0
         for payload in turns(source)[-1][:others] if self.world.maker else ():
             self.world.packet(self.world.stamped(payload))
 
     def check(self) -> None:
         world = self.world
         world.check(cpu_s() - self._cpu_s, world.messages - self._messages)
-        self._cpu_s, self._messages = cpu_s(), world.messages
+        self._cpu_s = cpu_s()
+        self._messages = world.messages
 
     @rule(turns=st.integers(1, 12), posed=st.booleans())
     def drive(self, turns, posed) -> None:
@@ -99,7 +101,8 @@ class LiveSequences(RuleBasedStateMachine):
         stands=st.booleans(),
     )
     def valid_packets_of_any_time(self, seed, scale_s, ahead, n, stands) -> None:
-        rng, world = np.random.default_rng(seed), self.world
+        rng = np.random.default_rng(seed)
+        world = self.world
         payloads = world.payloads[:1] if stands else world.payloads
         ahead_s = scale_s * rng.uniform(-1, ahead, n)
         for k, by_s in zip(rng.integers(len(payloads), size=n), np.sort(ahead_s) if stands else ahead_s, strict=True):
@@ -110,7 +113,8 @@ class LiveSequences(RuleBasedStateMachine):
     @precondition(lambda self: self.world.maker is not None and self.world.maker.turned is not None)
     @rule(seed=SEED, azimuth=st.sampled_from([None, 0, 17_999, 18_000, 35_999]), n=st.sampled_from([5, 200]))
     def heads_that_stand_or_leap(self, seed, azimuth, n) -> None:
-        rng, world = np.random.default_rng(seed), self.world
+        rng = np.random.default_rng(seed)
+        world = self.world
         for k in range(n):
             chosen = rng.integers(0, 36_000, 12) if azimuth is None else np.full(12, azimuth)
             payload = world.maker.turned(world.payloads[k % len(world.payloads)], chosen.tolist())
@@ -146,7 +150,8 @@ class LiveSequences(RuleBasedStateMachine):
     @precondition(lambda self: self.world.maker is not None)
     @rule(seed=SEED, at_ns=st.integers(0, 2**64 - 1), n=st.sampled_from([1, 50]))
     def bytes_of_packets_change(self, seed, at_ns, n) -> None:
-        rng, world = np.random.default_rng(seed), self.world
+        rng = np.random.default_rng(seed)
+        world = self.world
         for payload in world.payloads[:n]:
             changed = bytearray(world.stamped(payload))
             for _ in range(int(rng.integers(1, 4))):
@@ -195,7 +200,8 @@ class LiveSequences(RuleBasedStateMachine):
 
     @rule(seed=SEED, n=st.sampled_from([3, 300]), digits=st.integers(0, 9))
     def poses_in_disorder(self, seed, n, digits) -> None:
-        rng, world = np.random.default_rng(seed), self.world
+        rng = np.random.default_rng(seed)
+        world = self.world
         for offset_s in rng.normal(0.0, 0.5, n).round(digits):
             world.honest_pose(float(offset_s))
         world.drive(1)

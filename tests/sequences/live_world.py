@@ -30,9 +30,12 @@ SPEED_MPS = 5.0
 POSES_A_TURN = 5
 REACH_M = POSITION_NOISE_M + 2 * CONFIG.max_speed_mps * MAX_AGE_S
 """No pose of a frame is farther from every pose that was sent."""
-MOST_KINDS, MOST_REASONS = 60, 40
-MESSAGE_CPU_S, SLACK_CPU_S = 0.004, 1.0
-"""CPU time that a message may take on average, and a whole step besides."""
+MOST_KINDS = 60
+MOST_REASONS = 40
+MESSAGE_CPU_S = 0.004
+"""CPU time that a message may take on average."""
+SLACK_CPU_S = 1.0
+"""CPU time that a whole step may take besides."""
 
 
 @cache
@@ -51,7 +54,8 @@ class Datagrams(ReceivedPoses):
         self.held: list[bytes] = []
 
     def _take(self) -> list[bytes]:
-        taken, self.held = self.held[-CAPACITY:], []
+        taken = self.held[-CAPACITY:]
+        self.held = []
         self.received += len(taken)
         return taken
 
@@ -60,10 +64,12 @@ class Held:
     """A subscription to the messages that a test hands over. It gives the latest ones."""
 
     def __init__(self, depth: int) -> None:
-        self.depth, self.held = depth, list[Any]()
+        self.depth = depth
+        self.held = list[Any]()
 
     def take(self, timeout_s: float = 0.0) -> list[Any]:
-        taken, self.held = self.held[-self.depth :], []
+        taken = self.held[-self.depth :]
+        self.held = []
         return taken
 
 
@@ -72,8 +78,10 @@ class Lines(logging.Handler):
 
     def __init__(self, world: LiveWorld) -> None:
         super().__init__()
-        self.said, self.passed = Counter[str](), Counter[tuple[str, float]]()
-        self._world, self._limit = world, OncePerSecond(lambda: world.now_s)
+        self.said = Counter[str]()
+        self.passed = Counter[tuple[str, float]]()
+        self._world = world
+        self._limit = OncePerSecond(lambda: world.now_s)
 
     def emit(self, record: logging.LogRecord) -> None:
         kind = f"{record.name} {record.msg}"
@@ -103,8 +111,12 @@ class LiveWorld:
     """
 
     def __init__(self, source: str, odometry: str) -> None:
-        self.now_s, self.set_s, self.sensor_s, self.origin_m = 100.0, 1.6e9, 0.0, np.zeros(2)
-        self.source, self.maker = source, MAKERS.get(source)
+        self.now_s = 100.0
+        self.set_s = 1.6e9
+        self.sensor_s = 0.0
+        self.origin_m = np.zeros(2)
+        self.source = source
+        self.maker = MAKERS.get(source)
         self.payloads = turns(source)[0] if self.maker else ()
         self.decoder = self.maker.decoder() if self.maker else None
         self.reader: Any = Reader()
@@ -117,7 +129,8 @@ class LiveWorld:
             self.reader = PointCloudReader(self.clouds, "points")  # type: ignore[arg-type]
         info = StreamInfo("sensor", "test", 0, None, TURN_S, None, has_poses=False)
         self.stream = LiveStream(info, self.reader, clock=lambda: self.now_s)
-        self.messages, self.frames = 0, list[Frame]()
+        self.messages = 0
+        self.frames = list[Frame]()
         self._taken: list[tuple[float, float]] = []
         self.sent: deque[tuple[float, float, float]] = deque(maxlen=2000)
         self.poses: Any = Datagrams() if odometry == "datagrams" else PoseTopic(Held(256), CONFIG, "odom", np.eye(4))  # type: ignore[arg-type]
@@ -208,7 +221,8 @@ class LiveWorld:
             n = len(self.payloads)
             packets_ = [(k / n * TURN_S, payload, 0.0) for k, payload in enumerate(self.payloads)]
             packets_ = packets_ if faults is None else faults(packets_)
-            began_s, due = self.now_s, 0
+            began_s = self.now_s
+            due = 0
             for at_s, payload, ahead_s in packets_ if sensing else []:
                 self.now_s = max(self.now_s, began_s + at_s)
                 self.packet(self.stamped(payload, ahead_s))
@@ -236,7 +250,8 @@ class LiveWorld:
         assert len(self.lines.said) <= MOST_KINDS, "too many kinds of lines"
 
     def _present_counts(self) -> dict[str, float]:
-        health, report = self.stream.health(), self.poses.report()
+        health = self.stream.health()
+        report = self.poses.report()
         counts = {key: value for key, value in health.items() if isinstance(value, int)} | {"silent": 0}
         counts |= {f"refused {reason}": n for reason, n in health["refused_messages"].items()}
         counts |= {key: value for key, value in report.items() if isinstance(value, int)}
@@ -254,7 +269,8 @@ class LiveWorld:
     def recovers(self) -> None:
         """Check that sweeps and their poses come again three seconds after the last fault."""
         self.drive(30)
-        frames, posed = self.stream.sweeps, self.poses.posed
+        frames = self.stream.sweeps
+        posed = self.poses.posed
         refused = self.stream.faults.skipped
         self.drive(10)
         assert self.stream.sweeps - frames >= 9, "blind"

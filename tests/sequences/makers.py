@@ -108,12 +108,15 @@ class OusterSensor:
     def stamped(self, payload: bytes, at_s: float) -> bytes:
         """Packet with another time, in the present frame."""
         sdk, info, _ = _ouster()
-        layout, packet = sdk.PacketFormat(info), sdk.LidarPacket(sdk.PacketFormat(info))
+        layout = sdk.PacketFormat(info)
+        packet = sdk.LidarPacket(sdk.PacketFormat(info))
         packet.buf[:] = np.frombuffer(payload, np.uint8)
         first = int(layout.packet_header(sdk.ColHeader.MEASUREMENT_ID, packet.buf)[0])
-        half, ahead = info.format.columns_per_frame // 2, first - self.column
+        half = info.format.columns_per_frame // 2
+        ahead = first - self.column
         if ahead < -half:
-            self.frame, self.column = self.frame + 1, first
+            self.frame += 1
+            self.column = first
         else:
             self.column = max(self.column, first if ahead < half else 0)
         late = ahead >= half  # a packet of the frame before

@@ -44,8 +44,10 @@ class Watched:
     """A scheduler whose grants are held against the budget."""
 
     def __init__(self, scheduler: Scheduler) -> None:
-        self._scheduler, self.cost = scheduler, scheduler.cost
-        self._frames, self._spent_ms = 0, 0.0
+        self._scheduler = scheduler
+        self.cost = scheduler.cost
+        self._frames = 0
+        self._spent_ms = 0.0
 
     def paid(self, points: Any, cpu_ms: float) -> None:
         self._spent_ms += max(cpu_ms, 0.0)
@@ -128,20 +130,23 @@ class Run:
         assert np.isfinite(found.centroid).all()
 
     def _tracks(self, result: FrameResult) -> None:
-        tracks, ids = result.tracks, result.tracks.id.tolist()
+        tracks = result.tracks
+        ids = result.tracks.id.tolist()
         own = tracks.proposal[tracks.proposal != NONE]
         assert sorted(own.tolist()) == list(range(len(result.proposals)))  # every proposal has one track
         assert len(set(ids)) == len(ids)
         assert ((tracks.missed > 0) == (tracks.proposal == NONE)).all()
         new = set(ids) - self._before
         assert all(number >= self._next_id for number in new)  # no identity comes back
-        self._before, self._next_id = frozenset(ids), max([self._next_id - 1, *ids]) + 1
+        self._before = frozenset(ids)
+        self._next_id = max([self._next_id - 1, *ids]) + 1
         assert set(result.classified.tolist()) <= set(tracks.id[tracks.proposal != NONE].tolist())
         for name, column in tracks.columns().items():
             assert np.isfinite(column).all(), name
 
     def _posteriors(self, result: FrameResult) -> None:
-        tracks, frequency = result.tracks, self.pipeline.decision.frequency
+        tracks = result.tracks
+        frequency = self.pipeline.decision.frequency
         for column in (tracks.prior, tracks.posterior, frequency[None]):
             assert (column >= 0).all()
             np.testing.assert_allclose(column.sum(axis=1), 1.0, rtol=0, atol=1e-9)

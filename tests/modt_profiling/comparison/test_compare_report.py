@@ -35,7 +35,8 @@ class Board:
     facts = FACTS
 
     def __init__(self, every=1):
-        self.every, self.now_ns = every, 0
+        self.every = every
+        self.now_ns = 0
         self.ledger = Ledger(self.clock, self.clock)
 
     def clock(self):
@@ -63,7 +64,8 @@ class Board:
 
 
 def mode_run(name, metered):
-    board, windows = Board(EVERY[name]), None
+    board = Board(EVERY[name])
+    windows = None
     if metered:
         windows = Windows([board], Clocks(board.clock, board.clock, board.clock), Conditions(), min_s=0.1)
         for _ in range(2):  # its power is known
@@ -109,7 +111,8 @@ MEAN_MS = {"conventional": 10.975 + 2 + 3, "efficient": 10.975 + 2 + 3 / 20, "ac
 
 @pytest.mark.parametrize("mode", MODES)
 def test_estimated_energy_is_watts_times_cpu_time_and_measured_energy_that_of_the_meter(estimated, measured, mode):
-    found, metered = estimated["modes"][mode], measured["modes"][mode]
+    found = estimated["modes"][mode]
+    metered = measured["modes"][mode]
     assert found["cpu_ms"].value == pytest.approx(MEAN_MS[mode])
     assert found["net_J"].value == pytest.approx(3.0 * MEAN_MS[mode] / 1e3)
     assert found["gross_J"].value == pytest.approx(0.1 + 3.0 * MEAN_MS[mode] / 1e3)

@@ -22,7 +22,8 @@ class Scripted(Board):
 
     def __init__(self, name, log):
         super().__init__()
-        self.name, self.log = name, log
+        self.name = name
+        self.log = log
 
     def seen(self, index):
         return SCRIPT[index], CLASSIFIED[index]

@@ -13,7 +13,10 @@ from modt_profiling.comparison.comparison import COUNTS
 from modt_profiling.comparison.gamma import GammaEstimate, RunCosts, estimate_gamma
 from modt_profiling.comparison.prediction import OBSERVED, Rates, Stream, expect, forecast, measured
 
-SEG_S, TRACK_S, SCHEDULE_S, CLASS_S = 5e-8, (1e-3, 5e-5, 2e-5), (2e-4, 1e-6), (5e-4, 4e-4, 1e-6)
+SEG_S = 5e-8
+TRACK_S = (1e-3, 5e-5, 2e-5)
+SCHEDULE_S = (2e-4, 1e-6)
+CLASS_S = (5e-4, 4e-4, 1e-6)
 GAMMA = slice(3, None)
 FRAMES = 240
 
@@ -43,7 +46,8 @@ def run(mode: str, seen: np.ndarray, n_go: float, random: np.random.Generator, n
         "scheduling": SCHEDULE_S[0] + SCHEDULE_S[1] * (proposals + 2),
         "classification": np.stack([classified > 0, classified, network], 1) @ CLASS_S,
     }
-    table, cost = np.zeros((FRAMES, len(COUNTS)), np.int64), np.zeros((FRAMES, len(STAGES)))
+    table = np.zeros((FRAMES, len(COUNTS)), np.int64)
+    cost = np.zeros((FRAMES, len(STAGES)))
     for name, value in counts.items():
         table[:, COUNTS.index(name)] = value
     for stage, spent_s in costs.items():
@@ -146,7 +150,8 @@ def estimated(*given: RunCosts) -> GammaEstimate:
 
 
 def test_intervals_cover_the_truth_with_noise():
-    truth, found = estimated(*three_runs()).measured.value, estimated(*three_runs(noise=0.1))
+    truth = estimated(*three_runs()).measured.value
+    found = estimated(*three_runs(noise=0.1))
     assert found.measured.low < truth < found.measured.high
     assert found.reconciled.low < truth < found.reconciled.high
     assert found.deviation.low < 0 < found.deviation.high

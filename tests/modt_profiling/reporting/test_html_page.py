@@ -72,10 +72,12 @@ def test_the_extra_that_a_page_needs_is_named(tmp_path, monkeypatch):
 
 
 def test_how_many_are_as_late_or_later(tmp_path):
-    late, punctual = Deadlines(0.1), Deadlines(0.1)
+    late = Deadlines(0.1)
+    punctual = Deadlines(0.1)
     for ms in (0.2, 0.2, 3.0, 40.0):
         late.lateness.add(round(1e6 * ms))
-    found, none = late.late_or_later(), punctual.late_or_later()
+    found = late.late_or_later()
+    none = punctual.late_or_later()
     assert found["ms"] == pytest.approx([0.2, 3.0, 40.0], rel=0.03)
     assert found["frames"] == [4, 2, 1]
     (tmp_path / SUMMARY).write_text(json.dumps({"lateness": found}))

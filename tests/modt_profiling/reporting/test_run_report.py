@@ -60,8 +60,10 @@ def row(calls, items, ms, points=0):
 
 
 CAR_AND_BACKGROUND = result(0, [40, 40], {0: 0, 1: 1}, {0: CAR})
-CAR_AND_BACKGROUND.tracks.key_points[0], CAR_AND_BACKGROUND.tracks.final[0] = 40, True
-CAR_AND_BACKGROUND.tracks.points[:], CAR_AND_BACKGROUND.tracks.age[:] = 40, 1
+CAR_AND_BACKGROUND.tracks.key_points[0] = 40
+CAR_AND_BACKGROUND.tracks.final[0] = True
+CAR_AND_BACKGROUND.tracks.points[:] = 40
+CAR_AND_BACKGROUND.tracks.age[:] = 1
 NAMED, NAMELESS = frame_record(CAR_AND_BACKGROUND)["tracks"]
 
 
@@ -251,7 +253,8 @@ def test_points_hold_the_sums_of_their_frames(values):
     series = FrameSeries(1, points=8)
     for value in values:
         series.add([value])
-    frames, means = series.frames, series.means[:, 0]
+    frames = series.frames
+    means = series.means[:, 0]
     assert len(frames) == len(means) <= 8
     ends = np.cumsum(frames)
     assert ends[-1] == series.count == len(values)

@@ -17,7 +17,8 @@ from tools.send.loops import VelodyneStamps
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_changes_the_packets_from_its_begin_to_its_end(fault):
     before = [payload for _, payload in packets("vlp-16", 3)]
-    sent, faulty = iter(enumerate(before)), Faulty()
+    sent = iter(enumerate(before))
+    faulty = Faulty()
 
     def take(n):
         return [payload for _, payload in islice(faulty.applied(sent), n)]
@@ -35,7 +36,8 @@ def test_a_fault_changes_the_packets_from_its_begin_to_its_end(fault):
 
 
 def test_the_clock_of_the_sensor_is_set_once_by_its_fault():
-    stamps, faulty = VelodyneStamps(), Faulty()
+    stamps = VelodyneStamps()
+    faulty = Faulty()
     faulty.fault = next(fault for fault in FAULTS if fault.clock_s)
     sent = [(0.0, payload) for _, payload in packets("vlp-16", 1)][:4]
     changed = [payload for _, payload in islice(faulty.applied(iter(sent)), 4)]
@@ -45,7 +47,8 @@ def test_the_clock_of_the_sensor_is_set_once_by_its_fault():
 
 
 def result_log(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0, stall_s=0.0):
-    seen, times_s = ResultLog(), 0.1 * np.arange(1, 2000)
+    seen = ResultLog()
+    times_s = 0.1 * np.arange(1, 2000)
     seen.times_s = (times_s + stall_s * (times_s > 49.0)).tolist()
     seen.full = [not 50 < t < full_from for t in times_s]
     seen.missed = [sum(at <= t for at in missed_at) for t in times_s]

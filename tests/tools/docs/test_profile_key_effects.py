@@ -58,7 +58,8 @@ def street(stream: tuple[int, float] = (3, 1.0), also: str = "", value: Any = No
     """
 
     def digest_of(config: ProfileConfig, _folder: Path) -> str:
-        ledger, mode = Ledger(lambda: 0, lambda: 0), assembly.MODES["accurate"]
+        ledger = Ledger(lambda: 0, lambda: 0)
+        mode = assembly.MODES["accurate"]
         config = changed(config, also, value) if also else config
         pipeline = assembly.pipeline(mode, config, FieldOfView(), ledger)
         digest = hashlib.sha256()
@@ -127,13 +128,15 @@ OTHER_VALUES: dict[str, Any] = {
 
 def other_values(key: Key) -> Iterator[Any]:
     """Other values of a key, the moderate ones first."""
-    value, facts = attrgetter(key.path)(BASE), key.facts
+    value = attrgetter(key.path)(BASE)
+    facts = key.facts
     if key.path in OTHER_VALUES:
         yield OTHER_VALUES[key.path]
     elif "options" in facts:
         yield from facts["options"]
     else:
-        low, high = facts["low"], facts["high"]
+        low = facts["low"]
+        high = facts["high"]
         start = np.array(low + (high - low) / 1000 if value is None else value, np.float64)
         for other in (0.5 * start, 2.0 * start, 0.1 * start, 10.0 * start, low, high):
             bounded = np.clip(other, low, high).tolist()

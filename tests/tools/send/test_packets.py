@@ -19,7 +19,9 @@ from tools.send.pcap_writer import write_capture
 
 
 def test_each_packet_is_sent_when_it_is_due():
-    now_s, slept, sent = [10.0], [], []
+    now_s = [10.0]
+    slept = []
+    sent = []
 
     def sleep(time_s):
         slept.append(time_s)
@@ -59,7 +61,8 @@ def test_a_capture_is_repeated_without_a_gap_or_sent_as_it_is(tmp_path, monkeypa
 
 def test_a_stream_of_scans_is_sent_as_an_hdl_64e(tmp_path, monkeypatch):
     pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
-    scans, calibration = layouts.bare(tmp_path), tmp_path / "ideal.yaml"
+    scans = layouts.bare(tmp_path)
+    calibration = tmp_path / "ideal.yaml"
     out = written(tmp_path, monkeypatch, scans, "--as", "hdl-64e", "--calibration", calibration, "--seconds", "0.35")
     stream = open_stream(out, capture={"calibration": str(calibration)})
     assert stream.info.profile == "hdl-64e"

@@ -18,7 +18,8 @@ from tools.train.labelled_scans import Scan
 def data_of(crops: Crops, label: Int, **columns: Any) -> Dataset:
     """Crops of one real drive, whole and without reflectance, except for the columns given."""
     n = len(crops)
-    false, zero = np.zeros(n, np.bool_), np.zeros(n, np.int64)
+    false = np.zeros(n, np.bool_)
+    zero = np.zeros(n, np.int64)
     table: dict[str, Any] = {
         "sensors": Sensors.of(SensorConfig(), np.ones((n, 7)), np.full(n, -1.73)),
         "majority": label,

@@ -34,7 +34,8 @@ def test_augmentation_keeps_every_crop_and_enough_points(counts, seed):
 def test_no_augmented_crop_is_finer_than_its_sensor():
     rng = np.random.default_rng(0)
     azimuth, elevation = np.meshgrid(np.arange(-3, 3, 0.1), np.arange(-4.9, 0, 0.5))  # ten beams
-    a, e = np.deg2rad(azimuth.ravel()), np.deg2rad(elevation.ravel())
+    a = np.deg2rad(azimuth.ravel())
+    e = np.deg2rad(elevation.ravel())
     wall = np.c_[15 * np.cos(a), 15 * np.sin(a), 15 * np.tan(e)].astype(np.float32)
     n = 200
     crops = Crops(np.tile(wall, (n, 1)), np.arange(n + 1) * len(wall))
@@ -52,7 +53,8 @@ def boards(n: int, height_m: float = 1.8) -> tuple[Crops, Sensors]:
     y, z = np.meshgrid(np.linspace(-0.25, 0.25, 8), np.linspace(-1.4, height_m - 1.73, 60))
     one = np.stack([np.full(y.size, 10.0), y.ravel(), z.ravel()], axis=1)
     crops = Crops(np.tile(one, (n, 1)).astype(np.float32), np.arange(n + 1) * len(one))
-    ground, step = np.full(n, -1.73), np.full(n, 0.4)
+    ground = np.full(n, -1.73)
+    step = np.full(n, 0.4)
     return crops, Sensors(ground, step, step)
 
 

@@ -26,7 +26,8 @@ def single_points(label: Int, **columns: Any) -> Dataset:
 def test_folds_split_real_scans_by_drive_and_leave_out_the_rest():
     drive = np.array([0, 0, 1, 2, 3, 4, 4, 5])  # the last two drives are synthetic
     truth = truth_of(np.array([1, 2, 1]), np.array([0, 1, 2]))
-    label, variant = np.array([1, 0, 2, 1, 0, 1, 0, 3]), np.where(drive < 4, SHIPPED, SYNTHETIC)
+    label = np.array([1, 0, 2, 1, 0, 1, 0, 3])
+    variant = np.where(drive < 4, SHIPPED, SYNTHETIC)
     fold = folds(single_points(label, variant=variant, drive=drive, truth=truth), 3)
     assert (fold[4:] == NONE).all()
     assert sorted(set(fold[:4].tolist())) == [0, 1, 2]
@@ -53,8 +54,10 @@ def test_out_of_fold_models_predict_drives_unseen_in_training():
 
 
 def test_every_sensor_counts_as_much_as_the_others():
-    label, sensor = np.array([0, 0, 0, 1, 0, 1, 2, 0]), np.array([0, 0, 0, 0, 1, 1, 1, 1])
-    partial, variant = np.arange(8) == 4, np.where(np.arange(8) == 7, CLUSTERED, SHIPPED)
+    label = np.array([0, 0, 0, 1, 0, 1, 2, 0])
+    sensor = np.array([0, 0, 0, 0, 1, 1, 1, 1])
+    partial = np.arange(8) == 4
+    variant = np.where(np.arange(8) == 7, CLUSTERED, SHIPPED)
     truth = truth_of(label[4:], np.array([0, 0, 0, 9]), row=np.array([5, NONE, 7, 4]))
     columns = {"sensor": sensor, "sensor_names": ("a", "b"), "partial": partial, "variant": variant}
     valid = Validation.of(single_points(label, truth=truth, **columns))
@@ -67,7 +70,8 @@ def test_every_sensor_counts_as_much_as_the_others():
 
 
 def test_the_box_tells_objects_from_background_alone():
-    label, nothing = np.arange(400) % 4, np.zeros((400, 4))
+    label = np.arange(400) % 4
+    nothing = np.zeros((400, 4))
     valid = Validation.of(single_points(label, truth=truth_of(label, 0 * label, row=np.arange(400))))
     box = np.eye(4)[label] * 0.96 + 0.01
     weights, log_posterior = fit_pool(softmax(nothing, axis=1), box, nothing, valid, valid.weight)
@@ -94,7 +98,9 @@ def test_calibration_recovers_temperature_and_class_offsets():
 def test_calibration_folds_into_the_last_layer():
     rng = np.random.default_rng(0)
     calibration = Calibration(1.7, np.array([0.0, -1.0, 0.5, 2.0]))
-    x, weight, bias = rng.normal(size=(5, 8)), rng.normal(size=(8, 4)), rng.normal(size=4)
+    x = rng.normal(size=(5, 8))
+    weight = rng.normal(size=(8, 4))
+    bias = rng.normal(size=4)
     *hidden, folded = calibration.fold_into([(weight, bias), (weight, bias)])
     np.testing.assert_allclose(hidden[0][0], weight, atol=1e-6)
     np.testing.assert_allclose(
@@ -105,7 +111,8 @@ def test_calibration_folds_into_the_last_layer():
 def test_recall_counts_the_objects_called_right_at_the_precision():
     score = np.array([9.0, 8, 7, 6, 5, 4])
     right = np.array([True, True, False, True, True, False])
-    row, every = np.array([0, 3, 4, NONE, 5]), np.ones(6, np.bool_)
+    row = np.array([0, 3, 4, NONE, 5])
+    every = np.ones(6, np.bool_)
     wanted = np.array([True, True, True, True, False])  # the last one has too few points
 
     def recall(precision: float) -> tuple[float, float]:

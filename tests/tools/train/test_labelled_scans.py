@@ -53,7 +53,8 @@ def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_un
 
 
 def test_cars_of_pandaset_are_turned_to_their_points_and_people_without_a_label_unknown(tmp_path):
-    side, height = np.linspace(-2.0, 2.0, 41), np.full(41, 1.6)
+    side = np.linspace(-2.0, 2.0, 41)
+    height = np.full(41, 1.6)
     across = np.c_[np.full(41, -20.0), 30.0 + side, height]  # sensor at (-30, 34.1, 1.79)
     along = np.c_[-10.0 + side, np.full(41, 30.0), height]
     people = np.array([[-20.0, 51.6, 1.6], [-21.3, 51.4, 1.6], [-20.0, 55.0, 1.6]])

@@ -10,7 +10,8 @@ def test_max_pooled_linear_has_the_gradients_of_its_definition():
 
     torch.manual_seed(0)
     count = torch.tensor([1, 7, 30])
-    x, weight = torch.randn(38, 5, requires_grad=True), torch.randn(11, 5, requires_grad=True)
+    x = torch.randn(38, 5, requires_grad=True)
+    weight = torch.randn(11, 5, requires_grad=True)
     outward = torch.randn(3, 11)
     found = MaxPooledLinear.apply(x, weight, count)
     expected = torch.segment_reduce(x @ weight.T, "max", lengths=count, axis=0)
