@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from modt import host
-from modt.app import assembly
 from modt.classes import CLASS_NAMES
 from modt_evaluation.evaluation import ALL, Evaluation, collect, evaluation
 from modt_evaluation.experiments.catalogue import chosen
@@ -71,15 +70,14 @@ def on_kitti(drive: drives.Drive) -> Iterator[str]:
 
     All modes run on each frame, in random order.
     """
-    modes = {name: assembly.MODES[name] for name in (BASELINE, *BESIDE)}
-    pipelines = {name: assembly.pipeline(mode, drive.profile, drive.fov) for name, mode in modes.items()}
-    cpu_ns: dict[str, list[int]] = {name: [] for name in modes}
+    steps = {name: drives.steps_of(name, drive.profile, drive.fov) for name in (BASELINE, *BESIDE)}
+    cpu_ns: dict[str, list[int]] = {name: [] for name in steps}
     judged = []
     rng = np.random.default_rng(0)
     for frame, truth in drive.frames:
-        for name in rng.permutation(list(modes)).tolist():
+        for name in rng.permutation(list(steps)).tolist():
             began_ns = time.thread_time_ns()
-            result = pipelines[name].step(frame, modes[name].budget(drive.profile))
+            result = steps[name](frame)
             cpu_ns[name].append(time.thread_time_ns() - began_ns)
             if name == MODE:
                 judged.append(JudgedFrame.of_result(result, truth, drive.fov))

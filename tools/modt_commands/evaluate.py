@@ -120,7 +120,7 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
     if arguments.html is not None:
-        from modt_profiling.reporting.document import save
+        from modt_profiling.reporting.view_extra import save
         from modt_viewer.evaluation_page import evaluation_page
 
         save(arguments.html, evaluation_page(sensors))
@@ -140,7 +140,7 @@ def list_unlabelled(arguments: argparse.Namespace) -> None:
     """
     from modt.sinks.output import writing
     from modt_evaluation.unlabelled import listing, unlabelled, write_table
-    from modt_profiling.reporting.document import save
+    from modt_profiling.reporting.view_extra import save
     from modt_viewer.crop_picture import mover_page
 
     folder: Path = arguments.unlabelled

@@ -35,8 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app.inputs import Request
     from modt_profiling.comparison.compare import compare
     from modt_profiling.comparison.compare_view import compare_document, compare_plots
-    from modt_profiling.reporting.document import save
     from modt_profiling.reporting.quantity import to_json
+    from modt_profiling.reporting.view_extra import save
 
     def begin_repetition(number: int) -> None:
         if sys.stderr.isatty():

@@ -32,9 +32,9 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt.sinks.records import records_of
-    from modt_profiling.reporting.document import save
     from modt_profiling.reporting.quantity import to_json
     from modt_profiling.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
+    from modt_profiling.reporting.view_extra import save
 
     path = arguments.run_directory
     if path.is_file():

@@ -26,8 +26,7 @@ from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, occupied, packed_ce
 from modt_evaluation.run_record import FramesByNumber
 from modt_evaluation.truth import by_stamp
 from modt_evaluation.truth_files import labels_beside, open_truth
-from modt_profiling.reporting.document import save
-from modt_profiling.reporting.view_extra import importing
+from modt_profiling.reporting.view_extra import importing, save
 from modt_viewer.recorded_run import RecordedRun, reach_m
 from modt_viewer.track_page import rows_of, track_page, views
 from modt_viewer.truth_marks import LEGEND, truth_marks

@@ -22,13 +22,12 @@ from pathlib import Path
 import numpy as np
 
 from modt import host, profile
-from modt.app import assembly
 from modt.cli.options import frames as number_range
-from modt.geometry import FieldOfView
 from modt_simulation.sensors import SENSORS
 from modt_simulation.synthetic_stream import SyntheticStream
 from tools.docs.sections import replace_section
 from tools.options import parser
+from tools.study.drives import steps_of
 
 BOARDS = {
     "Raspberry Pi 4 (Cortex-A72, 1.8 GHz)": 1752,
@@ -80,16 +79,14 @@ def measured_rating() -> int:
 def work_of(sensor: str, mode_name: str, seeds: Sequence[int], seconds: float) -> Work:
     """Count and time the frames of simulated streets."""
     rows: list[tuple[float, float, float, float]] = []
-    mode = assembly.MODES[mode_name]
     config = profile.load(sensor)
     for seed in seeds:
         frames = list(SyntheticStream("street", sensor, seconds, seed))
-        pipeline = assembly.pipeline(mode, config, FieldOfView())
-        budget = mode.budget(config)
+        step = steps_of(mode_name, config)
         gc.collect()
         for number, frame in enumerate(frames):
             start = time.thread_time_ns()
-            result = pipeline.step(frame, budget)
+            result = step(frame)
             cpu_ms = (time.thread_time_ns() - start) / 1e6
             if number >= _FIRST:
                 rows.append((len(frame.points), len(result.proposals), len(result.classified), cpu_ms))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from modt.app import assembly
@@ -11,7 +12,7 @@ from modt.config import ProfileConfig
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
 from modt.sources.recognise import open_stream
-from modt.types import Frame
+from modt.types import Frame, FrameResult
 from modt_evaluation.evaluation import DriveRows, collect
 from modt_evaluation.experiments.drives import SIMULATED_TYPES
 from modt_evaluation.frame import JudgedFrame
@@ -61,11 +62,19 @@ def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None)
     return Drive(path.name, load(profile), frames, truth.rules, fov)
 
 
+Step = Callable[[Frame], FrameResult]
+"""Processes a frame."""
+
+
+def steps_of(mode_name: str, profile: ProfileConfig, fov: FieldOfView | None = None) -> Step:
+    """A new pipeline of a mode with its budget, over the full circle by default."""
+    mode = assembly.MODES[mode_name]
+    pipeline = assembly.pipeline(mode, profile, fov or FieldOfView())
+    return partial(pipeline.step, budget=mode.budget(profile))
+
+
 def judged(drive: Drive, mode_name: str, number: int = 0) -> DriveRows:
     """Run a drive in a mode and judge it. Drives that are pooled need different numbers."""
-    mode = assembly.MODES[mode_name]
-    pipeline = assembly.pipeline(mode, drive.profile, drive.fov)
-    budget = mode.budget(drive.profile)
-    results = ((pipeline.step(frame, budget), truth) for frame, truth in drive.frames)
-    frames = (JudgedFrame.of_result(result, truth, drive.fov) for result, truth in results)
+    step = steps_of(mode_name, drive.profile, drive.fov)
+    frames = (JudgedFrame.of_result(step(frame), truth, drive.fov) for frame, truth in drive.frames)
     return collect(frames, drive.rules, number)

@@ -19,7 +19,6 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.app import assembly
 from modt.cli.options import frames as frame_range
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
 from modt.poses.pose_source import NoPoses
@@ -29,6 +28,7 @@ from modt.sources.recognise import open_scans
 from modt.sources.stream import Stream
 from modt.types import Float64
 from tools.options import parser
+from tools.study.drives import steps_of
 
 VN = 6
 """Column of an OXTS record: velocity to the north [m/s]."""
@@ -64,13 +64,10 @@ def drift(estimate: Float64, reference: Float64) -> dict[str, float]:
 
 def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     """(n, 4, 4) poses estimated from proposals, without odometry."""
-    profile = load()
-    mode = assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assembly.pipeline(mode, profile, fov)
-    budget = mode.budget(profile)
-    return np.array([pipeline.step(frame, budget).T_world_sensor for frame in map(NoPoses().place, stream)])
+    step = steps_of("efficient", load(), fov)
+    return np.array([step(frame).T_world_sensor for frame in map(NoPoses().place, stream)])
 
 
 def by_kiss_icp(stream: Stream) -> Float64:

@@ -14,21 +14,20 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
-from modt.app import assembly
 from modt.classes import CLASS_NAMES
 from modt.cli.options import frames as number_range
-from modt.geometry import FieldOfView, wrap
+from modt.geometry import wrap
 from modt.profile import load
 from modt.types import NONE, Float64, Int, Proposals
 from modt_simulation.synthetic_stream import SyntheticStream
 from modt_simulation.world import MOVING_MPS
 from tools.options import parser
+from tools.study.drives import steps_of
 
 MIN_HITS = 6
 """Minimum number of proposals of a track before its errors count."""
@@ -58,14 +57,11 @@ class BodyTrack:
 
 def body_tracks(stream: SyntheticStream, profile_name: str) -> list[BodyTrack]:
     """Tracks that were on one body for at least MIN_FRAMES frames, in mode `efficient`."""
-    profile = load(profile_name)
-    mode = assembly.MODES["efficient"]
     world = stream.simulator.world
-    pipeline = assembly.pipeline(mode, profile, FieldOfView())
-    budget = mode.budget(profile)
+    step = steps_of("efficient", load(profile_name))
     records: dict[tuple[int, int, bool], list[tuple[Float64, Float64, Float64]]] = defaultdict(list)
     for frame, truth in stream.sweeps():
-        result = pipeline.step(frame, budget)
+        result = step(frame)
         body, share = majority_bodies(result.proposals, truth.instance)
         tracks = result.tracks
         poses = world.poses(frame.stamp_s)
@@ -174,10 +170,7 @@ def main() -> None:
             found += body_tracks(stream, arguments.sensor)
     for kind, parts in study(found).items():
         for part, c in parts.items():
-            line: dict[str, Any] = {"tracks": c.tracks, "samples": c.samples, "nees": round(c.mean, 3)}
-            line |= {"bounds": [round(c.low, 2), round(c.high, 2)], "median": round(c.median, 3)}
-            line |= {"beyond": round(c.beyond, 3), "rms": round(c.rms, 3)}
-            print(f"{kind:<22}{part:<9}", json.dumps(line))
+            print(f"{kind:<22}{part:<9}", json.dumps({name: round(value, 3) for name, value in asdict(c).items()}))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
-from modt.geometry import FieldOfView, inverse, transform_boxes
+from modt.geometry import inverse, transform_boxes
 from modt.placement import Mount
 from modt.profile import load
 from modt.sensor_fit.recognition import recognise
@@ -34,6 +34,7 @@ from modt_evaluation.truth import FrameTruth, Role
 from modt_simulation.sensors import SENSORS
 from modt_simulation.synthetic_stream import SCENES, SyntheticStream
 from tools.options import parser
+from tools.study.drives import steps_of
 
 BANDS_M = ((0.5, 3.0), (3.0, 8.0), (8.0, 20.0), (20.0, 60.0))
 EVERYWHERE_M = (0.0, float("inf"))
@@ -46,10 +47,8 @@ PLACES = ("yard", "corridor", "hall", "crowd", "ramp")
 def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig, mount: Mount) -> DriveRows:
     """Run a drive in a mode and judge it in the level frame."""
     frames = list(stream.sweeps())
-    mode = assembly.MODES[mode_name]
     config = recognise(frames[0][0].points, config).mounted(config)
-    pipeline = assembly.pipeline(mode, config, FieldOfView())
-    budget = mode.budget(config)
+    step = steps_of(mode_name, config)
 
     def judged() -> Iterator[JudgedFrame]:
         for frame, truth in frames:
@@ -57,7 +56,7 @@ def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig, mount: M
             assert pose is not None
             boxes = transform_boxes(inverse(pose), stream.simulator.world.boxes(frame.stamp_s)[truth.bodies])
             labels = FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], boxes)
-            result = JudgedFrame.of_result(pipeline.step(frame, budget), labels)
+            result = JudgedFrame.of_result(step(frame), labels)
             yield replace(result, points=mount.turn(frame.points))
 
     return collect(judged(), CUBOID_RULES)

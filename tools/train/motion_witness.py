@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.app import assembly
 from modt.classes import N_CLASSES
 from modt.classification.motion_witness import LENGTH_M, MOVED_M, YOUNG_S, cells
 from modt.types import Float64, Int
@@ -17,7 +16,7 @@ from modt_evaluation.evaluation import collect
 from modt_evaluation.frame import JudgedFrame
 from modt_simulation.sensors import SENSORS
 from tools.options import parser
-from tools.study.drives import Drive, simulated
+from tools.study.drives import Drive, simulated, steps_of
 
 CELLS = len(YOUNG_S) + 1 + len(MOVED_M)
 WEIGHT = 0.5
@@ -39,10 +38,8 @@ SECONDS = 8.0
 
 def counted(drive: Drive, number: int) -> Int:
     """(4, CELLS, 4) tracks of a drive, frame by frame, by length, cell and true class."""
-    mode = assembly.MODES["accurate"]
-    pipeline = assembly.pipeline(mode, drive.profile, drive.fov)
-    budget = mode.budget(drive.profile)
-    results = [pipeline.step(frame, budget) for frame, _ in drive.frames]
+    step = steps_of("accurate", drive.profile, drive.fov)
+    results = [step(frame) for frame, _ in drive.frames]
     judged = (JudgedFrame.of_result(r, truth, drive.fov) for r, (_, truth) in zip(results, drive.frames, strict=True))
     rows = collect(judged, drive.rules, number).proposals
     counts = np.zeros((len(LENGTH_M) + 1, CELLS, N_CLASSES), np.int64)

@@ -121,7 +121,8 @@ def _place(
     angle = rng.uniform(-np.pi, np.pi)
     rho = float(np.hypot(*cut.box[:2]))
     factor = 1.0 if rng.random() < SAME_RANGE_SHARE else float(min(rng.uniform(1.0, 2.2), max(60.0 / rho, 1.0)))
-    target = np.array(_rotated(*(cut.box[:2] * factor), angle))
+    foot_x, foot_y = cut.box[:2] * factor
+    target = np.array(_rotated(foot_x, foot_y, angle))
     ground = _free_ground(cut, scene, target, 0.3 + 0.02 * rho * factor)
     if ground is None:
         return None

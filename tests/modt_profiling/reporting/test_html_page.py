@@ -11,11 +11,12 @@ import pytest
 from modt.app.deadlines import Deadlines
 from modt.errors import MisuseError
 from modt.sinks.run_directory import SUMMARY
-from modt_profiling.reporting.document import Page, Plot, Section, save
+from modt_profiling.reporting.document import Page, Plot, Section
 from modt_profiling.reporting.energy_plots import stage_energy
 from modt_profiling.reporting.html_page import html, svg
 from modt_profiling.reporting.quantity import Quantity
 from modt_profiling.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
+from modt_profiling.reporting.view_extra import save
 
 
 def drawn(plot):

@@ -8,12 +8,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modt.sinks.output import writing
 from modt_profiling.reporting.quantity import LEGEND, Quantity, aligned
-from modt_profiling.reporting.view_extra import importing
 
 if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.axes import Axes
@@ -102,16 +99,3 @@ class Document:
 
 def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, 96, initial_indent="  ", subsequent_indent="    ")
-
-
-def save(path: Path, page: Page) -> None:
-    """Write a page as HTML.
-
-    Raises:
-        MisuseError: the extra `view` is not installed.
-        ModtError: the page cannot be written.
-    """
-    with importing(path):
-        from modt_profiling.reporting.html_page import html
-    with writing(path):
-        path.write_text(html(page), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Import of the libraries of the extra `view`: Matplotlib, Jinja and Pillow."""
+"""What needs the extra `view`: import of its libraries (Matplotlib, Jinja and Pillow), and pages as files."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from modt.errors import MisuseError, install
+from modt.sinks.output import writing
+from modt_profiling.reporting.document import Page
 
 MEMORY = Path("/dev/shm")
 """File system in memory."""
@@ -39,3 +41,16 @@ def _keep_cache_in_memory() -> TemporaryDirectory[str] | None:
     folder = TemporaryDirectory(prefix="modt-", dir=MEMORY if MEMORY.is_dir() else None)
     os.environ["MPLCONFIGDIR"] = folder.name
     return folder
+
+
+def save(path: Path, page: Page) -> None:
+    """Write a page as HTML.
+
+    Raises:
+        MisuseError: a library of the extra is not installed.
+        ModtError: the page cannot be written.
+    """
+    with importing(path):
+        from modt_profiling.reporting.html_page import html
+    with writing(path):
+        path.write_text(html(page), encoding="utf-8")
