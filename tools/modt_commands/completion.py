@@ -17,7 +17,9 @@ SHELLS = ("bash", "zsh", "fish")
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("completion", help="print a script by which a shell completes modt and modt-profile")
+    p = commands.add_parser(
+        "completion", help="print a script by which a shell completes modt and modt-profile (extra completion)"
+    )
     p.add_argument("shell", choices=SHELLS, metavar="|".join(SHELLS), help="shell")
     options.add_examples(
         p,

@@ -24,7 +24,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     pairs = "run directories (of replay --labels) and their labels"
     p.add_argument("pairs", nargs="*", type=Path, metavar="RUN TRUTH", help=pairs)
     p.add_argument("--json", action="store_true", help="print JSON, modt.evaluation/1")
-    p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots as well")
+    p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots as well (extra view)")
     vans = "count KITTI's vans as cars (all), or ignore them (paper)"
     p.add_argument("--classes", choices=("all", "paper"), default="all", help=vans)
     what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"

@@ -96,6 +96,7 @@ def errors(track: BodyTrack) -> tuple[Float64, Float64]:
     c, s = np.cos(track.pose[:, 2]), np.sin(track.pose[:, 2])
     R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
     off = track.x[:, :2] - track.pose[:, :2]
+    # The point of the body that the track refers to: the mean of its positions in the frame of the body.
     point = np.einsum("nji,nj->ni", R, off).mean(axis=0)
     motion = track.x[:, 2:] - track.pose[:, 2:]
     motion[:, 0] = wrap(motion[:, 0])

@@ -97,14 +97,17 @@ def _one_return_per_beam(xyz: Float64, crop_of_point: Int, sensors: Sensors, rng
     elevation = (
         np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))) / sensors.elevation_deg[crop_of_point]
     )
+    # Cells of one beam and one azimuth step, with an offset of their own in each crop.
     cell = np.stack([azimuth, elevation], axis=1) + rng.random((n, 2))[crop_of_point]
     column, beam = np.floor(cell).astype(np.int64).T + 32768
+    # Crop, column and beam in one number; of each, the first point in random order is kept.
     key = crop_of_point << 32 | column << 16 | beam
     order = rng.permutation(len(key))
     _, first = np.unique(key[order], return_index=True)
     keep = np.zeros(len(key), np.bool_)
     keep[order[first]] = True
     keep = _keep_enough(np.ones(len(key), np.bool_), keep, crop_of_point, n)
+    # Then every second or fourth beam alone, unless the beams that are left would be too far apart.
     step = rng.choice(BEAM_STEPS, n, p=BEAM_STEP_SHARE)
     step[sensors.elevation_deg * step > MAX_ELEVATION_DEG] = 1
     thin = _keep_enough(

@@ -102,6 +102,7 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
     for k, (members, object_class, box) in enumerate(zip(scan.objects, scan.kinds, scan.boxes, strict=True)):
         if len(members) < MIN_BOX_POINTS:
             continue
+        # Points that each proposal shares with the object; a proposal is whole where both hold most of the other.
         proposal_of_member = number[members]
         shared = np.bincount(proposal_of_member[proposal_of_member >= 0], minlength=len(proposals))
         held[:, object_class] += shared

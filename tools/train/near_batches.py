@@ -122,6 +122,7 @@ def varied(crops: Crops, rng: Generator) -> tuple[Crops, Int]:
     xyz[:, 1] = s * along + c * across
     xyz += rng.normal(0, 0.006, xyz.shape)
     xyz[:, 2] += rng.normal(0, 0.015, n)[crop_of_point]
+    # Hide a share of the width from one side; the mirroring above makes it either.
     low = np.minimum.reduceat(across, starts)
     high = np.maximum.reduceat(across, starts)
     hidden = np.where(rng.random(n) < HIDDEN_SHARE, rng.uniform(0.0, MAX_HIDDEN, n), 0.0)
@@ -153,12 +154,14 @@ def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sen
     near_m = np.exp(rng.uniform(*LOG_RANGE, n))
     xyz = crops.xyz.astype(np.float64)
     distance = np.hypot(xyz[:, 0], xyz[:, 1])
+    # Move each crop along the line of sight of its first point until its nearest point is near_m away.
     nearest = np.minimum.reduceat(distance, crops.offsets[:-1])
     bearing = np.arctan2(xyz[:, 1], xyz[:, 0])
     first = bearing[crops.offsets[:-1]]
     unit = np.stack([np.cos(first), np.sin(first)], axis=1)
     xyz[:, :2] += ((near_m - nearest)[:, None] * unit)[crop_of_point]
     xyz[:, 2] -= (sensors.ground_z_m + mount_m)[crop_of_point]
+    # Points above the highest and below the lowest beam are not seen.
     tangent = xyz[:, 2] / np.maximum(np.hypot(xyz[:, 0], xyz[:, 1]), 0.1)
     above = tangent > high[crop_of_point]
     below = tangent < low[crop_of_point]

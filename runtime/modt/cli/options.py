@@ -71,7 +71,7 @@ SHARED: dict[str, dict[str, Any]] = {
     "capture": {"type": capture, **_REPEATABLE, "metavar": "KEY=VALUE", "help": _CAPTURE},
     "core": {"type": core, "default": "last", "metavar": "N|none", "help": "pin to core N (default: the last)"},
     "fov": {"choices": ("camera", "full"), "default": "full", "help": "field of view (default: %(default)s)"},
-    "html": {"type": Path, "metavar": "FILE", "help": "write an HTML page with plots"},
+    "html": {"type": Path, "metavar": "FILE", "help": "write an HTML page with plots (extra view)"},
     "json": {"action": "store_true", "help": "print JSON"},
     "meter": {"metavar": "NAME", "help": "meter to read (default: the best)"},
     "mode": {"choices": MODES, "default": "accurate", "help": "default: %(default)s"},

@@ -38,6 +38,7 @@ class RunCosts:
         """
         counts = np.stack([run.counts() for run in runs])
         cost = np.stack([run.cpu_s() for run in runs])
+        # (repetitions, F, ...): of each frame, the repetition whose cost over all stages is the median
         middle = np.argsort(cost.sum(axis=2), axis=0, kind="stable")[(len(runs) - 1) // 2]
         frames = np.arange(len(middle))
         return cls(counts[middle, frames], cost[middle, frames])

@@ -67,6 +67,8 @@ class Views:
         each = _column(run, "classified").mean()
         if not each:
             return cls(0.0, 1.0, 1.0)
+        # Classifications come as by a Poisson process in calls: a share p of the frames with a call is a rate of
+        # -log(1 - p). Where every frame has one, p is taken as half a frame less than one.
         frames_with_calls = min(_column(run, "calls").mean(), 1.0 - 0.5 / len(run.counts))
         relative = _column(run, "points").sum() / _column(run, "classified").sum() / max(size, 1e-9)
         return cls(each / max(float(asking.mean()), 1e-9), relative, -np.log1p(-frames_with_calls) / each)
@@ -93,6 +95,7 @@ class Rates:
         observed = np.concatenate([stream.observed for stream in streams]).astype(float)
         *modes, _ = runs
         _, n, alive, _, all_points = observed.T[: len(OBSERVED)]
+        # In tracking-by-detection every proposal asks, in the other modes the tracks of their own column.
         asking = [n, *observed.T[len(OBSERVED) :]]
         size = float(all_points.sum() / max(n.sum(), 1.0))
         every_frame = np.ones(len(n))
@@ -130,6 +133,7 @@ def expect(rates: Rates, observed: Int, frames: int) -> Expected:
     tracks, *asked = _means(observed[:, [OBSERVED.index("tracks"), *range(len(OBSERVED), observed.shape[1])]], frames)
     e_seg = float(rates.segmentation @ [1.0, sweep_points])
     asking = dict(zip(rates.views, [n, *asked], strict=True))
+    # No mode classifies more than tracking-by-detection, which is the first.
     most = n * next(iter(rates.views.values())).each
     cost = {}
     loads = {}
@@ -143,6 +147,7 @@ def expect(rates: Rates, observed: Int, frames: int) -> Expected:
             + rates.scheduling[mode] @ [1.0, alive]
             + rates.classification @ loads[mode]
         )
+    # E(class) of Equation 3 is the mean cost of a proposal in tracking-by-detection, shares of calls included.
     base = next(iter(loads.values()))
     e_class = float(rates.classification @ base) / max(base[1], 1e-9)
     return Expected(cost, EnergyModel(e_seg, e_class, n, n / tracks if tracks else 1.0))

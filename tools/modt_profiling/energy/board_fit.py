@@ -26,6 +26,7 @@ def nonnegative_fit(gram: Float64, moment: Float64) -> Float64:
     if counted.any():
         scale = np.sqrt(np.diag(gram)[counted])
         normal = gram[np.ix_(counted, counted)] / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
+        # With X^T X = L L^T, |X b - y| is least where |L^T b - L^-1 X^T y| is: NNLS on p rows in place of n.
         lower = np.linalg.cholesky(normal)
         target = linalg.solve_triangular(lower, moment[counted] / scale, lower=True)
         value[counted] = optimize.nnls(lower.T, target)[0] / scale
@@ -131,7 +132,7 @@ def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: i
     )
 
 
-def _scaled_counts(windows: Sequence[Line]) -> tuple[Float64, Float64]:
+def _scaled_counts(windows: Sequence[EnergyWindow]) -> tuple[Float64, Float64]:
     """(n, p) counts of REGRESSORS in the windows, divided by (p,) their norms.
 
     Raises:

@@ -44,6 +44,7 @@ def find_body(sweeps: Sequence[Float32], height_m: float) -> Body | None:
     nearest = np.stack([_nearest(points) for points in sweeps])
     seen = np.isfinite(nearest).mean(axis=0) > MIN_SHARE
     cells = np.flatnonzero(seen)
+    # A cell is fixed where its range hardly varies: what moves with the sensor is a part of the robot.
     low, range_m, high = np.nanquantile(
         np.where(np.isfinite(nearest), nearest, np.nan)[:, cells], [0.1, 0.5, 0.9], axis=0
     )
@@ -51,6 +52,7 @@ def find_body(sweeps: Sequence[Float32], height_m: float) -> Body | None:
     elevation = np.deg2rad((cells // COLUMNS + 0.5) * CELL_DEG - 90)
     rise_m = range_m * np.tan(elevation)
     clear = (rise_m > MIN_CLEARANCE_M - height_m) & (rise_m < MAX_ABOVE_M)
+    # Where much beyond the robot's reach is fixed too, the recording stands still, and tells nothing.
     away = (range_m > BODY_REACH_M) & clear
     if not away.any() or fixed[away].mean() > MAX_FIXED_SHARE:
         return None
@@ -76,6 +78,7 @@ def _sectors(column: Bool) -> Float64:
     """(S, 2) bounds of runs of columns around the circle [deg], from -180 to 180."""
     if column.all():
         return np.array([[-180.0, 180.0]])
+    # Turn the circle so that it begins outside a run: no run then goes over its end.
     start = int(np.argmin(column))
     turned = np.roll(column, -start)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], turned, [False]]).astype(np.int8))).reshape(-1, 2)
