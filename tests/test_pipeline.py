@@ -14,7 +14,7 @@ from modt.types import Budget
 from modt_simulation.synthetic_stream import SyntheticStream
 
 FRAMES = list(SyntheticStream("street", "vlp-16", 0.4, seed=3))
-BOOKED = {SEGMENTATION: 1, ODOMETRY: 1, TRACKING: 2, FUSION: 3, SCHEDULING: 1, CLASSIFICATION: 1}
+BOOKED = {SEGMENTATION: 1, ODOMETRY: 1, TRACKING: 2, FUSION: 4, SCHEDULING: 1, CLASSIFICATION: 1}
 """Calls of a step that classifies."""
 
 
@@ -39,9 +39,18 @@ def test_every_call_is_booked_on_its_stage_and_the_budget_binds(pipe):
     assert 0 < len(result.classified) <= 5
 
 
+def test_stages_write_no_column_of_another(pipe):
+    """The stages hand proposals and each other's columns on read-only."""
+    result = pipe.step(FRAMES[3])
+    tracks = pipe.tracker.tracks
+    for column in (tracks.posterior, tracks.waiting, tracks.object_class, result.tracks.x, result.proposals.box):
+        with pytest.raises(ValueError, match="read-only"):
+            column[:] = 0
+
+
 def test_without_a_selection_nothing_is_classified(pipe):
     result = pipe.step(FRAMES[3], Budget(calls=0))
-    assert calls(pipe) == {stage: n for stage, n in (BOOKED | {FUSION: 2}).items() if stage != CLASSIFICATION}
+    assert calls(pipe) == {stage: n for stage, n in (BOOKED | {FUSION: 3}).items() if stage != CLASSIFICATION}
     assert len(result.classified) == 0 < result.n_deferred
 
 

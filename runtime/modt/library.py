@@ -26,7 +26,7 @@ from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
 from modt.sources.stream import Stream, no_seconds, unit_of
-from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int, Self
+from modt.types import UNRECORDED, Bool, Float32, Float64, Frame, Int, Self
 
 log = logging.getLogger(__name__)
 
@@ -233,7 +233,9 @@ class Pipeline:
         self._stamp_s = stamp_s
         result = self._pipeline.step(frame, self._budget)
         tracks = result.tracks
-        visible = tracks.proposal != NONE
+        visible = tracks.observed
+        box_sensor = np.full((len(tracks), 7), np.nan)
+        box_sensor[visible] = result.proposals.box[tracks.proposal[visible]]
         return TrackedObjects(
             id=tracks.id,
             object_class=tracks.object_class,
@@ -241,7 +243,7 @@ class Pipeline:
             final=tracks.final,
             visible=visible,
             unknown_near=unknown_near(result),
-            box_sensor=np.vstack([result.proposals.box, np.full(7, np.nan)])[tracks.proposal],  # NONE: the last row
+            box_sensor=box_sensor,
             box_world=tracks.box,
             position=tracks.x[:, :2],
             heading_rad=tracks.x[:, 2],

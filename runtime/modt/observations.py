@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.geometry import transform, transform_boxes
 from modt.geometry.kdop import AXES, DIRECTIONS, centres
@@ -44,34 +46,36 @@ class Observations:
         """(P, 2) centre of the k-DOP along x and y [m]."""
         return centres(self.kdop)[::2].T
 
-    def move(self, step: Float64) -> None:
-        """Displace all in place by steps (P, 2) [m, world]."""
-        self.box[:, :2] += step
-        self.centroid[:] += step
-        self.kdop[:] += DIRECTIONS.T @ step.T
+    def moved(self, step: Float64) -> Observations:
+        """The same, displaced by steps (P, 2) [m, world]."""
+        box = self.box.copy()
+        box[:, :2] += step
+        return replace(self, box=box, centroid=self.centroid + step, kdop=self.kdop + DIRECTIONS.T @ step.T)
 
-    def take(self, rows: Int) -> Observations:
-        """A copy of the rows given."""
+    def regrouped(self, source: Int, changed: Int, renewed: Observations) -> Observations:
+        """Observations of proposals in another grouping.
+
+        Args:
+            source: (Q,) former proposal whose observation each takes over.
+            changed: (R,) those, of Q, that are observed anew.
+            renewed: (R,) their observations.
+        """
+
+        def merged(column: str, axis: int = 0) -> NDArray[Any]:
+            entries: NDArray[Any] = getattr(self, column).take(source, axis=axis)
+            entries[(slice(None),) * axis + (changed,)] = getattr(renewed, column)
+            return entries
+
         return Observations(
-            box=self.box.take(rows, axis=0),
-            centroid=self.centroid.take(rows, axis=0),
-            kdop=self.kdop.take(rows, axis=1),
-            bottom=self.bottom[rows],
-            top=self.top[rows],
-            count=self.count[rows],
-            range_m=self.range_m[rows],
+            box=merged("box"),
+            centroid=merged("centroid"),
+            kdop=merged("kdop", axis=1),
+            bottom=merged("bottom"),
+            top=merged("top"),
+            count=merged("count"),
+            range_m=merged("range_m"),
             sensor_xy=self.sensor_xy,
         )
-
-    def put(self, rows: Int, few: Observations) -> None:
-        """Overwrite the rows given."""
-        self.box[rows] = few.box
-        self.centroid[rows] = few.centroid
-        self.kdop[:, rows] = few.kdop
-        self.bottom[rows] = few.bottom
-        self.top[rows] = few.top
-        self.count[rows] = few.count
-        self.range_m[rows] = few.range_m
 
 
 def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Observations:

@@ -18,11 +18,13 @@ from modt.types import (
     UNLIMITED,
     Bool,
     Budget,
+    Evidence,
     Float32,
     Float64,
     Frame,
     FrameResult,
     Int,
+    Motion,
     Proposals,
     TrackedFrame,
     Tracks,
@@ -34,7 +36,7 @@ SEGMENTATION, ODOMETRY, TRACKING, SCHEDULING, CLASSIFICATION, FUSION = STAGES = 
 _NOTHING: Bool = np.zeros(0, np.bool_)
 
 
-class Segmenter(Protocol):
+class SegmentationStage(Protocol):
     """Sweeps to proposals."""
 
     def segment(self, points: Float32) -> Proposals:
@@ -44,14 +46,14 @@ class Segmenter(Protocol):
         """Kernels of the segmenter, for the record of a run."""
 
 
-class Odometry(Protocol):
+class OdometryStage(Protocol):
     """Proposals to the world."""
 
     def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
         """Placement of the frame and observations of its proposals."""
 
 
-class Tracker(Protocol):
+class TrackingStage(Protocol):
     """Observations to tracks."""
 
     @property
@@ -61,14 +63,14 @@ class Tracker(Protocol):
     def static_tracks(self, stamp_s: float) -> StaticTracks:
         """Tracks that a frame at this time may continue, as the odometry needs them."""
 
-    def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+    def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """Predict, associate and update; afterwards every proposal belongs to one track."""
 
-    def conclude(self, rows: Int, certain: Bool) -> Tracks:
-        """Apply the frame's classifications to the state machine; returns a copy of the tracks."""
+    def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
+        """Lead the classified rows (R,) to their next states, by whether the class is confirmed; a snapshot."""
 
 
-class Classifier(Protocol):
+class ClassificationStage(Protocol):
     """Points to class likelihoods."""
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
@@ -78,48 +80,62 @@ class Classifier(Protocol):
         """Name and hash of the model, for the record of a run."""
 
 
-class Fusion(Protocol):
+class FusionStage(Protocol):
     """Views to posteriors."""
 
-    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+    def observe(self, evidence: Evidence, motion: Motion, proposals: Proposals) -> None:
+        """Write what boxes and motion of this frame tell of the classes."""
+
+    def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks whose view of this frame is worth a classification."""
 
-    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Write the posteriors of the rows; returns (R,) whether each class is confirmed."""
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """Write the views (R, 4) of the rows (R,) and their posteriors; returns (R,) whether each is confirmed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
     """The stages in their order; a mode of the method is a choice of these parts."""
 
-    segmenter: Segmenter
-    odometry: Odometry
-    tracker: Tracker
-    fusion: Fusion
+    segmenter: SegmentationStage
+    odometry: OdometryStage
+    tracker: TrackingStage
+    fusion: FusionStage
     scheduler: Scheduler
-    classifier: Classifier
+    classifier: ClassificationStage
     decision: LikeliestClass
     ledger: Ledger
     mount: Mount = LEVEL
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
         """Process a frame within a budget of classifications (Figs. 2 and 5)."""
-        run, frame = self.ledger.run, self.mount.level(frame)
+        run = self.ledger.run
+        frame = self.mount.level(frame)
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
-        tracked = run(TRACKING, self.tracker.follow, frame.time_s, proposals, located)
-        tracks, proposals = tracked.tracks, tracked.proposals
-        asks = run(FUSION, self.fusion.asks, tracks, proposals, tracked.wants_class)
-        chosen = run(SCHEDULING, self.scheduler.select, tracks, proposals, asks, budget)
-        rows, certain = chosen.rows, _NOTHING
+        tracked = run(TRACKING, self.tracker.track, frame.time_s, proposals, located)
+        proposals = tracked.proposals
+        motion = tracked.motion
+        evidence = tracked.evidence.read_only()
+        run(FUSION, self.fusion.observe, tracked.evidence, motion, proposals)
+        asks = run(FUSION, self.fusion.asks, evidence, motion, proposals, tracked.wants_class)
+        chosen = run(SCHEDULING, self.scheduler.select, tracked.requests, motion, evidence, proposals, asks, budget)
+        rows = chosen.rows
+        confirmed = _NOTHING
         if len(rows):
-            likelihood = self._classify(frame.points, proposals, tracks.proposal[rows], budget)
-            certain = run(FUSION, self.fusion.fuse, tracks, proposals, rows, likelihood)
-        run(FUSION, self.decision.decide, tracks)
-        final = run(TRACKING, self.tracker.conclude, rows, certain)
-        names, classified = self.tracker.state_names, final.id[rows]
-        T_world_sensor = located.placement.T_world_sensor
-        return FrameResult(frame, T_world_sensor, proposals, final, names, chosen.deferred, classified)
+            likelihood = self._classify(frame.points, proposals, motion.proposal[rows], budget)
+            confirmed = run(FUSION, self.fusion.fuse, tracked.evidence, motion, proposals, rows, likelihood)
+        run(FUSION, self.decision.decide, tracked.decisions, evidence, motion)
+        tracks = run(TRACKING, self.tracker.confirm, rows, confirmed)
+        return FrameResult(
+            frame=frame,
+            T_world_sensor=located.placement.T_world_sensor,
+            proposals=proposals,
+            tracks=tracks,
+            state_names=self.tracker.state_names,
+            n_deferred=chosen.deferred,
+            classified=tracks.id[rows],
+        )
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
         """(R, 4) likelihoods. The ledger counts the points; the scheduler learns the cost where time is limited."""

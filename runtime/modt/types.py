@@ -99,6 +99,16 @@ class Proposals:
     ground_z_m: Float64 | None = None  # (P,) z of the ground beneath each [m, sensor frame], None where not known
     reflectance: Float64 | None = None  # (P, 5)
 
+    def read_only(self) -> Self:
+        """These proposals, whose columns cannot be written to from here on.
+
+        Members, offsets and coordinates are not marked, since C takes read-only arrays several times slower.
+        """
+        for entries in (self.centroid, self.box, self.cut, self.ground_z_m, self.reflectance):
+            if entries is not None:
+                entries.setflags(write=False)
+        return self
+
     def __len__(self) -> int:
         return len(self.offsets) - 1
 
@@ -183,11 +193,72 @@ def column(kind: type, *shape: int, fill: float = 0) -> Any:
     return field(metadata={"blank": np.full(shape, fill, kind)})
 
 
-@dataclass(slots=True)
-class Tracks:
-    """The tracks alive, one row each. Every stage writes the columns that it owns, in place, and no others."""
+@dataclass(frozen=True)
+class Columns:
+    """Columns of a track table, one row a track.
 
-    # Columns of the tracker
+    A subclass declares the columns that one stage owns. The owner writes their entries in place; the other stages get
+    them read-only, and writing to those raises ValueError. No column is ever replaced by another array.
+    """
+
+    def __len__(self) -> int:
+        return len(next(iter(vars(self).values())))
+
+    @classmethod
+    def blank(cls, m: int = 0) -> Self:
+        """M rows without identity, proposal and view, with all classes alike."""
+        return cls._made({name: np.repeat(entry[None], m, axis=0) for name, entry in cls._blank_row().items()})
+
+    @classmethod
+    def of(cls, table: Columns) -> Self:
+        """The columns of this class in a table that has further ones; the arrays are shared."""
+        return cls._made({name: getattr(table, name) for name in cls._blank_row()})
+
+    @classmethod
+    @cache
+    def _blank_row(cls) -> dict[str, NDArray[Any]]:
+        return {f.name: f.metadata["blank"] for f in fields(cls)}
+
+    @classmethod
+    def _made(cls, columns: dict[str, NDArray[Any]]) -> Self:
+        """The table of these columns; the constructor of a frozen dataclass takes several times as long."""
+        table = object.__new__(cls)
+        vars(table).update(columns)
+        return table
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name."""
+        return vars(self).copy()
+
+    def copy(self) -> Self:
+        """The same rows, independent of these."""
+        return self._made({name: entries.copy() for name, entries in vars(self).items()})
+
+    def renewed(self, kept: Int, n: int) -> Self:
+        """The rows kept, by index, then n blank ones."""
+        if not len(self):
+            return self.blank(n)
+        rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
+        columns = {name: entries.take(rows, axis=0) for name, entries in vars(self).items()}
+        for name, blank in self._blank_row().items():
+            columns[name][len(kept) :] = blank
+        return self._made(columns)
+
+    def read_only(self, *parts: type[Columns]) -> Self:
+        """The same columns; those of the parts given, by default all, cannot be written to."""
+        columns = self.columns()
+        for part in parts or (type(self),):
+            for name in part._blank_row():
+                view = columns[name][:]
+                view.setflags(write=False)
+                columns[name] = view
+        return self._made(columns)
+
+
+@dataclass(frozen=True)
+class Motion(Columns):
+    """Columns of the tracker."""
+
     id: Int = column(int, fill=NONE)  # never used twice in a run
     state: Int = column(int)  # value of the state machine's enumeration
     final: Bool = column(bool)  # the class of that state is confirmed, and asked for only if the view improves
@@ -203,23 +274,35 @@ class Tracks:
     observed_s: Float64 = column(float)  # from the first proposal to the last
     size_m: Float64 = column(float, 3)  # length, width and height that were seen for some frames
     hidden: Bool = column(bool)  # a person of whom the view cuts off the upper half
-    # Columns of the fusion
+
+    @property
+    def observed(self) -> Bool:
+        """(M,) whether the track has a proposal in this frame."""
+        observed: Bool = self.proposal != NONE
+        return observed
+
+    def row_of_proposal(self, n_proposals: int) -> Int:
+        """(n_proposals,) row of the track of each proposal, NONE where there is none."""
+        rows = np.full(n_proposals, NONE, np.int64)
+        observed = self.observed.nonzero()[0]
+        rows[self.proposal[observed]] = observed
+        return rows
+
+
+@dataclass(frozen=True)
+class Evidence(Columns):
+    """Columns of the fusion: what is known of the class."""
+
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen
     posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, boxes, motion)
     witness: Float64 = column(float, N_CLASSES)  # log P(motion | class) over that of background
     box_evidence: Float64 = column(float, N_CLASSES)  # mean log P(box | class) of the boxes seen, up to a constant
+    may_be_object: Bool = column(bool)  # by the last box seen and the motion
     evidence: Float64 = column(float, N_CLASSES)  # mean log P(view | class) of the views, up to a constant
     weight: Float64 = column(float)  # of the views together in that mean
     views: Int = column(int)  # views fused
     key_points: Int = column(int)  # at the last view, 0 before any
     key_age: Int = column(int)  # age at the last view
-    # Column of the scheduler
-    waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
-    # Column of the decision
-    object_class: Int = column(int)  # the reported class
-
-    def __len__(self) -> int:
-        return len(self.id)
 
     @property
     def viewed(self) -> Bool:
@@ -227,55 +310,54 @@ class Tracks:
         viewed: Bool = self.key_points > 0
         return viewed
 
+
+@dataclass(frozen=True)
+class Requests(Columns):
+    """Column of the scheduler."""
+
+    waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
+
+
+@dataclass(frozen=True)
+class Decisions(Columns):
+    """Column of the decision."""
+
+    object_class: Int = column(int)  # the reported class
+
+
+@dataclass(frozen=True)
+class Tracks(Decisions, Requests, Evidence, Motion):
+    """All columns side by side, in the order of the parts from right to left."""
+
     @property
     def inherited(self) -> Bool:
         """(M,) whether the class is confirmed without any view, by a remembered background place."""
         inherited: Bool = self.final & ~self.viewed
         return inherited
 
-    @classmethod
-    def blank(cls, m: int = 0) -> Self:
-        """M rows without identity, proposal and view, with all classes alike."""
-        return cls(*(np.repeat(entry[None], m, axis=0) for entry in cls._blank_row()))
-
-    @classmethod
-    @cache
-    def _blank_row(cls) -> tuple[NDArray[Any], ...]:
-        return tuple(f.metadata["blank"] for f in fields(cls))
-
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name."""
-        return {name: getattr(self, name) for name in self.__match_args__}
-
-    def copy(self) -> Self:
-        """The same rows, independent of these."""
-        return type(self)(*[getattr(self, name).copy() for name in self.__match_args__])
-
-    def renewed(self, kept: Int, n: int) -> Self:
-        """The rows kept, by index, then n blank ones."""
-        if not len(self):
-            return self.blank(n)
-        rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
-        columns = [getattr(self, name).take(rows, axis=0) for name in self.__match_args__]
-        for column, blank in zip(columns, self._blank_row(), strict=True):
-            column[len(kept) :] = blank
-        return type(self)(*columns)
-
-    def row_of_proposal(self, n_proposals: int) -> Int:
-        """(n_proposals,) row of the track that owns each proposal, NONE where there is none."""
-        rows = np.full(n_proposals, NONE, np.int64)
-        seen = np.flatnonzero(self.proposal != NONE)
-        rows[self.proposal[seen]] = seen
-        return rows
-
 
 @dataclass(frozen=True, slots=True)
 class TrackedFrame:
-    """Result of tracking, for the stages after it."""
+    """Result of tracking: the tracks by owner, of which each stage writes its own part, and the frame's proposals."""
 
-    tracks: Tracks  # the live table
+    motion: Motion  # read-only
+    evidence: Evidence  # written by the fusion
+    requests: Requests  # written by the scheduler
+    decisions: Decisions  # written by the decision
     proposals: Proposals  # of the frame, regrouped where the tracks know better; each belongs to one track
     wants_class: Bool  # (M,) tracks with a proposal whose state asks for a class
+
+    @classmethod
+    def of(cls, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> TrackedFrame:
+        """The parts of a table whose columns can all be written to."""
+        return cls(
+            motion=Motion.of(tracks).read_only(),
+            evidence=Evidence.of(tracks),
+            requests=Requests.of(tracks),
+            decisions=Decisions.of(tracks),
+            proposals=proposals,
+            wants_class=wants_class,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,7 +379,7 @@ class FrameResult:
     frame: Frame  # level, as are the frame of the sensor in all that follows and its pose
     T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp, as the odometry placed it
     proposals: Proposals
-    tracks: Tracks  # a copy of those alive after the frame
+    tracks: Tracks  # a snapshot of those alive after the frame, read-only
     state_names: tuple[str, ...]  # of each value of tracks.state
     n_deferred: int  # tracks whose request for a class waits for the next frame's budget
     classified: Int = field(default_factory=lambda: np.zeros(0, np.int64))  # identities of the tracks

@@ -28,8 +28,8 @@ def stages_of(**request):
     return Stages(Request(**{"profile": ("vlp-16",), **request}), INFO, Ledger(), SensorWatch())
 
 
-CALLS = ("segmenter.segment", "odometry.locate", "tracker.follow", "fusion.asks", "scheduler.select")
-CALLS += ("classifier.classify", "fusion.fuse", "decision.decide", "tracker.conclude")
+CALLS = ("segmenter.segment", "odometry.locate", "tracker.track", "fusion.observe", "fusion.asks", "scheduler.select")
+CALLS += ("classifier.classify", "fusion.fuse", "decision.decide", "tracker.confirm")
 
 
 @pytest.mark.parametrize("after", [False, True], ids=["before its work", "after it"])

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from modt.pipeline import Fusion
+from modt.pipeline import FusionStage
 from modt.types import Bool, Float32, Int, Proposals, Tracks
 
 
@@ -30,10 +30,11 @@ def new_tracks(proposals: Proposals) -> Tracks:
     """A new track for each proposal; the world frame is the sensor frame."""
     n = len(proposals)
     tracks = Tracks.blank(n)
-    tracks.id, tracks.proposal = np.arange(n), np.arange(n)
-    tracks.points, tracks.box = proposals.count.copy(), proposals.box.copy()
-    tracks.size_m = proposals.box[:, 3:6].copy()
-    tracks.age[:], tracks.hits[:] = 1, 1
+    tracks.id[:] = tracks.proposal[:] = np.arange(n)
+    tracks.points[:] = proposals.count
+    tracks.box[:] = proposals.box
+    tracks.size_m[:] = proposals.box[:, 3:6]
+    tracks.age[:] = tracks.hits[:] = 1
     return tracks
 
 
@@ -48,7 +49,7 @@ ROW = np.array([0])
 class Fused:
     """Blobs of some numbers of points, their tracks, and what fuses their views."""
 
-    def __init__(self, fusion: Fusion, *counts: int, frames: int = 1) -> None:
+    def __init__(self, fusion: FusionStage, *counts: int, frames: int = 1) -> None:
         _, self.proposals = blobs(list(counts), np.random.default_rng(3))
         self.fusion, self.tracks = fusion, new_tracks(self.proposals)
         self.tracks.hits[:] = self.tracks.age[:] = frames
@@ -56,10 +57,13 @@ class Fused:
     def asks(self, wants_class: Bool | bool = True) -> list[bool]:
         """The tracks that ask for a classification, where these or all of them want one."""
         wanted = np.zeros(len(self.tracks), np.bool_) | wants_class
-        return self.fusion.asks(self.tracks, self.proposals, wanted).tolist()
+        self.fusion.observe(self.tracks, self.tracks, self.proposals)
+        return self.fusion.asks(self.tracks, self.tracks, self.proposals, wanted).tolist()
 
     def fuse(self, *view: float, rows: Int = ROW) -> Bool:
         """Fuse a view, and make final what is certain, as the state machine does."""
         likelihood = np.tile(view, (len(rows), 1))
-        self.tracks.final[rows] = certain = self.fusion.fuse(self.tracks, self.proposals, rows, likelihood)
+        self.tracks.final[rows] = certain = self.fusion.fuse(
+            self.tracks, self.tracks, self.proposals, rows, likelihood
+        )
         return certain

@@ -29,7 +29,7 @@ def tracks(*posteriors):
 )
 def test_the_likelier_object_is_reported_where_missing_it_costs_more(missed_cost, posterior, reported):
     table = tracks(posterior)
-    LikeliestClass(DecisionConfig(missed_cost=missed_cost), ASSUMED).decide(table)
+    LikeliestClass(DecisionConfig(missed_cost=missed_cost), ASSUMED).decide(table, table, table)
     assert table.object_class.tolist() == [reported]
 
 
@@ -46,7 +46,7 @@ def test_the_reported_class_is_kept_until_another_one_is_clearly_likelier(cost, 
     table, decision, history = tracks(posteriors[0]), Decision(DecisionConfig(missed_cost=(cost,) * 3), ASSUMED), []
     for posterior in posteriors:
         table.posterior[:] = posterior
-        decision.decide(table)
+        decision.decide(table, table, table)
         history.append(table.object_class[0])
     assert history == reported
 
@@ -64,7 +64,8 @@ def test_the_frequency_of_the_stream_is_learnt(frequency):
     rng = np.random.default_rng(1)
     decision = Decision(DecisionConfig(), ASSUMED)
     for _ in range(300):
-        decision.decide(tracks(*stream(frequency, rng, 60)))
+        seen = tracks(*stream(frequency, rng, 60))
+        decision.decide(seen, seen, seen)
     assert decision.frequency == pytest.approx(frequency, abs=0.06)
     assert np.abs(decision.frequency - frequency).max() <= max(0.05, np.abs(ASSUMED - frequency).max() / 2)
 
@@ -74,8 +75,9 @@ def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_tea
     rng, decision = np.random.default_rng(1), Decision(DecisionConfig(), ASSUMED)
     lost = tracks([0.0, 0.0, 1.0, 0.0])
     lost.proposal[:] = NONE
-    decision.decide(lost)
+    decision.decide(lost, lost, lost)
     assert decision.frequency == pytest.approx(ASSUMED)
     for _ in range(100):
-        decision.decide(tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60)))
+        seen = tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60))
+        decision.decide(seen, seen, seen)
     assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)

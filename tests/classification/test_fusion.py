@@ -14,7 +14,7 @@ from modt.classification.motion_witness import log_likelihood
 from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
-from modt.pipeline import Fusion
+from modt.pipeline import FusionStage
 from modt.types import NONE, Bool, Float64, Proposals
 from tests.classification.scenes import ROW, Fused, with_points
 
@@ -47,12 +47,12 @@ class FixedPrior:
 @pytest.mark.parametrize("fusion", ALL)
 @given(st.lists(arrays(np.float64, 4, elements=st.floats(allow_nan=True, allow_infinity=True)), max_size=8))
 @settings(max_examples=40)
-def test_posterior_stays_a_distribution_for_any_likelihood(fusion: Fusion, views: list[Float64]) -> None:
+def test_posterior_stays_a_distribution_for_any_likelihood(fusion: FusionStage, views: list[Float64]) -> None:
     subject = Fused(fusion, 50, 50, frames=3)
     for view in views:
         subject.asks()
         subject.fuse(*view, rows=np.arange(2))
-        subject.tracks.age += 1
+        subject.tracks.age[:] += 1
         assert (subject.tracks.posterior > 0).all()
         np.testing.assert_allclose(subject.tracks.posterior.sum(axis=1), 1.0)
 
@@ -106,8 +106,8 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
     for k, (view, box, count) in enumerate(zip(views, boxes, counts.tolist(), strict=True)):
         now = with_points(subject.proposals, count)
         prior.rows, tracks.hits[:] = box[None], k + 1
-        fusion.observe(tracks, now)
-        fusion.fuse(tracks, now, ROW, view[None])
+        fusion.observe(tracks, tracks, now)
+        fusion.fuse(tracks, tracks, now, ROW, view[None])
         odds = (1 / box[0] - 1) / (1 / FREQUENCY[0] - 1)  # of an object by the box, over those by frequency
         pooled = log_frequency + pool_weight * np.log(odds) * np.array([0, 1, 1, 1])
         seen = [(weight * rule.FORGETTING, evidence) for weight, evidence in seen]

@@ -41,7 +41,7 @@ def test_every_track_is_served_although_new_ones_keep_coming(counts: list[int], 
     scheduler = Scheduler(cost)
     for _ in range(20 + 2 * len(tracks)):
         asks = ~served | (np.arange(len(tracks)) < newcomers)
-        chosen = scheduler.select(tracks, proposals, asks, budget)
+        chosen = scheduler.select(tracks, tracks, tracks, proposals, asks, budget)
         served[chosen.rows] = True
     assert served.all()
 
@@ -53,7 +53,7 @@ def test_without_a_budget_all_are_served_by_decreasing_worth() -> None:
     tracks.posterior[1] = [0.97, 0.01, 0.01, 0.01]
     proposals.box[:, :2] = [20.0, 0.0]
     tracks.waiting[2] = 3
-    chosen = Scheduler(cost_model()).select(tracks, proposals, np.ones(3, np.bool_), UNLIMITED)
+    chosen = Scheduler(cost_model()).select(tracks, tracks, tracks, proposals, np.ones(3, np.bool_), UNLIMITED)
     assert chosen.rows.tolist() == [2, 0, 1]
     assert chosen.deferred == 0
 
@@ -63,7 +63,9 @@ def test_waiting_counts_deferred_frames() -> None:
     tracks = new_tracks(proposals)
     tracks.proposal[2] = NONE
     tracks.waiting[:] = 5
-    chosen = Scheduler(cost_model()).select(tracks, proposals, np.array([True, False, True]), Budget(calls=0))
+    chosen = Scheduler(cost_model()).select(
+        tracks, tracks, tracks, proposals, np.array([True, False, True]), Budget(calls=0)
+    )
     assert chosen.deferred == 1
     assert tracks.waiting.tolist() == [6, 0, 5]
 
@@ -86,7 +88,7 @@ def drive(budget, n, cost=None, seed=0, slow=1.0, ask=1.0, period_s=0.1):
     times, calls = np.zeros(n), np.zeros(n, np.int64)
     for k in range(n):
         proposals = dozen((100 * seed + k) % SCENES)
-        rows = scheduler.select(tracks, proposals, np.full(12, rng.random() < ask), budget).rows
+        rows = scheduler.select(tracks, tracks, tracks, proposals, np.full(12, rng.random() < ask), budget).rows
         calls[k], points = len(rows), proposals.count[rows]
         if len(rows):
             times[k] = work_ms(points, slow) * rng.lognormal(0.0, 0.12)
@@ -149,7 +151,7 @@ def test_a_large_proposal_is_saved_for_while_small_ones_ask() -> None:
     tracks, scheduler = new_tracks(proposals), Scheduler(cost_model())
     served = np.zeros(12, np.int64)
     for _ in range(400):
-        rows = scheduler.select(tracks, proposals, np.ones(12, np.bool_), Budget(mean_ms=0.3)).rows
+        rows = scheduler.select(tracks, tracks, tracks, proposals, np.ones(12, np.bool_), Budget(mean_ms=0.3)).rows
         served[rows] += 1
         if len(rows):
             scheduler.paid(proposals.count[rows], work_ms(proposals.count[rows]))

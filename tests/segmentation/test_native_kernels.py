@@ -301,9 +301,9 @@ def test_tracks_of_simulated_sweeps(kernels, name, fov):
         for frame in SyntheticStream("street", name, 1.0, 4):
             proposals = segmenter.segment(frame.points)
             located = odometry.locate(frame, proposals, tracker.static_tracks)
-            tracked = tracker.follow(frame.stamp_s, proposals, located)
-            tracked.tracks.object_class = tracked.tracks.id // 2 % 4  # people and cars grow and lose parts
-            runs[-1].append((tracker.conclude(np.zeros(0, np.int64), np.zeros(0, np.bool_)), tracked.proposals))
+            tracked = tracker.track(frame.stamp_s, proposals, located)
+            tracked.decisions.object_class[:] = tracked.motion.id // 2 % 4  # people and cars grow and lose parts
+            runs[-1].append((tracker.confirm(np.zeros(0, np.int64), np.zeros(0, np.bool_)), tracked.proposals))
     assert all(map(same, *runs))
     assert len(runs[0][-1][0]) > 3
 

@@ -53,12 +53,14 @@ class Watched:
         self._spent_ms += max(cpu_ms, 0.0)
         self._scheduler.paid(points, cpu_ms)
 
-    def select(self, tracks: Any, proposals: Any, asks: Any, budget: Budget) -> Selection:
-        chosen = self._scheduler.select(tracks, proposals, asks, budget)
-        points = proposals.count[tracks.proposal[chosen.rows]]
+    def select(
+        self, requests: Any, motion: Any, evidence: Any, proposals: Any, asks: Any, budget: Budget
+    ) -> Selection:
+        chosen = self._scheduler.select(requests, motion, evidence, proposals, asks, budget)
+        points = proposals.count[motion.proposal[chosen.rows]]
         assert len(set(chosen.rows.tolist())) == len(chosen.rows)
         assert asks[chosen.rows].all()
-        assert len(chosen.rows) + chosen.deferred == np.count_nonzero(asks & (tracks.proposal != NONE))
+        assert len(chosen.rows) + chosen.deferred == np.count_nonzero(asks & motion.observed)
         assert budget.calls is None or len(chosen.rows) <= budget.calls
         if budget.cpu_ms is not None and len(points):
             assert self.cost.cost_ms(points) <= budget.cpu_ms or (self.cost.outdated and len(points) == 1)

@@ -8,7 +8,7 @@ from modt.config import TrackingConfig
 from modt.observations import observe
 from modt.tracking.background_map import BackgroundMap
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
-from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, set_class, tracks_at
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, tracks_at
 
 BACKGROUND, CAR = ObjectClass.BACKGROUND, ObjectClass.CAR
 POST, FAR = box(10, 4, 1, 1), box(30, 0, 1, 1)
@@ -103,7 +103,7 @@ def test_background_that_leaves_its_place_loses_its_class_and_is_classified():
 def test_a_class_that_a_view_confirmed_holds_away_from_the_place():
     follower = Follower()
     follower.run(WALL + PART[:2])
-    set_class(follower.tracks, 1, BACKGROUND)
+    follower.set_class(1, BACKGROUND)
     assert follower.run(PART[2:]) == 0
     assert follower.states == ["tracked", "tracked"]
     assert not follower.tracks.inherited.any()

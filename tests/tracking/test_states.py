@@ -9,7 +9,7 @@ from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, Event, StateMachine, UndefinedTransitionError
 from modt.types import NONE
-from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, set_class
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
 
 class RecordedMachine(StateMachine):
@@ -42,8 +42,8 @@ def live(machine, script):
         tracks = follower.follow(*frame_of(boxes, follower.frames, EYE))
         assert follower.wants_class.tolist() == [name in WANT_A_CLASS for name in follower.states]
         if step in {"certain", "uncertain"}:
-            set_class(tracks, 0, ObjectClass.BACKGROUND)
-            follower.conclude([0], [step == "certain"])
+            follower.set_class(0, ObjectClass.BACKGROUND)
+            follower.confirm([0], [step == "certain"])
         assert tracks.final.tolist() == [name in FINAL and machine.final.any() for name in follower.states]
         assert len(tracks) <= 1
         states.extend(follower.states or ["gone"])

@@ -22,12 +22,15 @@ def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
     assert abs(wrap(tracker.tracks.x[0, 2] - course)) < 0.1
 
 
-def test_conclude_returns_a_copy():
-    tracker = Follower()
-    tracker.follow(*frame_of([box(10, 0)], 0, EYE))
-    tracks = tracker.conclude([0], [True])
-    tracks.id[:] = 99
-    assert tracker.tracks.id.tolist() == [0]
+def test_what_is_published_is_a_copy_that_nobody_writes_to():
+    follower = Follower()
+    follower.follow(*frame_of([box(10, 0)], 0, EYE))
+    tracks = follower.confirm([0], [True])
+    follower.run([[box(10, 0)]] * 2)
+    assert tracks.age.tolist() == [1]
+    for column in tracks.columns().values():
+        with pytest.raises(ValueError, match="read-only"):
+            column[:] = 0
 
 
 def test_a_track_at_rest_is_stationary_until_it_leaves_its_rest_position():

@@ -40,20 +40,24 @@ class Follower:
     def follow(self, frame, proposals):
         located = self.odometry.locate(frame, proposals, self.tracker.static_tracks)
         self.T_world_sensor = located.placement.T_world_sensor
-        tracked = self.tracker.follow(frame.stamp_s, proposals, located)
-        self.proposals, self.wants_class = tracked.proposals, tracked.wants_class
+        self.tracked = self.tracker.track(frame.stamp_s, proposals, located)
+        self.proposals = self.tracked.proposals
+        self.wants_class = self.tracked.wants_class
         self.frames += 1
-        return tracked.tracks
+        return self.tracks
 
-    def conclude(self, rows, certain):
-        return self.tracker.conclude(np.asarray(rows), np.asarray(certain))
+    def confirm(self, rows, confirmed):
+        return self.tracker.confirm(np.asarray(rows), np.asarray(confirmed))
+
+    def set_class(self, row, object_class):
+        write_class(self.tracked.evidence, self.tracked.decisions, row, object_class, self.tracks.points[row])
 
     def classify(self, *classes):
         """Give the tracks that want a class one each, in the order of their birth; the last for all further ones."""
         rows = self.wants_class.nonzero()[0]
         for row in rows:
-            set_class(self.tracks, row, classes[min(row, len(classes) - 1)])
-        return self.conclude(rows, np.ones(len(rows), np.bool_))
+            self.set_class(row, classes[min(row, len(classes) - 1)])
+        return self.confirm(rows, np.ones(len(rows), np.bool_))
 
     def run(self, scenes, *classes, T=EYE, **options):
         """Follow frames of boxes, and classify, by default as background; how often a track wanted a class."""
@@ -65,11 +69,11 @@ class Follower:
         return wanted
 
 
-def set_class(tracks, row, object_class):
-    """Write what fusion and decision write of a classified track."""
-    tracks.object_class[row] = object_class
-    tracks.posterior[row] = np.eye(N_CLASSES)[object_class]
-    tracks.key_points[row] = tracks.points[row]
+def write_class(evidence, decisions, row, object_class, points):
+    """Write what fusion and decision write of a track that was classified by a view of so many points."""
+    decisions.object_class[row] = object_class
+    evidence.posterior[row] = np.eye(N_CLASSES)[object_class]
+    evidence.key_points[row] = points
 
 
 def driving(i):
@@ -138,7 +142,8 @@ def tracks_at(boxes, *classes, points=60, **columns):
     t.envelope[:] = t.mean_kdop[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
     t.final[:] = True
     for row in range(n):
-        set_class(t, row, classes[row] if row < len(classes) else ObjectClass.BACKGROUND)
+        object_class = classes[row] if row < len(classes) else ObjectClass.BACKGROUND
+        write_class(t, t, row, object_class, t.points[row])
     for column, value in columns.items():
         getattr(t, column)[:] = value
     return t

@@ -6,7 +6,7 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,13 +26,13 @@ from modt.geometry.field_of_view import BlindSectors
 from modt.geometry.kernels import GeometryKernels
 from modt.native.library import NotAvailableError, load
 from modt.odometry.pose_estimator import PoseEstimator
-from modt.pipeline import Classifier, Fusion, Pipeline
-from modt.pipeline import Segmenter as SegmenterStage
+from modt.pipeline import ClassificationStage, FusionStage, Pipeline, SegmentationStage
 from modt.placement import Mount
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
+from modt.tracking.track_table import LiveTracks
 from modt.tracking.tracker import Tracker
 from modt.types import UNLIMITED, Budget, Float32, Proposals
 
@@ -50,7 +50,7 @@ class Mode:
     """
 
     machine: StateMachine
-    fusion: Callable[[FusionConfig, Prior], Fusion]
+    fusion: Callable[[FusionConfig, Prior], FusionStage]
     budget: Callable[[ProfileConfig], Budget]
 
 
@@ -58,7 +58,7 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
     return Budget(profile.scheduler.calls_per_frame, mean_ms=profile.classification_ms)
 
 
-Rule = Callable[[FusionConfig, Prior], Fusion]
+Rule = Callable[[FusionConfig, Prior], FusionStage]
 
 
 def _by_rule(mean: Rule, product: Rule) -> Rule:
@@ -78,7 +78,7 @@ MODES = {
 class BlindSectorFilter:
     """Moves the points of blind sectors to the origin, which means no return, before it segments."""
 
-    segmenter: SegmenterStage
+    segmenter: SegmentationStage
     sectors: BlindSectors
 
     def facts(self) -> dict[str, str]:
@@ -115,7 +115,7 @@ def chosen_kernels(wanted: str) -> Kernels:
         return NUMPY
 
 
-def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> SegmenterStage:
+def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> SegmentationStage:
     """The first stage, the same in every mode."""
     sensor = profile.sensor
     stage = Segmenter(profile.segmentation, sensor, fov, kernels)
@@ -135,8 +135,22 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
     log.warning("scheduler: the budget is %s: %s; for one in each raise %s", price, often, remedy)
 
 
-def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledger | None = None) -> Pipeline:
-    """The stages of a mode. Without a ledger they have one of their own.
+@dataclass(slots=True)
+class Continuity:
+    """What goes on when the stages of a run are exchanged for those of another profile."""
+
+    tracks: LiveTracks = field(default_factory=LiveTracks)
+    odometry: Odometry | None = None  # the last one, whose world the next one continues
+
+
+def pipeline(
+    mode: Mode,
+    profile: ProfileConfig,
+    fov: FieldOfView,
+    ledger: Ledger | None = None,
+    continuity: Continuity | None = None,
+) -> Pipeline:
+    """The stages of a mode. Without a ledger they have one of their own; without a continuity they begin anew.
 
     Raises:
         MisuseError: the model cannot be used.
@@ -149,7 +163,15 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledge
     warm_up(network.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost, profile)
     return stages(
-        mode, profile, network, segmenter(profile, fov, kernels), network, cost, ledger or Ledger(), kernels
+        mode,
+        profile,
+        network,
+        segmenter(profile, fov, kernels),
+        network,
+        cost,
+        ledger or Ledger(),
+        kernels,
+        continuity,
     )
 
 
@@ -157,19 +179,31 @@ def stages(
     mode: Mode,
     profile: ProfileConfig,
     network: PointNet,
-    segmenter: SegmenterStage,
-    classifier: Classifier,
+    segmenter: SegmentationStage,
+    classifier: ClassificationStage,
     cost: LinearCost,
     ledger: Ledger,
     kernels: GeometryKernels,
+    continuity: Continuity | None = None,
 ) -> Pipeline:
     """A pipeline around a given segmenter, and the network or a substitute of the given cost as its classifier."""
     prior = make_prior(network.box_scores, network.class_frequency)
+    continuity = continuity or Continuity()
+    odometry = PoseEstimator(kernels)
+    if continuity.odometry is not None:
+        odometry.adopt(continuity.odometry)
+    continuity.odometry = odometry
     decision = LikeliestClass if profile.decision.rule == "likeliest" else Decision
     return Pipeline(
         segmenter=segmenter,
-        odometry=PoseEstimator(kernels),
-        tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
+        odometry=odometry,
+        tracker=Tracker(
+            profile.tracking,
+            mode.machine,
+            period_s=profile.sensor.period_s,
+            kernels=kernels,
+            live=continuity.tracks,
+        ),
         fusion=mode.fusion(profile.fusion, prior),
         scheduler=Scheduler(cost, profile.sensor.period_s),
         classifier=classifier,

@@ -14,14 +14,11 @@ from modt.app import assembly, inputs
 from modt.app.chosen_profile import ChosenProfile, choose
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
-from modt.odometry.pose_estimator import PoseEstimator
 from modt.pipeline import Pipeline
 from modt.placement import Mount
 from modt.poses.pose_source import PoseSource
 from modt.sensor_fit.recognition import recognise
 from modt.sources.stream import StreamInfo
-from modt.tracking.track_table import TrackTable
-from modt.tracking.tracker import Tracker
 from modt.types import Budget, Float32, Frame, FrameResult
 
 SWEEPS = 10
@@ -89,10 +86,10 @@ class Stages:
         self._changed = False  # sweeps of another size wait for a comparison
         self.recognising: Thread | None = None
         self._recognised: list[ChosenProfile] = []  # profile chosen by the thread `recognising`
+        self._continuity = assembly.Continuity()
         self.chosen = self._choose()
         self.pipeline = self._new_pipeline(self.chosen.config)
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
-        self._last_good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id
 
     @property
     def info(self) -> StreamInfo:
@@ -126,10 +123,7 @@ class Stages:
             x, y = frame.points[:, :2].T
             near = np.square(x) + np.square(y) <= (RANGE_SHARE * self.config.sensor.max_range_m) ** 2
             frame = replace(frame, points=frame.points[near])
-        result = self.pipeline.step(frame, budget)
-        if isinstance(self.pipeline.tracker, Tracker) and isinstance(result.tracks, TrackTable):
-            self._last_good = result.tracks, self.pipeline.tracker.next_id
-        return result
+        return self.pipeline.step(frame, budget)
 
     def watch(self, frame: Frame) -> None:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it."""
@@ -144,11 +138,12 @@ class Stages:
 
     def recover(self, *, anew: bool) -> None:
         """Restore the tracks of the last good frame; with `anew` make new stages without tracks."""
-        tracks, next_id = self._last_good
-        if anew:
-            tracks, self.pipeline = TrackTable.blank(), self._new_pipeline(self.config)
-        if isinstance(self.pipeline.tracker, Tracker):
-            self.pipeline.tracker.restore(tracks, next_id)
+        if not anew:
+            self._continuity.tracks.roll_back()
+            return
+        self._continuity.odometry = None
+        self._continuity.tracks.clear()
+        self.pipeline = self._new_pipeline(self.config)
 
     def reload(self) -> None:
         """Use the profile as it is on disk now; the tracks are kept.
@@ -203,14 +198,10 @@ class Stages:
     def _new_pipeline(self, config: ProfileConfig) -> Pipeline:
         mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
         fov = inputs.field_of_view(self.request, self._info, mount)
-        return assembly.pipeline(self._mode, config, fov, self.ledger)
+        return assembly.pipeline(self._mode, config, fov, self.ledger, self._continuity)
 
     def _use(self, chosen: ChosenProfile) -> None:
         """Exchange the stages for those of another profile; the tracks are kept."""
-        old, new = self.pipeline, self._new_pipeline(chosen.config)
-        if isinstance(old.tracker, Tracker) and isinstance(new.tracker, Tracker):
-            new.tracker.adopt(old.tracker)
-        if isinstance(old.odometry, PoseEstimator) and isinstance(new.odometry, PoseEstimator):
-            new.odometry.adopt(old.odometry)
-        self.chosen, self.pipeline = chosen, new
+        self.pipeline = self._new_pipeline(chosen.config)
+        self.chosen = chosen
         host.release_freed_pages()

@@ -14,7 +14,7 @@ import numpy as np
 
 from modt.classes import N_CLASSES
 from modt.config import DecisionConfig
-from modt.types import NONE, Float64, Tracks
+from modt.types import Decisions, Evidence, Float64, Motion
 
 MIN_BACKGROUND = 0.1
 """Least frequency of background."""
@@ -38,15 +38,15 @@ class LikeliestClass:
         self.frequency = frequency
         self._threshold = 1.0 / (1.0 + np.array(config.missed_cost))
 
-    def decide(self, tracks: Tracks) -> None:
+    def decide(self, decisions: Decisions, evidence: Evidence, motion: Motion) -> None:
         """Write the class of every track."""
-        self._report(tracks, tracks.posterior.T)
+        self._report(decisions, evidence.posterior.T)
 
-    def _report(self, tracks: Tracks, weighed: Float64) -> None:
+    def _report(self, decisions: Decisions, weighed: Float64) -> None:
         """Write the class of every track by the weights (4, M) of its classes."""
         likeliest = weighed[1:].argmax(axis=0)
         reported = weighed[1:].max(axis=0) >= self._threshold[likeliest]
-        tracks.object_class = np.where(reported, likeliest + 1, 0)
+        decisions.object_class[:] = np.where(reported, likeliest + 1, 0)
 
 
 class Decision(LikeliestClass):
@@ -69,14 +69,14 @@ class Decision(LikeliestClass):
         self._mass = np.zeros(N_CLASSES)
         self._kept = np.append(1.0, np.minimum(KEPT_FROM / self._threshold, 1.0))
 
-    def decide(self, tracks: Tracks) -> None:
+    def decide(self, decisions: Decisions, evidence: Evidence, motion: Motion) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
-        adapted = self.adapted(tracks.posterior.T.copy())
-        weighed, objects = adapted.copy(), tracks.object_class.nonzero()[0]
-        last = tracks.object_class[objects]
+        adapted = self.adapted(evidence.posterior.T.copy())
+        weighed, objects = adapted.copy(), decisions.object_class.nonzero()[0]
+        last = decisions.object_class[objects]
         weighed[last, objects] /= self._kept[last]
-        self._report(tracks, weighed)
-        self._learn(adapted.take((tracks.proposal != NONE).nonzero()[0], axis=1))
+        self._report(decisions, weighed)
+        self._learn(adapted.take(motion.observed.nonzero()[0], axis=1))
 
     def adapted(self, posterior: Float64) -> Float64:
         """(4, M) posteriors under the frequencies of the stream."""

@@ -1,8 +1,8 @@
-"""Selection of views and fusion of all that is known of a track (section V-C): one `pipeline.Fusion` a mode.
+"""Selection of views and fusion of all that is known of a track (section V-C): one `pipeline.FusionStage` a mode.
 
-`asks` selects the tracks whose view is worth a classification; `fuse` takes the classifier's likelihoods and returns
-which tracks are certain, upon which the state machine makes a class final or reopens it. Both write the fusion's
-columns of the track table in place.
+`observe` adds the boxes and the motion of a frame to the evidence of the tracks. `asks` selects the tracks whose view
+is worth a classification. `fuse` takes the classifier's likelihoods and returns which tracks are certain, upon which
+the state machine makes a class final or reopens it. `observe` and `fuse` write the evidence in place.
 
 The posterior of a track after t frames, with views Y, boxes B and motion M, is
 
@@ -23,7 +23,7 @@ from modt.classification.motion_witness import log_likelihood
 from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
 from modt.config import FusionConfig
-from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
+from modt.types import Bool, Evidence, Float64, Int, Motion, Proposals
 
 MIN_PROBABILITY = 1e-4
 """Floor of every likelihood and posterior: no class is excluded for good."""
@@ -109,16 +109,18 @@ class Certainty:
 class EveryFrame:
     """Tracking by detection: every proposal is classified, its likelihood is the posterior (Fig. 2a)."""
 
-    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
-        """(M,) tracks with a proposal."""
-        observed: Bool = tracks.proposal != NONE
-        return observed
+    def observe(self, evidence: Evidence, motion: Motion, proposals: Proposals) -> None:
+        """Do nothing: views alone count."""
 
-    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks with a proposal."""
+        return motion.observed
+
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Replace the posterior; every row is certain."""
-        tracks.posterior[rows] = normalise(likelihood)
-        tracks.views[rows] = 1
-        tracks.key_points[rows] = proposals.count[tracks.proposal[rows]]
+        evidence.posterior[rows] = normalise(likelihood)
+        evidence.views[rows] = 1
+        evidence.key_points[rows] = proposals.count[motion.proposal[rows]]
         return np.ones(len(rows), np.bool_)
 
 
@@ -137,50 +139,46 @@ class FusedTracks:
         self.config, self.prior, self._log_frequency = config, prior, log_frequency_of(prior)
         self.certain = Certainty(self._log_frequency, config.object_threshold, background_threshold)
 
-    def observe(self, tracks: Tracks, proposals: Proposals) -> tuple[Int, Float64, Bool]:
-        """Add the box and the motion of every track with a proposal to what is known of it.
-
-        Returns these R rows, their posteriors (4, R), and whether each may be an object by box and motion.
-        """
-        rows = (tracks.proposal != NONE).nonzero()[0]
-        prior = self.prior.probability(proposals).T.take(tracks.proposal[rows], axis=1)
-        evidence, known = _log(prior) - self._log_frequency[:, None], _by_class(tracks.box_evidence, rows)
-        gain = np.maximum(1.0 / tracks.hits[rows], 1.0 - BOX_FORGETTING) * ~tracks.hidden[rows]
-        witness = log_likelihood(tracks.moved_m[rows], tracks.observed_s[rows], tracks.size_m.take(rows, axis=0)).T
-        boxes = known + gain * (evidence - known)
-        tracks.prior[rows], tracks.witness[rows], tracks.box_evidence[rows] = prior.T, witness.T, boxes.T
+    def observe(self, evidence: Evidence, motion: Motion, proposals: Proposals) -> None:
+        """Add the box and the motion of every track with a proposal to what is known of it."""
+        rows = motion.observed.nonzero()[0]
+        prior = self.prior.probability(proposals).T.take(motion.proposal[rows], axis=1)
+        of_box, known = _log(prior) - self._log_frequency[:, None], _by_class(evidence.box_evidence, rows)
+        gain = np.maximum(1.0 / motion.hits[rows], 1.0 - BOX_FORGETTING) * ~motion.hidden[rows]
+        witness = log_likelihood(motion.moved_m[rows], motion.observed_s[rows], motion.size_m.take(rows, axis=0)).T
+        boxes = known + gain * (of_box - known)
+        evidence.prior[rows], evidence.witness[rows], evidence.box_evidence[rows] = prior.T, witness.T, boxes.T
         weighed = prior * np.exp(witness)
         probability = (weighed / weighed.sum(axis=0)).T
-        may_be_object = self.prior.may_be_object(probability, self.config.min_object_probability)
-        posterior = self._posterior(tracks, rows, prior, boxes, witness)
-        posterior.T[tracks.inherited[rows]] = _BACKGROUND  # remembered places
-        tracks.posterior[rows] = posterior.T
-        return rows, posterior, may_be_object
+        evidence.may_be_object[rows] = self.prior.may_be_object(probability, self.config.min_object_probability)
+        posterior = self._posterior(evidence, rows, prior, boxes, witness)
+        posterior.T[motion.final[rows] & ~evidence.viewed[rows]] = _BACKGROUND  # remembered places
+        evidence.posterior[rows] = posterior.T
 
-    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows; (R,) which are certain now.
 
         The classifier returns a posterior under the class frequency and, by its pool weight, the box prior: both are
         divided out.
         """
-        count = proposals.count[tracks.proposal[rows]]
-        prior = tracks.prior.take(rows, axis=0)
+        count = proposals.count[motion.proposal[rows]]
+        prior = evidence.prior.take(rows, axis=0)
         view = np.log(normalise(likelihood)) - pooled_prior(_log(prior), self._log_frequency, self.prior.pool_weight)
-        known, weight = tracks.evidence.take(rows, axis=0), np.sqrt(count)
-        total = FORGETTING * tracks.weight[rows] + weight
-        tracks.evidence[rows] = known + (weight / total)[:, None] * (view - known)
-        tracks.weight[rows] = total
-        tracks.views[rows] += 1
-        tracks.key_points[rows], tracks.key_age[rows] = count, tracks.age[rows]
-        boxes, witness = _by_class(tracks.box_evidence, rows), _by_class(tracks.witness, rows)
-        posterior = self._posterior(tracks, rows, prior.T, boxes, witness)
-        tracks.posterior[rows] = posterior.T
+        known, weight = evidence.evidence.take(rows, axis=0), np.sqrt(count)
+        total = FORGETTING * evidence.weight[rows] + weight
+        evidence.evidence[rows] = known + (weight / total)[:, None] * (view - known)
+        evidence.weight[rows] = total
+        evidence.views[rows] += 1
+        evidence.key_points[rows], evidence.key_age[rows] = count, motion.age[rows]
+        boxes, witness = _by_class(evidence.box_evidence, rows), _by_class(evidence.witness, rows)
+        posterior = self._posterior(evidence, rows, prior.T, boxes, witness)
+        evidence.posterior[rows] = posterior.T
         return self.certain(posterior)
 
-    def _posterior(self, tracks: Tracks, rows: Int, prior: Float64, boxes: Float64, witness: Float64) -> Float64:
+    def _posterior(self, evidence: Evidence, rows: Int, prior: Float64, boxes: Float64, witness: Float64) -> Float64:
         """Posterior (4, R) of the rows by their views, and by their boxes and motion, (4, R) each."""
-        weight = _POWERS.take(tracks.views[rows], mode="clip")
-        known = self._log_frequency[:, None] + weight * _by_class(tracks.evidence, rows)
+        weight = _POWERS.take(evidence.views[rows], mode="clip")
+        known = self._log_frequency[:, None] + weight * _by_class(evidence.evidence, rows)
         known += BOX_WEIGHT * boxes + witness
         posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
         posterior += MISMATCH_PROBABILITY * prior
@@ -199,13 +197,13 @@ class FirstViews(FusedTracks):
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
         super().__init__(config, prior, config.object_threshold)
 
-    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+    def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
-        rows, posterior, may_be_object = self.observe(tracks, proposals)
-        waits = wants_class & (tracks.hits >= FIRST_VIEW_MIN_HITS) & ~tracks.hidden
-        asks = np.zeros(len(tracks), np.bool_)
-        asks[rows] = may_be_object & (
-            (~tracks.viewed | _shows_more(tracks))[rows] | _person_waits(tracks, rows, posterior)
+        rows = motion.observed.nonzero()[0]
+        waits = wants_class & (motion.hits >= FIRST_VIEW_MIN_HITS) & ~motion.hidden
+        asks = np.zeros(len(motion), np.bool_)
+        asks[rows] = evidence.may_be_object[rows] & (
+            (~evidence.viewed | _shows_more(evidence, motion))[rows] | _person_waits(evidence, motion, rows)
         )
         return asks & waits
 
@@ -220,21 +218,24 @@ class FurtherViews(FusedTracks):
     more than half.
     """
 
-    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+    def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
-        rows, posterior, may_be_object = self.observe(tracks, proposals)
-        background, age, key_age = posterior[ObjectClass.BACKGROUND], tracks.age[rows], tracks.key_age[rows]
-        own, limit = tracks.proposal[rows], self.config.min_object_probability
-        may_be_object |= (proposals.count[own] >= MANY_POINTS) & self.prior.may_be_object(tracks.prior[rows], limit)
+        rows = motion.observed.nonzero()[0]
+        posterior = _by_class(evidence.posterior, rows)
+        background, age, key_age = posterior[ObjectClass.BACKGROUND], motion.age[rows], evidence.key_age[rows]
+        own, limit = motion.proposal[rows], self.config.min_object_probability
+        may_be_object = evidence.may_be_object[rows] | (
+            (proposals.count[own] >= MANY_POINTS) & self.prior.may_be_object(evidence.prior[rows], limit)
+        )
         first = may_be_object | _near(proposals)[own]
         review = (background < 0.5) & (age >= REVIEW_GROWTH * key_age + REVIEW_FRAMES)
-        review |= first & _shows_more(tracks, FAR_MORE_POINTS)[rows]
+        review |= first & _shows_more(evidence, motion, FAR_MORE_POINTS)[rows]
         growth = np.where(background > LIKELY_BACKGROUND, BACKGROUND_GROWTH, UNSURE_GROWTH)
-        unsure = _shows_more(tracks)[rows] | (age >= growth * key_age + UNSURE_FRAMES)
-        unsure |= _person_waits(tracks, rows, posterior)
+        unsure = _shows_more(evidence, motion)[rows] | (age >= growth * key_age + UNSURE_FRAMES)
+        unsure |= _person_waits(evidence, motion, rows)
         further = np.where(self.certain(posterior), review, unsure)
-        asks = np.zeros(len(tracks), np.bool_)
-        asks[rows] = ~tracks.hidden[rows] & np.where(tracks.viewed[rows], further, first)
+        asks = np.zeros(len(motion), np.bool_)
+        asks[rows] = ~motion.hidden[rows] & np.where(evidence.viewed[rows], further, first)
         return asks
 
 
@@ -245,15 +246,15 @@ def _near(proposals: Proposals) -> Bool:
     return near
 
 
-def _person_waits(tracks: Tracks, rows: Int, posterior: Float64) -> Bool:
-    """(R,) rows that may be people by their posterior (4, R), and were last classified PERSON_FRAMES ago."""
-    waits: Bool = posterior[IS_PERSON].sum(axis=0) > MAYBE_PERSON
-    return waits & (tracks.age >= tracks.key_age + PERSON_FRAMES)[rows]
+def _person_waits(evidence: Evidence, motion: Motion, rows: Int) -> Bool:
+    """(R,) rows that may be people by their posterior, and were last classified PERSON_FRAMES ago."""
+    waits: Bool = _by_class(evidence.posterior, rows)[IS_PERSON].sum(axis=0) > MAYBE_PERSON
+    return waits & (motion.age >= evidence.key_age + PERSON_FRAMES)[rows]
 
 
-def _shows_more(tracks: Tracks, ratio: float = MORE_POINTS) -> Bool:
+def _shows_more(evidence: Evidence, motion: Motion, ratio: float = MORE_POINTS) -> Bool:
     """(M,) tracks whose last proposal shows clearly more of them than their last view."""
-    return tracks.points > ratio * tracks.key_points + MORE_POINTS_BY
+    return motion.points > ratio * evidence.key_points + MORE_POINTS_BY
 
 
 def _by_class(column: Float64, rows: Int) -> Float64:

@@ -7,7 +7,7 @@ import numpy as np
 from modt.classification.fusion import Certainty, from_log_weights, log_frequency_of, normalise
 from modt.classification.prior import Prior
 from modt.config import FusionConfig
-from modt.types import Bool, Float64, Int, Proposals, Tracks
+from modt.types import Bool, Evidence, Float64, Int, Motion, Proposals
 
 
 class AnyView:
@@ -16,16 +16,20 @@ class AnyView:
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
         self._log_frequency = log_frequency_of(prior)
 
-    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
-        """(M,) tracks never viewed."""
-        return wants_class & ~tracks.viewed
+    def observe(self, evidence: Evidence, motion: Motion, proposals: Proposals) -> None:
+        """Do nothing: views alone count."""
 
-    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks never viewed."""
+        return wants_class & ~evidence.viewed
+
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiply the view into the posterior; (R,) True."""
-        posterior = from_log_weights((tracks.evidence[rows] + np.log(normalise(likelihood))).T).T
-        tracks.posterior[rows], tracks.evidence[rows] = posterior, np.log(posterior) - self._log_frequency
-        tracks.views[rows] += 1
-        tracks.key_points[rows] = proposals.count[tracks.proposal[rows]]
+        posterior = from_log_weights((evidence.evidence[rows] + np.log(normalise(likelihood))).T).T
+        evidence.posterior[rows] = posterior
+        evidence.evidence[rows] = np.log(posterior) - self._log_frequency
+        evidence.views[rows] += 1
+        evidence.key_points[rows] = proposals.count[motion.proposal[rows]]
         return np.ones(len(rows), np.bool_)
 
 
@@ -41,20 +45,20 @@ class KeyViews(AnyView):
         self._point_change, self._start_frame = np.array(config.point_change), config.start_frame
         self._certain = Certainty(self._log_frequency, config.object_threshold, config.object_threshold)
 
-    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+    def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first or an independent view."""
         rows = wants_class.nonzero()[0]
-        now, then = proposals.count[tracks.proposal[rows]], tracks.key_points[rows]
-        alpha = self._point_change[tracks.posterior[rows].argmax(axis=1)]
-        independent = (tracks.views[rows] == 0) | (np.abs(now - then) > alpha * then)
+        now, then = proposals.count[motion.proposal[rows]], evidence.key_points[rows]
+        alpha = self._point_change[evidence.posterior[rows].argmax(axis=1)]
+        independent = (evidence.views[rows] == 0) | (np.abs(now - then) > alpha * then)
         asks = wants_class.copy()
-        asks[rows] = ~tracks.viewed[rows] | (independent & (tracks.age[rows] >= self._start_frame))
+        asks[rows] = ~evidence.viewed[rows] | (independent & (motion.age[rows] >= self._start_frame))
         return asks
 
-    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiply the view into the posterior (Equation 6); (R,) which rows are certain now."""
-        tracks.evidence[rows[tracks.views[rows] == 0]] = 0.0
-        super().fuse(tracks, proposals, rows, likelihood)
-        started: Bool = tracks.age[rows] >= self._start_frame
-        tracks.views[rows] -= ~started
-        return self._certain(tracks.posterior[rows].T) & started
+        evidence.evidence[rows[evidence.views[rows] == 0]] = 0.0
+        super().fuse(evidence, motion, proposals, rows, likelihood)
+        started: Bool = motion.age[rows] >= self._start_frame
+        evidence.views[rows] -= ~started
+        return self._certain(evidence.posterior[rows].T) & started

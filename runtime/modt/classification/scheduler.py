@@ -13,7 +13,7 @@ import numpy as np
 from modt.classes import N_CLASSES
 from modt.classification.crops import batches
 from modt.config import ClassificationConfig
-from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tracks
+from modt.types import Bool, Budget, Evidence, Float32, Float64, Int, Motion, Proposals, Requests
 
 
 def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
@@ -151,39 +151,51 @@ class Scheduler:
         self.cost.update(points, cpu_ms)
         self._saved_ms -= cpu_ms if 0.0 <= cpu_ms < math.inf else 0.0
 
-    def select(self, tracks: Tracks, proposals: Proposals, asks: Bool, budget: Budget) -> Selection:
-        """The tracks to classify in this frame; writes tracks.waiting.
+    def select(
+        self,
+        requests: Requests,
+        motion: Motion,
+        evidence: Evidence,
+        proposals: Proposals,
+        asks: Bool,
+        budget: Budget,
+    ) -> Selection:
+        """The tracks to classify in this frame; writes how long the others have waited.
 
         Args:
-            tracks: alive.
+            requests: written.
+            motion: of the tracks alive.
+            evidence: of the same.
             proposals: proposals of this frame.
             asks: (M,) tracks that request a class, each with a proposal.
             budget: budget of the frame.
         """
-        observed = tracks.proposal != NONE
+        observed = motion.observed
         asking = (asks & observed).nonzero()[0]
-        worth = self.worth(tracks, proposals, asking)
-        ranked = asking[np.lexsort((tracks.id[asking], -worth))]
-        granted = self._affordable(proposals.count[tracks.proposal[ranked]], budget)
+        worth = self.worth(requests, motion, evidence, proposals, asking)
+        ranked = asking[np.lexsort((motion.id[asking], -worth))]
+        granted = self._affordable(proposals.count[motion.proposal[ranked]], budget)
         deferred = ranked[~granted]
-        waiting = tracks.waiting[deferred] + 1
-        tracks.waiting[observed] = 0
-        tracks.waiting[deferred] = waiting
+        waiting = requests.waiting[deferred] + 1
+        requests.waiting[observed] = 0
+        requests.waiting[deferred] = waiting
         return Selection(ranked[granted], len(deferred))
 
-    def worth(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Float64:
+    def worth(
+        self, requests: Requests, motion: Motion, evidence: Evidence, proposals: Proposals, rows: Int
+    ) -> Float64:
         """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
-        proposal_rows = tracks.proposal[rows]
-        posterior = np.maximum(tracks.posterior[rows], 1e-12)
+        proposal_rows = motion.proposal[rows]
+        posterior = np.maximum(evidence.posterior[rows], 1e-12)
         uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / math.log(N_CLASSES)
-        count, last_points = proposals.count[proposal_rows], tracks.key_points[rows]
+        count, last_points = proposals.count[proposal_rows], evidence.key_points[rows]
         novelty = np.minimum(np.abs(count - last_points) / np.maximum(last_points, 1), 1.0)
         nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / NEARNESS_RANGE_M)
         value: Float64 = (
             UNCERTAINTY_WEIGHT * uncertainty
             + NEARNESS_WEIGHT * nearness
             + NOVELTY_WEIGHT * novelty
-            + WAITING_WEIGHT * tracks.waiting[rows]
+            + WAITING_WEIGHT * requests.waiting[rows]
         )
         return value
 

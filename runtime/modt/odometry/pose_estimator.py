@@ -138,7 +138,7 @@ class _Sweep:
         observations = observe(self.proposals, placement.T_world_sensor, self.kernels)
         if self.delay_s is not None:
             step = placement.motion.displacement(self.proposals.centroid[:, :2], self.delay_s)
-            observations.move(step @ placement.T_world_sensor[:2, :2].T)
+            observations = observations.moved(step @ placement.T_world_sensor[:2, :2].T)
         return observations
 
     def correction_share(self) -> Float64 | float:

@@ -109,8 +109,9 @@ def _rows(result: FrameResult) -> text.Text:
     lost = tracks.proposal == NONE
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
     id_, proposal, points, age, missed = text.integers(np.stack(counts))
-    boxes = np.vstack([result.proposals.box, np.zeros(len(BOX_KEYS))])  # the last row stands for NONE
-    box = _group(text.rounded_to_3(boxes[tracks.proposal]), BOX_KEYS)
+    boxes = np.zeros((len(tracks), len(BOX_KEYS)))
+    boxes[~lost] = result.proposals.box[tracks.proposal[~lost]]
+    box = _group(text.rounded_to_3(boxes), BOX_KEYS)
     for value in (proposal, box):
         value[lost] = 0
         value[lost, 0] = NULL

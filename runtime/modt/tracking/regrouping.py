@@ -17,6 +17,7 @@ The risk: a person who steps close to a parked car, and is not classified yet, b
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -144,11 +145,8 @@ class Regrouping:
         proposals, observations = self._regrouped(
             frame, placement, number[:n], moved, source[kept], renewed[kept], yaw[kept]
         )
-        if proposals.reflectance is not None:
-            proposals.reflectance[new] = np.nan
         if len(rows):
-            observations.kdop[:, new] = self._locate(tracks, rows, observations.kdop[:, new], matches)
-        observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
+            proposals, observations = self._as_expected(tracks, rows, new, proposals, observations, matches)
         return Associated(proposals, observations, matches._replace(proposals=number[matches.proposals]))
 
     def _pairs(self, tracks: TrackTable, frame: Associated, owner: Int) -> Pairs:
@@ -220,14 +218,43 @@ class Regrouping:
         runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
         copied = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
         few = proposals.regrouped(*copied, count[changed], changed)
-        few.box[:] = kernels.upright_boxes(few.coordinates, few.offsets, yaw[changed])
-        few.centroid[:] = (kernels.group_sums(few.coordinates, few.offsets) / few.count).T
-        proposals.box[changed], proposals.centroid[changed] = few.box, few.centroid
-        observations = frame.observations.take(source)
+        few = replace(
+            few,
+            box=kernels.upright_boxes(few.coordinates, few.offsets, yaw[changed]),
+            centroid=(kernels.group_sums(few.coordinates, few.offsets) / few.count).T,
+        )
+        box = proposals.box.copy()
+        box[changed] = few.box
+        centroid = proposals.centroid.copy()
+        centroid[changed] = few.centroid
         observed = observe(few, placement.T_world_sensor, kernels)
-        observed.move(placement.deskew(observed.centroid))
-        observations.put(changed, observed)
-        return proposals, observations
+        observed = observed.moved(placement.deskew(observed.centroid))
+        return (
+            replace(proposals, box=box, centroid=centroid),
+            frame.observations.regrouped(source, changed, observed),
+        )
+
+    def _as_expected(
+        self,
+        tracks: TrackTable,
+        rows: Int,
+        pieces: Int,
+        proposals: Proposals,
+        observations: Observations,
+        matches: Matches,
+    ) -> tuple[Proposals, Observations]:
+        """Proposals and observations whose pieces (S,) show of the tracks (S,) nothing but their positions."""
+        kdop, bottom, top = observations.kdop.copy(), observations.bottom.copy(), observations.top.copy()
+        kdop[:, pieces] = self._locate(tracks, rows, observations.kdop[:, pieces], matches)
+        bottom[pieces], top[pieces] = tracks.bottom[rows], tracks.top[rows]
+        reflectance = proposals.reflectance
+        if reflectance is not None:
+            reflectance = reflectance.copy()
+            reflectance[pieces] = np.nan
+        return (
+            replace(proposals, reflectance=reflectance),
+            replace(observations, kdop=kdop, bottom=bottom, top=top),
+        )
 
     def _locate(self, tracks: TrackTable, rows: Int, kdop: Float64, matches: Matches) -> Float64:
         """(8, S) k-DOPs of tracks (S,) whose pieces have (8, S) k-DOPs; writes the measured positions into matches.

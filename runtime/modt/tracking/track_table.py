@@ -15,7 +15,19 @@ from modt.geometry.kdop import DIRECTIONS
 from modt.geometry.tuning import ShapeTuning
 from modt.native.library import FLOAT64, INT64, Own, declare, structure
 from modt.observations import Observations
-from modt.types import Bool, Float64, Int, Tracks, column
+from modt.types import (
+    Bool,
+    Decisions,
+    Evidence,
+    Float64,
+    Int,
+    Motion,
+    Proposals,
+    Requests,
+    TrackedFrame,
+    Tracks,
+    column,
+)
 
 ESTABLISHED_HITS = 4
 """Frames in which a track was observed, from which its velocity and class change proposals."""
@@ -33,7 +45,7 @@ MAX_LENGTH_M: Float64 = np.where(np.arange(len(MAX_SIZE_M)) == ObjectClass.BACKG
 """(4,) length of a track of each class beyond which it is merged with others."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True)
 class TrackTable(Tracks):
     """Tracks with the columns that only the tracker needs; k-DOPs as in geometry/kdop.py."""
 
@@ -58,6 +70,61 @@ class TrackTable(Tracks):
         """(8, R) k-DOPs of all that was observed of the rows, where the filter expects them now."""
         kdop: Float64 = (self.envelope.take(rows, axis=0) + self.x.take(rows, axis=0)[:, :2] @ DIRECTIONS).T.copy()
         return kdop
+
+
+class LiveTracks:
+    """The tracks alive, and what else goes on from frame to frame. The stages may be exchanged around it.
+
+    Attributes:
+        table: the tracks as the tracker has them: its own columns can be written to, the others are read-only.
+        next_id: identity of the next new track.
+        stamp_s: time of the last frame [s], None before the first.
+    """
+
+    def __init__(self) -> None:
+        self.next_id = 0
+        self.stamp_s: float | None = None
+        self._hold(TrackTable.blank())
+        self._saved = self.table, self.next_id
+
+    def _hold(self, table: TrackTable) -> None:
+        """Exchange the table for another one, whose columns can all be written to."""
+        self._evidence = Evidence.of(table)
+        self._requests = Requests.of(table)
+        self._decisions = Decisions.of(table)
+        self.table = table.read_only(Evidence, Requests, Decisions)
+
+    def renew(self, kept: Int, n_new: int) -> Int:
+        """Keep these rows, in their order, and add blank ones with new identities, whose rows are returned."""
+        self._hold(self.table.renewed(kept, n_new))
+        new = np.arange(len(kept), len(kept) + n_new)
+        self.table.id[new] = np.arange(self.next_id, self.next_id + n_new)
+        self.next_id += n_new
+        return new
+
+    def tracked(self, proposals: Proposals, wants_class: Bool) -> TrackedFrame:
+        """The tracks by owner, for the stages after the tracker."""
+        motion = Motion.of(self.table).read_only()
+        return TrackedFrame(
+            motion, self._evidence, self._requests, self._decisions, proposals.read_only(), wants_class
+        )
+
+    def save(self) -> Tracks:
+        """Copy the tracks at the end of a frame, for `roll_back`; the copy is read-only."""
+        saved = self.table.copy()
+        self._saved = saved, self.next_id
+        return Tracks.of(saved).read_only()
+
+    def roll_back(self) -> None:
+        """Return to the tracks that were saved last."""
+        saved, self.next_id = self._saved
+        self._hold(saved.copy())
+
+    def clear(self) -> None:
+        """Forget the tracks and the time. Identities go on after those that were saved last."""
+        self.next_id = self._saved[1]
+        self.stamp_s = None
+        self._hold(TrackTable.blank())
 
 
 def observe(

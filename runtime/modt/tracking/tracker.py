@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from modt.class_sizes import IS_PERSON
@@ -15,7 +17,7 @@ from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.states import Event, StateMachine
-from modt.tracking.track_table import NativeObserve, TrackTable, observe
+from modt.tracking.track_table import LiveTracks, NativeObserve, TrackTable, observe
 from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks
 
 ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS = 2.0, 0.3
@@ -48,6 +50,7 @@ class Tracker:
         association: association of proposals with tracks; by default the configured one.
         period_s: time between sweeps; a track that is not seen is kept for `max_missed` of them.
         kernels: passes over points and pairs.
+        live: tracks to go on with; by default none.
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class Tracker:
         association: Association | None = None,
         period_s: float = 0.1,
         kernels: GeometryKernels = NUMPY_GEOMETRY,
+        live: LiveTracks | None = None,
     ) -> None:
         self.config, self.machine = config, machine
         self.association = association_of(config, kernels) if association is None else association
@@ -68,23 +72,12 @@ class Tracker:
         self._filter = filter_of(kernels, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS)
         position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
         self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
-        self._tracks = TrackTable.blank()
-        self.next_id = 0
-        self._stamp_s: float | None = None
+        self._live = LiveTracks() if live is None else live
 
     @property
     def tracks(self) -> TrackTable:
-        """The live table."""
-        return self._tracks
-
-    def restore(self, tracks: TrackTable, next_id: int) -> None:
-        """Hold a copy of these tracks, and give new ones ids from `next_id` on."""
-        self._tracks, self.next_id = tracks.copy(), next_id
-
-    def adopt(self, other: Tracker) -> None:
-        """Continue with the tracks and the time of another tracker."""
-        self.restore(other.tracks, other.next_id)
-        self._stamp_s = other._stamp_s
+        """The live table: its own columns can be written to, those of other stages are read-only."""
+        return self._live.table
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -94,17 +87,17 @@ class Tracker:
     def static_tracks(self, stamp_s: float) -> StaticTracks:
         """Facts that the odometry needs of the tracks that a frame at this time may continue."""
         self._forget(stamp_s)
-        t = self._tracks
+        t = self.tracks
         return StaticTracks(
             id=t.id,
-            observed=t.proposal != NONE,
+            observed=t.observed,
             stationary=t.stationary,
             candidate=(t.stationary | (t.hits < 3)) & (t.missed <= 2),
             kdop=t.kdop,
             predicted_kdop=t.predicted_kdops(),
         )
 
-    def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+    def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """Match a frame's proposals, regrouped where the tracks know better, with the tracks; each belongs to one.
 
         Args:
@@ -113,40 +106,39 @@ class Tracker:
             located: the same in the world.
 
         Returns:
-            The live table, into which later stages write their columns; the proposals; and which tracks want a class.
+            The tracks by owner, the proposals, and which tracks want a class.
         """
         self._forget(stamp_s)
         dt_s = self._predict(stamp_s)
-        matches = self.association.match(self._tracks, located.observations)
+        matches = self.association.match(self.tracks, located.observations)
         frame = Associated(proposals, located.observations, matches)
         if self._extended:  # the paper takes proposals as they are
-            frame = self._regrouping.regroup(self._tracks, frame, located.placement)
-        known = self._tracks.box.take(frame.matches.rows, axis=0)
+            frame = self._regrouping.regroup(self.tracks, frame, located.placement)
+        known = self.tracks.box.take(frame.matches.rows, axis=0)
         self._associate(frame.matches.rows)
         self._update(frame.matches, frame.observations, dt_s)
-        self._keep_top(frame, known)
+        proposals = self._keep_top(frame, known)
         self._observe_rest(frame.matches.rows)
         near = self._near_rest()
         self._withdraw(near)
         at_rest = self._background(near)
         self._renew(self._expire(at_rest), at_rest, frame.matches, frame.observations)
-        t = self._tracks
-        return TrackedFrame(t, frame.proposals, self.machine.wants_class[t.state] & (t.proposal != NONE))
+        t = self.tracks
+        return self._live.tracked(proposals, self.machine.wants_class[t.state] & t.observed)
 
-    def conclude(self, rows: Int, certain: Bool) -> Tracks:
-        """Tell the machine of the classifications of a frame, and return a copy of the tracks.
+    def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
+        """Lead the tracks that were classified to their next states, and return a snapshot of all tracks.
 
         Args:
             rows: (R,) tracks classified.
-            certain: (R,) whether the class of each is certain now.
+            confirmed: (R,) whether the class of each is confirmed now.
         """
-        t = self._tracks
-        self._advance(rows, np.where(certain, Event.CLASSIFIED.value, Event.UNDECIDED.value))
-        return t.copy()
+        self._advance(rows, np.where(confirmed, Event.CLASSIFIED.value, Event.UNDECIDED.value))
+        return self._live.save()
 
     def _advance(self, rows: Int, events: Event | Int) -> None:
         """Move rows to the states that events lead to, and write whether the class is final there."""
-        t = self._tracks
+        t = self.tracks
         if not len(rows):
             return
         t.state[rows] = self.machine.transition(t.state[rows], events)
@@ -154,7 +146,8 @@ class Tracker:
 
     def _lapse_s(self, stamp_s: float) -> float:
         """Time since the last frame, zero where the clock went back."""
-        return 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
+        last_s = self._live.stamp_s
+        return 0.0 if last_s is None else max(0.0, stamp_s - last_s)
 
     def _coasting_s(self, frames: float) -> float:
         """Time that N frames, and some more, take."""
@@ -162,62 +155,64 @@ class Tracker:
 
     def _forget(self, stamp_s: float) -> None:
         """Delete the tracks that would have expired in a gap; beyond N frames of it, the scene may be another one."""
-        t, lapse_s, most_s = self._tracks, self._lapse_s(stamp_s), self._coasting_s(1.5)
+        t, lapse_s, most_s = self.tracks, self._lapse_s(stamp_s), self._coasting_s(1.5)
         gone = t.unseen_s + lapse_s > most_s
         if gone.any():
             self.background_map.add(t, (gone & self._background(self._near_rest())).nonzero()[0])
-            self._tracks = t.renewed((~gone).nonzero()[0], 0)
+            self._live.renew((~gone).nonzero()[0], 0)
         if lapse_s > most_s:
             self.background_map.clear()
 
     def _predict(self, stamp_s: float) -> float:
         """Equation 1, over the time since the last frame, which is returned [s]."""
         dt_s = self._lapse_s(stamp_s)
-        self._stamp_s = stamp_s
-        t = self._tracks
+        self._live.stamp_s = stamp_s
+        t = self.tracks
         creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
-        t.unseen_s += self._period_s if creeps else dt_s
+        t.unseen_s[:] += self._period_s if creeps else dt_s
         self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
     def _associate(self, rows: Int) -> None:
         """Count hits and misses; proposals take over the standing of their tracks, the other tracks coast."""
-        t = self._tracks
+        t = self.tracks
         events = np.full(len(t), Event.UNASSOCIATED.value)
         events[rows] = Event.ASSOCIATED.value
         t.state[:] = self.machine.transition(t.state, events)
         t.state[rows] = self.machine.joined(t.state[rows])
         t.final[:] = self.machine.final[t.state]
-        t.age += 1
+        t.age[:] += 1
         t.hits[rows] += 1
-        t.missed += 1
+        t.missed[:] += 1
         t.missed[rows], t.unseen_s[rows] = 0, 0.0
         t.proposal[:] = NONE
 
     def _update(self, matches: Matches, observations: Observations, dt_s: float) -> None:
         """Equation 1's filter on the matched positions, and what the proposals show of their tracks."""
-        t, rows = self._tracks, matches.rows
+        t, rows = self.tracks, matches.rows
         self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         t.end_variance[rows] = matches.end_variance
         self._observe(t, rows, matches.proposals, observations, matches.position, dt_s)
 
-    def _keep_top(self, frame: Associated, known: Float64) -> None:
-        """A person cut above is as high as in (R, 7) the boxes known before the frame: writes track and proposal."""
-        t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
+    def _keep_top(self, frame: Associated, known: Float64) -> Proposals:
+        """A person cut above is as high as in (R, 7) the boxes known before the frame: in the track and proposal."""
+        t, rows, own = self.tracks, frame.matches.rows, frame.matches.proposals
         t.hidden[rows] = False
         people = IS_PERSON[t.object_class[rows]].nonzero()[0]
         people = people[frame.proposals.cut[own[people]] & Cut.TOP.value > 0]
         if not len(people):
-            return
+            return frame.proposals
         rows, own, known = rows[people], own[people], known[people]
         hidden_m = np.maximum((known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2), 0.0)
         t.hidden[rows] = (hidden_m > 0) & (t.box[rows, 5] < PERSON_M / 2)
-        for boxes, index in ((t.box, rows), (frame.proposals.box, own)):
+        raised = frame.proposals.box.copy()
+        for boxes, index in ((t.box, rows), (raised, own)):
             boxes[index, 2:6:3] += np.outer(hidden_m, (0.5, 1.0))  # z of the middle, and height
+        return replace(frame.proposals, box=raised)
 
     def _observe_rest(self, rows: Int) -> None:
         """Write rest position and stationary of the rows; a track that stopped rests where it is."""
-        t = self._tracks
+        t = self.tracks
         x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
         stopped = ((x[:, SPEED] < STOPPED_MPS) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
         position[stopped] = x[stopped, :2]
@@ -230,24 +225,24 @@ class Tracker:
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
-        step = self._tracks.x[:, :2] - self._tracks.rest_position
+        step = self.tracks.x[:, :2] - self.tracks.rest_position
         near: Bool = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
         return near
 
     def _background(self, near: Bool) -> Bool:
         """(M,) tracks that are finally background, and near their rest position."""
-        background: Bool = self._tracks.object_class == ObjectClass.BACKGROUND.value
-        return self._tracks.final & background & near
+        background: Bool = self.tracks.object_class == ObjectClass.BACKGROUND.value
+        return self.tracks.final & background & near
 
     def _withdraw(self, near: Bool) -> None:
         """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
-        t = self._tracks
+        t = self.tracks
         rows = (t.inherited & ~near).nonzero()[0]
         self._advance(rows[t.proposal[rows] != NONE], Event.WITHDRAWN)
 
     def _expire(self, at_rest: Bool) -> Int:
         """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
-        t = self._tracks
+        t = self.tracks
         expired: Bool = (t.proposal == NONE) & (t.unseen_s > self._coasting_s(0.5))
         self.background_map.add(t, (expired & at_rest).nonzero()[0])
         self._advance(expired.nonzero()[0], Event.EXPIRED)
@@ -258,11 +253,9 @@ class Tracker:
         claimed = np.zeros(len(observations), np.bool_)
         claimed[matches.proposals] = True
         proposals = (~claimed).nonzero()[0]
-        known = self.background_map.recall(self._tracks, kept[at_rest[kept]], observations, proposals)
-        t = self._tracks = self._tracks.renewed(kept, len(proposals))
-        rows, new = np.arange(len(kept), len(t)), slice(len(kept), len(t))
-        t.id[new] = np.arange(self.next_id, self.next_id + len(rows))
-        self.next_id += len(rows)
+        known = self.background_map.recall(self.tracks, kept[at_rest[kept]], observations, proposals)
+        rows, new = self._live.renew(kept, len(proposals)), slice(len(kept), None)
+        t = self.tracks
         t.state[new] = self.machine.proposal
         self._advance(rows, np.where(known, Event.ASSOCIATED.value, Event.UNASSOCIATED.value))
         self._advance(rows[known], Event.JOINS_FINAL)

@@ -118,10 +118,10 @@ def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: PoseEstimator) ->
     for made in drive.frames:
         frame, proposals = made.frame, made.proposals
         located = odometry.locate(frame, proposals, tracker.static_tracks)
-        tracks = tracker.follow(frame.stamp_s, proposals, located).tracks
-        own = tracks.id[tracks.row_of_proposal(len(proposals))].tolist()
+        motion = tracker.track(frame.stamp_s, proposals, located).motion
+        id_of_proposal = motion.id[motion.row_of_proposal(len(proposals))].tolist()
         objects = _object_of_proposal(made)
-        keys = [("object", k) if k != NONE else ("other", i) for k, i in zip(objects, own, strict=True)]
+        keys = [("object", k) if k != NONE else ("other", i) for k, i in zip(objects, id_of_proposal, strict=True)]
         yield np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
 
 
@@ -187,27 +187,31 @@ class IdealTracking(PlayedBack):
         return Located(origin, observe(proposals, origin.T_world_sensor))
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """Raise an error: no caller needs it.
+        """None, since nothing is registered."""
+        nothing = np.zeros(0, np.bool_)
+        return StaticTracks(
+            id=np.zeros(0, np.int64),
+            observed=nothing,
+            stationary=nothing,
+            candidate=nothing,
+            kdop=np.zeros((0, 8)),
+            predicted_kdop=np.zeros((8, 0)),
+        )
 
-        Raises:
-            NotImplementedError: always.
-        """
-        raise NotImplementedError
-
-    def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+    def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """The table with a row for each track of the drive."""
         t, rows = self._tracks, next(self._rows)[self._which]
         t.proposal[:] = NONE
         t.proposal[rows] = np.arange(len(rows))
         t.points[rows] = proposals.count
         t.hits[rows] += 1
-        t.age += t.hits > 0
-        t.missed = np.where(t.proposal == NONE, t.missed + 1, 0)
-        return TrackedFrame(t, proposals, (t.proposal != NONE) & ~t.final)
+        t.age[t.hits > 0] += 1
+        t.missed[:] = np.where(t.proposal == NONE, t.missed + 1, 0)
+        return TrackedFrame.of(t, proposals, t.observed & ~t.final)
 
-    def conclude(self, rows: Int, certain: Bool) -> Tracks:
+    def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
         """Make the confirmed classes final."""
-        self._tracks.final[rows] = certain
+        self._tracks.final[rows] = confirmed
         return self._tracks.copy()
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:

@@ -12,9 +12,9 @@ import numpy as np
 from modt.classes import ObjectClass
 from modt.energy.ledger import Ledger, LedgerLine, StageWork
 from modt.energy.windows import EnergyWindow, Windows
-from modt.pipeline import CLASSIFICATION, STAGES, Fusion, Pipeline
+from modt.pipeline import CLASSIFICATION, STAGES, FusionStage, Pipeline
 from modt.reporting.histogram import Histogram
-from modt.types import NONE, Bool, Budget, Float64, Frame, FrameResult, Int, Proposals, Tracks
+from modt.types import NONE, Bool, Budget, Evidence, Float64, Frame, FrameResult, Int, Motion, Proposals
 from modt_profiling.energy.savings import Counts
 
 COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
@@ -24,16 +24,17 @@ COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
 class RecordingFusion:
     """A fusion that records which tracks have asked for a class."""
 
-    def __init__(self, fusion: Fusion) -> None:
+    def __init__(self, fusion: FusionStage) -> None:
+        self.observe = fusion.observe
         self.fuse = fusion.fuse
         self._asks = fusion.asks
         self._asked: set[int] = set()
         self._known: set[int] = set()
 
-    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+    def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks whose view is worth a classification."""
-        asks = self._asks(tracks, proposals, wants_class)
-        self._asked.update(tracks.id[asks].tolist())
+        asks = self._asks(evidence, motion, proposals, wants_class)
+        self._asked.update(motion.id[asks].tolist())
         return asks
 
     def first_asked(self, alive: set[int]) -> int:
