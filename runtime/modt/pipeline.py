@@ -116,15 +116,15 @@ class Pipeline:
         tracked = run(TRACKING, self.tracker.track, frame.time_s, proposals, located)
         proposals = tracked.proposals
         motion = tracked.motion
-        evidence = tracked.evidence.read_only()
-        run(FUSION, self.fusion.observe, tracked.evidence, motion, proposals)
+        evidence = tracked.evidence
+        run(FUSION, self.fusion.observe, tracked.own_evidence, motion, proposals)
         asks = run(FUSION, self.fusion.asks, evidence, motion, proposals, tracked.wants_class)
         chosen = run(SCHEDULING, self.scheduler.select, tracked.requests, motion, evidence, proposals, asks, budget)
         rows = chosen.rows
         confirmed = _NOTHING
         if len(rows):
             likelihood = self._classify(frame.points, proposals, motion.proposal[rows], budget)
-            confirmed = run(FUSION, self.fusion.fuse, tracked.evidence, motion, proposals, rows, likelihood)
+            confirmed = run(FUSION, self.fusion.fuse, tracked.own_evidence, motion, proposals, rows, likelihood)
         run(FUSION, self.decision.decide, tracked.decisions, evidence, motion)
         tracks = run(TRACKING, self.tracker.confirm, rows, confirmed)
         return FrameResult(

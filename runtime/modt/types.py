@@ -99,8 +99,8 @@ class Proposals:
     ground_z_m: Float64 | None = None  # (P,) z of the ground beneath each [m, sensor frame], None where not known
     reflectance: Float64 | None = None  # (P, 5)
 
-    def read_only(self) -> Self:
-        """These proposals, whose columns cannot be written to from here on.
+    def lock(self) -> Self:
+        """These proposals, whose columns nobody can write to from here on.
 
         Members, offsets and coordinates are not marked, since C takes read-only arrays several times slower.
         """
@@ -249,10 +249,15 @@ class Columns:
         columns = self.columns()
         for part in parts or (type(self),):
             for name in part._blank_row():
-                view = columns[name][:]
+                columns[name] = view = columns[name].view()
                 view.setflags(write=False)
-                columns[name] = view
         return self._made(columns)
+
+    def lock(self) -> Self:
+        """Forbid to write to these columns from here on; returns the table."""
+        for entries in vars(self).values():
+            entries.setflags(write=False)
+        return self
 
 
 @dataclass(frozen=True)
@@ -341,23 +346,12 @@ class TrackedFrame:
     """Result of tracking: the tracks by owner, of which each stage writes its own part, and the frame's proposals."""
 
     motion: Motion  # read-only
-    evidence: Evidence  # written by the fusion
+    evidence: Evidence  # read-only
+    own_evidence: Evidence  # the same, written by the fusion
     requests: Requests  # written by the scheduler
     decisions: Decisions  # written by the decision
     proposals: Proposals  # of the frame, regrouped where the tracks know better; each belongs to one track
     wants_class: Bool  # (M,) tracks with a proposal whose state asks for a class
-
-    @classmethod
-    def of(cls, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> TrackedFrame:
-        """The parts of a table whose columns can all be written to."""
-        return cls(
-            motion=Motion.of(tracks).read_only(),
-            evidence=Evidence.of(tracks),
-            requests=Requests.of(tracks),
-            decisions=Decisions.of(tracks),
-            proposals=proposals,
-            wants_class=wants_class,
-        )
 
 
 @dataclass(frozen=True, slots=True)

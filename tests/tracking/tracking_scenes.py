@@ -50,7 +50,7 @@ class Follower:
         return self.tracker.confirm(np.asarray(rows), np.asarray(confirmed))
 
     def set_class(self, row, object_class):
-        write_class(self.tracked.evidence, self.tracked.decisions, row, object_class, self.tracks.points[row])
+        write_class(self.tracked.own_evidence, self.tracked.decisions, row, object_class, self.tracks.points[row])
 
     def classify(self, *classes):
         """Give the tracks that want a class one each, in the order of their birth; the last for all further ones."""

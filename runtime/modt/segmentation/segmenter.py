@@ -82,7 +82,7 @@ class Segmenter:
             cut=cut,
             ground_z_m=mean[3],
             reflectance=self._reflectance(points, members),
-        ).read_only()
+        ).lock()
 
     def sensor_height_m(self, points: Float32) -> float:
         """Height of the sensor [m]: of the profile, or estimated where the profile has none."""

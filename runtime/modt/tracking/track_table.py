@@ -104,16 +104,21 @@ class LiveTracks:
 
     def tracked(self, proposals: Proposals, wants_class: Bool) -> TrackedFrame:
         """The tracks by owner, for the stages after the tracker."""
-        motion = Motion.of(self.table).read_only()
         return TrackedFrame(
-            motion, self._evidence, self._requests, self._decisions, proposals.read_only(), wants_class
+            motion=Motion.of(self.table).read_only(),
+            evidence=Evidence.of(self.table),
+            own_evidence=self._evidence,
+            requests=self._requests,
+            decisions=self._decisions,
+            proposals=proposals.lock(),
+            wants_class=wants_class,
         )
 
     def save(self) -> Tracks:
         """Copy the tracks at the end of a frame, for `roll_back`; the copy is read-only."""
         saved = self.table.copy()
         self._saved = saved, self.next_id
-        return Tracks.of(saved).read_only()
+        return Tracks.of(saved).lock()
 
     def roll_back(self) -> None:
         """Return to the tracks that were saved last."""

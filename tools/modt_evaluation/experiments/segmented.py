@@ -23,7 +23,22 @@ from modt.odometry.pose_estimator import PoseEstimator
 from modt.placement import Placement
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
-from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks, copy_runs
+from modt.types import (
+    NONE,
+    Bool,
+    Decisions,
+    Evidence,
+    Float32,
+    Float64,
+    Frame,
+    Int,
+    Motion,
+    Proposals,
+    Requests,
+    TrackedFrame,
+    Tracks,
+    copy_runs,
+)
 from modt_evaluation.experiments.drives import Drive
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.overlap import PAD_M, ObjectPoints, Overlap, in_box_frame, inside
@@ -207,7 +222,15 @@ class IdealTracking(PlayedBack):
         t.hits[rows] += 1
         t.age[t.hits > 0] += 1
         t.missed[:] = np.where(t.proposal == NONE, t.missed + 1, 0)
-        return TrackedFrame.of(t, proposals, t.observed & ~t.final)
+        return TrackedFrame(
+            motion=Motion.of(t),
+            evidence=Evidence.of(t),
+            own_evidence=Evidence.of(t),
+            requests=Requests.of(t),
+            decisions=Decisions.of(t),
+            proposals=proposals,
+            wants_class=t.observed & ~t.final,
+        )
 
     def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
         """Make the confirmed classes final."""
