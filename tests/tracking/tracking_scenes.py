@@ -11,8 +11,8 @@ from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
 from modt.odometry.pose_estimator import PoseEstimator
 from modt.placement import Placement
-from modt.tracking.association import Matches
-from modt.tracking.regrouping import Associated, Regrouping
+from modt.tracking.association import Associated, Matches
+from modt.tracking.regrouping import Regrouping
 from modt.tracking.states import EFFICIENT
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tracker import Tracker

@@ -8,7 +8,7 @@ import numpy as np
 
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
-from modt.types import NONE, Float64, Int
+from modt.types import NONE, Float64, Int, Proposals
 
 UNMEASURED_M2 = 100.0
 """Variance along either axis of a position that was not measured."""
@@ -38,16 +38,25 @@ class Matches(NamedTuple):
         """
         changed = np.zeros(len(tracks), np.bool_)
         changed[rows] = True
-        same, taken = (~changed[self.rows]).nonzero()[0], (proposals != NONE).nonzero()[0]
-        rows, n = rows[taken], len(taken)
-        columns = (
-            (self.rows, rows),
-            (self.proposals, proposals[taken]),
-            (self.position, tracks.x.take(rows, axis=0)[:, :2]),
-            (self.covariance, (UNMEASURED_M2 * np.eye(2))[None].repeat(n, axis=0)),
-            (self.end_variance, tracks.end_variance.take(rows, axis=0)),
+        same = (~changed[self.rows]).nonzero()[0]
+        matched = (proposals != NONE).nonzero()[0]
+        rows = rows[matched]
+        new = Matches(
+            rows=rows,
+            proposals=proposals[matched],
+            position=tracks.x.take(rows, axis=0)[:, :2],
+            covariance=(UNMEASURED_M2 * np.eye(2))[None].repeat(len(rows), axis=0),
+            end_variance=tracks.end_variance.take(rows, axis=0),
         )
-        return Matches(*(np.concatenate([known.take(same, axis=0), new]) for known, new in columns))
+        return Matches(*(np.concatenate([a.take(same, axis=0), b]) for a, b in zip(self, new, strict=True)))
+
+
+class Associated(NamedTuple):
+    """A frame after association."""
+
+    proposals: Proposals
+    observations: Observations  # the proposals in the world
+    matches: Matches
 
 
 class Association(Protocol):

@@ -11,11 +11,11 @@ from modt.classes import PERSON_M, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
-from modt.tracking.association import Association, Matches
+from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
 from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
-from modt.tracking.regrouping import Associated, Regrouping
+from modt.tracking.regrouping import Regrouping
 from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import LiveTracks, NativeObserve, TrackTable, observe
 from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks

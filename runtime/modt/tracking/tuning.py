@@ -1,0 +1,228 @@
+"""Tuning of the tracking stage: every value of it that was chosen, by mechanism."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from modt.geometry.kdop import PairWeights
+
+
+@dataclass(frozen=True, slots=True)
+class FilterTuning:
+    """Noise of the extended Kalman filter (Equation 1)."""
+
+    acceleration_sigma_mps2: float = 2.0
+    """Process noise of the speed [m/s2]. Greater: speed follows the last positions faster, and jitters more.
+    Chosen on: judgement."""
+
+    turn_sigma_radps: float = 0.3
+    """Process noise of the heading [rad/s]. Greater: turns are followed faster, and straight courses waver.
+    Chosen on: judgement."""
+
+    initial_position_sigma_m: float = 0.3
+    """Standard deviation of the position of a new track, along either axis [m]. Greater: the second position counts
+    more than the first.
+    Chosen on: judgement."""
+
+    initial_speed_sigma_mps: float = 8.0
+    """Standard deviation of the speed of a new track [m/s]. Less: fast objects are lost in their second frame.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class KdopAssociationTuning:
+    """Association of k-DOPs, and the measurement of positions by them."""
+
+    max_cost: float = 7.0
+    """Cost of leaving a track without a proposal; no matched pair costs more. Greater: more tracks are matched, some
+    with a neighbour.
+    Chosen on: judgement."""
+
+    min_overlap: float = 0.3
+    """Least overlap, relative to the smaller, of a pair that changed its shape and is matched second. Less: a track
+    is matched with what lies beside its object.
+    Chosen on: judgement."""
+
+    jump_sigma_m: float = 0.4
+    """Standard deviation of an end of a k-DOP as parts of an object come into view [m]. Greater: pairs further apart
+    are matched.
+    Chosen on: judgement."""
+
+    position_sigma_m: float = 0.1
+    """Standard deviation of a measured position along either axis [m]. Greater: the filter smooths more.
+    Chosen on: judgement."""
+
+    weights: PairWeights = field(default=PairWeights(size=2.0, overlap=3.0, height=2.0, points=0.5))
+    """Cost of a unit of difference: of log sizes, of 1 - IoU, of heights [1/m], of log numbers of points. Greater:
+    pairs that differ in it are matched less often.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaperAssociationTuning:
+    """Association of profile `paper` (section III-B)."""
+
+    alpha: float = 2.0
+    """Weight of 1 - I, the lacking overlap, in the cost of a match. Chosen on: the paper."""
+
+    beta: float = 0.01
+    """Weight of the likeness of point numbers. Chosen on: the paper."""
+
+    gamma: float = 0.1
+    """Weight of the likeness of sizes. Chosen on: the paper."""
+
+    max_cost: float = 0.95
+    """Greatest cost of a match, T_DA. Chosen on: the paper."""
+
+    position_sigma_m: float = 0.3
+    """Standard deviation of a centroid [m], which the paper does not state. Greater: tracks turn later.
+    Chosen on: drive 0005, by the nearness to Table VI."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExtentTuning:
+    """Memory of the extent, the shape and the size of a track, and of the place that it comes from."""
+
+    lag_s: float = 1.5
+    """Time constant of the place that a displacement is measured from [s]. Greater: slow motion shows better, and a
+    stop shows later.
+    Chosen on: judgement."""
+
+    known_decay: float = 0.98
+    """Share of the known extent beyond what is seen that is kept a frame. Less: parts that come back into view are
+    not joined.
+    Chosen on: judgement."""
+
+    mean_decay: float = 0.8
+    """Greatest weight of the past in a mean k-DOP. Greater: positions jitter less, and follow a changing shape later.
+    Chosen on: judgement."""
+
+    growth: float = 0.5
+    """Weight of a larger box in the size of a track. Greater: one frame merged with a neighbour makes it large.
+    Chosen on: judgement."""
+
+    person_growth: float = 0.1
+    """The same for a confirmed person, who is merged with things in passing. Greater: cyclists beside walls lose
+    their class.
+    Chosen on: pandar64 drives with cyclists beside walls."""
+
+    shrinkage: float = 0.02
+    """Weight of a smaller box in the size of a track: the part that is hidden now was seen before. Greater: parts of
+    a hidden car count as people.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestTuning:
+    """Test whether a track is at rest."""
+
+    radius_m: float = 0.5
+    """A track this near to its rest position is at rest [m]. Greater: slow walkers are kept in place.
+    Chosen on: judgement."""
+
+    speed_sigma_mps: float = 1.0
+    """Standard deviation of the speed 0 that is observed of a track at rest [m/s]. Less: parked cars are steadier,
+    and cars start later.
+    Chosen on: judgement."""
+
+    stopped_mps: float = 0.5
+    """A moving track slower than this rests where it is [m/s]. Greater: walkers come to rest now and then.
+    Chosen on: judgement."""
+
+    gain: float = 0.1
+    """Weight of a new position in the rest position. Greater: the rest position creeps along with slow objects.
+    Chosen on: judgement."""
+
+    min_hits: int = 3
+    """Frames with a proposal from which a track can be at rest; a younger one may be a landmark of the odometry.
+    Greater: new landmarks are used later.
+    Chosen on: judgement."""
+
+    max_missed: int = 2
+    """Frames without a proposal up to which a track is a landmark of the odometry. Greater: landmarks that are gone
+    are searched longer.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class RegroupingTuning:
+    """Which parts of proposals make up the object of a track."""
+
+    min_coverage: float = 0.45
+    """Least part of a proposal within the known extent of a track, or of the expected track within a proposal. Less:
+    neighbours are taken for parts.
+    Chosen on: judgement."""
+
+    min_part_coverage: float = 0.7
+    """Least part of a proposal within the known extent of the track that it is joined with. Less: neighbours are
+    joined.
+    Chosen on: judgement."""
+
+    longer_m: float = 0.3
+    """A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m].
+    Greater: more is joined and less is split.
+    Chosen on: judgement."""
+
+    beside_m: float = 0.6
+    """Greatest gap between a car and a new proposal that is joined with it [m]. Greater: more parts are joined, and
+    more neighbours.
+    Chosen on: judgement."""
+
+    margin_m: float = 0.2
+    """Margin around the expected extent, and above the expected top, within which points are split off [m]. Greater:
+    pieces hold more of what their object touches.
+    Chosen on: judgement."""
+
+    touch_m: float = 0.05
+    """A piece that reaches this near to the margin goes on beyond it, so its end there is not known [m]. Greater:
+    fewer ends of pieces measure a position.
+    Chosen on: judgement."""
+
+    min_probability: float = 0.5
+    """Probability of its class from which a track leaves its proposal for a piece. Less: false people live longer.
+    Chosen on: drives with false people, by the length of their tracks."""
+
+    min_points: int = 8
+    """Least number of points that are split off, and that remain. Less: pieces of a few points measure positions.
+    Chosen on: judgement."""
+
+    min_share: float = 0.4
+    """Least share of the points last seen in a piece, and in a proposal that is not split. Greater: fewer splits.
+    Chosen on: judgement."""
+
+    max_drop_m: float = 0.4
+    """Greatest distance of the top of a piece below the expected top [m]. Greater: low things are split off as
+    people.
+    Chosen on: judgement."""
+
+    min_hits: int = 4
+    """Frames in which a track was observed from which parts are joined with it. Greater: fewer joins of new cars.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class BackgroundMapTuning:
+    """Recognition of remembered background."""
+
+    min_coverage: float = 0.6
+    """Least part of a new proposal that lies within a remembered place. Less: what appears beside background takes
+    over its class.
+    Chosen on: judgement."""
+
+    max_rise_m: float = 0.5
+    """Height by which a new proposal may rise above a remembered place [m]. Greater: people before a hedge take over
+    its class.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingTuning:
+    """Everything that is chosen in the tracking stage."""
+
+    filter: FilterTuning = FilterTuning()
+    kdop_association: KdopAssociationTuning = KdopAssociationTuning()
+    paper_association: PaperAssociationTuning = PaperAssociationTuning()
+    extent: ExtentTuning = ExtentTuning()
+    rest: RestTuning = RestTuning()
+    regrouping: RegroupingTuning = RegroupingTuning()
+    background_map: BackgroundMapTuning = BackgroundMapTuning()
