@@ -26,10 +26,9 @@ from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.tuning import DEFAULT
+from modt.tracking.extent import extent_update_of
 from modt.tracking.kalman import filter_of
 from modt.tracking.states import ACCURATE
-from modt.tracking.track_table import NativeObserve
-from modt.tracking.track_table import observe as observe_tracks
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, UNRECORDED
 from modt_simulation.synthetic_stream import SyntheticStream
@@ -266,7 +265,7 @@ def test_filter(kernels, seed, m, dt_s):
     tables = []
     for each in (NUMPY, kernels):
         own, covariance = x.copy(), A @ A.transpose(0, 2, 1) + 0.1 * np.eye(4)
-        kalman = filter_of(each, 2.0, 0.3)
+        kalman = filter_of(each)
         kalman.predict(own, covariance, dt_s)
         kalman.update(own, covariance, rows, z, R)
         kalman.observe_speed(own, covariance, rows[1:], 0.0, 0.5)
@@ -284,9 +283,9 @@ def test_observed_tracks(kernels, seed, n, dt_s):
     seen, rows = observe(frame_of(boxes)[1], np.eye(4)), rng.permutation(n)
     few = rows[: n // 2 + 1]
     tables = [tracks_at(np.roll(boxes, 1, axis=0), *range(min(n, 4))) for _ in range(2)]
-    for table, each in zip(tables, (observe_tracks, NativeObserve(kernels.library)), strict=True):
+    for table, each in zip(tables, (NUMPY, kernels), strict=True):
         table.final[::2] = False
-        each(table, few, np.arange(len(few)), seen, seen.position[: len(few)].copy(), dt_s)
+        extent_update_of(each)(table, few, np.arange(len(few)), seen, seen.position[: len(few)].copy(), dt_s)
     assert same(*tables)
 
 

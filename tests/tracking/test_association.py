@@ -11,9 +11,9 @@ from scipy.optimize import linear_sum_assignment
 from modt.classes import ObjectClass
 from modt.geometry.kernels import assign
 from modt.observations import observe
-from modt.tracking import paper_association
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.paper_association import PaperAssociation
+from modt.tracking.tuning import PaperAssociationTuning
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, tracks_at
 
 
@@ -124,9 +124,9 @@ def test_no_pair_costs_less_than_one_of_equals(shift, length, points):
 
 
 @pytest.mark.parametrize(("x", "t_da", "n"), [(11, 0.95, 1), (12, 0.95, 0), (12, 2.0, 1)])
-def test_pairs_above_the_threshold_are_not_matched(x, t_da, n, monkeypatch):
-    monkeypatch.setattr(paper_association, "T_DA", t_da)
-    assert len(PaperAssociation().match(*pair(box(10, 0), box(x, 0))).rows) == n
+def test_pairs_above_the_threshold_are_not_matched(x, t_da, n):
+    association = PaperAssociation(PaperAssociationTuning(max_cost=t_da))
+    assert len(association.match(*pair(box(10, 0), box(x, 0))).rows) == n
 
 
 def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it():
@@ -139,10 +139,9 @@ def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it
     np.testing.assert_allclose(matches.position, observations.centroid)
 
 
-def test_pairs_above_the_threshold_compete(monkeypatch):
+def test_pairs_above_the_threshold_compete():
     """Crosswise both tracks cost least together, one pair of them too much."""
     tracks, observations = tracks_at([box(10, 0)] * 2), observe(frame_of([box(10, 0)] * 2)[1], EYE)
-    monkeypatch.setattr(paper_association, "T_DA", 0.3)
-    association = PaperAssociation()
+    association = PaperAssociation(PaperAssociationTuning(max_cost=0.3))
     association.cost = lambda *_: np.array([0.1, 0.4, 0.2, 0.9])
     assert association.match(tracks, observations).rows.tolist() == [1]

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.observations import observe as observe_proposals
-from modt.tracking.track_table import LAG_S, TrackTable, observe
+from modt.observations import observe
+from modt.tracking.extent import extent_update_of
+from modt.tracking.track_table import TrackTable
+from modt.tracking.tuning import ExtentTuning
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
 
@@ -22,7 +24,7 @@ def displacement(boxes):
 def test_a_steady_walk_tends_to_speed_times_lag(bearing_rad):
     dx, dy = 0.12 * np.array([np.cos(bearing_rad), np.sin(bearing_rad)])
     moved_m, observed_s, _ = displacement([box(20 + k * dx, k * dy, 0.5, 0.5) for k in range(80)])
-    assert moved_m == pytest.approx(1.2 * LAG_S, rel=0.12)  # axes are 45 degrees apart
+    assert moved_m == pytest.approx(1.2 * ExtentTuning().lag_s, rel=0.12)  # axes are 45 degrees apart
     assert observed_s == pytest.approx(7.9)
 
 
@@ -45,8 +47,8 @@ def test_a_cyclist_who_passes_by_a_wall_is_not_as_large_as_it():
         tracks.final[:], tracks.object_class[:], tracks.size_m[:] = True, confirmed, [1.5, 0.7, 1.7]
         tracks.hits[:] = 1
         for width_m in (2.3, *[0.7] * 10):
-            frame = observe_proposals(frame_of([box(10, 0, 1.5, width_m, 1.7)])[1], EYE)
-            observe(tracks, np.array([0]), np.array([0]), frame, frame.position, 0.1)
+            frame = observe(frame_of([box(10, 0, 1.5, width_m, 1.7)])[1], EYE)
+            extent_update_of()(tracks, np.array([0]), np.array([0]), frame, frame.position, 0.1)
         widths_m.append(tracks.size_m[0, 1])
     assert widths_m[0] < 0.9 < 1.2 < widths_m[1]
 

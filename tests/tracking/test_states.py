@@ -7,7 +7,7 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
-from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, Event, StateMachine, UndefinedTransitionError
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateEvent, StateMachine, UndefinedTransitionError
 from modt.types import NONE
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
@@ -22,7 +22,7 @@ class RecordedMachine(StateMachine):
     def transition(self, states, events):
         after = super().transition(states, events)
         for source, event, target in zip(states, np.broadcast_to(events, len(states)), after, strict=True):
-            self.rows.add((self.names[source], Event(event), self.names[target]))
+            self.rows.add((self.names[source], StateEvent(event), self.names[target]))
         return after
 
 
@@ -97,8 +97,8 @@ def test_arrays_of_states_follow_their_rows_and_an_event_without_a_row_is_an_err
     assert len(rows) == len(machine.transitions)
     sources, events = np.array(list(rows)).T
     np.testing.assert_array_equal(machine.transition(sources, events), list(rows.values()))
-    assert len(machine.transition(sources[:0], Event.ASSOCIATED)) == 0
-    for state, event in set(itertools.product(range(len(machine.names)), Event)) - set(rows):
+    assert len(machine.transition(sources[:0], StateEvent.ASSOCIATED)) == 0
+    for state, event in set(itertools.product(range(len(machine.names)), StateEvent)) - set(rows):
         known = sources[events == event][:1]
         with pytest.raises(UndefinedTransitionError, match=f"{event.name} in state {machine.names[state]}"):
             machine.transition(np.array([*known, state]), event)
@@ -106,7 +106,7 @@ def test_arrays_of_states_follow_their_rows_and_an_event_without_a_row_is_an_err
 
 @each_machine
 def test_a_matched_proposal_and_its_track_end_in_one_state(machine):
-    tracks = (machine.after[:, Event.ASSOCIATED] != NONE).nonzero()[0]
+    tracks = (machine.after[:, StateEvent.ASSOCIATED] != NONE).nonzero()[0]
     tracks = tracks[tracks != machine.proposal]
-    after = machine.transition(tracks, Event.ASSOCIATED)
+    after = machine.transition(tracks, StateEvent.ASSOCIATED)
     np.testing.assert_array_equal(machine.joined(after), after)

@@ -1,165 +1,232 @@
-/* The extended Kalman filter of tracks and what is observed of them, in their table: kalman.py and track_table.py. */
+/* The extended Kalman filter of tracks (tracking/kalman.py), and what proposals show of their tracks
+ * (tracking/extent.py).
+ *
+ * A state is x, y [m], heading [rad], speed [m/s]; M states are rows of four numbers, and their covariances rows of
+ * 4 x 4. Cosines, sines and headings come from NumPy, so that both implementations share their rounding.
+ */
 #include "kernels.h"
 
-enum { X, Y, HEADING, SPEED, N };
+enum { X, Y, HEADING, SPEED, N_STATE };
+enum { N_AXES = 4, N_ENDS = 2 * N_AXES }; /* of a k-DOP; the end opposite to end k is k + N_AXES */
 
-/* geometry.wrap, where % is done without rounding */
+static const double PI = 0x1.921fb54442d18p+1;
+
+/* An angle in [-pi, pi), as geometry.wrap: the remainder is found by subtractions, none of which rounds. */
 static double wrap(double angle)
 {
-    const double pi = 0x1.921fb54442d18p+1, turn = 2 * pi, from = angle + pi;
-    double rest = __builtin_fabs(from), step = turn;
+    const double full_turn = 2 * PI, from = angle + PI;
+    double rest = __builtin_fabs(from);
+    double step = full_turn;
     while (step <= rest / 2 && step < 1e300)
         step *= 2;
-    for (; step >= turn; step /= 2)
+    for (; step >= full_turn; step /= 2)
         if (rest >= step)
             rest -= step;
-    return (from < 0.0 && rest > 0.0 ? turn - rest : rest) - pi;
+    return (from < 0.0 && rest > 0.0 ? full_turn - rest : rest) - PI;
 }
 
-/* A less the products of K (N, width) and the rows from `first` of A, halved with its transpose */
-static void reduce(double A[N][N], const double K[N][2], int first, int width)
+/* The covariance P after an observation of `n_observed` components of the state, the first of which is `first`:
+ * P less the gain times the rows observed, and the mean of that and its transpose, which rounding made differ. */
+static void reduce_covariance(double P[N_STATE][N_STATE], const double gain[N_STATE][2], int first, int n_observed)
 {
-    double less[N][N];
-    for (int i = 0; i < N; i++)
-        for (int k = 0; k < N; k++)
-            less[i][k] = A[i][k] - (width == 1 ? K[i][0] * A[first][k]
-                                               : K[i][0] * A[first][k] + K[i][1] * A[first + 1][k]);
-    for (int i = 0; i < N; i++)
-        for (int k = 0; k < N; k++)
-            A[i][k] = (less[i][k] + less[k][i]) / 2;
+    double reduced[N_STATE][N_STATE];
+    for (int i = 0; i < N_STATE; i++)
+        for (int k = 0; k < N_STATE; k++)
+            reduced[i][k] = P[i][k] - (n_observed == 1 ? gain[i][0] * P[first][k]
+                                                       : gain[i][0] * P[first][k] + gain[i][1] * P[first + 1][k]);
+    for (int i = 0; i < N_STATE; i++)
+        for (int k = 0; k < N_STATE; k++)
+            P[i][k] = (reduced[i][k] + reduced[k][i]) / 2;
 }
 
-/* predict: n states dt_s later, given the cosine and sine of each heading; noise of speed, position and heading. */
-EXPORT void modt_predict(double (*x)[N], double (*P)[N][N], i64 n, const double *cosine, const double *sine, double dt_s,
-                         const double noise[3])
+/* kalman.predict: all n states dt_s later, in place (Equation 1). F is the derivative of x and y by heading and speed,
+ * which themselves stay as they are, so that F P F' needs products with the two last rows and columns of P alone. */
+EXPORT void modt_predict(double (*states)[N_STATE], double (*covariances)[N_STATE][N_STATE], i64 n,
+                         const double *cosine, const double *sine, double dt_s, double speed_noise,
+                         double position_noise, double heading_noise)
 {
     for (i64 m = 0; m < n; m++) {
-        double c = dt_s * cosine[m], s = dt_s * sine[m], v = x[m][SPEED], (*A)[N] = P[m], cross[2][2];
-        const double F[2][2] = {{-s * v, c}, {c * v, s}};
+        double *x = states[m];
+        double(*P)[N_STATE] = covariances[m];
+        const double along_x = dt_s * cosine[m], along_y = dt_s * sine[m], speed = x[SPEED];
+        const double F[2][2] = {{-along_y * speed, along_x}, {along_x * speed, along_y}};
+        double cross[2][2]; /* covariance of x and y with heading and speed */
         for (int i = 0; i < 2; i++) {
-            x[m][i] += F[i][1] * v;
+            x[i] += F[i][1] * speed;
             for (int k = 0; k < 2; k++)
-                cross[i][k] = A[i][2 + k] + (F[i][0] * A[2][2 + k] + F[i][1] * A[3][2 + k]);
+                cross[i][k] = P[i][2 + k] + (F[i][0] * P[HEADING][2 + k] + F[i][1] * P[SPEED][2 + k]);
         }
         for (int i = 0; i < 2; i++)
             for (int k = 0; k < 2; k++)
-                A[i][k] += (F[i][0] * A[2][k] + F[i][1] * A[3][k]) + (cross[i][0] * F[k][0] + cross[i][1] * F[k][1]);
+                P[i][k] += (F[i][0] * P[HEADING][k] + F[i][1] * P[SPEED][k])
+                           + (cross[i][0] * F[k][0] + cross[i][1] * F[k][1]);
         for (int i = 0; i < 2; i++) {
-            A[i][i] += noise[1];
-            A[i][HEADING] = A[HEADING][i] = cross[i][0];
-            A[i][SPEED] = A[SPEED][i] = cross[i][1] + noise[0] / 2 * F[i][1];
+            P[i][i] += position_noise;
+            P[i][HEADING] = P[HEADING][i] = cross[i][0];
+            P[i][SPEED] = P[SPEED][i] = cross[i][1] + speed_noise / 2 * F[i][1];
         }
-        A[HEADING][HEADING] += noise[2];
-        A[SPEED][SPEED] += noise[0];
+        P[HEADING][HEADING] += heading_noise;
+        P[SPEED][SPEED] += speed_noise;
     }
 }
 
-/* face, update and turn_about: n rows of the states after places z of covariance R, given the heading that each turns to
- * first, and the cosine and sine of that turn. */
-EXPORT void modt_update(double (*x)[N], double (*P)[N][N], const i64 *rows, i64 n, const double *heading,
-                        const double *cosine, const double *sine, const double (*z)[2], const double (*R)[2][2])
+/* kalman.face: rotates the covariance of the position, and its rows and columns with the rest, by a turn. */
+static void rotate_position(double P[N_STATE][N_STATE], double cosine, double sine)
+{
+    const double rotation[2][2] = {{cosine, -sine}, {sine, cosine}};
+    double rows_rotated[N_STATE][N_STATE];
+    for (int k = 0; k < N_STATE; k++)
+        for (int i = 0; i < N_STATE; i++)
+            rows_rotated[i][k] = i < 2 ? rotation[i][0] * P[X][k] + rotation[i][1] * P[Y][k] : P[i][k];
+    for (int i = 0; i < N_STATE; i++)
+        for (int k = 0; k < N_STATE; k++)
+            P[i][k] = k < 2 ? rows_rotated[i][X] * rotation[k][0] + rows_rotated[i][Y] * rotation[k][1]
+                            : rows_rotated[i][k];
+}
+
+/* kalman.turn_about: the same motion with a speed that is not negative. */
+static void turn_about(double x[N_STATE], double P[N_STATE][N_STATE])
+{
+    if (!(x[SPEED] < 0.0))
+        return;
+    x[SPEED] = -x[SPEED];
+    x[HEADING] = wrap(x[HEADING] + PI);
+    for (int k = 0; k < N_STATE; k++)
+        if (k != SPEED) {
+            P[SPEED][k] = -P[SPEED][k];
+            P[k][SPEED] = -P[k][SPEED];
+        }
+}
+
+/* kalman.Filter.update: the states and covariances of n rows of the table after observed positions, in place. Each is
+ * turned to a heading first, given with the cosine and sine of that turn; then follow the update of the filter and the
+ * turn to a speed that is not negative. */
+EXPORT void modt_update(double (*states)[N_STATE], double (*covariances)[N_STATE][N_STATE], const i64 *rows, i64 n,
+                        const double *heading, const double *cosine, const double *sine, const double (*position)[2],
+                        const double (*noise)[2][2])
 {
     for (i64 m = 0; m < n; m++) {
-        double *own = x[rows[m]], (*A)[N] = P[rows[m]], T[N][N], K[N][2];
-        const double turn[2][2] = {{cosine[m], -sine[m]}, {sine[m], cosine[m]}};
-        for (int k = 0; k < N; k++)
-            for (int i = 0; i < N; i++)
-                T[i][k] = i < 2 ? turn[i][0] * A[0][k] + turn[i][1] * A[1][k] : A[i][k];
-        for (int i = 0; i < N; i++)
-            for (int k = 0; k < N; k++)
-                A[i][k] = k < 2 ? T[i][0] * turn[k][0] + T[i][1] * turn[k][1] : T[i][k];
-        own[HEADING] = wrap(heading[m]);
-        double a = A[0][0] + R[m][0][0], b = A[0][1] + R[m][0][1], c = A[1][0] + R[m][1][0], d = A[1][1] + R[m][1][1];
-        double scale = a * d - b * c, dx = z[m][0] - own[X], dy = z[m][1] - own[Y];
-        const double S[2][2] = {{d / scale, -b / scale}, {-c / scale, a / scale}};
-        for (int i = 0; i < N; i++) {
+        double *x = states[rows[m]];
+        double(*P)[N_STATE] = covariances[rows[m]];
+        rotate_position(P, cosine[m], sine[m]);
+        x[HEADING] = wrap(heading[m]);
+        /* S, the covariance of the innovation, and its inverse */
+        double xx = P[X][X] + noise[m][0][0], xy = P[X][Y] + noise[m][0][1];
+        double yx = P[Y][X] + noise[m][1][0], yy = P[Y][Y] + noise[m][1][1];
+        double determinant = xx * yy - xy * yx;
+        const double inverse[2][2] = {{yy / determinant, -xy / determinant}, {-yx / determinant, xx / determinant}};
+        double innovation_x = position[m][0] - x[X], innovation_y = position[m][1] - x[Y];
+        double gain[N_STATE][2];
+        for (int i = 0; i < N_STATE; i++) {
             for (int k = 0; k < 2; k++)
-                K[i][k] = A[i][0] * S[0][k] + A[i][1] * S[1][k];
-            own[i] += K[i][0] * dx + K[i][1] * dy;
+                gain[i][k] = P[i][X] * inverse[0][k] + P[i][Y] * inverse[1][k];
+            x[i] += gain[i][0] * innovation_x + gain[i][1] * innovation_y;
         }
-        own[HEADING] = wrap(own[HEADING]);
-        reduce(A, K, X, 2);
-        if (own[SPEED] < 0.0) {
-            own[SPEED] = -own[SPEED];
-            own[HEADING] = wrap(own[HEADING] + 0x1.921fb54442d18p+1);
-            for (int k = 0; k < N; k++)
-                if (k != SPEED)
-                    A[SPEED][k] = -A[SPEED][k], A[k][SPEED] = -A[k][SPEED];
-        }
+        x[HEADING] = wrap(x[HEADING]);
+        reduce_covariance(P, gain, X, 2);
+        turn_about(x, P);
     }
 }
 
-/* observe_speed: n rows of the states after an observed speed. */
-EXPORT void modt_observe_speed(double (*x)[N], double (*P)[N][N], const i64 *rows, i64 n, double speed, double variance)
+/* kalman.observe_speed: the states and covariances of n rows of the table after an observed speed, in place. */
+EXPORT void modt_observe_speed(double (*states)[N_STATE], double (*covariances)[N_STATE][N_STATE], const i64 *rows,
+                               i64 n, double speed, double variance)
 {
     for (i64 m = 0; m < n; m++) {
-        double *own = x[rows[m]], (*A)[N] = P[rows[m]], off = speed - own[SPEED], K[N][2] = {{0.0}};
-        for (int i = 0; i < N; i++) {
-            K[i][0] = A[i][SPEED] / (A[SPEED][SPEED] + variance);
-            own[i] += K[i][0] * off;
+        double *x = states[rows[m]];
+        double(*P)[N_STATE] = covariances[rows[m]];
+        double innovation = speed - x[SPEED];
+        double gain[N_STATE][2] = {{0.0}};
+        for (int i = 0; i < N_STATE; i++) {
+            gain[i][0] = P[i][SPEED] / (P[SPEED][SPEED] + variance);
+            x[i] += gain[i][0] * innovation;
         }
-        own[HEADING] = wrap(own[HEADING]);
-        reduce(A, K, SPEED, 1);
+        x[HEADING] = wrap(x[HEADING]);
+        reduce_covariance(P, gain, SPEED, 1);
     }
 }
 
+/* Columns of the track table, an entry a track; k-DOPs [m, world], envelope and mean about the position [m]. */
 typedef struct {
-    double (*kdop)[8], (*lagged)[8], (*envelope)[8], (*mean)[8], (*box)[7], (*size)[3], (*anchor)[2];
-    double *moved, *observed, *bottom, *top;
+    double (*kdop)[8], (*lagged_kdop)[8], (*envelope)[8], (*mean_kdop)[8], (*box)[7], (*size_m)[3], (*anchor)[2];
+    double *moved_m, *observed_s, *bottom, *top;
     i64 *proposal, *points;
     const i64 *hits, *object_class;
     const uint8_t *final;
-} Table;
+} TrackColumns;
 
+/* The n proposals of a frame in the world: kdop is eight rows of n. */
 typedef struct {
-    const double *kdop, (*box)[7], *bottom, *top; /* eight rows of n, rows of seven */
+    const double *kdop, (*box)[7], *bottom, *top;
     const i64 *count;
     i64 n;
 } Observations;
 
+/* tracking.tuning.ExtentTuning */
 typedef struct {
-    double envelope_decay, mean_decay, agree, shrinkage, growth, lag, dt_s, longest[4], confirmed_growth[4];
-} Memory;
+    double lag_s, known_decay, mean_decay, growth, person_growth, shrinkage;
+} ExtentTuning;
 
-/* observe: what n proposals show of rows of the table at positions, which are given along the directions of k-DOPs too. */
-EXPORT void modt_observe(const Table *t, const Observations *seen, const i64 *rows, const i64 *proposals, i64 n,
-                         const double (*position)[2], const double (*along)[8], const Memory *memory)
+/* Limits of tracking.extent, by class where they are arrays. */
+typedef struct {
+    const double *max_length_m, *confirmed_growth;
+    double agreement_m;
+} ExtentLimits;
+
+/* extent.ExtentUpdate: writes what n proposals show of n rows of the table.
+ *
+ * positions are the measured ones, given along the eight directions of k-DOPs too. follow is the share of a
+ * displacement by which the lagged k-DOP follows. The displacement is found before the lagged k-DOP is moved, and the
+ * class and the hits of a track are read alone. */
+EXPORT void modt_update_extent(const TrackColumns *tracks, const Observations *seen, const i64 *rows,
+                               const i64 *proposals, i64 n, const double (*position)[2],
+                               const double (*position_along)[N_ENDS], const ExtentTuning *tuning,
+                               const ExtentLimits *limits, double follow, double dt_s)
 {
     for (i64 m = 0; m < n; m++) {
-        i64 row = rows[m], p = proposals[m], class = t->object_class[row];
-        PROVEN(p >= 0 && p < seen->n && class >= 0 && class < 4);
-        double end[8], about[8], shift[8], longest = 0.0, moved = 0.0, weight = 1.0 - 1.0 / (double)t->hits[row];
-        for (int k = 0; k < 8; k++) {
-            end[k] = seen->kdop[k * seen->n + p];
-            about[k] = end[k] - along[m][k];
-            shift[k] = end[k] - t->lagged[row][k];
+        const i64 row = rows[m], proposal = proposals[m], class = tracks->object_class[row];
+        PROVEN(proposal >= 0 && proposal < seen->n && class >= 0 && class < 4);
+        double end[N_ENDS], about[N_ENDS], shift[N_ENDS];
+        for (int k = 0; k < N_ENDS; k++) {
+            end[k] = seen->kdop[k * seen->n + proposal];
+            about[k] = end[k] - position_along[m][k];
+            shift[k] = end[k] - tracks->lagged_kdop[row][k];
         }
-        for (int k = 0; k < 4; k++) {
-            double ahead = shift[k], behind = -shift[k + 4];
-            double together = high(low(ahead, behind), -high(ahead, behind)); /* 0 or less where the ends part */
-            longest = high(about[k] + about[k + 4], longest);
+        /* Along each axis the track went as far as the end that moved less; 0 or less where the ends part. */
+        double longest = 0.0, moved = 0.0;
+        for (int k = 0; k < N_AXES; k++) {
+            double ahead = shift[k], behind = -shift[k + N_AXES];
+            double together = high(low(ahead, behind), -high(ahead, behind));
+            longest = high(about[k] + about[k + N_AXES], longest);
             moved = high(together, moved);
         }
-        weight = low(weight, memory->mean_decay);
-        for (int k = 0; k < 8; k++) {
-            double *envelope = &t->envelope[row][k], off = t->mean[row][k] - about[k];
-            if (!(longest > memory->longest[class])) /* else merged with others */
-                *envelope = high(about[k], memory->envelope_decay * *envelope + (1 - memory->envelope_decay) * about[k]);
-            t->mean[row][k] = __builtin_fabs(off) < memory->agree ? about[k] + weight * off : about[k];
-            t->kdop[row][k] = end[k];
-            t->lagged[row][k] += memory->lag * shift[k];
+        const int merged = longest > limits->max_length_m[class]; /* with other objects: nothing new is known */
+        const double weight = low(1.0 - 1.0 / (double)tracks->hits[row], tuning->mean_decay);
+        const double decay = tuning->known_decay;
+        for (int k = 0; k < N_ENDS; k++) {
+            double *envelope = &tracks->envelope[row][k];
+            double off = tracks->mean_kdop[row][k] - about[k];
+            if (!merged)
+                *envelope = high(about[k], decay * *envelope + (1 - decay) * about[k]);
+            tracks->mean_kdop[row][k] =
+                __builtin_fabs(off) < limits->agreement_m ? about[k] + weight * off : about[k]; /* else it jumped */
+            tracks->kdop[row][k] = end[k];
+            tracks->lagged_kdop[row][k] += follow * shift[k];
         }
-        double growth = t->final[row] ? memory->confirmed_growth[class] : memory->growth;
+        const double growth = tracks->final[row] ? limits->confirmed_growth[class] : tuning->growth;
         for (int k = 0; k < 3; k++) {
-            double change = seen->box[p][3 + k] - t->size[row][k];
-            t->size[row][k] += (change > 0 ? growth : memory->shrinkage) * change;
+            double change = seen->box[proposal][3 + k] - tracks->size_m[row][k];
+            tracks->size_m[row][k] += (change > 0 ? growth : tuning->shrinkage) * change;
         }
         for (int k = 0; k < 7; k++)
-            t->box[row][k] = seen->box[p][k];
+            tracks->box[row][k] = seen->box[proposal][k];
         for (int k = 0; k < 2; k++)
-            t->anchor[row][k] = position[m][k];
-        t->moved[row] = moved, t->observed[row] += memory->dt_s;
-        t->bottom[row] = seen->bottom[p], t->top[row] = seen->top[p];
-        t->proposal[row] = p, t->points[row] = seen->count[p];
+            tracks->anchor[row][k] = position[m][k];
+        tracks->moved_m[row] = moved;
+        tracks->observed_s[row] += dt_s;
+        tracks->bottom[row] = seen->bottom[proposal];
+        tracks->top[row] = seen->top[proposal];
+        tracks->points[row] = seen->count[proposal];
+        tracks->proposal[row] = proposal;
     }
 }

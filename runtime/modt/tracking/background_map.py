@@ -7,24 +7,37 @@ import numpy as np
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
+from modt.tracking.tuning import BackgroundMapTuning
 from modt.types import Bool, Int
 
 CAPACITY = 2048
 """Places of deleted tracks that are remembered."""
-MIN_COVERAGE, RISE_M = 0.6, 0.5
-"""Least part of a new proposal that lies within a place; by how much it may rise above the place."""
 
 
 class BackgroundMap:
-    """k-DOPs and tops of deleted background in the world; of capacity 0, a map that recalls nothing."""
+    """k-DOPs and tops of deleted background in the world.
 
-    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY, capacity: int = CAPACITY) -> None:
-        self.capacity, self._kernels = capacity, kernels
+    Args:
+        kernels: passes over pairs.
+        capacity: greatest number of places; with 0 the map recalls nothing.
+        tuning: what counts as within a place.
+    """
+
+    def __init__(
+        self,
+        kernels: GeometryKernels = NUMPY_GEOMETRY,
+        capacity: int = CAPACITY,
+        tuning: BackgroundMapTuning = BackgroundMapTuning(),
+    ) -> None:
+        self.capacity = capacity
+        self._kernels = kernels
+        self._tuning = tuning
         self.clear()
 
     def clear(self) -> None:
         """Forget all places."""
-        self._kdop, self._top = np.zeros((8, 0)), np.zeros(0)
+        self._kdop = np.zeros((8, 0))
+        self._top = np.zeros(0)
 
     def add(self, tracks: TrackTable, rows: Int) -> None:
         """Remember the places of rows, background at rest; beyond the capacity the oldest places are dropped."""
@@ -37,11 +50,13 @@ class BackgroundMap:
     def recall(self, tracks: TrackTable, rows: Int, observations: Observations, which: Int) -> Bool:
         """(n,) whether background stood, or as rows of the tracks stands, where the observations which (n,) are."""
         known = np.zeros(len(which), np.bool_)
-        if self.capacity and len(which):
-            place = np.concatenate([self._kdop, tracks.known_kdops(rows)], axis=1)
-            top = np.concatenate([self._top, tracks.top[rows]])
-            kdop = observations.kdop.take(which, axis=1)
-            i, j = self._kernels.overlapping_pairs(kdop, place)
-            within = self._kernels.coverage(kdop, place, i, j) >= MIN_COVERAGE
-            known[i[within & (observations.top[which[i]] < top[j] + RISE_M)]] = True
+        if not self.capacity or not len(which):
+            return known
+        place = np.concatenate([self._kdop, tracks.known_kdops(rows)], axis=1)
+        top = np.concatenate([self._top, tracks.top[rows]])
+        kdop = observations.kdop.take(which, axis=1)
+        new, old = self._kernels.overlapping_pairs(kdop, place)
+        within = self._kernels.coverage(kdop, place, new, old) >= self._tuning.min_coverage
+        within &= observations.top[which[new]] < top[old] + self._tuning.max_rise_m
+        known[new[within]] = True
         return known

@@ -9,13 +9,14 @@ all tracks, and arithmetic runs along it. Along axes of four it would be slow.
 from __future__ import annotations
 
 import ctypes
-from array import array
+from typing import NamedTuple
 
 import numpy as np
 
 from modt.geometry import wrap
 from modt.geometry.kernels import GeometryKernels
 from modt.native.library import FLOAT64, INT64, Own, Signatures, declare
+from modt.tracking.tuning import FilterTuning
 from modt.types import Float64, Int
 
 X, Y, HEADING, SPEED = range(4)
@@ -47,36 +48,58 @@ def symmetric(P: Float64) -> Float64:
     return (P + transposed(P)) / 2
 
 
+class ProcessNoise(NamedTuple):
+    """Variances that a time step adds to the parts of a state."""
+
+    position: float  # along either axis [m2]
+    heading: float  # [rad2]
+    speed: float  # [m2/s2]
+
+    @classmethod
+    def over(cls, dt_s: float, acceleration_mps2: float, turn_radps: float) -> ProcessNoise:
+        """The noise of an acceleration and of a rate of turn, given as standard deviations, that last for dt_s."""
+        across = dt_s**2 / 2 * acceleration_mps2
+        turn = dt_s * turn_radps
+        along = dt_s * acceleration_mps2
+        return cls(position=across * across, heading=turn * turn, speed=along * along)
+
+
 def motion_jacobian(x: Float64, dt_s: float) -> Float64:
     """(2, 2, M) derivative of the motion's x and y by heading and speed, at x; heading and speed stay as they are."""
-    c, s = dt_s * np.cos(x[HEADING]), dt_s * np.sin(x[HEADING])
-    return np.array(((-s * x[SPEED], c), (c * x[SPEED], s)))
+    along_x = dt_s * np.cos(x[HEADING])
+    along_y = dt_s * np.sin(x[HEADING])
+    return np.array(((-along_y * x[SPEED], along_x), (along_x * x[SPEED], along_y)))
 
 
 def predict(
-    x: Float64, P: Float64, dt_s: float, acceleration: Float64 | float, turn: Float64 | float
+    x: Float64, P: Float64, dt_s: float, acceleration_mps2: float, turn_radps: float
 ) -> tuple[Float64, Float64]:
     """States and covariances dt_s later, F P F' + Q.
 
-    Q is what an acceleration [m/s2] and a rate of turn [rad/s], white within dt_s, add. Across its heading a track
-    can be pushed as hard as along it while it stands, since its heading is then unknown.
+    Q is what an acceleration and a rate of turn, white within dt_s, add, given as standard deviations. Across its
+    heading a track can be pushed as hard as along it while it stands, since its heading is then unknown.
     """
     F = motion_jacobian(x, dt_s)
     moved = x.copy()
     moved[:2] += F[:, 1] * x[SPEED]  # the motion is linear in the speed
-    along, across = np.square(dt_s * acceleration), np.square(dt_s**2 / 2 * acceleration)
-    after, cross = P.copy(), P[:2, 2:] + product(F, P[2:, 2:])
+    noise = ProcessNoise.over(dt_s, acceleration_mps2, turn_radps)
+    after = P.copy()
+    cross = P[:2, 2:] + product(F, P[2:, 2:])  # of position with heading and speed
     after[:2, :2] += product(F, P[2:, :2]) + product(cross, transposed(F))
-    cross[:, 1] += along / 2 * F[:, 1]
-    after[:2, 2:], after[2:, :2] = cross, transposed(cross)
-    for k, noise in ((X, across), (Y, across), (HEADING, np.square(dt_s * turn)), (SPEED, along)):
-        after[k, k] += noise
+    cross[:, 1] += noise.speed / 2 * F[:, 1]
+    after[:2, 2:] = cross
+    after[2:, :2] = transposed(cross)
+    after[X, X] += noise.position
+    after[Y, Y] += noise.position
+    after[HEADING, HEADING] += noise.heading
+    after[SPEED, SPEED] += noise.speed
     return moved, after
 
 
 def update(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, Float64]:
     """States and covariances after the observed places z (2, M) of covariance R (2, 2, M)."""
-    innovation, S = z - x[:2], P[:2, :2] + R
+    innovation = z - x[:2]
+    S = P[:2, :2] + R
     K = product(P[:, :2], inverse_2x2(S))
     after = x + product(K, innovation[:, None])[:, 0]
     after[HEADING] = wrap(after[HEADING])
@@ -98,10 +121,12 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
     the heading is chosen anew, and the covariance along it and across it turns with it.
     """
     turn = heading_rad - x[HEADING]
-    c, s = np.cos(turn), np.sin(turn)
+    c = np.cos(turn)
+    s = np.sin(turn)
     rotation = np.array(((c, -s), (s, c)))
-    facing, turned = x.copy(), P.copy()
+    facing = x.copy()
     facing[HEADING] = wrap(heading_rad)
+    turned = P.copy()
     turned[:2] = product(rotation, P[:2])
     turned[:, :2] = product(turned[:, :2], transposed(rotation))
     return facing, turned
@@ -110,12 +135,13 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
 def turn_about(x: Float64, P: Float64) -> tuple[Float64, Float64]:
     """The same motion with a speed that is not negative."""
     sign = np.where(x[SPEED] < 0, -1.0, 1.0)
-    forth, turned = x.copy(), P.copy()
-    forth[SPEED] *= sign
-    forth[HEADING] = np.where(sign < 0, wrap(x[HEADING] + np.pi), x[HEADING])
+    forward = x.copy()
+    forward[SPEED] *= sign
+    forward[HEADING] = np.where(sign < 0, wrap(x[HEADING] + np.pi), x[HEADING])
+    turned = P.copy()
     turned[SPEED] *= sign
     turned[:, SPEED] *= sign
-    return forth, turned
+    return forward, turned
 
 
 def inverse_2x2(S: Float64) -> Float64:
@@ -129,31 +155,32 @@ class Filter:
     """The filter on a table of states x (M, 4) and covariances P (M, 4, 4), in place: the reference.
 
     Args:
-        acceleration: [m/s2], and
-        turn: [rad/s] that add to the covariance, as of `predict`.
+        tuning: noise of the process.
     """
 
-    def __init__(self, acceleration: float, turn: float) -> None:
-        self.acceleration, self.turn = acceleration, turn
+    def __init__(self, tuning: FilterTuning = FilterTuning()) -> None:
+        self.tuning = tuning
 
     def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
         """All states dt_s later."""
-        x[:], P[:] = tracks_first(*predict(*components_first(x, P), dt_s, self.acceleration, self.turn))
+        tuning = self.tuning
+        after = predict(*components_first(x, P), dt_s, tuning.acceleration_sigma_mps2, tuning.turn_sigma_radps)
+        x[:], P[:] = tracks_first(*after)
 
     def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:
         """The rows after the observed places z (K, 2) of covariance R (K, 2, 2), at a speed that is not negative.
 
         One that may stand is turned to where it seems to go.
         """
-        own, covariance = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
-        place, noise = components_first(z, R)
-        turned = face(own, covariance, _heading(own, covariance[SPEED, SPEED], place))
-        x[rows], P[rows] = tracks_first(*turn_about(*update(*turned, place, noise)))
+        state, covariance = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
+        position, noise = components_first(z, R)
+        turned = face(state, covariance, _heading(state, covariance[SPEED, SPEED], position))
+        x[rows], P[rows] = tracks_first(*turn_about(*update(*turned, position, noise)))
 
     def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
         """The rows after an observed speed of deviation sigma."""
-        own = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
-        x[rows], P[rows] = tracks_first(*observe_speed(*own, speed_mps, sigma_mps))
+        before = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
+        x[rows], P[rows] = tracks_first(*observe_speed(*before, speed_mps, sigma_mps))
 
 
 def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
@@ -163,9 +190,10 @@ def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
     return heading
 
 
-_D, _L = ctypes.c_double, ctypes.c_int64
+_D = ctypes.c_double
+_L = ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_predict": (None, (FLOAT64, FLOAT64, _L, Own, Own, _D, Own)),
+    "modt_predict": (None, (FLOAT64, FLOAT64, _L, Own, Own, _D, _D, _D, _D)),
     "modt_update": (None, (FLOAT64, FLOAT64, INT64, _L, Own, Own, Own, FLOAT64, FLOAT64)),
     "modt_observe_speed": (None, (FLOAT64, FLOAT64, INT64, _L, _D, _D)),
 }
@@ -174,23 +202,24 @@ _SIGNATURES: Signatures = {
 class NativeFilter(Filter):
     """The filter in C (`modt.native`)."""
 
-    def __init__(self, library: ctypes.CDLL, acceleration: float, turn: float) -> None:
-        super().__init__(acceleration, turn)
+    def __init__(self, library: ctypes.CDLL, tuning: FilterTuning) -> None:
+        super().__init__(tuning)
         declare(library, _SIGNATURES)
         self._library = library
 
     def predict(self, x: Float64, P: Float64, dt_s: float) -> None:
         """All states dt_s later."""
         heading = x[:, HEADING].copy()
-        along, across, turn = dt_s * self.acceleration, dt_s**2 / 2 * self.acceleration, dt_s * self.turn
-        noise = array("d", (along * along, across * across, turn * turn))
-        self._library.modt_predict(x, P, len(x), np.cos(heading), np.sin(heading), dt_s, noise)
+        noise = ProcessNoise.over(dt_s, self.tuning.acceleration_sigma_mps2, self.tuning.turn_sigma_radps)
+        self._library.modt_predict(
+            x, P, len(x), np.cos(heading), np.sin(heading), dt_s, noise.speed, noise.position, noise.heading
+        )
 
     def update(self, x: Float64, P: Float64, rows: Int, z: Float64, R: Float64) -> None:
         """The rows after the observed places z (K, 2) of covariance R (K, 2, 2), at a speed that is not negative."""
-        own = x.take(rows, axis=0).T.copy()
-        heading = _heading(own, P[rows, SPEED, SPEED], z.T.copy())
-        turn = heading - own[HEADING]
+        state = x.take(rows, axis=0).T.copy()
+        heading = _heading(state, P[rows, SPEED, SPEED], z.T.copy())
+        turn = heading - state[HEADING]
         self._library.modt_update(x, P, rows, len(rows), heading, np.cos(turn), np.sin(turn), z, R)
 
     def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
@@ -198,7 +227,6 @@ class NativeFilter(Filter):
         self._library.modt_observe_speed(x, P, rows, len(rows), speed_mps, sigma_mps**2)
 
 
-def filter_of(kernels: GeometryKernels, acceleration: float, turn: float) -> Filter:
+def filter_of(kernels: GeometryKernels, tuning: FilterTuning = FilterTuning()) -> Filter:
     """The filter where the other passes are."""
-    library = kernels.library
-    return Filter(acceleration, turn) if library is None else NativeFilter(library, acceleration, turn)
+    return Filter(tuning) if kernels.library is None else NativeFilter(kernels.library, tuning)

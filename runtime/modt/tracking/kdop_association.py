@@ -9,16 +9,8 @@ from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
+from modt.tracking.tuning import KdopAssociationTuning
 from modt.types import Bool, Float64, Int
-
-MAX_COST = 7.0
-"""Cost of leaving a track without a proposal; no pair costs more."""
-MIN_OVERLAP = 0.3
-"""Least overlap, over the smaller, of a pair that changed its shape and is matched second."""
-JUMP_SIGMA_M, POSITION_SIGMA_M = 0.4, 0.1
-"""Deviations of a k-DOP as parts of an object come into view, and of a measured position [m]."""
-WEIGHTS = PairWeights(size=2.0, overlap=3.0, height=2.0, points=0.5)
-"""Cost of a unit of difference: of log sizes, of 1 - IoU, of heights [1/m], of log point numbers."""
 
 
 class KdopAssociation:
@@ -30,62 +22,75 @@ class KdopAssociation:
 
     Args:
         kernels: passes over pairs.
+        tuning: costs and deviations.
     """
 
-    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+    def __init__(
+        self,
+        kernels: GeometryKernels = NUMPY_GEOMETRY,
+        tuning: KdopAssociationTuning = KdopAssociationTuning(),
+    ) -> None:
         self._kernels = kernels
+        self._tuning = tuning
+        self._weights = PairWeights(
+            size=tuning.size_weight,
+            overlap=tuning.overlap_weight,
+            height=tuning.height_weight_per_m,
+            points=tuning.points_weight,
+        )
+        self._variance = tuning.position_sigma_m**2
+        self._jump_variance = self._variance + tuning.jump_sigma_m**2
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs of least cost; then, among the rest, those that overlap although they changed their shape."""
         expected = tracks.predicted_kdops()
-        variance = POSITION_SIGMA_M**2
-        xx, xy, yy = covariance = np.array((tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]))
-        rows, columns = self._kernels.overlapping_pairs(expected + _reach(xx, xy, yy), observations.kdop)
+        covariance = np.array((tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]))  # xx, xy, yy
+        reached = expected + self._reach(covariance)
+        rows, columns = self._kernels.overlapping_pairs(reached, observations.kdop)
+        shape_tuning = self._kernels.shape_tuning
         cost, coverage = self._kernels.pair_costs(
-            Shapes.of(expected, tracks.bottom, tracks.top, tracks.points, self._kernels.shape_tuning),
-            Shapes.of(
-                observations.kdop,
-                observations.bottom,
-                observations.top,
-                observations.count,
-                self._kernels.shape_tuning,
-            ),
+            Shapes.of(expected, tracks.bottom, tracks.top, tracks.points, shape_tuning),
+            Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count, shape_tuning),
             covariance,
-            variance + JUMP_SIGMA_M**2,
+            self._jump_variance,
             (rows, columns),
-            WEIGHTS,
+            self._weights,
         )
-        first = (cost < MAX_COST).nonzero()[0]
-        first = first[self._kernels.assign(rows[first], columns[first], cost[first], MAX_COST)]
-        second = (coverage > MIN_OVERLAP).nonzero()[0]
+        max_cost = self._tuning.max_cost
+        first = (cost < max_cost).nonzero()[0]
+        first = first[self._kernels.assign(rows[first], columns[first], cost[first], max_cost)]
+        second = (coverage > self._tuning.min_overlap).nonzero()[0]
         second = second[_free(rows[second], rows[first], len(tracks))]
         second = second[_free(columns[second], columns[first], len(observations))]
         second = second[self._kernels.assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
         kept = np.concatenate([first, second])
-        rows, columns = rows[kept], columns[kept]
+        return self._measured(tracks, observations, rows[kept], columns[kept])
+
+    def _measured(self, tracks: TrackTable, observations: Observations, rows: Int, columns: Int) -> Matches:
+        """Matches of pairs of a row and a proposal, with the position that each proposal measures."""
         x = tracks.x.take(rows, axis=0)[:, :2]
         mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
         before = tracks.end_variance.T.take(rows, axis=1)
         kdop = observations.kdop.take(columns, axis=1)
-        shift, covariance, end_variance = self._kernels.measured(mean, kdop, variance, before)
+        shift, covariance, end_variance = self._kernels.measured(mean, kdop, self._variance, before)
         return Matches(rows, columns, x + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:
         """Centre of the k-DOP."""
         return observations.position
 
+    def _reach(self, covariance: Float64) -> Float64:
+        """(M,) distance beyond which no pair of a track is listed, by xx, xy, yy (3, M) of its position [m].
 
-def _reach(xx: Float64, xy: Float64, yy: Float64) -> Float64:
-    """(M,) distance beyond which no pair of a track is listed, by the covariance of its position [m].
-
-    It is three deviations, or fewer where a pair would cost more than MAX_COST: shapes that do not overlap cost the
-    weight of the overlap at least, and an uncertain position costs its uncertainty.
-    """
-    least = POSITION_SIGMA_M**2 + JUMP_SIGMA_M**2
-    uncertainty = np.log(((xx + least) * (yy + least) - xy * xy) / least**2)
-    left = np.minimum(2 * (MAX_COST - WEIGHTS.overlap) - uncertainty, 9.0)
-    reach: Float64 = 0.5 + np.sqrt(np.maximum(left, 0.0) * np.maximum(xx, yy))
-    return reach
+        It is three deviations, or fewer where a pair would cost more than the greatest cost: shapes that do not
+        overlap cost the weight of the overlap at least, and an uncertain position costs its uncertainty.
+        """
+        xx, xy, yy = covariance
+        least = self._jump_variance
+        uncertainty = np.log(((xx + least) * (yy + least) - xy * xy) / least**2)
+        left = np.minimum(2 * (self._tuning.max_cost - self._weights.overlap) - uncertainty, 9.0)
+        reach: Float64 = 0.5 + np.sqrt(np.maximum(left, 0.0) * np.maximum(xx, yy))
+        return reach
 
 
 def _free(index: Int, taken: Int, n: int) -> Bool:

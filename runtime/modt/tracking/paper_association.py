@@ -8,14 +8,9 @@ from modt.geometry.kernels import assign
 from modt.observations import Observations
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
+from modt.tracking.tuning import PaperAssociationTuning
 from modt.types import Float64, Int
 
-ALPHA, BETA, GAMMA = 2.0, 0.01, 0.1
-"""Weights of 1 - I, of N and of S in the cost of a match."""
-T_DA = 0.95
-"""Greatest cost of a match."""
-POSITION_SIGMA_M = 0.3
-"""Standard deviation of a centroid [m], which the paper does not state. With a greater one tracks turn later."""
 _NO_PARTNER = 1e6
 """Cost of leaving a row without a partner."""
 _TINY = 1e-9
@@ -35,27 +30,35 @@ class PaperAssociation:
 
     T_DA = 0.95 then asks for an overlap of 0.37 of proposals that are alike, of 0.52 of others. All pairs compete in
     the assignment; those of a higher cost are rejected afterwards.
+
+    Args:
+        tuning: weights and threshold of the paper, and the deviation of a centroid.
     """
+
+    def __init__(self, tuning: PaperAssociationTuning = PaperAssociationTuning()) -> None:
+        self._tuning = tuning
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs of least cost in all, without those above T_DA."""
         rows, columns = np.indices((len(tracks), len(observations))).reshape(2, -1)
         cost = self.cost(tracks, observations, rows, columns)
         kept = assign(rows, columns, cost, _NO_PARTNER)
-        kept = kept[cost[kept] <= T_DA]
-        rows, columns = rows[kept], columns[kept]
-        covariance = np.square(POSITION_SIGMA_M) * np.eye(2)[None].repeat(len(kept), axis=0)
-        return Matches(rows, columns, observations.centroid[columns], covariance, np.zeros((len(kept), 4)))
+        kept = kept[cost[kept] <= self._tuning.max_cost]
+        columns = columns[kept]
+        covariance = np.square(self._tuning.position_sigma_m) * np.eye(2)[None].repeat(len(kept), axis=0)
+        return Matches(rows[kept], columns, observations.centroid[columns], covariance, np.zeros((len(kept), 4)))
 
     def cost(self, tracks: TrackTable, observations: Observations, rows: Int, columns: Int) -> Float64:
         """(K,) cost of the pairs."""
-        a, b = tracks.box[rows], observations.box[columns]
+        track_box = tracks.box[rows]
+        box = observations.box[columns]
         overlap = _overlap(
-            tracks.x[rows, :2], _sides_along_axes(a), observations.centroid[columns], _sides_along_axes(b)
+            tracks.x[rows, :2], _sides_along_axes(track_box), observations.centroid[columns], _sides_along_axes(box)
         )
         points = _likeness(tracks.points[rows], observations.count[columns])
-        size = _likeness(a[:, 3:6], b[:, 3:6]).sum(axis=1)
-        cost: Float64 = ALPHA * (1 - overlap) - BETA * points - GAMMA * size
+        size = _likeness(track_box[:, 3:6], box[:, 3:6]).sum(axis=1)
+        tuning = self._tuning
+        cost: Float64 = tuning.alpha * (1 - overlap) - tuning.beta * points - tuning.gamma * size
         return cost
 
     def initial_position(self, observations: Observations) -> Float64:
@@ -71,8 +74,10 @@ def _likeness(a: Float64 | Int, b: Float64 | Int) -> Float64:
 
 def _sides_along_axes(boxes: Float64) -> Float64:
     """(n, 2) extent along x and y of boxes (n, 7) seen from above."""
-    c, s = np.abs(np.cos(boxes[:, 6])), np.abs(np.sin(boxes[:, 6]))
-    length, width = boxes[:, 3], boxes[:, 4]
+    c = np.abs(np.cos(boxes[:, 6]))
+    s = np.abs(np.sin(boxes[:, 6]))
+    length = boxes[:, 3]
+    width = boxes[:, 4]
     return np.stack([length * c + width * s, length * s + width * c], axis=1)
 
 

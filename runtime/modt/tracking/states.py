@@ -21,7 +21,7 @@ class UndefinedTransitionError(ValueError):
     """A state met an event that its machine has no row for."""
 
 
-class Event(IntEnum):
+class StateEvent(IntEnum):
     """Events that change the state of a proposal or track."""
 
     ASSOCIATED = 0
@@ -58,7 +58,7 @@ class State:
     name: str
     wants_class: bool = False
     final: bool = False
-    joining: Event = Event.JOINS_WAITING
+    joining: StateEvent = StateEvent.JOINS_WAITING
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Transition:
     source: str
     label: str
     target: str
-    event: Event
+    event: StateEvent
     meaning: str
 
 
@@ -111,7 +111,7 @@ class StateMachine:
     @cached_property
     def after(self) -> Int:
         """(S, E) state that each event leads to, NONE where the table has no row."""
-        after = np.full((len(self.states), len(Event)), NONE, np.int64)
+        after = np.full((len(self.states), len(StateEvent)), NONE, np.int64)
         for t in self.transitions:
             after[self.index(t.source), t.event] = self.index(t.target)
         return after
@@ -131,7 +131,7 @@ class StateMachine:
         """(S,) event that a proposal meets which joins a track in each state."""
         return np.array([state.joining for state in self.states])
 
-    def transition(self, states: Int, events: Event | Int) -> Int:
+    def transition(self, states: Int, events: StateEvent | Int) -> Int:
         """(M,) states after an event, one for all or one each.
 
         Raises:
@@ -140,17 +140,17 @@ class StateMachine:
         after: Int = self.after[states, events]
         if after.min(initial=0) == NONE:
             bad = (after == NONE).nonzero()[0][0]
-            event = Event(np.broadcast_to(events, after.shape)[bad])
+            event = StateEvent(np.broadcast_to(events, after.shape)[bad])
             raise UndefinedTransitionError(f"{self.title}: {event.name} in state {self.names[states[bad]]}")
         return after
 
     def joined(self, states: Int) -> Int:
         """(M,) states of proposals that were matched with tracks in these states (a1, then what they join)."""
-        matched = self.transition(np.array([self.proposal]), Event.ASSOCIATED)
+        matched = self.transition(np.array([self.proposal]), StateEvent.ASSOCIATED)
         return self.transition(matched.repeat(len(states)), self.joining[states])
 
 
-_E = Event
+_E = StateEvent
 
 _WAITING = (
     Transition("unmatched", "e1", "unmatched", _E.ASSOCIATED, "followed while it waits to be classified"),

@@ -1,20 +1,12 @@
-"""The tracker's own table."""
+"""The table of the tracks alive."""
 
 from __future__ import annotations
 
-import ctypes
-import math
-from array import array
 from dataclasses import dataclass
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_SIZE_M
-from modt.classes import ObjectClass
 from modt.geometry.kdop import DIRECTIONS
-from modt.geometry.tuning import ShapeTuning
-from modt.native.library import FLOAT64, INT64, Own, declare, structure
-from modt.observations import Observations
 from modt.types import (
     Bool,
     Decisions,
@@ -28,21 +20,6 @@ from modt.types import (
     Tracks,
     column,
 )
-
-ESTABLISHED_HITS = 4
-"""Frames in which a track was observed, from which its velocity and class change proposals."""
-LAG_S = 1.5
-"""Time constant of the place that a displacement is measured from."""
-AGREE_M = ShapeTuning().agreement_m
-ENVELOPE_DECAY, MEAN_KDOP_DECAY = 0.98, 0.8
-"""Share kept a frame of an extent that is not seen again; greatest weight of the past in a mean k-DOP."""
-GROWTH, PERSON_GROWTH, SHRINKAGE = 0.5, 0.1, 0.02
-"""Weights in the size of a track: of a larger box; of a larger box of a confirmed person, who is merged with things
-in passing; and of a smaller box, since the part that is hidden was seen before."""
-CONFIRMED_GROWTH: Float64 = np.where(IS_PERSON, PERSON_GROWTH, GROWTH)
-"""(4,) weight of a larger box of a track whose class is confirmed."""
-MAX_LENGTH_M: Float64 = np.where(np.arange(len(MAX_SIZE_M)) == ObjectClass.BACKGROUND, np.inf, MAX_SIZE_M[:, 0])
-"""(4,) length of a track of each class beyond which it is merged with others."""
 
 
 @dataclass(frozen=True)
@@ -130,58 +107,3 @@ class LiveTracks:
         self.next_id = self._saved[1]
         self.stamp_s = None
         self._hold(TrackTable.blank())
-
-
-def observe(
-    t: TrackTable, rows: Int, proposals: Int, observations: Observations, position: Float64, dt_s: float
-) -> None:
-    """Write what the proposals (R,) show of the rows (R,), at positions (R, 2), dt_s after the frame before.
-
-    The known extent decays slowly towards what is seen, but for an object longer than its class, which is merged with
-    others. In the mean k-DOP an end that jumped begins anew.
-
-    The place that a track comes from follows its k-DOP with a lag: at a constant speed v the displacement tends
-    to v * LAG_S. Along each axis it is that of the end that moved less, and nothing where the ends moved apart:
-    a changing view moves one of them alone.
-    """
-    kdop, box = observations.kdop.T.take(proposals, axis=0), observations.box.take(proposals, axis=0)
-    about, class_ = kdop - position @ DIRECTIONS, t.object_class[rows]
-    known, mean = t.envelope.take(rows, axis=0), t.mean_kdop.take(rows, axis=0)
-    lagged, size = t.lagged_kdop.take(rows, axis=0), t.size_m.take(rows, axis=0)
-    merged = (about[:, :4] + about[:, 4:] > MAX_LENGTH_M[class_][:, None]).any(axis=1)
-    envelope = np.maximum(about, ENVELOPE_DECAY * known + (1 - ENVELOPE_DECAY) * about)
-    off, shift, change = mean - about, kdop - lagged, box[:, 3:6] - size
-    weight = np.minimum(1.0 - 1.0 / t.hits[rows], MEAN_KDOP_DECAY)[:, None]
-    ahead, behind = shift[:, :4], -shift[:, 4:]
-    together = np.maximum(np.minimum(ahead, behind), -np.maximum(ahead, behind))
-    growth = np.where(t.final[rows], CONFIRMED_GROWTH[class_], GROWTH)[:, None]
-    t.envelope[rows] = np.where(merged[:, None], known, envelope)
-    t.mean_kdop[rows] = about + (np.abs(off) < AGREE_M) * weight * off
-    t.moved_m[rows] = together.max(axis=1, initial=0.0)
-    t.observed_s[rows] += dt_s
-    t.size_m[rows] = size + np.where(change > 0, growth, SHRINKAGE) * change
-    t.lagged_kdop[rows] = lagged + (1.0 - math.exp(-dt_s / LAG_S)) * shift
-    t.anchor[rows], t.kdop[rows], t.box[rows], t.proposal[rows] = position, kdop, box, proposals
-    t.points[rows] = observations.count[proposals]
-    t.bottom[rows], t.top[rows] = observations.bottom[proposals], observations.top[proposals]
-
-
-class NativeObserve:
-    """The same in C (`modt.native`)."""
-
-    def __init__(self, library: ctypes.CDLL) -> None:
-        declare(library, {"modt_observe": (None, (Own, Own, INT64, INT64, ctypes.c_int64, FLOAT64, FLOAT64, Own))})
-        self._library, self._limits = library, (*MAX_LENGTH_M.tolist(), *CONFIRMED_GROWTH.tolist())
-
-    def __call__(
-        self, t: TrackTable, rows: Int, proposals: Int, observations: Observations, position: Float64, dt_s: float
-    ) -> None:
-        """Write what the proposals (R,) show of the rows (R,)."""
-        o = observations
-        floats = t.kdop, t.lagged_kdop, t.envelope, t.mean_kdop, t.box, t.size_m, t.anchor, t.moved_m, t.observed_s
-        columns = structure(*floats, t.bottom, t.top, t.proposal, t.points, t.hits, t.object_class, t.final)
-        seen = structure(o.kdop, o.box, o.bottom, o.top, o.count, len(o))
-        decays = (ENVELOPE_DECAY, MEAN_KDOP_DECAY, AGREE_M, SHRINKAGE, GROWTH, 1.0 - math.exp(-dt_s / LAG_S), dt_s)
-        numbers = array("d", (*decays, *self._limits))
-        along = position @ DIRECTIONS
-        self._library.modt_observe(columns, seen, rows, proposals, len(rows), position, along, numbers)

@@ -13,32 +13,25 @@ from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
+from modt.tracking.extent import extent_update_of
 from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
+from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Regrouping
-from modt.tracking.states import Event, StateMachine
-from modt.tracking.track_table import LiveTracks, NativeObserve, TrackTable, observe
+from modt.tracking.states import StateEvent, StateMachine
+from modt.tracking.track_table import LiveTracks, TrackTable
+from modt.tracking.tuning import TrackingTuning
 from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks
 
-ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS = 2.0, 0.3
-"""Process noise of speed [m/s2] and heading [rad/s]."""
-INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS = 0.3, 8.0
-"""Deviations of a new track."""
-STATIONARY_RADIUS_M, STATIONARY_SIGMA_MPS = 0.5, 1.0
-"""A track this near to its rest position is stationary: the speed 0 is observed of it, with this deviation."""
-STOPPED_MPS, REST_GAIN = 0.5, 0.1
-"""A moving track slower than this has a new rest position; weight of a new position in the rest position."""
 MIN_STEP_SHARE = 0.1
 """A time step shorter than this share of the period means a stalled clock."""
 
 
-def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
+def association_of(config: TrackingConfig, kernels: GeometryKernels, tuning: TrackingTuning) -> Association:
     """The association that a configuration names."""
     if config.association == "paper":
-        from modt.tracking.paper_association import PaperAssociation
-
-        return PaperAssociation()
-    return KdopAssociation(kernels)
+        return PaperAssociation(tuning.paper_association)
+    return KdopAssociation(kernels, tuning.kdop_association)
 
 
 class Tracker:
@@ -51,6 +44,7 @@ class Tracker:
         period_s: time between sweeps; a track that is not seen is kept for `max_missed` of them.
         kernels: passes over points and pairs.
         live: tracks to go on with; by default none.
+        tuning: everything that is chosen in the stage.
     """
 
     def __init__(
@@ -61,17 +55,22 @@ class Tracker:
         period_s: float = 0.1,
         kernels: GeometryKernels = NUMPY_GEOMETRY,
         live: LiveTracks | None = None,
+        tuning: TrackingTuning = TrackingTuning(),
     ) -> None:
-        self.config, self.machine = config, machine
-        self.association = association_of(config, kernels) if association is None else association
+        self.config = config
+        self.machine = machine
+        self.association = association_of(config, kernels, tuning) if association is None else association
         self._extended = config.extensions == "all"
-        self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0)
+        self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0, tuning.background_map)
         self._period_s = period_s
-        self._regrouping = Regrouping(kernels)
-        self._observe = observe if kernels.library is None else NativeObserve(kernels.library)
-        self._filter = filter_of(kernels, ACCELERATION_SIGMA_MPS2, TURN_SIGMA_RADPS)
-        position_m, speed_mps = INITIAL_POSITION_SIGMA_M, INITIAL_SPEED_SIGMA_MPS
-        self._P_new = np.diag(np.square([position_m, position_m, np.pi, speed_mps]))  # a heading of pi: unknown
+        self._regrouping = Regrouping(kernels, tuning)
+        self._update_extent = extent_update_of(kernels, tuning.extent)
+        self._filter = filter_of(kernels, tuning.filter)
+        position_m = tuning.filter.initial_position_sigma_m
+        unknown_heading_rad = np.pi
+        sigma = [position_m, position_m, unknown_heading_rad, tuning.filter.initial_speed_sigma_mps]
+        self._P_new = np.diag(np.square(sigma))
+        self._rest = tuning.rest
         self._live = LiveTracks() if live is None else live
 
     @property
@@ -92,7 +91,7 @@ class Tracker:
             id=t.id,
             observed=t.observed,
             stationary=t.stationary,
-            candidate=(t.stationary | (t.hits < 3)) & (t.missed <= 2),
+            candidate=(t.stationary | (t.hits < self._rest.min_hits)) & (t.missed <= self._rest.max_missed),
             kdop=t.kdop,
             predicted_kdop=t.predicted_kdops(),
         )
@@ -114,15 +113,17 @@ class Tracker:
         frame = Associated(proposals, located.observations, matches)
         if self._extended:  # the paper takes proposals as they are
             frame = self._regrouping.regroup(self.tracks, frame, located.placement)
-        known = self.tracks.box.take(frame.matches.rows, axis=0)
-        self._associate(frame.matches.rows)
+        rows = frame.matches.rows
+        box_before = self.tracks.box.take(rows, axis=0)
+        self._associate(rows)
         self._update(frame.matches, frame.observations, dt_s)
-        proposals = self._keep_top(frame, known)
-        self._observe_rest(frame.matches.rows)
-        near = self._near_rest()
-        self._withdraw(near)
-        at_rest = self._background(near)
-        self._renew(self._expire(at_rest), at_rest, frame.matches, frame.observations)
+        proposals = self._keep_top(frame, box_before)
+        self._observe_rest(rows)
+        near_rest = self._near_rest()
+        self._withdraw(near_rest)
+        settled = self._settled_background(near_rest)
+        kept = self._expire(settled)
+        self._begin_tracks(kept, settled, frame.matches, frame.observations)
         t = self.tracks
         return self._live.tracked(proposals, self.machine.wants_class[t.state] & t.observed)
 
@@ -133,10 +134,10 @@ class Tracker:
             rows: (R,) tracks classified.
             confirmed: (R,) whether the class of each is confirmed now.
         """
-        self._advance(rows, np.where(confirmed, Event.CLASSIFIED.value, Event.UNDECIDED.value))
+        self._advance(rows, np.where(confirmed, StateEvent.CLASSIFIED.value, StateEvent.UNDECIDED.value))
         return self._live.save()
 
-    def _advance(self, rows: Int, events: Event | Int) -> None:
+    def _advance(self, rows: Int, events: StateEvent | Int) -> None:
         """Move rows to the states that events lead to, and write whether the class is final there."""
         t = self.tracks
         if not len(rows):
@@ -155,10 +156,13 @@ class Tracker:
 
     def _forget(self, stamp_s: float) -> None:
         """Delete the tracks that would have expired in a gap; beyond N frames of it, the scene may be another one."""
-        t, lapse_s, most_s = self.tracks, self._lapse_s(stamp_s), self._coasting_s(1.5)
+        t = self.tracks
+        lapse_s = self._lapse_s(stamp_s)
+        most_s = self._coasting_s(1.5)
         gone = t.unseen_s + lapse_s > most_s
         if gone.any():
-            self.background_map.add(t, (gone & self._background(self._near_rest())).nonzero()[0])
+            settled = self._settled_background(self._near_rest())
+            self.background_map.add(t, (gone & settled).nonzero()[0])
             self._live.renew((~gone).nonzero()[0], 0)
         if lapse_s > most_s:
             self.background_map.clear()
@@ -174,95 +178,116 @@ class Tracker:
         return dt_s
 
     def _associate(self, rows: Int) -> None:
-        """Count hits and misses; proposals take over the standing of their tracks, the other tracks coast."""
+        """Count hits and misses; matched proposals take over the states of their tracks, the other tracks coast."""
         t = self.tracks
-        events = np.full(len(t), Event.UNASSOCIATED.value)
-        events[rows] = Event.ASSOCIATED.value
+        events = np.full(len(t), StateEvent.UNASSOCIATED.value)
+        events[rows] = StateEvent.ASSOCIATED.value
         t.state[:] = self.machine.transition(t.state, events)
         t.state[rows] = self.machine.joined(t.state[rows])
         t.final[:] = self.machine.final[t.state]
         t.age[:] += 1
         t.hits[rows] += 1
         t.missed[:] += 1
-        t.missed[rows], t.unseen_s[rows] = 0, 0.0
+        t.missed[rows] = 0
+        t.unseen_s[rows] = 0.0
         t.proposal[:] = NONE
 
     def _update(self, matches: Matches, observations: Observations, dt_s: float) -> None:
         """Equation 1's filter on the matched positions, and what the proposals show of their tracks."""
-        t, rows = self.tracks, matches.rows
+        t = self.tracks
+        rows = matches.rows
         self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         t.end_variance[rows] = matches.end_variance
-        self._observe(t, rows, matches.proposals, observations, matches.position, dt_s)
+        self._update_extent(t, rows, matches.proposals, observations, matches.position, dt_s)
 
-    def _keep_top(self, frame: Associated, known: Float64) -> Proposals:
-        """A person cut above is as high as in (R, 7) the boxes known before the frame: in the track and proposal."""
-        t, rows, own = self.tracks, frame.matches.rows, frame.matches.proposals
-        t.hidden[rows] = False
-        people = IS_PERSON[t.object_class[rows]].nonzero()[0]
-        people = people[frame.proposals.cut[own[people]] & Cut.TOP.value > 0]
+    def _keep_top(self, frame: Associated, box_before: Float64) -> Proposals:
+        """Give people whom the view cuts off above their former height, in the tracks and in the proposals returned.
+
+        Args:
+            frame: regrouped.
+            box_before: (R, 7) boxes of the matched tracks before the frame [m, world].
+        """
+        t = self.tracks
+        t.hidden[frame.matches.rows] = False
+        cut_above = frame.proposals.cut[frame.matches.proposals] & Cut.TOP.value > 0
+        people = (IS_PERSON[t.object_class[frame.matches.rows]] & cut_above).nonzero()[0]
         if not len(people):
             return frame.proposals
-        rows, own, known = rows[people], own[people], known[people]
-        hidden_m = np.maximum((known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2), 0.0)
+        rows = frame.matches.rows[people]
+        proposals = frame.matches.proposals[people]
+        top_before_m = box_before[people, 2] + box_before[people, 5] / 2
+        top_m = t.box[rows, 2] + t.box[rows, 5] / 2
+        hidden_m = np.maximum(top_before_m - top_m, 0.0)
         t.hidden[rows] = (hidden_m > 0) & (t.box[rows, 5] < PERSON_M / 2)
-        raised = frame.proposals.box.copy()
-        for boxes, index in ((t.box, rows), (raised, own)):
-            boxes[index, 2:6:3] += np.outer(hidden_m, (0.5, 1.0))  # z of the middle, and height
-        return replace(frame.proposals, box=raised)
+        middle_and_height = np.outer(hidden_m, (0.5, 1.0))  # z of the middle rises by half
+        t.box[rows, 2:6:3] += middle_and_height
+        box = frame.proposals.box.copy()
+        box[proposals, 2:6:3] += middle_and_height
+        return replace(frame.proposals, box=box)
 
     def _observe_rest(self, rows: Int) -> None:
         """Write rest position and stationary of the rows; a track that stopped rests where it is."""
         t = self.tracks
-        x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
-        stopped = ((x[:, SPEED] < STOPPED_MPS) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
+        rest = self._rest
+        x = t.x.take(rows, axis=0)
+        position = t.rest_position.take(rows, axis=0)
+        hits = t.hits[rows]
+        stopped = ((x[:, SPEED] < rest.stopped_mps) & ~t.stationary[rows] & (hits > rest.min_hits)).nonzero()[0]
         position[stopped] = x[stopped, :2]
         step = x[:, :2] - position
-        near = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
-        t.stationary[rows] = near & (hits > 2)
-        t.rest_position[rows] = position + (REST_GAIN * near)[:, None] * step
+        near = np.hypot(step[:, 0], step[:, 1]) < rest.radius_m
+        t.stationary[rows] = near & (hits >= rest.min_hits)
+        t.rest_position[rows] = position + (rest.gain * near)[:, None] * step
         if self._extended:
-            self._filter.observe_speed(t.x, t.P, rows[near], 0.0, STATIONARY_SIGMA_MPS)
+            self._filter.observe_speed(t.x, t.P, rows[near], 0.0, rest.speed_sigma_mps)
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
         step = self.tracks.x[:, :2] - self.tracks.rest_position
-        near: Bool = np.hypot(step[:, 0], step[:, 1]) < STATIONARY_RADIUS_M
+        near: Bool = np.hypot(step[:, 0], step[:, 1]) < self._rest.radius_m
         return near
 
-    def _background(self, near: Bool) -> Bool:
-        """(M,) tracks that are finally background, and near their rest position."""
+    def _settled_background(self, near_rest: Bool) -> Bool:
+        """(M,) tracks that are confirmed background, and near their rest position."""
         background: Bool = self.tracks.object_class == ObjectClass.BACKGROUND.value
-        return self.tracks.final & background & near
+        return self.tracks.final & background & near_rest
 
-    def _withdraw(self, near: Bool) -> None:
+    def _withdraw(self, near_rest: Bool) -> None:
         """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
         t = self.tracks
-        rows = (t.inherited & ~near).nonzero()[0]
-        self._advance(rows[t.proposal[rows] != NONE], Event.WITHDRAWN)
+        withdrawn = t.inherited & ~near_rest & t.observed
+        self._advance(withdrawn.nonzero()[0], StateEvent.WITHDRAWN)
 
-    def _expire(self, at_rest: Bool) -> Int:
-        """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
+    def _expire(self, settled: Bool) -> Int:
+        """After the time of N frames a track ends (a9, a14); settled background (M,) goes into the map.
+
+        Returns:
+            The rows (A,) of the other tracks.
+        """
         t = self.tracks
-        expired: Bool = (t.proposal == NONE) & (t.unseen_s > self._coasting_s(0.5))
-        self.background_map.add(t, (expired & at_rest).nonzero()[0])
-        self._advance(expired.nonzero()[0], Event.EXPIRED)
+        expired: Bool = ~t.observed & (t.unseen_s > self._coasting_s(0.5))
+        self.background_map.add(t, (expired & settled).nonzero()[0])
+        self._advance(expired.nonzero()[0], StateEvent.EXPIRED)
         return (~expired).nonzero()[0]
 
-    def _renew(self, kept: Int, at_rest: Bool, matches: Matches, observations: Observations) -> None:
-        """The rows kept, and a track for every proposal without one: a2, or a1 and a5 (a6) at a remembered place."""
-        claimed = np.zeros(len(observations), np.bool_)
-        claimed[matches.proposals] = True
-        proposals = (~claimed).nonzero()[0]
-        known = self.background_map.recall(self.tracks, kept[at_rest[kept]], observations, proposals)
-        rows, new = self._live.renew(kept, len(proposals)), slice(len(kept), None)
+    def _begin_tracks(self, kept: Int, settled: Bool, matches: Matches, observations: Observations) -> None:
+        """Keep these rows, and begin a track with each unmatched proposal (a2).
+
+        At a remembered place of background, or at one of settled background (M,), it inherits that class (a1, a5, a6).
+        """
+        matched = np.zeros(len(observations), np.bool_)
+        matched[matches.proposals] = True
+        proposals = (~matched).nonzero()[0]
+        known = self.background_map.recall(self.tracks, kept[settled[kept]], observations, proposals)
+        rows = self._live.renew(kept, len(proposals))
         t = self.tracks
-        t.state[new] = self.machine.proposal
-        self._advance(rows, np.where(known, Event.ASSOCIATED.value, Event.UNASSOCIATED.value))
-        self._advance(rows[known], Event.JOINS_FINAL)
+        t.state[rows] = self.machine.proposal
+        self._advance(rows, np.where(known, StateEvent.ASSOCIATED.value, StateEvent.UNASSOCIATED.value))
+        self._advance(rows[known], StateEvent.JOINS_FINAL)
         position = self.association.initial_position(observations).take(proposals, axis=0)
-        t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
-        t.P[new] = self._P_new
-        t.age[new] = t.hits[new] = 1
-        t.lagged_kdop[new] = observations.kdop.T.take(proposals, axis=0)
-        t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]
-        self._observe(t, rows, proposals, observations, position, 0.0)
+        t.x[rows, :2] = t.rest_position[rows] = position  # speed and heading begin at zero
+        t.P[rows] = self._P_new
+        t.age[rows] = t.hits[rows] = 1
+        t.lagged_kdop[rows] = observations.kdop.T.take(proposals, axis=0)
+        t.size_m[rows] = observations.box.take(proposals, axis=0)[:, 3:6]
+        self._update_extent(t, rows, proposals, observations, position, 0.0)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
-from modt.geometry.kdop import PairWeights
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +50,22 @@ class KdopAssociationTuning:
     """Standard deviation of a measured position along either axis [m]. Greater: the filter smooths more.
     Chosen on: judgement."""
 
-    weights: PairWeights = field(default=PairWeights(size=2.0, overlap=3.0, height=2.0, points=0.5))
-    """Cost of a unit of difference: of log sizes, of 1 - IoU, of heights [1/m], of log numbers of points. Greater:
-    pairs that differ in it are matched less often.
+    size_weight: float = 2.0
+    """Cost of a difference of 1 of the logarithms of the widths. Greater: pairs of other sizes are matched less often.
+    Chosen on: judgement."""
+
+    overlap_weight: float = 3.0
+    """Cost of no overlap; one of half of the union costs half. Greater: pairs side by side are matched less often.
+    Chosen on: judgement."""
+
+    height_weight_per_m: float = 2.0
+    """Cost of a mean difference of bottom and top of a metre [1/m]. Greater: pairs of other heights are matched less
+    often.
+    Chosen on: judgement."""
+
+    points_weight: float = 0.5
+    """Cost of a difference of 1 of the logarithms of the numbers of points. Greater: pairs of other numbers are matched
+    less often.
     Chosen on: judgement."""
 
 

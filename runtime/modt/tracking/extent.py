@@ -1,0 +1,212 @@
+"""Extent, size and displacement of a track, as its proposals show them."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from dataclasses import fields
+
+import numpy as np
+
+from modt.class_sizes import IS_PERSON, MAX_SIZE_M
+from modt.classes import N_CLASSES, ObjectClass
+from modt.geometry.kdop import DIRECTIONS
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
+from modt.native.library import FLOAT64, INT64, Array, Layout, Number, declare
+from modt.observations import Observations
+from modt.tracking.track_table import TrackTable
+from modt.tracking.tuning import ExtentTuning
+from modt.types import Float64, Int
+
+MAX_LENGTH_M: Float64 = np.where(np.arange(N_CLASSES) == ObjectClass.BACKGROUND, np.inf, MAX_SIZE_M[:, 0])
+"""(4,) length of a track of each class beyond which it is merged with others."""
+
+
+class ExtentUpdate:
+    """Writes what proposals show of their tracks: the reference in NumPy.
+
+    Args:
+        tuning: weights of what is seen and what was seen before.
+        agreement_m: an end of the mean k-DOP that is further off jumped, as in ShapeTuning [m].
+    """
+
+    def __init__(self, tuning: ExtentTuning, agreement_m: float) -> None:
+        self.tuning = tuning
+        self.agreement_m = agreement_m
+        self.confirmed_growth: Float64 = np.where(IS_PERSON, tuning.person_growth, tuning.growth)
+        """(4,) weight of a larger box of a track whose class is confirmed."""
+
+    def __call__(
+        self,
+        tracks: TrackTable,
+        rows: Int,
+        proposals: Int,
+        observations: Observations,
+        position: Float64,
+        dt_s: float,
+    ) -> None:
+        """Write the columns of the extent.
+
+        Args:
+            tracks: written.
+            rows: (R,) tracks that have a proposal.
+            proposals: (R,) the proposal of each.
+            observations: of the frame.
+            position: (R, 2) measured position of each [m, world].
+            dt_s: time since the frame before [s].
+        """
+        kdop = observations.kdop.T.take(proposals, axis=0)
+        box = observations.box.take(proposals, axis=0)
+        about = kdop - position @ DIRECTIONS
+        self._envelope(tracks, rows, about)
+        self._mean(tracks, rows, about)
+        self._displacement(tracks, rows, kdop, dt_s)
+        self._size(tracks, rows, box[:, 3:6])
+        tracks.observed_s[rows] += dt_s
+        tracks.anchor[rows] = position
+        tracks.kdop[rows] = kdop
+        tracks.box[rows] = box
+        tracks.bottom[rows] = observations.bottom[proposals]
+        tracks.top[rows] = observations.top[proposals]
+        tracks.points[rows] = observations.count[proposals]
+        tracks.proposal[rows] = proposals
+
+    def _envelope(self, tracks: TrackTable, rows: Int, about: Float64) -> None:
+        """The known extent grows to what is seen (R, 8), and decays slowly towards it.
+
+        It stays as it is for an object longer than its class, which is merged with others.
+        """
+        known = tracks.envelope.take(rows, axis=0)
+        decay = self.tuning.known_decay
+        grown = np.maximum(about, decay * known + (1 - decay) * about)
+        longest_m = MAX_LENGTH_M[tracks.object_class[rows]]
+        merged = (about[:, :4] + about[:, 4:] > longest_m[:, None]).any(axis=1)
+        tracks.envelope[rows] = np.where(merged[:, None], known, grown)
+
+    def _mean(self, tracks: TrackTable, rows: Int, about: Float64) -> None:
+        """The mean k-DOP follows what is seen (R, 8); an end that jumped begins anew."""
+        off = tracks.mean_kdop.take(rows, axis=0) - about
+        weight = np.minimum(1.0 - 1.0 / tracks.hits[rows], self.tuning.mean_decay)[:, None]
+        tracks.mean_kdop[rows] = about + (np.abs(off) < self.agreement_m) * weight * off
+
+    def _displacement(self, tracks: TrackTable, rows: Int, kdop: Float64, dt_s: float) -> None:
+        """The place that a track comes from follows its k-DOP (R, 8) with a lag; the displacement is from there.
+
+        At a constant speed v it tends to v * lag_s. Along each axis it is that of the end that moved less, and
+        nothing where the ends moved apart: a changing view moves one of them alone.
+        """
+        lagged = tracks.lagged_kdop.take(rows, axis=0)
+        shift = kdop - lagged
+        ahead = shift[:, :4]
+        behind = -shift[:, 4:]
+        together = np.maximum(np.minimum(ahead, behind), -np.maximum(ahead, behind))
+        tracks.moved_m[rows] = together.max(axis=1, initial=0.0)
+        tracks.lagged_kdop[rows] = lagged + self._follow(dt_s) * shift
+
+    def _size(self, tracks: TrackTable, rows: Int, seen_m: Float64) -> None:
+        """The size follows a larger box (R, 3) fast, and a smaller one slowly, since a part may be hidden."""
+        size_m = tracks.size_m.take(rows, axis=0)
+        change = seen_m - size_m
+        confirmed = self.confirmed_growth[tracks.object_class[rows]]
+        growth = np.where(tracks.final[rows], confirmed, self.tuning.growth)[:, None]
+        tracks.size_m[rows] = size_m + np.where(change > 0, growth, self.tuning.shrinkage) * change
+
+    def _follow(self, dt_s: float) -> float:
+        """Share of a displacement by which the place that it is measured from follows."""
+        return 1.0 - math.exp(-dt_s / self.tuning.lag_s)
+
+
+_COLUMNS = Layout(
+    "TrackColumns",
+    kdop=Array(np.float64, "m", 8),
+    lagged_kdop=Array(np.float64, "m", 8),
+    envelope=Array(np.float64, "m", 8),
+    mean_kdop=Array(np.float64, "m", 8),
+    box=Array(np.float64, "m", 7),
+    size_m=Array(np.float64, "m", 3),
+    anchor=Array(np.float64, "m", 2),
+    moved_m=Array(np.float64, "m"),
+    observed_s=Array(np.float64, "m"),
+    bottom=Array(np.float64, "m"),
+    top=Array(np.float64, "m"),
+    proposal=Array(np.int64, "m"),
+    points=Array(np.int64, "m"),
+    hits=Array(np.int64, "m"),
+    object_class=Array(np.int64, "m"),
+    final=Array(np.bool_, "m"),
+)
+_OBSERVATIONS = Layout(
+    "Observations",
+    kdop=Array(np.float64, 8, "n"),
+    box=Array(np.float64, "n", 7),
+    bottom=Array(np.float64, "n"),
+    top=Array(np.float64, "n"),
+    count=Array(np.int64, "n"),
+    n=Number(np.int64),
+)
+_TUNING = Layout("ExtentTuning", **{field.name: Number(np.float64) for field in fields(ExtentTuning)})
+_LIMITS = Layout(
+    "ExtentLimits",
+    max_length_m=Array(np.float64, N_CLASSES),
+    confirmed_growth=Array(np.float64, N_CLASSES),
+    agreement_m=Number(np.float64),
+)
+_DOUBLE = ctypes.c_double
+_ARGUMENTS = (
+    _COLUMNS,
+    _OBSERVATIONS,
+    INT64,
+    INT64,
+    ctypes.c_int64,
+    FLOAT64,
+    FLOAT64,
+    _TUNING,
+    _LIMITS,
+    _DOUBLE,
+    _DOUBLE,
+)
+
+
+class NativeExtentUpdate(ExtentUpdate):
+    """The same in C (`modt.native`)."""
+
+    def __init__(self, library: ctypes.CDLL, tuning: ExtentTuning, agreement_m: float) -> None:
+        super().__init__(tuning, agreement_m)
+        declare(library, {"modt_update_extent": (None, _ARGUMENTS)})
+        self._library = library
+        self._tuning = _TUNING.of(tuning)
+        self._limits = _LIMITS.of(self, max_length_m=MAX_LENGTH_M)
+
+    def __call__(
+        self,
+        tracks: TrackTable,
+        rows: Int,
+        proposals: Int,
+        observations: Observations,
+        position: Float64,
+        dt_s: float,
+    ) -> None:
+        """Write the columns of the extent."""
+        self._library.modt_update_extent(
+            _COLUMNS.of(tracks),
+            _OBSERVATIONS.of(observations, n=len(observations)),
+            rows,
+            proposals,
+            len(rows),
+            position,
+            position @ DIRECTIONS,
+            self._tuning,
+            self._limits,
+            self._follow(dt_s),
+            dt_s,
+        )
+
+
+def extent_update_of(
+    kernels: GeometryKernels = NUMPY_GEOMETRY, tuning: ExtentTuning = ExtentTuning()
+) -> ExtentUpdate:
+    """The update where the other passes are."""
+    agreement_m = kernels.shape_tuning.agreement_m
+    if kernels.library is None:
+        return ExtentUpdate(tuning, agreement_m)
+    return NativeExtentUpdate(kernels.library, tuning, agreement_m)
