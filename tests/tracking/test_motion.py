@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
+from modt.geometry.kernels import NUMPY_GEOMETRY
 from modt.observations import observe
 from modt.tracking.extent import extent_update_of
 from modt.tracking.track_table import TrackTable
@@ -48,7 +49,7 @@ def test_a_cyclist_who_passes_by_a_wall_is_not_as_large_as_it():
         tracks.hits[:] = 1
         for width_m in (2.3, *[0.7] * 10):
             frame = observe(frame_of([box(10, 0, 1.5, width_m, 1.7)])[1], EYE)
-            extent_update_of()(tracks, np.array([0]), np.array([0]), frame, frame.position, 0.1)
+            extent_update_of(NUMPY_GEOMETRY)(tracks, np.array([0]), np.array([0]), frame, frame.position, 0.1)
         widths_m.append(tracks.size_m[0, 1])
     assert widths_m[0] < 0.9 < 1.2 < widths_m[1]
 

@@ -11,7 +11,7 @@ import numpy as np
 from modt.class_sizes import IS_PERSON, MAX_SIZE_M
 from modt.classes import N_CLASSES, ObjectClass
 from modt.geometry.kdop import DIRECTIONS
-from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
+from modt.geometry.kernels import GeometryKernels
 from modt.native.library import FLOAT64, INT64, Array, Layout, Number, declare
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
@@ -80,8 +80,8 @@ class ExtentUpdate:
         decay = self.tuning.known_decay
         grown = np.maximum(about, decay * known + (1 - decay) * about)
         longest_m = MAX_LENGTH_M[tracks.object_class[rows]]
-        merged = (about[:, :4] + about[:, 4:] > longest_m[:, None]).any(axis=1)
-        tracks.envelope[rows] = np.where(merged[:, None], known, grown)
+        merged = (about[:, :4] + about[:, 4:] > longest_m[:, None]).any(axis=1, keepdims=True)
+        tracks.envelope[rows] = np.where(merged, known, grown)
 
     def _mean(self, tracks: TrackTable, rows: Int, about: Float64) -> None:
         """The mean k-DOP follows what is seen (R, 8); an end that jumped begins anew."""
@@ -202,9 +202,7 @@ class NativeExtentUpdate(ExtentUpdate):
         )
 
 
-def extent_update_of(
-    kernels: GeometryKernels = NUMPY_GEOMETRY, tuning: ExtentTuning = ExtentTuning()
-) -> ExtentUpdate:
+def extent_update_of(kernels: GeometryKernels, tuning: ExtentTuning = ExtentTuning()) -> ExtentUpdate:
     """The update where the other passes are."""
     agreement_m = kernels.shape_tuning.agreement_m
     if kernels.library is None:

@@ -10,10 +10,11 @@ from modt.class_sizes import IS_PERSON
 from modt.geometry.kdop import widths
 from modt.geometry.kernels import GeometryKernels
 from modt.observations import Observations
-from modt.tracking.association import Matches
+from modt.placement import Placement
+from modt.tracking.association import Associated, Matches
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import RegroupingTuning
-from modt.types import NONE, Bool, Float64, Int
+from modt.types import NONE, Bool, Float64, Int, Proposals
 
 
 class Assignment(NamedTuple):
@@ -47,12 +48,40 @@ class Pairs(NamedTuple):
     extent_m: Float64  # (P,) greatest width of the k-DOP of each proposal
 
 
-def list_pairs(
+class Situation(NamedTuple):
+    """A frame after association, with all that the edits are found from."""
+
+    tracks: TrackTable  # as predicted
+    proposals: Proposals
+    observations: Observations  # the proposals in the world
+    placement: Placement  # of the frame in the world
+    assignment: Assignment
+    pairs: Pairs
+    kernels: GeometryKernels
+    tuning: RegroupingTuning
+
+    @classmethod
+    def of(
+        cls,
+        tracks: TrackTable,
+        frame: Associated,
+        placement: Placement,
+        kernels: GeometryKernels,
+        tuning: RegroupingTuning,
+    ) -> Situation:
+        """The situation of a frame, with its pairs."""
+        proposals, observations, matches = frame
+        assignment = Assignment.of(matches, len(tracks), len(proposals))
+        pairs = _listed(tracks, observations, assignment, kernels, tuning.min_coverage)
+        return cls(tracks, proposals, observations, placement, assignment, pairs, kernels, tuning)
+
+
+def _listed(
     tracks: TrackTable,
     observations: Observations,
     assignment: Assignment,
     kernels: GeometryKernels,
-    tuning: RegroupingTuning,
+    min_coverage: float,
 ) -> Pairs:
     """Pairs of the tracks that were observed twice or more."""
     # Senior is the track of which more points were seen: frames with a proposal times points of the last one. Of two
@@ -69,20 +98,12 @@ def list_pairs(
     joinable = ~IS_PERSON[tracks.object_class] | tracks.hidden
     within = kernels.coverage(observations.kdop, known, proposals, which)
     around = kernels.coverage(expected, observations.kdop, rows, proposals)
-    free = np.maximum(within, around) > tuning.min_coverage
+    free = np.maximum(within, around) > min_coverage
     owner = assignment.track_of_proposal[proposals]
     owned = (owner != NONE).nonzero()[0]
     free[owned] &= _may_take(tracks, rank, joinable, rows[owned], owner[owned])
-    return Pairs(
-        rows=rows,
-        proposals=proposals,
-        within=within,
-        around=around,
-        free=free,
-        joinable=joinable,
-        expected=expected,
-        extent_m=widths(observations.kdop).max(axis=0),
-    )
+    extent_m = widths(observations.kdop).max(axis=0)
+    return Pairs(rows, proposals, within, around, free, joinable, expected, extent_m)
 
 
 def _may_take(tracks: TrackTable, rank: Int, joinable: Bool, rows: Int, owners: Int) -> Bool:
@@ -108,6 +129,13 @@ def first_of_each(group: Int, n_groups: int) -> Int:
     first = np.full(n_groups, len(group))
     np.minimum.at(first, group, np.arange(len(group)))
     return first[first < len(group)]
+
+
+def with_rows(column: Float64, rows: Int, entries: Float64 | float) -> Float64:
+    """A copy of a column with other entries in these rows."""
+    copied = column.copy()
+    copied[rows] = entries
+    return copied
 
 
 def fit_together(a: Float64, b: Float64, size: Float64) -> Bool:

@@ -30,7 +30,7 @@ from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Associated, Matches
 from modt.tracking.join import Joins, find_joins
-from modt.tracking.pairs import Assignment, list_pairs
+from modt.tracking.pairs import Situation, with_rows
 from modt.tracking.split import Splits, find_splits, locate_pieces
 from modt.tracking.take import find_takes
 from modt.tracking.track_table import TrackTable
@@ -77,7 +77,7 @@ class Regrouping:
     def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY, tuning: TrackingTuning = TrackingTuning()) -> None:
         self._kernels = kernels
         self._tuning = tuning.regrouping
-        self._position_sigma_m = tuning.kdop_association.position_sigma_m
+        self._position_variance = tuning.kdop_association.position_sigma_m**2
 
     def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
         """The frame in a better grouping; every point stays in one proposal.
@@ -89,66 +89,53 @@ class Regrouping:
         """
         if not len(frame.proposals) or not len(tracks):
             return frame
-        kernels = self._kernels
-        tuning = self._tuning
-        observations = frame.observations
-        matched = Assignment.of(frame.matches, len(tracks), len(frame.proposals))
-        pairs = list_pairs(tracks, observations, matched, kernels, tuning)
-        takes = find_takes(tracks, observations, pairs, matched)
-        taken = takes.applied(matched)
-        joins = find_joins(tracks, observations, pairs, taken, kernels, tuning)
-        splits = find_splits(tracks, frame, placement, pairs, taken, tuning)
-        matches = _matches_after(tracks, frame.matches, matched, taken, joins, splits)
+        before = Situation.of(tracks, frame, placement, self._kernels, self._tuning)
+        takes = find_takes(before)
+        now = before._replace(assignment=takes.applied(before.assignment))
+        joins = find_joins(now)
+        splits = find_splits(now)
+        matches = _matches_after(before, now, frame.matches, joins, splits)
         if not len(joins.parts) + len(splits.rows):
             return frame._replace(matches=matches)
-        return self._applied(tracks, frame._replace(matches=matches), placement, taken, joins, splits)
+        return self._applied(now, matches, joins, splits)
 
-    def _applied(
-        self,
-        tracks: TrackTable,
-        frame: Associated,
-        placement: Placement,
-        assignment: Assignment,
-        joins: Joins,
-        splits: Splits,
-    ) -> Associated:
-        """The frame after joins and splits. Its matches number the pieces after the former proposals."""
-        numbering = _Numbering.after(len(frame.proposals), joins, splits)
-        proposals = self._regrouped(frame.proposals, splits, numbering)
+    def _applied(self, now: Situation, matches: Matches, joins: Joins, splits: Splits) -> Associated:
+        """The frame after joins and splits. The matches given number the pieces after the former proposals."""
+        numbering = _Numbering.after(len(now.proposals), joins, splits)
+        renewed = numbering.renewed
+        proposals = self._regrouped(now.proposals, splits, numbering)
         yaw = proposals.box[:, 6].copy()
-        turn = yaw_of(placement.T_world_sensor)
-        yaw[numbering.of_piece] = tracks.box[splits.rows, 6] - turn
+        turn = yaw_of(now.placement.T_world_sensor)
+        yaw[numbering.of_piece] = now.tracks.box[splits.rows, 6] - turn
         # A host has the heading of its track, since a part may lie across the car.
-        yaw[numbering.of_proposal[joins.hosts]] = tracks.box[assignment.track_of_proposal[joins.hosts], 6] - turn
-        renewed = self._renewed(proposals, yaw[numbering.renewed], numbering.renewed)
-        reflectance = proposals.reflectance
-        proposals = replace(
-            proposals,
-            box=_with(proposals.box, numbering.renewed, renewed.box),
-            centroid=_with(proposals.centroid, numbering.renewed, renewed.centroid),
-            reflectance=None if reflectance is None else _with(reflectance, numbering.of_piece, np.nan),
-        )
-        observed = observe(renewed, placement.T_world_sensor, self._kernels)
-        observed = observed.moved(placement.deskew(observed.centroid))
-        matches = frame.matches
+        rows_of_hosts = now.assignment.track_of_proposal[joins.hosts]
+        yaw[numbering.of_proposal[joins.hosts]] = now.tracks.box[rows_of_hosts, 6] - turn
+        few = self._renewed(proposals, yaw[renewed], renewed)
+        observed = observe(few, now.placement.T_world_sensor, self._kernels)
+        observed = observed.moved(now.placement.deskew(observed.centroid))
         if len(splits.rows):
-            observed, matches = self._with_pieces(tracks, splits, observed, matches)
+            observed, matches = self._with_pieces(now, splits, observed, matches)
         number = np.concatenate([numbering.of_proposal, numbering.of_piece])
+        reflectance = proposals.reflectance
         return Associated(
-            proposals=proposals,
-            observations=frame.observations.regrouped(numbering.source, numbering.renewed, observed),
+            proposals=replace(
+                proposals,
+                box=with_rows(proposals.box, renewed, few.box),
+                centroid=with_rows(proposals.centroid, renewed, few.centroid),
+                reflectance=None if reflectance is None else with_rows(reflectance, numbering.of_piece, np.nan),
+            ),
+            observations=now.observations.regrouped(numbering.source, renewed, observed),
             matches=matches._replace(proposals=number[matches.proposals]),
         )
 
     def _regrouped(self, former: Proposals, splits: Splits, numbering: _Numbering) -> Proposals:
         """Proposals of the members in their new order; boxes and other columns are those of their sources."""
-        moved = splits.members, numbering.of_piece[splits.piece]
         members, coordinates, count = self._kernels.regrouped(
             former.members,
             former.coordinates,
             former.offsets,
             numbering.of_proposal,
-            moved,
+            (splits.members, numbering.of_piece[splits.piece]),
             len(numbering.source),
         )
         return former.regrouped(members, coordinates, count, numbering.source)
@@ -164,43 +151,34 @@ class Regrouping:
         return replace(few, box=box, centroid=centroid)
 
     def _with_pieces(
-        self, tracks: TrackTable, splits: Splits, observed: Observations, matches: Matches
+        self, now: Situation, splits: Splits, observed: Observations, matches: Matches
     ) -> tuple[Observations, Matches]:
         """Observations (R,), the last of which are the pieces, and matches, where pieces show positions alone.
 
         Their extent is that of their tracks.
         """
-        pieces = np.arange(len(observed) - len(splits.rows), len(observed))
+        rows = splits.rows
+        pieces = np.arange(len(observed) - len(rows), len(observed))
         kdop = observed.kdop.copy()
-        kdop[:, pieces], matches = locate_pieces(
-            tracks, splits.rows, kdop[:, pieces], matches, self._kernels, self._position_sigma_m, self._tuning
-        )
-        bottom = _with(observed.bottom, pieces, tracks.bottom[splits.rows])
-        top = _with(observed.top, pieces, tracks.top[splits.rows])
+        kdop[:, pieces], matches = locate_pieces(now, rows, kdop[:, pieces], matches, self._position_variance)
+        bottom = with_rows(observed.bottom, pieces, now.tracks.bottom[rows])
+        top = with_rows(observed.top, pieces, now.tracks.top[rows])
         return replace(observed, kdop=kdop, bottom=bottom, top=top), matches
 
 
-def _matches_after(
-    tracks: TrackTable, matches: Matches, before: Assignment, taken: Assignment, joins: Joins, splits: Splits
-) -> Matches:
+def _matches_after(before: Situation, taken: Situation, matches: Matches, joins: Joins, splits: Splits) -> Matches:
     """The matches after all edits; pieces are numbered after the former proposals.
 
     A track measures nothing by a proposal that is new to it, or that another track takes points of.
     """
-    proposal_of_track = taken.proposal_of_track.copy()
-    owner_of_part = taken.track_of_proposal[joins.parts]
-    proposal_of_track[owner_of_part[owner_of_part != NONE]] = NONE
-    n = len(taken.track_of_proposal)
+    proposal_of_track = taken.assignment.proposal_of_track.copy()
+    track_of_proposal = taken.assignment.track_of_proposal
+    loses_all = track_of_proposal[joins.parts]
+    proposal_of_track[loses_all[loses_all != NONE]] = NONE
+    n = len(track_of_proposal)
     proposal_of_track[splits.rows] = np.arange(n, n + len(splits.rows))
-    changed = proposal_of_track != before.proposal_of_track
-    owner_of_host = taken.track_of_proposal[splits.hosts]
-    changed[owner_of_host[owner_of_host != NONE]] = True
+    changed = proposal_of_track != before.assignment.proposal_of_track
+    loses_points = track_of_proposal[splits.hosts]
+    changed[loses_points[loses_points != NONE]] = True
     rows = changed.nonzero()[0]
-    return matches.reassigned(tracks, rows, proposal_of_track[rows]) if len(rows) else matches
-
-
-def _with(column: Float64, rows: Int, entries: Float64 | float) -> Float64:
-    """A copy of a column with other entries in these rows."""
-    copied = column.copy()
-    copied[rows] = entries
-    return copied
+    return matches.reassigned(before.tracks, rows, proposal_of_track[rows]) if len(rows) else matches

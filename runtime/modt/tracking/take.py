@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from modt.class_sizes import MAX_SIZE_M
-from modt.observations import Observations
-from modt.tracking.pairs import Assignment, Pairs, fit_together
-from modt.tracking.track_table import TrackTable
+from modt.tracking.pairs import Assignment, Situation, fit_together
 from modt.types import NONE, Int
 
 
@@ -31,29 +29,36 @@ class Takes(NamedTuple):
         return Assignment(proposal_of_track, track_of_proposal)
 
 
-def find_takes(tracks: TrackTable, observations: Observations, pairs: Pairs, assignment: Assignment) -> Takes:
+def find_takes(now: Situation) -> Takes:
     """Exchanges by which senior tracks get larger parts that fit into one object with the box known of them.
 
     The most senior track chooses first. A track that has changed its proposal keeps the new one.
     """
+    tracks = now.tracks
+    pairs = now.pairs
+    proposal_of_track, track_of_proposal = now.assignment
+    count = now.observations.count
     size = np.zeros(len(tracks), np.int64)
-    held = (assignment.proposal_of_track != NONE).nonzero()[0]
-    size[held] = observations.count[assignment.proposal_of_track[held]]
-    larger = (pairs.free & (observations.count[pairs.proposals] > size[pairs.rows])).nonzero()[0]
+    held = (proposal_of_track != NONE).nonzero()[0]
+    size[held] = count[proposal_of_track[held]]
+    larger = pairs.free & (count[pairs.proposals] > size[pairs.rows])
     rows = pairs.rows[larger]
     proposals = pairs.proposals[larger]
-    known = tracks.box.take(rows, axis=0)  # where the filter expects it now
-    known[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
-    limits = MAX_SIZE_M[tracks.object_class[rows]]
-    fits = fit_together(known, observations.box.take(proposals, axis=0), limits)
+    known = tracks.box[rows]  # where the filter expects it now
+    known[:, :2] += tracks.x[rows, :2] - tracks.anchor[rows]
+    fits = fit_together(known, now.observations.box[proposals], MAX_SIZE_M[tracks.object_class[rows]])
+    return _exchanges(rows[fits].tolist(), proposals[fits].tolist(), proposal_of_track, track_of_proposal)
 
+
+def _exchanges(rows: list[int], proposals: list[int], proposal_of_track: Int, track_of_proposal: Int) -> Takes:
+    """Exchanges of pairs that are considered in this order, each with what the ones before have changed."""
     proposal_after: dict[int, int] = {}  # by track
     track_after: dict[int, int] = {}  # by proposal
-    for row, proposal in zip(rows[fits].tolist(), proposals[fits].tolist(), strict=True):
-        junior = track_after.get(proposal, int(assignment.track_of_proposal[proposal]))
+    for row, proposal in zip(rows, proposals, strict=True):
+        junior = track_after.get(proposal, int(track_of_proposal[proposal]))
         if row in proposal_after or junior in proposal_after:
             continue
-        given_up = int(assignment.proposal_of_track[row])
+        given_up = int(proposal_of_track[row])
         proposal_after[row] = proposal
         track_after[proposal] = row
         if junior != NONE:

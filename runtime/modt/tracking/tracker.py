@@ -273,7 +273,7 @@ class Tracker:
     def _begin_tracks(self, kept: Int, settled: Bool, matches: Matches, observations: Observations) -> None:
         """Keep these rows, and begin a track with each unmatched proposal (a2).
 
-        At a remembered place of background, or at one of settled background (M,), it inherits that class (a1, a5, a6).
+        At a place of remembered or of settled background (M,) it inherits that class (a1, a5, a6).
         """
         matched = np.zeros(len(observations), np.bool_)
         matched[matches.proposals] = True

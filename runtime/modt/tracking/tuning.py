@@ -51,7 +51,8 @@ class KdopAssociationTuning:
     Chosen on: judgement."""
 
     size_weight: float = 2.0
-    """Cost of a difference of 1 of the logarithms of the widths. Greater: pairs of other sizes are matched less often.
+    """Cost of a difference of 1 of the logarithms of the widths. Greater: pairs of other sizes are matched less
+    often.
     Chosen on: judgement."""
 
     overlap_weight: float = 3.0
@@ -64,8 +65,8 @@ class KdopAssociationTuning:
     Chosen on: judgement."""
 
     points_weight: float = 0.5
-    """Cost of a difference of 1 of the logarithms of the numbers of points. Greater: pairs of other numbers are matched
-    less often.
+    """Cost of a difference of 1 of the logarithms of the numbers of points. Greater: pairs of other numbers are
+    matched less often.
     Chosen on: judgement."""
 
 
