@@ -139,7 +139,8 @@ class Pipeline:
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
         """(R, 4) likelihoods. The ledger counts the points; the scheduler learns the cost where time is limited."""
-        cost, count = self.scheduler.cost, proposals.count[which]
+        cost = self.scheduler.cost
+        count = proposals.count[which]
         classify = self.classifier.classify
         likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
         self.ledger.count(CLASSIFICATION, points=cost.size(count))

@@ -33,7 +33,8 @@ CASES = [(scene, mode) for scene in SCENES for mode in assembly.MODES]
 def replay(scene: str, mode_name: str) -> Iterator[FrameResult]:
     """Results of a mode on a scene."""
     world, sensor, profile_name = SCENES[scene]
-    profile, mode = load(profile_name), assembly.MODES[mode_name]
+    profile = load(profile_name)
+    mode = assembly.MODES[mode_name]
     pipeline = assembly.pipeline(mode, profile, FieldOfView())
     for frame in SyntheticStream(world, sensor, SECONDS, seed=7):
         yield pipeline.step(frame, mode.budget(profile))
@@ -50,7 +51,8 @@ def summary(result: FrameResult) -> dict[str, Any]:
     box: box by id, of the tracks of objects: x, y, z, l, w, h [mm, sensor frame], yaw [mrad].
     box_sum: sum of the boxes of all proposals [mm, mrad].
     """
-    tracks, boxes = result.tracks, 1000 * result.proposals.box
+    tracks = result.tracks
+    boxes = 1000 * result.proposals.box
     owner = tracks.row_of_proposal(len(result.proposals))
     rows = np.concatenate([owner, np.flatnonzero(tracks.proposal == NONE)])
     classes = zip(tracks.object_class[rows], tracks.final[rows], strict=True)

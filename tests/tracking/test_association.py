@@ -21,7 +21,8 @@ def assigned(cost, limit):
     """Rows and columns that assign keeps of a dense matrix, of the pairs below the limit."""
     rows, columns = np.nonzero(cost < limit)
     kept = assign(rows, columns, cost[rows, columns], limit)
-    rows, columns = rows[kept], columns[kept]
+    rows = rows[kept]
+    columns = columns[kept]
     assert len(set(rows)) == len(set(columns)) == len(kept)
     return rows, columns
 
@@ -51,7 +52,8 @@ def matched(tracks, observations):
 
 def test_a_lost_track_does_not_take_the_proposal_of_a_track_that_is_expected_there():
     """Measured in deviations, the person is nearer to the lost track."""
-    tracks, person = tracks_at([box(9.3, 0, 0.6, 0.6), box(11.5, 0, 0.6, 0.6)]), observed([box(10, 0, 0.6, 0.6)])
+    tracks = tracks_at([box(9.3, 0, 0.6, 0.6), box(11.5, 0, 0.6, 0.6)])
+    person = observed([box(10, 0, 0.6, 0.6)])
     tracks.P[:, :2, :2] = np.eye(2) * np.array([0.1, 9.0])[:, None, None]
     assert matched(tracks, person) == [(0, 0)]
 
@@ -66,7 +68,8 @@ def test_a_pair_further_apart_than_the_filter_is_uncertain_is_not_matched(x, col
 @pytest.mark.parametrize(("x", "pairs"), [(9.0, [(0, 0)]), (7.4, [])])
 def test_what_changed_its_shape_is_matched_by_coverage(x, pairs):
     """A car of which most disappeared costs more than a pair may."""
-    tracks, part = tracks_at([box(10, 3)], points=3000), observed([box(x, 3, 0.3, 0.3, 0.3, z=-1.6)], points=6)
+    tracks = tracks_at([box(10, 3)], points=3000)
+    part = observed([box(x, 3, 0.3, 0.3, 0.3, z=-1.6)], points=6)
     assert matched(tracks, part) == pairs
 
 
@@ -94,7 +97,8 @@ def test_a_lost_track_is_matched_along_its_prediction():
 
 def pair(before, after, points=60):
     """A track at one box, and the observation of another; their centroids are the centres of the boxes."""
-    tracks, observations = tracks_at([before]), observe(frame_of([after], points=points)[1], EYE)
+    tracks = tracks_at([before])
+    observations = observe(frame_of([after], points=points)[1], EYE)
     tracks.x[:, :2] = tracks.box[:, :2]
     return tracks, replace(observations, centroid=observations.box[:, :2])
 
@@ -141,7 +145,8 @@ def test_the_last_box_is_compared_about_its_centroid_where_the_filter_expects_it
 
 def test_pairs_above_the_threshold_compete():
     """Crosswise both tracks cost least together, one pair of them too much."""
-    tracks, observations = tracks_at([box(10, 0)] * 2), observe(frame_of([box(10, 0)] * 2)[1], EYE)
+    tracks = tracks_at([box(10, 0)] * 2)
+    observations = observe(frame_of([box(10, 0)] * 2)[1], EYE)
     association = PaperAssociation(PaperAssociationTuning(max_cost=0.3))
     association.cost = lambda *_: np.array([0.1, 0.4, 0.2, 0.9])
     assert association.match(tracks, observations).rows.tolist() == [1]

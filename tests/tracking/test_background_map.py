@@ -10,8 +10,10 @@ from modt.tracking.background_map import BackgroundMap
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, tracks_at
 
-BACKGROUND, CAR = ObjectClass.BACKGROUND, ObjectClass.CAR
-POST, FAR = box(10, 4, 1, 1), box(30, 0, 1, 1)
+BACKGROUND = ObjectClass.BACKGROUND
+CAR = ObjectClass.CAR
+POST = box(10, 4, 1, 1)
+FAR = box(30, 0, 1, 1)
 EMPTY = tracks_at([])
 NO_ROWS = np.zeros(0, np.int64)
 
@@ -46,7 +48,8 @@ def test_a_proposal_within_a_place_is_recalled_unless_it_rises_above(stranger, k
 
 
 def test_only_the_rows_and_observations_named_count():
-    tracks, nothing = tracks_at([FAR, POST]), BackgroundMap()
+    tracks = tracks_at([FAR, POST])
+    nothing = BackgroundMap()
     assert recalled(nothing, [POST, FAR], tracks, np.array([0])) == [False, True]
     assert recalled(nothing, [POST, FAR], tracks, np.array([0]), which=[1]) == [True]
     assert recalled(nothing, [POST, FAR], tracks, np.array([0]), which=NO_ROWS) == []

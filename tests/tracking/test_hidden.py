@@ -9,7 +9,8 @@ from modt.classes import ObjectClass
 from modt.types import Cut
 from tests.tracking.tracking_scenes import Follower, box, frame_of
 
-PEDESTRIAN, BACKGROUND = ObjectClass.PEDESTRIAN, ObjectClass.BACKGROUND
+PEDESTRIAN = ObjectClass.PEDESTRIAN
+BACKGROUND = ObjectClass.BACKGROUND
 WHOLE = box(1.0, 0.0, 0.6, 0.6, 1.7, z=-0.15)
 LOWER = box(1.0, 0.0, 0.6, 0.6, 0.6, z=-0.7)
 LEGS = [box(1.0, y, 0.15, 0.15, 0.6, z=-0.7) for y in (-0.2, 0.2)]

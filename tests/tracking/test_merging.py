@@ -23,7 +23,8 @@ from tests.tracking.tracking_scenes import (
 
 BACKGROUND, CAR, PEDESTRIAN, CYCLIST = ObjectClass
 WHOLE, REAR, FRONT = (box(x, 3, length, 1.8, 1.5) for x, length in ((10, 4.2), (8.6, 1.4), (11.1, 2.0)))
-AHEAD, SLIM = box(15, 3, 4.2, 1.8, 1.5), box(11.1, 3, 0.6, 0.6, 1.5)
+AHEAD = box(15, 3, 4.2, 1.8, 1.5)
+SLIM = box(11.1, 3, 0.6, 0.6, 1.5)
 POINTS = 80
 
 
@@ -36,7 +37,8 @@ def frame_at_rest(tracks, boxes, *rows):
 
 def merged(tracks, boxes, rows):
     """Original proposals of each one after merging, and the frame; the first are matched with the rows."""
-    after, n = regrouped(tracks, frame_at_rest(tracks, boxes, *rows)), len(boxes)
+    after = regrouped(tracks, frame_at_rest(tracks, boxes, *rows))
+    n = len(boxes)
     label = after.proposals.label(n * POINTS)
     per_box = label.reshape(n, POINTS)
     assert (per_box == per_box[:, :1]).all()
@@ -72,7 +74,8 @@ def test_what_is_a_part(known, classes, seen, columns, is_part):
     assert groups == ([[0, 1]] if is_part else [[0], [1]])
 
 
-NEAR_END, NEXT = box(10.5, 3, 2.0, 1.8, 1.5), box(12.1, 3, 0.8, 1.8, 1.5)
+NEAR_END = box(10.5, 3, 2.0, 1.8, 1.5)
+NEXT = box(12.1, 3, 0.8, 1.8, 1.5)
 
 
 @pytest.mark.parametrize(
@@ -125,7 +128,8 @@ def test_of_two_cars_the_older_takes_parts_and_proposals_of_the_younger(ahead_m,
 
 
 def test_the_reflectance_is_that_of_the_matched_proposal():
-    tracks, reflectance = tracks_at([WHOLE], CAR), np.arange(10.0).reshape(2, 5)
+    tracks = tracks_at([WHOLE], CAR)
+    reflectance = np.arange(10.0).reshape(2, 5)
     frame = frame_at_rest(tracks, [FRONT, REAR], 0)
     after = regrouped(tracks, frame._replace(proposals=replace(frame.proposals, reflectance=reflectance)))
     np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
@@ -182,6 +186,7 @@ def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length
 
 
 def test_what_surrounds_the_part_last_seen_and_lies_outside_the_known_extent_is_no_part():
-    tracks, strip = tracks_at([WHOLE], CAR), box(12, 3, 0.2, 1.8, 1.5)
+    tracks = tracks_at([WHOLE], CAR)
+    strip = box(12, 3, 0.2, 1.8, 1.5)
     tracks.kdop[:] = tracks_at([strip]).kdop
     assert len(regrouped(tracks, frame_at_rest(tracks, [strip, box(12.7, 3, 1.5, 1.8, 1.5)], 0)).proposals) == 2

@@ -45,7 +45,9 @@ def test_a_cyclist_who_passes_by_a_wall_is_not_as_large_as_it():
     widths_m = []
     for confirmed in (ObjectClass.CYCLIST, ObjectClass.BACKGROUND):
         tracks = TrackTable.blank(1)
-        tracks.final[:], tracks.object_class[:], tracks.size_m[:] = True, confirmed, [1.5, 0.7, 1.7]
+        tracks.final[:] = True
+        tracks.object_class[:] = confirmed
+        tracks.size_m[:] = [1.5, 0.7, 1.7]
         tracks.hits[:] = 1
         for width_m in (2.3, *[0.7] * 10):
             frame = observe(frame_of([box(10, 0, 1.5, width_m, 1.7)])[1], EYE)

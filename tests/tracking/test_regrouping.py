@@ -14,7 +14,10 @@ from modt.types import NONE
 from tests.tracking.tracking_scenes import EYE, associated, box, frame_of, joined, regrouped, tracks_at
 
 BACKGROUND, CAR, PEDESTRIAN, _ = ObjectClass
-WHOLE, REAR, FRONT, NEXT = box(12, 4), box(11.0, 4, l=1.9), box(13.3, 4, l=1.3), box(17.4, 4)
+WHOLE = box(12, 4)
+REAR = box(11.0, 4, l=1.9)
+FRONT = box(13.3, 4, l=1.3)
+NEXT = box(17.4, 4)
 
 
 def ranked(boxes, *classes, points=None, hits=3):
@@ -81,9 +84,12 @@ POINTS = 60
 def scenes(draw):
     """Tracks of cars and people, and proposals of cut cars, joined people and what nobody knows."""
     rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    known, seen, groups = [], [], []
+    known = []
+    seen = []
+    groups = []
     for k in range(draw(st.integers(1, 3))):
-        x, kind = 8.0 * k + 8, draw(st.sampled_from(["cut", "touching", "whole"]))
+        x = 8.0 * k + 8
+        kind = draw(st.sampled_from(["cut", "touching", "whole"]))
         first = len(seen)
         if kind == "touching":
             known.append(box(x, 2.5, 0.6, 0.6, 1.7, z=-0.85))
@@ -108,13 +114,15 @@ def scenes(draw):
 
 
 @given(scenes())
-def test_every_member_stays_once_with_its_coordinates_and_proposals_and_tracks_are_pairs(scene):
+def test_every_point_stays_in_one_proposal_with_its_coordinates_and_proposals_and_tracks_are_pairs(scene):
     frame = regrouped(*scene)
-    before, after = scene[1].proposals, frame.proposals
+    before = scene[1].proposals
+    after = frame.proposals
     assert (after.count > 0).all()
     for rows in (frame.matches.rows, frame.matches.proposals):
         assert len(np.unique(rows)) == len(rows)
-    old, new = before.members.argsort(), after.members.argsort()
+    old = before.members.argsort()
+    new = after.members.argsort()
     np.testing.assert_array_equal(before.members[old], after.members[new])
     np.testing.assert_array_equal(before.coordinates[:, old], after.coordinates[:, new])
 

@@ -22,10 +22,13 @@ from tests.tracking.tracking_scenes import (
     tracks_at,
 )
 
-BACKGROUND, CAR, PEDESTRIAN = ObjectClass.BACKGROUND, ObjectClass.CAR, ObjectClass.PEDESTRIAN
+BACKGROUND = ObjectClass.BACKGROUND
+CAR = ObjectClass.CAR
+PEDESTRIAN = ObjectClass.PEDESTRIAN
 WALL = box(12, 3.2, l=16.0, w=0.3, h=2.5, z=-0.5)
 PERSON = box(10, 2.5, 0.6, 0.6, 1.7, z=-0.85)
-PERSON_POINTS, WALL_POINTS = 80, 400
+PERSON_POINTS = 80
+WALL_POINTS = 400
 
 
 def wall_with(*people, points=PERSON_POINTS, wall=WALL):
@@ -160,7 +163,8 @@ def test_the_first_track_takes_what_two_expect():
     assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 1, 2: 0}
 
 
-STEP_M, TOUCH = 0.14, 10
+STEP_M = 0.14
+TOUCH = 10
 """Speed of a pedestrian a frame, and the first frame in which the pedestrian touches the wall."""
 
 
@@ -171,7 +175,8 @@ def follow(follower, bodies, i, T=EYE, together=()):
     follower.follow(frame, joined(proposals, together) if together else proposals)
     follower.classify(*[PEDESTRIAN] * (len(bodies) - 1), BACKGROUND)
     owner = owner_of_points(follower.tracks, follower.proposals, len(frame.points))
-    ids, shares = [], []
+    ids = []
+    shares = []
     for own in np.split(owner, np.cumsum(counts)[:-1]):
         found, count = np.unique(own, return_counts=True)
         ids.append(int(found[count.argmax()]))
@@ -197,7 +202,8 @@ def test_a_pedestrian_who_touches_a_wall_keeps_the_track(pose):
 @pytest.mark.parametrize(("wall_y", "together"), [(9.0, [(0, 1), (2,)]), (3.3, [(0, 1, 2)])])
 def test_two_pedestrians_who_meet_keep_their_tracks(wall_y, together):
     """Also where they touch a wall: they share no point."""
-    follower, wall = Follower(), [12, wall_y, *WALL[2:]]
+    follower = Follower()
+    wall = [12, wall_y, *WALL[2:]]
     for i in range(TOUCH + 12):
         bodies = [walker(i, y=2.0), box(12.2 - STEP_M * i, 2.85, 0.6, 0.6, 1.7, z=-0.85), wall]
         ids, shares = follow(follower, bodies, i, together=together if i in {14, 15} else ())
@@ -207,7 +213,8 @@ def test_two_pedestrians_who_meet_keep_their_tracks(wall_y, together):
 
 def test_a_piece_is_expected_where_the_head_saw_it_not_at_the_middle_of_the_wall():
     """A wall of 40 m is seen over a third of a sweep, in which the sensor moves by 0.7 m."""
-    follower, wall = Follower(), box(30, 6, l=40.0, w=0.3, h=2.5, z=-0.5)
+    follower = Follower()
+    wall = box(30, 6, l=40.0, w=0.3, h=2.5, z=-0.5)
     person = walker(86, y=5.4)
     for i in range(11):
         frame, proposals = skewed(np.array([person, wall]), i, 0.1, 20.0, 0.0, True)

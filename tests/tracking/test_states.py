@@ -36,7 +36,8 @@ def live(machine, script):
 
     A step says whether the object is seen, seen 1 m further on ("moved"), hidden, or classified as certain or not.
     """
-    follower, states = Follower(TrackingConfig(max_missed=2), machine), []
+    follower = Follower(TrackingConfig(max_missed=2), machine)
+    states = []
     for step in script:
         boxes = [] if step == "hidden" else [box(11 if step == "moved" else 10, 2)]
         tracks = follower.follow(*frame_of(boxes, follower.frames, EYE))

@@ -14,7 +14,8 @@ from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
 @pytest.mark.parametrize("course", np.deg2rad([0, 90, 180, -45]))
 def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
-    tracker, speed = Follower(), 8.0
+    tracker = Follower()
+    speed = 8.0
     dx, dy = speed * 0.1 * np.array([np.cos(course), np.sin(course)])
     tracker.run([[box(12 + i * dx, 6 + i * dy, yaw=course)] for i in range(12)])
     assert tracker.tracks.id.tolist() == [0]

@@ -25,7 +25,8 @@ class Follower:
     """Odometry and tracker in a row, with what the last frame gave."""
 
     def __init__(self, config=None, machine=EFFICIENT, **parts):
-        self.frames, self.odometry = 0, PoseEstimator()
+        self.frames = 0
+        self.odometry = PoseEstimator()
         self.tracker = Tracker(config or TrackingConfig(), machine, **parts)
         self.proposals = self.wants_class = self.T_world_sensor = None
 
@@ -101,9 +102,11 @@ def cloud(box, n, rng):
     """(n, 3) points that reach every side of the box."""
     u = rng.uniform(-0.5, 0.5, (n, 3))
     for k in range(3):
-        u[2 * k, k], u[2 * k + 1, k] = -0.5, 0.5
+        u[2 * k, k] = -0.5
+        u[2 * k + 1, k] = 0.5
     local = u * box[3:6]
-    c, s = np.cos(box[6]), np.sin(box[6])
+    c = np.cos(box[6])
+    s = np.sin(box[6])
     return local @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + box[:3]
 
 
@@ -134,11 +137,16 @@ def tracks_at(boxes, *classes, points=60, **columns):
     observations = observe(frame_of(boxes, points=2000)[1], EYE)  # dense: k-DOPs reach the corners
     n = len(observations)
     t = TrackTable.blank(n)
-    t.id[:], t.age[:], t.hits[:], t.points[:] = np.arange(n), 10, 10, points
+    t.id[:] = np.arange(n)
+    t.age[:] = 10
+    t.hits[:] = 10
+    t.points[:] = points
     t.x[:, :2] = t.anchor[:] = t.rest_position[:] = observations.position
     t.P[:] = 0.01 * np.eye(4)
-    t.box[:], t.kdop[:] = observations.box, observations.kdop.T
-    t.bottom[:], t.top[:] = observations.bottom, observations.top
+    t.box[:] = observations.box
+    t.kdop[:] = observations.kdop.T
+    t.bottom[:] = observations.bottom
+    t.top[:] = observations.top
     t.envelope[:] = t.mean_kdop[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
     t.final[:] = True
     for row in range(n):
@@ -151,7 +159,8 @@ def tracks_at(boxes, *classes, points=60, **columns):
 
 def associated(proposals, rows=(), matched=None):
     """A frame at the origin whose proposals, by default the first ones, are matched with these rows of a table."""
-    observations, rows = observe(proposals, EYE), np.array(rows, np.int64)
+    observations = observe(proposals, EYE)
+    rows = np.array(rows, np.int64)
     matched = np.arange(len(rows)) if matched is None else np.array(matched, np.int64)
     covariance = 0.01 * np.eye(2)[None].repeat(len(rows), axis=0)
     matches = Matches(rows, matched, observations.position[matched], covariance, np.zeros((len(rows), 4)))

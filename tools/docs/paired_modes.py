@@ -29,7 +29,7 @@ SCENES = ("street", "crossing")
 SEEDS = range(1100, 1104)
 """Seeds of the drives of each sensor.
 
-The first was looked at when the growth of people's boxes was added to the tracks.
+The first was looked at when `person_growth` of `modt.tracking.tuning` was added.
 """
 SECONDS = 6.0
 """Duration of each drive [s]."""

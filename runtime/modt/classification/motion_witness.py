@@ -1,7 +1,7 @@
 """The witness of a track: P(how far it went, how large it is | class), an expert beside network and box.
 
 It is a state, not a view: it replaces itself in every frame and is never multiplied twice. A track went as far as
-both of its ends did (`modt.tracking.track_table`): where a changing part of a wall is seen, one of them moves.
+both of its ends did (`modt.tracking.extent`): where a changing part of a wall is seen, one of them moves.
 """
 
 from __future__ import annotations
