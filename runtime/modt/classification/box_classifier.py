@@ -27,7 +27,7 @@ Layers = Sequence[tuple[Weights, Weights]]
 
 
 def logits(layers: Layers, features: Float64) -> Float64:
-    """(R, 4) of (R, F) features, worked out in the precision of the layers."""
+    """(R, 4) outputs of a multilayer perceptron for (R, F) features, in the precision of its layers."""
     *hidden, (weight, bias) = layers
     value: Weights = features.astype(weight.dtype)
     for hidden_weight, hidden_bias in hidden:
@@ -52,18 +52,27 @@ def from_lists(lists: Any, n_features: int) -> Layers:
     return layers
 
 
-METADATA_KEY, BOUNDS_KEY = "box_prior", "box_bounds"
-"""Keys of the box classifiers: in the metadata of an ONNX model, and of that beside it for what the view cuts."""
-N_FEATURES, N_BOUND_FEATURES = 7, 7 + len(Cut)
-PERSON_TOP_M, LEGS_M = 2.0, 0.4
-"""Heights above ground [m]: a box cut above below the first, or below above the second, may be of a person."""
+METADATA_KEY = "box_prior"
+"""Key of the box classifier in the metadata of an ONNX model."""
+BOUNDS_KEY = "box_bounds"
+"""Key of the classifier of cut boxes, in the metadata of the model beside it that judges what the view cuts."""
 # Definition of the features: fixed when a model is trained.
+N_FEATURES = 7
+"""Number of features of a box."""
+N_BOUND_FEATURES = N_FEATURES + len(Cut)
+"""Number of features of a cut box."""
+PERSON_TOP_M = 2.0
+"""Height above ground below which the view may have cut off a person's upper part [m]."""
+LEGS_M = 0.4
+"""Height above ground above which the view may have cut off a person's legs [m]."""
 _MAX_COUNT = 1000
-_LENGTH_OFFSET_M = 0.05  # keeps the logarithm of a length finite
+"""Points that count for the area at most."""
+_LENGTH_OFFSET_M = 0.05
+"""Offset that keeps the logarithm of a length finite [m]."""
 
 
 class NoBoxClassifier:
-    """No information from boxes."""
+    """Box classifier of a model without one: every class is as likely as any other."""
 
     weights = PoolWeights()
 
@@ -74,14 +83,20 @@ class NoBoxClassifier:
 
 @dataclass(frozen=True, slots=True)
 class MlpBoxClassifier:
-    """Multilayer perceptron of 1,444 weights, and one for boxes whose sizes are bounds."""
+    """Multilayer perceptron, and one for cut boxes, whose sizes are lower bounds.
+
+    Attributes:
+        layers: layers of the perceptron.
+        weights: weights in the pool with the network, without reflectance.
+        bounds: layers of the perceptron for cut boxes; without it they are classified as the others.
+    """
 
     layers: Layers
-    weights: PoolWeights  # in the pool with the network, without reflectance
+    weights: PoolWeights
     bounds: Layers | None = None
 
     def log_probability(self, features: Float64, cut: Int) -> Float64:
-        """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features` and (R,) flags of Cut."""
+        """(R, 4) log P(class | box) up to a constant a row, of (R, 7) `box_features` and (R,) flags of Cut."""
         out = logits(self.layers, features)
         if self.bounds is not None and len(rows := is_bound(features, cut).nonzero()[0]):
             out[rows] = logits(self.bounds, bound_features(features[rows], cut[rows]))
@@ -92,19 +107,21 @@ BoxClassifier = NoBoxClassifier | MlpBoxClassifier
 
 
 def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64) -> Float64:
-    """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
+    """Features of boxes (P, 7).
 
-    The area in place of the number of points makes the features independent of the sensor's resolution.
+    They are the logarithms of the area covered by points [m2], of distance, length and width [m], then height, foot
+    and top above ground [m]. The area in place of the number of points makes them independent of the sensor's
+    resolution.
 
     Args:
         count: (P,) points.
-        box: (P, 7) sensor frame.
-        ground_z_m: (P,) height of the ground beneath each, sensor frame.
+        box: (P, 7) boxes in the sensor frame.
+        ground_z_m: (P,) z of the ground beneath each [m, sensor frame].
         beam_sr: (P,) or () solid angle of a point [sr].
     """
     x, y, z, length, width, height, _ = box.T
     features = np.empty((N_FEATURES, len(box)))
-    area, distance, *_, foot, top = features
+    area, distance, *_, foot, top = features  # views: what is written into them is a feature
     np.maximum(np.hypot(x, y), 1.0, out=distance)
     np.multiply(np.minimum(np.maximum(count, 1), _MAX_COUNT), distance**2 * beam_sr, out=area)
     np.add((length, width), _LENGTH_OFFSET_M, out=features[2:4])
@@ -116,21 +133,33 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
 
 
 def is_bound(features: Float64, cut: Int) -> Bool:
-    """(R,) boxes of (R, 7) features that are cut where a person may go on: at least so high, not so high."""
+    """(R,) boxes that the view cuts where a person may go on, so that their sizes are lower bounds.
+
+    Args:
+        features: (R, 7) features of the boxes.
+        cut: (R,) flags of Cut.
+    """
     if not (cut & (Cut.TOP | Cut.BOTTOM).value).any():  # most frames
         return np.zeros(len(cut), np.bool_)
-    is_bound: Bool = ((cut & Cut.TOP) > 0) & (features[:, -1] < PERSON_TOP_M)
-    is_bound |= ((cut & Cut.BOTTOM) > 0) & (features[:, -2] > LEGS_M)
+    *_, foot_m, top_m = features.T
+    is_bound: Bool = ((cut & Cut.TOP) > 0) & (top_m < PERSON_TOP_M)
+    is_bound |= ((cut & Cut.BOTTOM) > 0) & (foot_m > LEGS_M)
     return is_bound
 
 
 def bound_features(features: Float64, cut: Int) -> Float64:
-    """(R, 11) features of bounds: (R, 7) of boxes, and the flags (R,) of Cut one by one."""
+    """(R, 11) features of cut boxes: (R, 7) features of boxes, and each flag of Cut (R,) in a column of its own."""
     return np.column_stack([features, *((cut & side) > 0 for side in Cut)])
 
 
 def proposal_features(proposals: Proposals, sensor: SensorConfig, beams: Beams | None = None) -> Float64:
-    """(P, 7) box features of the proposals. Whoever has the beams of the sensor at hand spares looking them up."""
+    """(P, 7) features of the boxes of proposals.
+
+    Args:
+        proposals: proposals of a frame.
+        sensor: azimuth step, and the height where the proposals have no ground.
+        beams: beams of the sensor, if at hand: looking them up in `sensor` takes time.
+    """
     box = proposals.box
     tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
     elevation_step_rad = (beams or sensor.beams).step_rad(tangent.astype(np.float32))
@@ -139,7 +168,11 @@ def proposal_features(proposals: Proposals, sensor: SensorConfig, beams: Beams |
 
 
 def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None = None) -> BoxClassifier:
-    """Box classifier of a model, and of bounds of the one beside it; NoBoxClassifier where its metadata has none.
+    """Box classifier of a model; NoBoxClassifier where its metadata has none.
+
+    Args:
+        metadata: metadata of the model.
+        beside: metadata of the model beside it, with the classifier of cut boxes.
 
     Raises:
         KeyError, TypeError, ValueError: malformed entry.
@@ -149,6 +182,5 @@ def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None 
         return NoBoxClassifier()
     content = json.loads(text)
     bounds = from_lists(json.loads(beside[BOUNDS_KEY]), N_BOUND_FEATURES) if beside else None
-    return MlpBoxClassifier(
-        from_lists(content["layers"], N_FEATURES), PoolWeights.from_dict(content["weights"]), bounds
-    )
+    layers = from_lists(content["layers"], N_FEATURES)
+    return MlpBoxClassifier(layers, PoolWeights.from_dict(content["weights"]), bounds)

@@ -1,4 +1,7 @@
-"""The pool of network, box and reflectance. The box tells objects from background, not one class from another."""
+"""Log-linear pool of network, box and reflectance.
+
+The box tells objects from background, not one class of objects from another.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,8 @@ import numpy as np
 
 from modt.types import Float64
 
-_MIN_PROBABILITY = 1e-12  # keeps logarithms finite
+_MIN_PROBABILITY = 1e-12
+"""Floor that keeps logarithms finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +43,7 @@ class PoolWeights:
 
 
 def _log_odds(log_probability: Float64) -> Float64:
-    """(R,) of any object against background, of (R, 4)."""
+    """(R,) logarithm of the odds of any object against background, of log probabilities (R, 4)."""
     log_odds: Float64 = np.log(np.exp(log_probability[:, 1:] - log_probability[:, :1]).sum(axis=1))
     return log_odds
 
@@ -60,7 +64,7 @@ def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Flo
 
 @cache
 def _assumed_log_odds(log_frequency: bytes) -> Float64:
-    """(1,) log of any object against background by the class frequency, the same in every frame."""
+    """(1,) log odds of any object by the class frequency, whose bytes are the key: it is the same in every frame."""
     return _log_odds(np.frombuffer(log_frequency)[None])
 
 
@@ -70,11 +74,11 @@ def log_pool(
     """(R, 4) logarithm of the pool, up to a constant.
 
     Args:
-        network: (R, 4) P(class | points).
+        network: (R, 4) P(class | points) of the network.
         log_box: (R, 4) log P(class | box), up to a constant a row.
         reflectance: (R, 4) log P(reflectance | class, box), up to a constant a row.
         log_frequency: (4,) log of the frequencies of the classes that network and box assume.
-        weights: weights of the three.
+        weights: exponents of the three.
     """
     score = pooled_prior(log_box, log_frequency, weights.box)
     score += weights.network * (np.log(np.maximum(network, _MIN_PROBABILITY)) - log_frequency)

@@ -1,9 +1,9 @@
 """Likelihood of a proposal's reflectance statistics under each class.
 
 Number plates and lamps are bright, car paint at a grazing angle returns nothing, cloth and leaves lie between. The
-values hold on the scale of one sensor: a model has a classifier for each scale that it learnt, by its name. Where the
-scale that `sensor.reflectance` of the profile names is not among them, or a sweep has no reflectance, none adds
-anything.
+values hold on the scale of one sensor, so a model has a classifier for each scale that it learnt, by its name. Where
+the scale that `sensor.reflectance` of the profile names is not among them, or a sweep has no reflectance, every class
+is as likely as any other.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ METADATA_KEY = "reflectance"
 
 
 class NoReflectanceClassifier:
-    """No information from reflectance."""
+    """Reflectance classifier of a model without one for this sensor: every class is as likely as any other."""
 
     weights = None
 
@@ -38,21 +38,24 @@ class NoReflectanceClassifier:
 
 
 class MlpReflectanceClassifier:
-    """Multilayer perceptron of 1,604 weights over box features and reflectance statistics, side by side.
+    """Multilayer perceptron over box features and reflectance statistics.
 
     Args:
-        layers: layers of the network.
-        weights: in the pool of network, box and reflectance.
+        layers: layers of the perceptron.
+        weights: weights in the pool of network, box and reflectance; also an attribute.
     """
 
     def __init__(self, layers: Layers, weights: PoolWeights) -> None:
-        self._layers, self.weights = layers, weights
+        self.weights = weights
+        self._layers = layers
         self._warned = False
 
     def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) log P(reflectance | class, box) up to a constant, of (R, 7) `box_features` and (R, 5) statistics.
+        """(R, 4) log P(reflectance | class, box) up to a constant a row.
 
-        Zeros where a proposal has no reflectance (NaN) or the sweep has none (None).
+        Args:
+            box_features: (R, 7) features of the boxes.
+            reflectance: (R, 5) statistics. The result is 0 where a proposal has none (NaN), or the sweep (None).
         """
         if reflectance is not None:
             likelihood = logits(self._layers, np.concatenate((box_features, reflectance), axis=1))
@@ -71,7 +74,7 @@ ReflectanceClassifier = NoReflectanceClassifier | MlpReflectanceClassifier
 
 
 def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> ReflectanceClassifier:
-    """Reflectance classifier of a model; NoReflectanceClassifier where its metadata has none of this scale.
+    """Reflectance classifier of a model; NoReflectanceClassifier where its metadata has none of the sensor's scale.
 
     Raises:
         KeyError, TypeError, ValueError: malformed entry.
