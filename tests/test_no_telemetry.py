@@ -116,7 +116,7 @@ def test_no_socket_is_made_and_no_name_is_looked_up(calls):
 
 def test_the_variable_is_set_before_the_only_import():
     files = [path for place in ("runtime", "tools") for path in (ROOT / place).rglob("*.py")]
-    assert [path.name for path in files if re.search(IMPORT, path.read_text(), re.MULTILINE)] == ["pointnet.py"]
+    assert [path.name for path in files if re.search(IMPORT, path.read_text(), re.MULTILINE)] == ["network.py"]
     code = f"""
 import os, sys
 class Watch:
@@ -124,7 +124,7 @@ class Watch:
         if name == "onnxruntime":
             print(os.environ["{VARIABLE}"])
 sys.meta_path.insert(0, Watch())
-import modt.classification.pointnet
+import modt.classification.network
 """
     done = subprocess.run([sys.executable, "-c", code], env=permissive(), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "1\n"), done.stderr

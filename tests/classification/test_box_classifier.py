@@ -103,12 +103,12 @@ def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds() -> N
     box[4, 2] = 0.6  # begins above the knees
     cut = np.array([0, Cut.TOP, Cut.TOP | Cut.NEAR, Cut.TOP, Cut.BOTTOM, Cut.BOTTOM])
     proposals = dataclasses.replace(blob, box=box, cut=cut, ground_z_m=np.full(6, -0.3))
-    scored = BoxScores(MlpBoxClassifier(sizes, 0.4, bounds), NoReflectanceClassifier(), SENSOR).of(proposals)[0]
+    scored = BoxScores(MlpBoxClassifier(sizes, 0.4, bounds), NoReflectanceClassifier(), SENSOR).of(proposals).box
     features = proposal_features(proposals, SENSOR)
     by_size, by_bounds = logits(sizes, features), logits(bounds, bound_features(features, cut))
     is_bound = [False, True, True, False, True, False]
     np.testing.assert_allclose(scored, np.where(np.array(is_bound)[:, None], by_bounds, by_size))
-    without = BoxScores(MlpBoxClassifier(sizes, 0.4), NoReflectanceClassifier(), SENSOR).of(proposals)[0]
+    without = BoxScores(MlpBoxClassifier(sizes, 0.4), NoReflectanceClassifier(), SENSOR).of(proposals).box
     np.testing.assert_array_equal(without, by_size)
 
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.classification import decision as constants
 from modt.classification.decision import Decision, LikeliestClass
+from modt.classification.tuning import DecisionTuning
 from modt.config import DecisionConfig
 from modt.types import NONE, Tracks
 
@@ -70,9 +70,9 @@ def test_the_frequency_of_the_stream_is_learnt(frequency):
     assert np.abs(decision.frequency - frequency).max() <= max(0.05, np.abs(ASSUMED - frequency).max() / 2)
 
 
-def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_teaches_nothing(monkeypatch):
-    monkeypatch.setattr(constants, "START_PROPOSALS", 1)  # what is seen counts soon
-    rng, decision = np.random.default_rng(1), Decision(DecisionConfig(), ASSUMED)
+def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_teaches_nothing():
+    rng = np.random.default_rng(1)
+    decision = Decision(DecisionConfig(), ASSUMED, DecisionTuning(start_proposals=1))  # what is seen counts soon
     lost = tracks([0.0, 0.0, 1.0, 0.0])
     lost.proposal[:] = NONE
     decision.decide(lost, lost, lost)

@@ -8,17 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.classification import fusion as rule
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews, FusedTracks
-from modt.classification.motion_witness import log_likelihood
+from modt.classification.motion_likelihood import MotionLikelihood
 from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
+from modt.classification.tuning import DEFAULT
 from modt.config import FusionConfig
 from modt.pipeline import FusionStage
 from modt.types import NONE, Bool, Float64, Proposals
 from tests.classification.scenes import ROW, Fused, with_points
 
 CONFIG = FusionConfig()
+WEIGHTS = DEFAULT.fusion.evidence
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 ALIKE = FrequencyPrior(FREQUENCY)
 ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in (FirstViews, FurtherViews, AnyView, KeyViews)))
@@ -35,7 +36,10 @@ class FixedPrior:
 
     def __init__(self, *rows: list[float], pool_weight: float = 0.0) -> None:
         self.rows = np.array(rows)
-        self.pool_weight = pool_weight
+        self._pool_weight = pool_weight
+
+    def pool_weight(self, proposals: Proposals) -> float:
+        return self._pool_weight
 
     def probability(self, proposals: Proposals) -> Float64:
         return self.rows
@@ -99,7 +103,7 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
     subject = Fused(FusedTracks(CONFIG, prior), 50)
     fusion, tracks = subject.fusion, subject.tracks
     tracks.moved_m[:], tracks.observed_s[:], tracks.size_m[:] = moved_m, 3.0, 1.0
-    motion = log_likelihood(tracks.moved_m, tracks.observed_s, tracks.size_m)[0]
+    motion = MotionLikelihood(DEFAULT.fusion.motion).log_ratio(tracks.moved_m, tracks.observed_s, tracks.size_m)[:, 0]
     log_frequency = np.log(FREQUENCY / FREQUENCY.sum())
     seen: list[tuple[float, Float64]] = []
     box_mean = np.zeros(4)
@@ -110,16 +114,16 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
         fusion.fuse(tracks, tracks, now, ROW, view[None])
         odds = (1 / box[0] - 1) / (1 / FREQUENCY[0] - 1)  # of an object by the box, over those by frequency
         pooled = log_frequency + pool_weight * np.log(odds) * np.array([0, 1, 1, 1])
-        seen = [(weight * rule.FORGETTING, evidence) for weight, evidence in seen]
+        seen = [(weight * WEIGHTS.view_memory, evidence) for weight, evidence in seen]
         seen.append((count**0.5, np.log(view) - pooled))
-        gain = max(1 / (k + 1), 1 - rule.BOX_FORGETTING)
+        gain = max(1 / (k + 1), 1 - WEIGHTS.box_memory)
         box_mean = (1 - gain) * box_mean + gain * (np.log(box) - log_frequency)
         mean = sum(weight * evidence for weight, evidence in seen) / sum(weight for weight, _ in seen)
-        log = log_frequency + (k + 1) ** rule.GROWTH * mean + rule.BOX_WEIGHT * box_mean + motion
+        log = log_frequency + (k + 1) ** WEIGHTS.view_exponent * mean + WEIGHTS.box_weight * box_mean + motion
         expected = np.exp(log) / np.exp(log).sum()
         if expected.min() < 1e-3:
             return  # the floor applies from here on
-        expected = (1 - rule.MISMATCH_PROBABILITY) * expected + rule.MISMATCH_PROBABILITY * box
+        expected = (1 - WEIGHTS.mismatch_probability) * expected + WEIGHTS.mismatch_probability * box
         np.testing.assert_allclose(tracks.posterior[0], expected, rtol=1e-6)
 
 

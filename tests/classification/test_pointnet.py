@@ -14,8 +14,10 @@ import pytest
 from scipy.special import softmax
 
 from modt import assets
+from modt.app import assembly
 from modt.classification.box_classifier import NoBoxClassifier
-from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet, ort_errors
+from modt.classification.network import Network, ort_errors
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import Float32, Float64
@@ -58,7 +60,7 @@ def save(folder: Path, layers: Layers, **options: bool) -> Path:
 
 
 def network(model: str | Path, **options: Any) -> PointNet:
-    return PointNet(ClassificationConfig(model=str(model), **options), SENSOR)
+    return assembly.network(ClassificationConfig(model=str(model), **options), SENSOR)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +76,7 @@ def test_the_exported_graph_agrees_with_the_textbook(tmp_path: Path, pool_first:
     for points in (1, 2, 5, 50, 400, 1000):
         batch = rng.normal(0, 1.5, (3, points, 3)).astype(np.float32)
         expected = [textbook(layers, crop) for crop in batch]
-        np.testing.assert_allclose(net.infer(batch), expected, atol=1e-4)
+        np.testing.assert_allclose(net.network.infer(batch), expected, atol=1e-4)
 
 
 def test_result_is_independent_of_batch_and_order(shipped: PointNet) -> None:
@@ -91,7 +93,7 @@ def test_result_is_independent_of_batch_and_order(shipped: PointNet) -> None:
 @pytest.mark.parametrize("likelihood", ["network", "pooled"])
 def test_ground_of_the_proposals_overrides_the_profile(likelihood: str) -> None:
     config = ClassificationConfig(likelihood=likelihood)
-    low, unknown = (PointNet(config, SensorConfig(height_m=height_m)) for height_m in (0.4, None))
+    low, unknown = (assembly.network(config, SensorConfig(height_m=height_m)) for height_m in (0.4, None))
     points, proposals = blobs([40, 7, 200], np.random.default_rng(5))
     rows = np.arange(3)
     measured = dataclasses.replace(proposals, ground_z_m=np.full(3, -0.4))
@@ -102,30 +104,28 @@ def test_ground_of_the_proposals_overrides_the_profile(likelihood: str) -> None:
 
 def test_the_papers_network_stands_alone_and_takes_a_fixed_number_of_points(shipped, monkeypatch):
     points, proposals = blobs([40, 7, 500], np.random.default_rng(4))
-    paper, sizes = network(shipped.path, max_points=400, likelihood="network"), []
+    paper, sizes = network(shipped.model.path, max_points=400, likelihood="network"), []
     assert isinstance(paper.box_scores.boxes, NoBoxClassifier)
-    bare = network(shipped.path, max_points=400)
+    bare = network(shipped.model.path, max_points=400)
     bare._pooled = lambda out, *_: out  # type: ignore[method-assign]
     expected = bare.classify(points, proposals, np.arange(3))
-    infer = PointNet.infer
-    monkeypatch.setattr(
-        PointNet, "infer", lambda self, batch, *_: (sizes.append(batch.shape[:2]), infer(self, batch))[1]
-    )
+    infer = Network.infer
+    monkeypatch.setattr(Network, "infer", lambda self, batch: (sizes.append(batch.shape[:2]), infer(self, batch))[1])
     np.testing.assert_allclose(paper.classify(points, proposals, np.arange(3)), expected, atol=1e-5)
     assert sizes == [(1, 400)] * 3
 
 
 @pytest.mark.parametrize("name", [path.stem for path in assets.shipped("models", ".onnx")])
 def test_every_model_has_a_card_with_its_hash_and_licence(name: str) -> None:
-    net = network(name)
-    card = net.path.with_suffix(".md").read_text(encoding="utf-8")
-    assert net.sha256 in card
+    model = network(name).model
+    card = model.path.with_suffix(".md").read_text(encoding="utf-8")
+    assert model.sha256 in card
     assert "licence:" in card
 
 
 def test_model_that_differs_from_its_card_is_misuse(tmp_path: Path, shipped: PointNet) -> None:
     model = save(tmp_path, random_layers(0))
-    shutil.copy(shipped.path.with_suffix(".md"), model.with_suffix(".md"))
+    shutil.copy(shipped.model.path.with_suffix(".md"), model.with_suffix(".md"))
     with pytest.raises(MisuseError, match=r"net\.onnx: is not the model of net\.md"):
         network(model)
 

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, NoBoxClassifier, proposal_features
-from modt.classification.pointnet import PointNet
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxScores, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
@@ -41,7 +41,7 @@ def test_box_prior_excludes_proposals_below_the_threshold() -> None:
     probability = np.array([[0.995, 0.005, 0.0, 0.0], [0.97, 0.01, 0.01, 0.01], [0.1, 0.9, 0.0, 0.0]])
     prior = make_prior(scores_of(BOXES), FREQUENCY)
     assert prior.may_be_object(probability, 0.02).tolist() == [False, True, True]
-    assert prior.pool_weight == 0.4
+    assert prior.pool_weight(Proposals.empty()) == 0.4
     assert prior.probability(Proposals.empty()).shape == (0, 4)
 
 
@@ -51,7 +51,7 @@ def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
     assert isinstance(prior, FrequencyPrior)
     np.testing.assert_allclose(prior.probability(proposals), [FREQUENCY] * 2)
     assert prior.may_be_object(prior.probability(proposals), 1.0).all()
-    assert prior.pool_weight == 0.0
+    assert prior.pool_weight(proposals) == 0.0
     assert prior.probability(Proposals.empty()).shape == (0, 4)
 
 
@@ -60,15 +60,15 @@ def test_scores_are_of_the_frame_that_is_given() -> None:
     scores = scores_of(BOXES)
     first, second = (blobs(counts, RNG)[1] for counts in ([10, 30], [20, 5, 7]))
     for proposals in (first, first, second, first):
-        log_box, log_reflectance = scores.of(proposals)
+        found = scores.of(proposals)
         expected = BOXES.log_probability(proposal_features(proposals, SENSOR), proposals.cut)
-        np.testing.assert_array_equal(log_box, expected)
-        assert not log_reflectance.any()
+        np.testing.assert_array_equal(found.box, expected)
+        assert not found.reflectance.any()
 
 
 @pytest.mark.parametrize("name", ["pointnet-kitti", "pointnet-synthetic"])
 def test_box_priors_of_the_shipped_models(name: str) -> None:
-    prior = make_prior(PointNet(ClassificationConfig(model=name), SensorConfig()).box_scores, FREQUENCY)
+    prior = make_prior(assembly.network(ClassificationConfig(model=name), SensorConfig()).box_scores, FREQUENCY)
     car = prior.probability(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
     person = prior.probability(standing(120, 12.0, 0.6, 0.5, 1.4))[0]
     wall = prior.probability(standing(600, 15.0, 12.0, 0.5, 2.3))[0]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import softmax
 
+from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.box_classifier import (
@@ -21,7 +22,7 @@ from modt.classification.box_classifier import (
     logits,
     proposal_features,
 )
-from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, BoxScores, make_prior
 from modt.classification.reflectance_classifier import (
@@ -32,7 +33,7 @@ from modt.classification.reflectance_classifier import (
 )
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
-from modt.types import N_REFLECTANCE, Cut, Proposals
+from modt.types import N_REFLECTANCE, Cut, Float64, Proposals
 from tests.classification.scenes import blobs
 from tools.train.export_pointnet import classifier_entry, to_lists
 
@@ -118,7 +119,7 @@ def test_malformed_metadata_is_rejected(text: str) -> None:
 def _with_metadata(path: Path, metadata: dict[str, str]) -> ClassificationConfig:
     """The shipped model with other metadata."""
     onnx = pytest.importorskip("onnx", reason="extra [train] is not installed")
-    model = onnx.load(PointNet(ClassificationConfig(), SensorConfig()).path)
+    model = onnx.load(assembly.network(ClassificationConfig(), SensorConfig()).model.path)
     onnx.helper.set_model_props(model, metadata)
     path.write_bytes(model.SerializeToString())
     return ClassificationConfig(model=str(path))
@@ -132,7 +133,7 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
         METADATA_KEY: metadata_of({"hdl-64e": (LAYERS, WEIGHTS)}),
         CLASS_FREQUENCY_KEY: json.dumps(FREQUENCY.tolist()),
     }
-    alone = PointNet(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
+    alone = assembly.network(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
     model = _with_metadata(tmp_path / "pooled.onnx", metadata)
     shape, feature = alone.classify(points, proposals, which), proposal_features(proposals, SENSOR)[which]
     box, likelihood = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
@@ -145,15 +146,15 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
         (SENSOR, bare, with_box, 0.2),
         (SensorConfig(), proposals, with_box, 0.2),
     ):
-        network = PointNet(model, sensor)
+        network = assembly.network(model, sensor)
         probability = network.classify(points, given, which)
         np.testing.assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
         prior = make_prior(network.box_scores, FREQUENCY)
-        assert prior.pool_weight == weight
+        assert prior.pool_weight(given) == weight
 
 
 def test_shipped_model_separates_number_plates_from_leaves() -> None:
-    model = PointNet(ClassificationConfig(), SENSOR)
+    model = assembly.network(ClassificationConfig(), SENSOR)
     reflectance = model.box_scores.reflectance
     assert isinstance(reflectance, MlpReflectanceClassifier)
     _, proposals = blobs([150], np.random.default_rng(0))
@@ -178,8 +179,12 @@ def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path: 
     whole = dataclasses.replace(proposals, cut=np.zeros(3, np.int64))
     metadata = {box_classifier.METADATA_KEY: json.dumps(classifier_entry(BOX_LAYERS, PoolWeights(0.8, 0.2)))}
     model = _with_metadata(tmp_path / "net.onnx", metadata)
-    alone = PointNet(model, SensorConfig()).classify(points, proposals, np.arange(3))
-    np.testing.assert_array_equal(PointNet(model, SensorConfig()).classify(points, whole, np.arange(3)), alone)
+
+    def classified(given: Proposals, *which: int) -> Float64:
+        return assembly.network(model, SensorConfig()).classify(points, given, np.array(which))
+
+    alone = classified(proposals, 0, 1, 2)
+    np.testing.assert_array_equal(classified(whole, 0, 1, 2), alone)
 
     beside = onnx.load(tmp_path / "net.onnx")
     last = next(i for i in beside.graph.initializer if i.name == "bias5")
@@ -188,11 +193,11 @@ def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path: 
     text = {box_classifier.BOUNDS_KEY: json.dumps(to_lists(bounds))}
     onnx.helper.set_model_props(beside, text)
     (tmp_path / "net-near.onnx").write_bytes(beside.SerializeToString())
-    found = PointNet(model, SensorConfig()).classify(points, proposals, np.array([2, 1, 0]))
+    found = classified(proposals, 2, 1, 0)
     assert (found[[0, 2], ObjectClass.PEDESTRIAN] > 0.99).all()
     np.testing.assert_array_equal(found[1], alone[1])
-    np.testing.assert_array_equal(PointNet(model, SensorConfig()).classify(points, whole, np.arange(3)), alone)
+    np.testing.assert_array_equal(classified(whole, 0, 1, 2), alone)
     onnx.helper.set_model_props(beside, {box_classifier.BOUNDS_KEY: "[]"})
     (tmp_path / "net-near.onnx").write_bytes(beside.SerializeToString())
     with pytest.raises(MisuseError, match="malformed box"):
-        PointNet(model, SensorConfig())
+        classified(proposals, 0)

@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.scheduler import START_MARGIN, LinearCost, Scheduler, padded_size, warm_up
+from modt.classification.call_cost import LinearCost, padded_size, warm_up
+from modt.classification.scheduler import Scheduler
+from modt.classification.tuning import CallCostTuning
 from modt.config import ClassificationConfig
 from modt.types import NONE, UNLIMITED, Budget, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
@@ -191,4 +193,4 @@ def test_the_warm_up_classifies_small_and_large_frames_and_prices_them() -> None
     cost = LinearCost(128, lambda points: int(points.sum()))
     warm_up(lambda _, __, which: sizes.append(len(which)), cost, 128, 8, lambda: next(clock))
     assert set(sizes) == {1, 8, 16}
-    assert cost.cost_ms(np.array([60])) == pytest.approx(START_MARGIN * 2.0, rel=0.01)
+    assert cost.cost_ms(np.array([60])) == pytest.approx(CallCostTuning().start_margin * 2.0, rel=0.01)

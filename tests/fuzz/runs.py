@@ -9,6 +9,7 @@ import numpy as np
 import onnx.parser
 
 from modt import assets, profile
+from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.cli import status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
@@ -46,7 +47,7 @@ def network():
 
 
 def load(path):
-    return PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+    return assembly.network(ClassificationConfig(model=str(path)), SensorConfig())
 
 
 SHIPPED = [(assets.folder("profiles") / f"{name}.yaml").read_bytes() for name in ("hdl-64e", "vlp-16")]

@@ -7,9 +7,9 @@ import re
 import pytest
 
 from modt import profile
-from modt.classification.pointnet import read_model
 from modt.cli.status import read as read_status
 from modt.errors import ModtError
+from modt.model_file import ModelFile
 from modt.ros2.cdr import CdrWriter
 from modt.sources.drivers.hesai import read_angles
 from modt.sources.drivers.ouster import OusterDecoder
@@ -105,7 +105,7 @@ PIPES = {
     "calibration of a Velodyne": lambda path: VelodyneDecoder("sensor", calibration=path),
     "calibration of a Hesai": read_angles,
     "metadata of an Ouster": lambda path: OusterDecoder("sensor", path),
-    "model": read_model,
+    "model": ModelFile.read,
     "profile": lambda path: profile.load([str(path)]),
 }
 

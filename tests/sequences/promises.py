@@ -13,9 +13,10 @@ from modt import profile
 from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import Scheduler, Selection
-from modt.config import ProfileConfig, TrackingConfig
+from modt.config import ClassificationConfig, ProfileConfig, SensorConfig, TrackingConfig
 from modt.energy.ledger import Ledger, LedgerLine
 from modt.geometry import FieldOfView
+from modt.model_file import ModelFile
 from modt.sinks.records import line
 from modt.sinks.tracks import frame_line
 from modt.tracking.background_map import CAPACITY
@@ -81,8 +82,8 @@ def config(sensor: str, association: str) -> ProfileConfig:
 
 
 @cache
-def _network(*arguments: Any) -> PointNet:
-    return PointNet(*arguments)
+def _network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
+    return PointNet(ModelFile.find(config.model), config, sensor)
 
 
 def _warm_up(classify: Any, cost: Any, *_: Any) -> None:
@@ -103,7 +104,7 @@ class Run:
     _next_id: int = 0
 
     def __post_init__(self) -> None:
-        with patch.multiple(assembly, PointNet=_network, warm_up=_warm_up):
+        with patch.multiple(assembly, network=_network, warm_up=_warm_up):
             ledger = Ledger(Clock(self.back), Clock(self.back))
             made = assembly.pipeline(assembly.MODES[self.mode], self.config, FieldOfView(), ledger)
         self.pipeline = replace(made, scheduler=Watched(made.scheduler))  # type: ignore[arg-type]

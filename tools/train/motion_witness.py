@@ -2,7 +2,7 @@
 
     python -m tools.train.motion_witness
 
-Prints LOG_LIKELIHOOD_RATIO of modt.classification.motion_witness in tenths.
+Prints LOG_LIKELIHOOD_RATIO of modt.classification.motion_likelihood in tenths.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.classification.motion_witness import LENGTH_M, MOVED_M, YOUNG_S, cells
+from modt.classification.motion_likelihood import LENGTH_M, MOVED_M, YOUNG_S, cells
 from modt.types import Float64, Int
 from modt_evaluation.evaluation import collect
 from modt_evaluation.frame import JudgedFrame

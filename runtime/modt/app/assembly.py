@@ -11,19 +11,21 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from modt import host
+from modt.classification.call_cost import LinearCost, padded_size, warm_up
 from modt.classification.decision import Decision, LikeliestClass
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.classification.product_fusion import AnyView, KeyViews
-from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
-from modt.config import KERNELS, NATIVE, FusionConfig, ProfileConfig
+from modt.classification.scheduler import Scheduler
+from modt.config import KERNELS, NATIVE, ClassificationConfig, FusionConfig, ProfileConfig, SensorConfig
 from modt.config import NUMPY as NUMPY_NAME
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
 from modt.geometry.kernels import GeometryKernels
+from modt.model_file import ModelFile
 from modt.native.library import NotAvailableError, load
 from modt.odometry.pose_estimator import PoseEstimator
 from modt.pipeline import ClassificationStage, FusionStage, Pipeline, SegmentationStage
@@ -124,6 +126,15 @@ def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> Seg
     return BlindSectorFilter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
 
 
+def network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
+    """The classifier with the model that the configuration names.
+
+    Raises:
+        MisuseError: the model cannot be used.
+    """
+    return PointNet(ModelFile.find(config.model), config, sensor)
+
+
 def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> None:
     """Warn of a budget that is below the price of one classification."""
     price_ms = cost.cost_ms(np.ones(1, np.int64))
@@ -158,16 +169,16 @@ def pipeline(
     host.keep_freed_pages()
     kernels = chosen_kernels(profile.segmentation.kernels)
     limits = profile.classification
-    network = PointNet(limits, profile.sensor)
+    classifier = network(limits, profile.sensor)
     cost = LinearCost(limits.max_points, padded_size(limits))
-    warm_up(network.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
+    warm_up(classifier.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost, profile)
     return stages(
         mode,
         profile,
-        network,
+        classifier,
         segmenter(profile, fov, kernels),
-        network,
+        classifier,
         cost,
         ledger or Ledger(),
         kernels,

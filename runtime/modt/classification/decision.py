@@ -12,18 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import N_CLASSES
+from modt.classes import N_CLASSES, ObjectClass
+from modt.classification.tuning import DEFAULT, DecisionTuning
 from modt.config import DecisionConfig
 from modt.types import Decisions, Evidence, Float64, Motion
-
-MIN_BACKGROUND = 0.1
-"""Least frequency of background."""
-KEPT_FROM = 0.4
-"""A reported class is kept down to this probability if its threshold is higher; less: doubtful classes linger."""
-START_PROPOSALS, MEMORY_PROPOSALS = 2000, 20_000
-"""Weight of the frequency at the start, and of the memory of the stream, as numbers of proposals."""
-MAX_CHANGE = 5.0
-"""A class becomes at most so many times as frequent as the model assumes."""
 
 
 class LikeliestClass:
@@ -42,11 +34,11 @@ class LikeliestClass:
         """Write the class of every track."""
         self._report(decisions, evidence.posterior.T)
 
-    def _report(self, decisions: Decisions, weighed: Float64) -> None:
+    def _report(self, decisions: Decisions, weight: Float64) -> None:
         """Write the class of every track by the weights (4, M) of its classes."""
-        likeliest = weighed[1:].argmax(axis=0)
-        reported = weighed[1:].max(axis=0) >= self._threshold[likeliest]
-        decisions.object_class[:] = np.where(reported, likeliest + 1, 0)
+        likeliest = weight[1:].argmax(axis=0)
+        is_reported = weight[1:].max(axis=0) >= self._threshold[likeliest]
+        decisions.object_class[:] = np.where(is_reported, likeliest + 1, ObjectClass.BACKGROUND)
 
 
 class Decision(LikeliestClass):
@@ -55,27 +47,32 @@ class Decision(LikeliestClass):
     Args:
         config: costs, and the frequency at the start.
         frequency: (4,) frequencies of the classes among proposals that the posteriors assume.
+        tuning: memory and bounds of the frequency, and hysteresis of the reported class.
 
     Attributes:
         frequency: (4,) frequencies of the classes among the proposals of this stream, as estimated so far.
     """
 
-    def __init__(self, config: DecisionConfig, frequency: Float64) -> None:
+    def __init__(self, config: DecisionConfig, frequency: Float64, tuning: DecisionTuning = DEFAULT.decision) -> None:
         super().__init__(config, frequency)
         self._assumed = frequency
+        self._tuning = tuning
         start = config.frequency
         self.frequency = frequency.copy() if start is None else np.array([1.0 - sum(start), *start])
-        self._start_mass = START_PROPOSALS * self.frequency
+        # Sums of the posteriors of proposals: as if seen before the start, and seen since then.
+        self._start_mass = tuning.start_proposals * self.frequency
         self._mass = np.zeros(N_CLASSES)
-        self._kept = np.append(1.0, np.minimum(KEPT_FROM / self._threshold, 1.0))
+        # Share of its threshold that a class needs which was reported last.
+        self._kept_share = np.append(1.0, np.minimum(tuning.kept_probability / self._threshold, 1.0))
 
     def decide(self, decisions: Decisions, evidence: Evidence, motion: Motion) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
         adapted = self.adapted(evidence.posterior.T.copy())
-        weighed, objects = adapted.copy(), decisions.object_class.nonzero()[0]
-        last = decisions.object_class[objects]
-        weighed[last, objects] /= self._kept[last]
-        self._report(decisions, weighed)
+        weight = adapted.copy()
+        objects = decisions.object_class.nonzero()[0]
+        last_class = decisions.object_class[objects]
+        weight[last_class, objects] /= self._kept_share[last_class]
+        self._report(decisions, weight)
         self._learn(adapted.take(motion.observed.nonzero()[0], axis=1))
 
     def adapted(self, posterior: Float64) -> Float64:
@@ -85,13 +82,16 @@ class Decision(LikeliestClass):
         return adapted
 
     def _learn(self, adapted: Float64) -> None:
-        """The mean of the adapted posteriors (4, R), the frequency at the start counting as START_PROPOSALS."""
+        """Add adapted posteriors (4, R), and estimate the frequency by the mean of all, within bounds."""
         self._mass += adapted.sum(axis=1)
-        total = self._mass.sum()
-        if total > MEMORY_PROPOSALS:
-            self._mass *= MEMORY_PROPOSALS / total
-        mass, assumed = (self._start_mass + self._mass).tolist(), self._assumed.tolist()
-        n = sum(mass)  # lists are faster than arrays of four
-        objects = [min(max(m / n, a), a * MAX_CHANGE) for m, a in zip(mass[1:], assumed[1:], strict=True)]
-        frequency = [max(1.0 - sum(objects), MIN_BACKGROUND), *objects]
+        n_seen = self._mass.sum()
+        if n_seen > self._tuning.memory_proposals:
+            self._mass *= self._tuning.memory_proposals / n_seen
+        mass = (self._start_mass + self._mass).tolist()  # lists are faster than arrays of four
+        n = sum(mass)
+        objects = [
+            min(max(class_mass / n, assumed), assumed * self._tuning.max_frequency_ratio)
+            for class_mass, assumed in zip(mass[1:], self._assumed[1:].tolist(), strict=True)
+        ]
+        frequency = [max(1.0 - sum(objects), self._tuning.min_background_frequency), *objects]
         self.frequency = np.array(frequency) / sum(frequency)

@@ -1,16 +1,19 @@
 """Selection of views and fusion of all that is known of a track (section V-C): one `pipeline.FusionStage` a mode.
 
 `observe` adds the boxes and the motion of a frame to the evidence of the tracks. `asks` selects the tracks whose view
-is worth a classification. `fuse` takes the classifier's likelihoods and returns which tracks are certain, upon which
-the state machine makes a class final or reopens it. `observe` and `fuse` write the evidence in place.
+is worth a classification. `fuse` adds the classifier's likelihoods and returns which classes are confirmed, upon
+which the state machine leads a track to its next state. `observe` and `fuse` write the evidence in place.
 
 The posterior of a track after t frames, with views Y, boxes B and motion M, is
 
-    P(X | Y_1:t, B_1:t, M_t) ~ P(X) P(M_t | X) exp(n^GROWTH mean log P(Y | X) + BOX_WEIGHT mean log P(B | X))
+    P(X | Y_1:t, B_1:t, M_t) ~ P(X) P(M_t | X) exp(n^view_exponent mean log P(Y | X) + box_weight mean log P(B | X))
 
 Views of one object are correlated (log-odds of consecutive views of a car by .8 to .87), so they are averaged, not
-multiplied: n of them weigh n^GROWTH. Both means forget the past; a view counts by the root of its points. Profile
-`paper` multiplies views as the paper writes it: `modt.classification.product_fusion`.
+multiplied: n of them weigh n^view_exponent. Both means forget the past; a view counts by the root of its points.
+Profile `paper` multiplies views as the paper writes it: `modt.classification.product_fusion`.
+
+Arrays of R tracks with a class in each of four rows, (4, R), are contiguous by class: arithmetic along axes of four
+would be slow.
 """
 
 from __future__ import annotations
@@ -19,41 +22,17 @@ import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_PERSON_M
 from modt.classes import N_CLASSES, PERSON_M, ObjectClass
-from modt.classification.motion_witness import log_likelihood
+from modt.classification.motion_likelihood import MotionLikelihood
 from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
+from modt.classification.tuning import DEFAULT, FusionTuning
 from modt.config import FusionConfig
 from modt.types import Bool, Evidence, Float64, Int, Motion, Proposals
 
 MIN_PROBABILITY = 1e-4
 """Floor of every likelihood and posterior: no class is excluded for good."""
-FORGETTING, GROWTH = 0.72, 0.22
-"""Weight of the views so far at a further one, and the power of their number that they weigh together."""
-BOX_FORGETTING, BOX_WEIGHT = 0.5, 0.75
-"""Weight of the boxes so far at a further one, and of their mean."""
-MISMATCH_PROBABILITY = 0.05
-"""Probability that a proposal is not the object of its track, whose posterior is then the prior of the box."""
-MORE_POINTS, FAR_MORE_POINTS, MORE_POINTS_BY = 1.25, 2.0, 5
-"""An uncertain track is classified again at MORE_POINTS times the points of its last view, a certain one that may be
-an object at FAR_MORE_POINTS times; each by MORE_POINTS_BY more, which is random variation."""
-BACKGROUND_THRESHOLD = 0.5
-"""Posterior under equal class frequencies at which background is final where it is looked at again; less: sooner."""
-FIRST_VIEW_MIN_HITS = 2
-"""Frames with a proposal that mode efficient waits for: more of them spare calls on spurious proposals."""
-REVIEW_GROWTH, REVIEW_FRAMES = 2.0, 10
-"""A certain object is classified again at REVIEW_GROWTH times its age at the last view, and REVIEW_FRAMES later."""
-UNSURE_GROWTH, UNSURE_FRAMES = 1.3, 2
-"""The same of an uncertain track. With longer intervals, fewer calls are made and cars are recognised later."""
-LIKELY_BACKGROUND, BACKGROUND_GROWTH = 0.8, 2.0
-"""Posterior from which an uncertain track is probably background, and UNSURE_GROWTH of such a track."""
-MAYBE_PERSON, PERSON_FRAMES = 0.25, 4
-"""Posterior from which an uncertain track may be a person, who is classified again after PERSON_FRAMES at the latest:
-one view of a few points is weak evidence, and many of them are right."""
-MANY_POINTS = 20
-"""Points of a proposal from which mode accurate classifies what may be an object by its box, whatever its motion."""
-NEAR_M = 3.0
-"""Mode accurate classifies whatever may be a person as near as this, however unlikely it is one by its box [m]."""
-_POWERS = np.arange(1000) ** GROWTH  # by the number of views; more of them hardly weigh more
+_MAX_VIEWS = 1000
+"""Number of views from which further ones add no weight."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
@@ -76,6 +55,11 @@ def _floored(weight: Float64) -> Float64:
     return normalised
 
 
+def _log(probability: Float64) -> Float64:
+    """Logarithm of probabilities, of MIN_PROBABILITY at least."""
+    return np.log(np.maximum(probability, MIN_PROBABILITY))
+
+
 def log_frequency_of(prior: Prior) -> Float64:
     """(4,) logarithm of the class frequency that a prior assumes."""
     frequency = np.maximum(prior.frequency, MIN_PROBABILITY)
@@ -83,7 +67,7 @@ def log_frequency_of(prior: Prior) -> Float64:
     return log_frequency
 
 
-class Certainty:
+class Confirmation:
     """Test whether the posterior of an object, or the evidence for background, reaches its threshold.
 
     Background is the most frequent class and has a high posterior before any view, so its threshold applies to the
@@ -96,14 +80,16 @@ class Certainty:
 
     def __init__(self, log_frequency: Float64, object_threshold: float, background_threshold: float) -> None:
         self._frequency = np.exp(log_frequency)
-        self._object, self._background = object_threshold, background_threshold
+        self._object_threshold = object_threshold
+        self._background_threshold = background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
-        """(R,) of posteriors (4, R)."""
-        objects: Bool = posterior[1:].max(axis=0) >= self._object
-        evidence = posterior / self._frequency[:, None]
-        background: Bool = evidence[ObjectClass.BACKGROUND] >= self._background * evidence.sum(axis=0)
-        return objects | background
+        """(R,) whether a class is confirmed by posteriors (4, R)."""
+        is_object: Bool = posterior[1:].max(axis=0) >= self._object_threshold
+        under_equal = posterior / self._frequency[:, None]
+        threshold = self._background_threshold * under_equal.sum(axis=0)
+        is_background: Bool = under_equal[ObjectClass.BACKGROUND] >= threshold
+        return is_object | is_background
 
 
 class EveryFrame:
@@ -117,7 +103,7 @@ class EveryFrame:
         return motion.observed
 
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Replace the posterior; every row is certain."""
+        """Replace the posterior; every class is confirmed."""
         evidence.posterior[rows] = normalise(likelihood)
         evidence.views[rows] = 1
         evidence.key_points[rows] = proposals.count[motion.proposal[rows]]
@@ -128,140 +114,167 @@ class FusedTracks:
     """Common part of the modes that fuse: the posterior of every track with a proposal, in every frame.
 
     Args:
-        config: condition of a view, threshold of certainty.
+        config: condition of a view, threshold of an object.
         prior: probabilities of the classes of a proposal before its view.
-        background_threshold: evidence at which background is certain.
+        tuning: weights of the evidence, and conditions of a view.
     """
 
-    def __init__(
-        self, config: FusionConfig, prior: Prior, background_threshold: float = BACKGROUND_THRESHOLD
-    ) -> None:
-        self.config, self.prior, self._log_frequency = config, prior, log_frequency_of(prior)
-        self.certain = Certainty(self._log_frequency, config.object_threshold, background_threshold)
+    def __init__(self, config: FusionConfig, prior: Prior, tuning: FusionTuning = DEFAULT.fusion) -> None:
+        self._prior = prior
+        self._min_object_probability = config.min_object_probability
+        self._weights = tuning.evidence
+        self._conditions = tuning.requests
+        self._motion_likelihood = MotionLikelihood(tuning.motion)
+        self._weight_of_views = np.arange(_MAX_VIEWS) ** tuning.evidence.view_exponent
+        self._log_frequency = log_frequency_of(prior)
+        self._is_confirmed = Confirmation(
+            self._log_frequency, config.object_threshold, tuning.evidence.background_threshold
+        )
 
     def observe(self, evidence: Evidence, motion: Motion, proposals: Proposals) -> None:
         """Add the box and the motion of every track with a proposal to what is known of it."""
         rows = motion.observed.nonzero()[0]
-        prior = self.prior.probability(proposals).T.take(motion.proposal[rows], axis=1)
-        of_box, known = _log(prior) - self._log_frequency[:, None], _by_class(evidence.box_evidence, rows)
-        gain = np.maximum(1.0 / motion.hits[rows], 1.0 - BOX_FORGETTING) * ~motion.hidden[rows]
-        witness = log_likelihood(motion.moved_m[rows], motion.observed_s[rows], motion.size_m.take(rows, axis=0)).T
-        boxes = known + gain * (of_box - known)
-        evidence.prior[rows], evidence.witness[rows], evidence.box_evidence[rows] = prior.T, witness.T, boxes.T
-        weighed = prior * np.exp(witness)
-        probability = (weighed / weighed.sum(axis=0)).T
-        evidence.may_be_object[rows] = self.prior.may_be_object(probability, self.config.min_object_probability)
-        posterior = self._posterior(evidence, rows, prior, boxes, witness)
-        posterior.T[motion.final[rows] & ~evidence.viewed[rows]] = _BACKGROUND  # remembered places
+        prior = self._prior.probability(proposals).T.take(motion.proposal[rows], axis=1)
+        size_m = motion.size_m.take(rows, axis=0)
+        motion_evidence = self._motion_likelihood.log_ratio(motion.moved_m[rows], motion.observed_s[rows], size_m)
+        # The mean of the boxes is exact at first and forgets later; a hidden person's box tells nothing.
+        box_evidence = _by_class(evidence.box_evidence, rows)
+        gain = np.maximum(1.0 / motion.hits[rows], 1.0 - self._weights.box_memory) * ~motion.hidden[rows]
+        box_evidence += gain * (_log(prior) - self._log_frequency[:, None] - box_evidence)
+        evidence.prior[rows] = prior.T
+        evidence.witness[rows] = motion_evidence.T
+        evidence.box_evidence[rows] = box_evidence.T
+        weighted = prior * np.exp(motion_evidence)
+        evidence.may_be_object[rows] = self._may_be_object((weighted / weighted.sum(axis=0)).T)
+        posterior = self._posterior(evidence, rows, prior, box_evidence, motion_evidence)
+        is_remembered_place = motion.final[rows] & ~evidence.viewed[rows]
+        posterior.T[is_remembered_place] = _BACKGROUND
         evidence.posterior[rows] = posterior.T
 
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Add a view to what is known of the rows; (R,) which are certain now.
+        """Add a view to what is known of the rows (R,); returns (R,) whether the class is confirmed now.
 
-        The classifier returns a posterior under the class frequency and, by its pool weight, the box prior: both are
-        divided out.
+        The likelihood (R, 4) of the classifier is a posterior under the class frequency and, by its pool weight, the
+        box prior: both are divided out.
         """
-        count = proposals.count[motion.proposal[rows]]
+        points = proposals.count[motion.proposal[rows]]
         prior = evidence.prior.take(rows, axis=0)
-        view = np.log(normalise(likelihood)) - pooled_prior(_log(prior), self._log_frequency, self.prior.pool_weight)
-        known, weight = evidence.evidence.take(rows, axis=0), np.sqrt(count)
-        total = FORGETTING * evidence.weight[rows] + weight
-        evidence.evidence[rows] = known + (weight / total)[:, None] * (view - known)
+        assumed = pooled_prior(_log(prior), self._log_frequency, self._prior.pool_weight(proposals))
+        view = np.log(normalise(likelihood)) - assumed
+        mean = evidence.evidence.take(rows, axis=0)
+        weight = np.sqrt(points)
+        total = self._weights.view_memory * evidence.weight[rows] + weight
+        evidence.evidence[rows] = mean + (weight / total)[:, None] * (view - mean)
         evidence.weight[rows] = total
         evidence.views[rows] += 1
-        evidence.key_points[rows], evidence.key_age[rows] = count, motion.age[rows]
-        boxes, witness = _by_class(evidence.box_evidence, rows), _by_class(evidence.witness, rows)
-        posterior = self._posterior(evidence, rows, prior.T, boxes, witness)
+        evidence.key_points[rows] = points
+        evidence.key_age[rows] = motion.age[rows]
+        box_evidence = _by_class(evidence.box_evidence, rows)
+        motion_evidence = _by_class(evidence.witness, rows)
+        posterior = self._posterior(evidence, rows, prior.T, box_evidence, motion_evidence)
         evidence.posterior[rows] = posterior.T
-        return self.certain(posterior)
+        return self._is_confirmed(posterior)
 
-    def _posterior(self, evidence: Evidence, rows: Int, prior: Float64, boxes: Float64, witness: Float64) -> Float64:
-        """Posterior (4, R) of the rows by their views, and by their boxes and motion, (4, R) each."""
-        weight = _POWERS.take(evidence.views[rows], mode="clip")
-        known = self._log_frequency[:, None] + weight * _by_class(evidence.evidence, rows)
-        known += BOX_WEIGHT * boxes + witness
-        posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
-        posterior += MISMATCH_PROBABILITY * prior
+    def _posterior(self, evidence: Evidence, rows: Int, prior: Float64, boxes: Float64, motion: Float64) -> Float64:
+        """(4, R) posterior of the rows (R,).
+
+        Args:
+            evidence: the views.
+            rows: (R,) tracks.
+            prior: (4, R) P(class | box) of the last box.
+            boxes: (4, R) evidence of the boxes.
+            motion: (4, R) evidence of the motion.
+        """
+        weight = self._weight_of_views.take(evidence.views[rows], mode="clip")
+        log_weight = self._log_frequency[:, None] + weight * _by_class(evidence.evidence, rows)
+        log_weight += self._weights.box_weight * boxes + motion
+        posterior = (1.0 - self._weights.mismatch_probability) * from_log_weights(log_weight)
+        posterior += self._weights.mismatch_probability * prior
         return posterior
+
+    def _may_be_object(self, probability: Float64) -> Bool:
+        """(R,) whether probabilities (R, 4) leave an object likely enough for a classification."""
+        return self._prior.may_be_object(probability, self._min_object_probability)
+
+    def _shows_more(self, evidence: Evidence, motion: Motion, rows: Int, ratio: float) -> Bool:
+        """(R,) tracks of which the last proposal shows clearly more points than the last view."""
+        return motion.points[rows] > ratio * evidence.key_points[rows] + self._conditions.more_points_offset
+
+    def _is_person_due(self, evidence: Evidence, motion: Motion, rows: Int, posterior: Float64) -> Bool:
+        """(R,) tracks that may be people by their posterior (4, R), and whose last view is some frames ago."""
+        maybe_person: Bool = posterior[IS_PERSON].sum(axis=0) > self._conditions.maybe_person
+        return maybe_person & (motion.age[rows] >= evidence.key_age[rows] + self._conditions.person_frames)
 
 
 class FirstViews(FusedTracks):
-    """Mode efficient: the first classification that is certain is final (Table I).
+    """Mode efficient: the first view that confirms a class is the last (Table I).
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
-    minimum number of observations, since spurious proposals do not last. A track that is uncertain is classified
-    again once it shows clearly more points, and every few frames where it may be a person. Background is as final as
-    an object here, and as certain.
+    minimum number of observations, since spurious proposals do not last. An unconfirmed track is classified again
+    once it shows clearly more points, and every few frames where it may be a person. Nobody looks at background
+    a second time, so it has to be as likely as an object.
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior) -> None:
-        super().__init__(config, prior, config.object_threshold)
+    def __init__(self, config: FusionConfig, prior: Prior, tuning: FusionTuning = DEFAULT.fusion) -> None:
+        super().__init__(config, prior, tuning)
+        self._is_confirmed = Confirmation(self._log_frequency, config.object_threshold, config.object_threshold)
 
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
-        """(M,) tracks without a final class that meet the conditions."""
+        """(M,) tracks without a confirmed class that meet the conditions."""
         rows = motion.observed.nonzero()[0]
-        waits = wants_class & (motion.hits >= FIRST_VIEW_MIN_HITS) & ~motion.hidden
+        posterior = _by_class(evidence.posterior, rows)
+        is_due = ~evidence.viewed[rows]
+        is_due |= self._shows_more(evidence, motion, rows, self._conditions.more_points_ratio)
+        is_due |= self._is_person_due(evidence, motion, rows, posterior)
         asks = np.zeros(len(motion), np.bool_)
-        asks[rows] = evidence.may_be_object[rows] & (
-            (~evidence.viewed | _shows_more(evidence, motion))[rows] | _person_waits(evidence, motion, rows)
-        )
-        return asks & waits
+        asks[rows] = evidence.may_be_object[rows] & is_due
+        return asks & wants_class & (motion.hits >= self._conditions.first_view_min_hits) & ~motion.hidden
 
 
 class FurtherViews(FusedTracks):
-    """Mode accurate: views are fused until the class is certain, and where something changes (Table II).
+    """Mode accurate: views are fused until the class is confirmed, and where something changes (Table II).
 
-    A track, a remembered place too, is classified as soon as it may be an object by box and motion, by a box of
-    MANY_POINTS alone, or a person near by: the box prior takes tall people who stand for background. An uncertain one
-    is classified again where it shows clearly more points, and at growing intervals, as is a certain object. Certain
-    background is only where it shows far more points and may be an object. A person is not while the view cuts off
-    more than half.
+    A track, at a remembered place too, is classified as soon as it may be an object by box and motion, by a box of
+    many points alone, or a person near by: the box prior takes tall people who stand for background. An unconfirmed
+    one is classified again where it shows clearly more points, and at growing intervals, as is a confirmed object.
+    Confirmed background is only where it shows far more points and may be an object. A person is not while the view
+    cuts off more than half.
     """
 
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
+        conditions = self._conditions
         rows = motion.observed.nonzero()[0]
+        age = motion.age[rows]
+        key_age = evidence.key_age[rows]
         posterior = _by_class(evidence.posterior, rows)
-        background, age, key_age = posterior[ObjectClass.BACKGROUND], motion.age[rows], evidence.key_age[rows]
-        own, limit = motion.proposal[rows], self.config.min_object_probability
-        may_be_object = evidence.may_be_object[rows] | (
-            (proposals.count[own] >= MANY_POINTS) & self.prior.may_be_object(evidence.prior[rows], limit)
-        )
-        first = may_be_object | _near(proposals)[own]
-        review = (background < 0.5) & (age >= REVIEW_GROWTH * key_age + REVIEW_FRAMES)
-        review |= first & _shows_more(evidence, motion, FAR_MORE_POINTS)[rows]
-        growth = np.where(background > LIKELY_BACKGROUND, BACKGROUND_GROWTH, UNSURE_GROWTH)
-        unsure = _shows_more(evidence, motion)[rows] | (age >= growth * key_age + UNSURE_FRAMES)
-        unsure |= _person_waits(evidence, motion, rows)
-        further = np.where(self.certain(posterior), review, unsure)
+        background = posterior[ObjectClass.BACKGROUND]
+        # An object by box and motion, by the box alone if it shows many points, or near by: worth a first view.
+        proposal_of_row = motion.proposal[rows]
+        many_points = proposals.count[proposal_of_row] >= conditions.first_view_points
+        may_be_object = evidence.may_be_object[rows] | (many_points & self._may_be_object(evidence.prior[rows]))
+        may_be_object |= self._may_be_near_person(proposals)[proposal_of_row]
+        # Views of a confirmed class: of an object at growing intervals, of background with far more points.
+        review = (background < 0.5) & (age >= conditions.review_age_ratio * key_age + conditions.review_frames)
+        review |= may_be_object & self._shows_more(evidence, motion, rows, conditions.far_more_points_ratio)
+        # Views of an unconfirmed one: at shorter intervals, with more points, of a possible person every few frames.
+        is_likely_background = background > conditions.likely_background
+        ratio = np.where(is_likely_background, conditions.background_age_ratio, conditions.unconfirmed_age_ratio)
+        unconfirmed = age >= ratio * key_age + conditions.unconfirmed_frames
+        unconfirmed |= self._shows_more(evidence, motion, rows, conditions.more_points_ratio)
+        unconfirmed |= self._is_person_due(evidence, motion, rows, posterior)
+        further = np.where(self._is_confirmed(posterior), review, unconfirmed)
         asks = np.zeros(len(motion), np.bool_)
-        asks[rows] = ~motion.hidden[rows] & np.where(evidence.viewed[rows], further, first)
+        asks[rows] = ~motion.hidden[rows] & np.where(evidence.viewed[rows], further, may_be_object)
         return asks
 
-
-def _near(proposals: Proposals) -> Bool:
-    """(P,) proposals that are near, and as long and as high as a person may be."""
-    x, y, _, length_m, _, height_m, _ = proposals.box.T
-    near: Bool = (x * x + y * y < NEAR_M**2) & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
-    return near
-
-
-def _person_waits(evidence: Evidence, motion: Motion, rows: Int) -> Bool:
-    """(R,) rows that may be people by their posterior, and were last classified PERSON_FRAMES ago."""
-    waits: Bool = _by_class(evidence.posterior, rows)[IS_PERSON].sum(axis=0) > MAYBE_PERSON
-    return waits & (motion.age >= evidence.key_age + PERSON_FRAMES)[rows]
-
-
-def _shows_more(evidence: Evidence, motion: Motion, ratio: float = MORE_POINTS) -> Bool:
-    """(M,) tracks whose last proposal shows clearly more of them than their last view."""
-    return motion.points > ratio * evidence.key_points + MORE_POINTS_BY
+    def _may_be_near_person(self, proposals: Proposals) -> Bool:
+        """(P,) proposals that are near, at most as long as a person, and at least half as high."""
+        x, y, _, length_m, _, height_m, _ = proposals.box.T
+        near: Bool = x * x + y * y < self._conditions.near_m**2
+        return near & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
 
 
 def _by_class(column: Float64, rows: Int) -> Float64:
-    """(4, R) rows of a column (M, 4), a contiguous row a class: arithmetic along axes of four would be slow."""
+    """(4, R) rows of a column (M, 4), contiguous by class."""
     return column.take(rows, axis=0).T.copy()
-
-
-def _log(probability: Float64) -> Float64:
-    """Logarithm, of MIN_PROBABILITY at least."""
-    return np.log(np.maximum(probability, MIN_PROBABILITY))

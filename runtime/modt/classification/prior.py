@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from modt.classes import N_CLASSES, ObjectClass
+from modt.classes import ObjectClass
 from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, is_bound, proposal_features
 from modt.classification.pool import PoolWeights, softmax
 from modt.classification.reflectance_classifier import NoReflectanceClassifier, ReflectanceClassifier
@@ -14,48 +15,62 @@ from modt.config import SensorConfig
 from modt.types import Bool, Float64, Proposals
 
 
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Scores of the P proposals of a frame by box and reflectance.
+
+    Attributes:
+        box: (P, 4) log P(class | box), up to a constant a row.
+        reflectance: (P, 4) log P(reflectance | class, box), up to a constant a row.
+        is_bound: (P,) proposals that the view cuts where a person may go on.
+        weights: weights in the pool with the network, which counts more where the sweep has no reflectance.
+    """
+
+    box: Float64
+    reflectance: Float64
+    is_bound: Bool
+    weights: PoolWeights
+
+
 class BoxScores:
     """The box classifier and the reflectance classifier of a model, side by side.
 
-    The prior of the tracks and the classifier's pool need the same scores of the same proposals: those of the last
+    The prior of the tracks and the pool of the classifier need the scores of the same proposals: those of the last
     frame are kept.
 
     Args:
-        boxes: P(class | box).
-        reflectance: P(reflectance | class, box).
+        boxes: P(class | box); also an attribute.
+        reflectance: P(reflectance | class, box); also an attribute.
         sensor: spacing of its beams, and its height where the proposals have none.
     """
 
     def __init__(self, boxes: BoxClassifier, reflectance: ReflectanceClassifier, sensor: SensorConfig) -> None:
-        self.boxes, self.reflectance, self._sensor = boxes, reflectance, sensor
-        self._beams, self._proposals = sensor.beams, Proposals.empty()
-        self._scores = np.zeros((0, N_CLASSES)), np.zeros((0, N_CLASSES))
+        self.boxes = boxes
+        self.reflectance = reflectance
+        self._sensor = sensor
+        self._beams = sensor.beams
+        self._last: tuple[Proposals, Scores] | None = None
 
     @property
     def informative(self) -> bool:
         """Whether there is either classifier."""
         return not (isinstance(self.boxes, NoBoxClassifier) and isinstance(self.reflectance, NoReflectanceClassifier))
 
-    @property
-    def weights(self) -> PoolWeights:
-        """In the pool with the network, of the proposals last given: without reflectance the network counts more."""
-        told = None if self._proposals.reflectance is None else self.reflectance.weights
-        return told or self.boxes.weights
+    def of(self, proposals: Proposals) -> Scores:
+        """Scores of the proposals of a frame, worked out once as long as the frame is the same."""
+        if self._last is None or self._last[0] is not proposals:
+            self._last = (proposals, self._computed(proposals))
+        return self._last[1]
 
-    def of(self, proposals: Proposals) -> tuple[Float64, Float64]:
-        """(P, 4) log P(class | box) and (P, 4) log P(reflectance | class, box), up to constants."""
-        if proposals is not self._proposals:
-            features = proposal_features(proposals, self._sensor, self._beams)
-            boxes = self.boxes.log_probability(features, proposals.cut)
-            reflectance = self.reflectance.log_likelihood(features, proposals.reflectance)
-            self._proposals, self._scores = proposals, (boxes, reflectance)
-            self._bound = is_bound(features, proposals.cut)
-        return self._scores
-
-    def bound(self, proposals: Proposals) -> Bool:
-        """(P,) proposals that the view cuts where a person may go on."""
-        self.of(proposals)
-        return self._bound
+    def _computed(self, proposals: Proposals) -> Scores:
+        features = proposal_features(proposals, self._sensor, self._beams)
+        weights = None if proposals.reflectance is None else self.reflectance.weights
+        return Scores(
+            box=self.boxes.log_probability(features, proposals.cut),
+            reflectance=self.reflectance.log_likelihood(features, proposals.reflectance),
+            is_bound=is_bound(features, proposals.cut),
+            weights=weights or self.boxes.weights,
+        )
 
 
 class Prior(Protocol):
@@ -64,53 +79,59 @@ class Prior(Protocol):
     frequency: Float64
     """(4,) frequency of the classes among proposals."""
 
-    @property
-    def pool_weight(self) -> float:
-        """Exponent of what the prior says of an object, in the classifier's pool (0 to 1)."""
+    def pool_weight(self, proposals: Proposals) -> float:
+        """Exponent of the prior's odds of an object in the classifier's pool (0 to 1)."""
 
     def probability(self, proposals: Proposals) -> Float64:
-        """(P, 4) of each proposal of a frame."""
+        """(P, 4) prior of each proposal of a frame."""
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
-        """(M,) rows of priors (M, 4) worth a classification: objects with at least this probability."""
+        """(M,) rows of priors (M, 4) worth a classification: the threshold or more for the objects together."""
 
 
 class FrequencyPrior:
     """The frequency of the classes among proposals, the same for each: it excludes none.
 
     Args:
-        frequency: (4,) frequencies of the classes.
+        frequency: (4,) frequencies of the classes; also an attribute.
     """
-
-    pool_weight = 0.0
 
     def __init__(self, frequency: Float64) -> None:
         self.frequency = frequency
 
+    def pool_weight(self, proposals: Proposals) -> float:
+        """0: the pool has no box."""
+        return 0.0
+
     def probability(self, proposals: Proposals) -> Float64:
-        """(P, 4) equal rows."""
+        """(P, 4) prior of each proposal of a frame, in equal rows."""
         return np.tile(self.frequency, (len(proposals), 1))
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
-        """(M,) True."""
+        """(M,) True for every row."""
         return np.ones(len(probability), np.bool_)
 
 
 class BoxPrior:
-    """P(class | box, reflectance), under the class frequency (4,) that the scores assume."""
+    """P(class | box, reflectance) by the classifiers of a model.
+
+    Args:
+        scores: the classifiers.
+        frequency: (4,) class frequency that they assume; also an attribute.
+    """
 
     def __init__(self, scores: BoxScores, frequency: Float64) -> None:
-        self._scores, self.frequency = scores, frequency
+        self.frequency = frequency
+        self._scores = scores
 
-    @property
-    def pool_weight(self) -> float:
-        """Weight of the box in the pool, of the proposals last given."""
-        return self._scores.weights.box
+    def pool_weight(self, proposals: Proposals) -> float:
+        """Weight of the box in the pool."""
+        return self._scores.of(proposals).weights.box
 
     def probability(self, proposals: Proposals) -> Float64:
-        """(P, 4) of each proposal of a frame."""
-        boxes, reflectance = self._scores.of(proposals)
-        return softmax(boxes + reflectance)
+        """(P, 4) prior of each proposal of a frame."""
+        scores = self._scores.of(proposals)
+        return softmax(scores.box + scores.reflectance)
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) rows of priors (M, 4) that give the objects together at least this probability."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classification.fusion import Certainty, from_log_weights, log_frequency_of, normalise
+from modt.classification.fusion import Confirmation, from_log_weights, log_frequency_of, normalise
 from modt.classification.prior import Prior
 from modt.config import FusionConfig
 from modt.types import Bool, Evidence, Float64, Int, Motion, Proposals
 
 
 class AnyView:
-    """Mode efficient of the paper: every track is classified once, and that is final (Table I)."""
+    """Mode efficient of the paper: every track is classified once, which confirms its class (Table I)."""
 
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
         self._log_frequency = log_frequency_of(prior)
@@ -24,7 +24,7 @@ class AnyView:
         return wants_class & ~evidence.viewed
 
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Multiply the view into the posterior; (R,) True."""
+        """Multiply the view into the posterior; every class is confirmed."""
         posterior = from_log_weights((evidence.evidence[rows] + np.log(normalise(likelihood))).T).T
         evidence.posterior[rows] = posterior
         evidence.evidence[rows] = np.log(posterior) - self._log_frequency
@@ -36,29 +36,34 @@ class AnyView:
 class KeyViews(AnyView):
     """Mode accurate of the paper: views whose number of points differs are independent (Equation 4, Table II).
 
-    A new track is classified at once, so that it has a class, but views are fused, and a certain class is final, only
+    A new track is classified at once, so that it has a class, but views are fused, and a class can be confirmed, only
     from `start_frame` on: first views are often far and partial (Fig. 11).
     """
 
     def __init__(self, config: FusionConfig, prior: Prior) -> None:
         super().__init__(config, prior)
-        self._point_change, self._start_frame = np.array(config.point_change), config.start_frame
-        self._certain = Certainty(self._log_frequency, config.object_threshold, config.object_threshold)
+        self._point_change = np.array(config.point_change)
+        self._start_frame = config.start_frame
+        self._is_confirmed = Confirmation(self._log_frequency, config.object_threshold, config.object_threshold)
 
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first or an independent view."""
         rows = wants_class.nonzero()[0]
-        now, then = proposals.count[motion.proposal[rows]], evidence.key_points[rows]
-        alpha = self._point_change[evidence.posterior[rows].argmax(axis=1)]
-        independent = (evidence.views[rows] == 0) | (np.abs(now - then) > alpha * then)
+        points = proposals.count[motion.proposal[rows]]
+        key_points = evidence.key_points[rows]
+        alpha = self._point_change[evidence.posterior[rows].argmax(axis=1)]  # of the likeliest class
+        independent = (evidence.views[rows] == 0) | (np.abs(points - key_points) > alpha * key_points)
         asks = wants_class.copy()
         asks[rows] = ~evidence.viewed[rows] | (independent & (motion.age[rows] >= self._start_frame))
         return asks
 
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Multiply the view into the posterior (Equation 6); (R,) which rows are certain now."""
+        """Multiply the view into the posterior (Equation 6); returns (R,) whether the class is confirmed now.
+
+        A view before the start frame is not counted, and the next one replaces it.
+        """
         evidence.evidence[rows[evidence.views[rows] == 0]] = 0.0
         super().fuse(evidence, motion, proposals, rows, likelihood)
         started: Bool = motion.age[rows] >= self._start_frame
         evidence.views[rows] -= ~started
-        return self._certain(evidence.posterior[rows].T) & started
+        return self._is_confirmed(evidence.posterior[rows].T) & started

@@ -30,7 +30,6 @@ def run(arguments: argparse.Namespace) -> int:
     from modt import profile
     from modt.app import assembly, checks
     from modt.app.inputs import live_source
-    from modt.classification.pointnet import PointNet
     from modt.energy.meters.discovery import discover
 
     config = profile.load(arguments.profile)
@@ -41,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
         *checks.permissions(),
         checks.meters(discover(config.energy)),
         checks.kernels(lambda: assembly.chosen_kernels(config.segmentation.kernels).name),
-        checks.model(limits, lambda: PointNet(limits, config.sensor).facts()),
+        checks.model(limits, lambda: assembly.network(limits, config.sensor).facts()),
         checks.near(config.sensor),
         checks.disk(arguments.out, config),
         checks.clock(),

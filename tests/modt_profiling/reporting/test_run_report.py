@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt import profile
-from modt.classification.scheduler import padded_size
+from modt.classification.call_cost import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.energy.ledger import StageWork
 from modt.errors import MisuseError

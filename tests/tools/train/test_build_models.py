@@ -6,7 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from modt.classification.pointnet import PointNet, ort
+from modt.app import assembly
+from modt.classification.network import ort
 from modt.config import ClassificationConfig, SensorConfig
 from tests.tools.train.datasets import write_folder
 from tools.train import build_models
@@ -26,7 +27,7 @@ def test_one_command_trains_on_scans_of_ones_own(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["build_models", str(tmp_path), *options])
     build_models.main()
     path = tmp_path / "pointnet-scans.onnx"
-    PointNet(ClassificationConfig(model=str(path)), SensorConfig())  # checks the hash on the card
+    assembly.network(ClassificationConfig(model=str(path)), SensorConfig())  # checks the hash on the card
     card = path.with_suffix(".md").read_text(encoding="utf-8")
     assert "| vlp-16 |" in card
     metadata = ort.InferenceSession(path).get_modelmeta().custom_metadata_map

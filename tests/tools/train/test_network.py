@@ -27,8 +27,8 @@ def test_max_pooled_linear_has_the_gradients_of_its_definition():
 @pytest.mark.parametrize("pool_first", [True, False])
 def test_the_exported_network_equals_the_trained_one(pool_first, tmp_path):
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
-    from modt.classification.pointnet import PointNet
-    from modt.config import ClassificationConfig, SensorConfig
+    from modt.classification.network import Network
+    from modt.model_file import ModelFile
     from tools.train.export_pointnet import graph
     from tools.train.network import PointNet as Trained
 
@@ -42,7 +42,7 @@ def test_the_exported_network_equals_the_trained_one(pool_first, tmp_path):
     net.eval()
     path = tmp_path / "net.onnx"
     path.write_bytes(graph(net.layers(), pool_first=pool_first).SerializeToString())
-    exported = PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+    exported = Network(ModelFile.read(path))
     for n in (1, 2, 17, 400, 1200):
         xyz = torch.randn(2 * n, 3) * 2
         expected = torch.softmax(net(xyz, torch.tensor([n, n])), dim=1).detach().numpy()

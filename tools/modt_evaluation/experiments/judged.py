@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from modt.app import assembly
-from modt.classification.scheduler import LinearCost, padded_size
+from modt.classification.call_cost import LinearCost, padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.pipeline import Pipeline

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from modt import host, profile
-from modt.classification.pointnet import PointNet
+from modt.app import assembly
 from modt_evaluation.experiments.catalogue import Experiment
 from modt_evaluation.experiments.study import Row
 
@@ -98,7 +98,7 @@ def _cell(row: Row) -> str:
 def sources(profiles: Sequence[Sequence[str]]) -> str:
     """A sentence: the commit, and the networks of these profiles."""
     configs = [profile.load(list(names)) for names in profiles]
-    facts = [PointNet(config.classification, config.sensor).facts() for config in configs]
+    facts = [assembly.network(config.classification, config.sensor).facts() for config in configs]
     models = ", ".join(dict.fromkeys(f"{found['file']} ({found['sha256'][:12]})" for found in facts))
     return f"Commit {commit()}, model {models}"
 

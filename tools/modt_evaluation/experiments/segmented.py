@@ -83,7 +83,7 @@ def _segmented(drive: Drive, config: ProfileConfig) -> SegmentedDrive:
 
 @cache
 def _network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
-    return PointNet(config, sensor)
+    return assembly.network(config, sensor)
 
 
 def _frames(drive: Drive, config: ProfileConfig, network: PointNet) -> Iterator[SegmentedFrame]:

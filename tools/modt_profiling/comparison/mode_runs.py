@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 
 from modt.app import assembly, inputs
-from modt.classification.scheduler import padded_size
+from modt.classification.call_cost import padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions, Meter

@@ -13,7 +13,7 @@ import numpy as np
 from modt.app import assembly, inputs
 from modt.app.chosen_profile import choose
 from modt.classification.pointnet import PointNet
-from modt.classification.scheduler import padded_size
+from modt.classification.call_cost import padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, StageWork
 from modt.energy.meters.discovery import discover

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modt.classification.scheduler import padded_size
+from modt.classification.call_cost import padded_size
 from modt.config import ClassificationConfig, EnergyConfig
 from modt.energy.ledger import LedgerLine
 from modt.energy.meters.meter import Kind

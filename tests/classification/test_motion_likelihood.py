@@ -8,14 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt.classification.motion_witness import LOG_LIKELIHOOD_RATIO, TOO_LARGE, log_likelihood
+from modt.classification.motion_likelihood import LOG_LIKELIHOOD_RATIO, MotionLikelihood
+from modt.classification.tuning import MotionTuning
 
 CAR, PEDESTRIAN, CYCLIST = (int(c) for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST))
 
 
 def ratios(moved_m: float, observed_s: float, length_m: float, width_m: float = 0.4) -> np.ndarray:
     size_m = np.array([[length_m, width_m, 1.5]])
-    return log_likelihood(np.array([moved_m]), np.array([observed_s]), size_m)[0]
+    return MotionLikelihood(MotionTuning()).log_ratio(np.array([moved_m]), np.array([observed_s]), size_m)[:, 0]
 
 
 @given(st.floats(0, 1e3), st.floats(0, 1e4), st.floats(0, 1e3))
@@ -23,7 +24,7 @@ def test_no_motion_rules_a_class_out(moved_m: float, observed_s: float, length_m
     found = ratios(moved_m, observed_s, length_m)
     assert found[0] == 0.0
     assert np.abs(found[:CYCLIST]).max() <= np.abs(LOG_LIKELIHOOD_RATIO).max() == 1.5
-    assert np.abs(found[CYCLIST]) <= 1.5 + TOO_LARGE
+    assert np.abs(found[CYCLIST]) <= 1.5 + MotionTuning().oversize_penalty
 
 
 @pytest.mark.parametrize(

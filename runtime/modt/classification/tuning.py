@@ -1,0 +1,280 @@
+"""Chosen values of the classification stage: what each does to the result, its unit, and what it was chosen on.
+
+Values that a profile may set stand in `modt.config`; values that were fixed when a model was trained stand beside
+the code that shares them with the training.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class BatchingTuning:
+    """Division of the crops of a frame into calls of the network."""
+
+    max_padding_points: int = 100
+    """Points of padding that a batch takes on for its next crop [points]. More padding makes fewer but larger calls.
+
+    Chosen on: CPU time of the calls of single frames; results are the same.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class MotionTuning:
+    """Likelihood of the classes by motion and size, besides the table counted on simulated drives."""
+
+    oversize_penalty: float = 3.0
+    """Log-likelihood that a cyclist loses where the track is larger than one. With less, hidden cars are cyclists.
+
+    Chosen on: parts of hidden cars that were reported as cyclists for 30 frames.
+    """
+    oversize_ratio: float = 1.1
+    """Size over the greatest size of a cyclist from which a track is larger than one: a cyclist may once be seen
+    together with something else.
+
+    Chosen on: parts of hidden cars that were reported as cyclists for 30 frames.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceTuning:
+    """Weights of views and boxes in the posterior of a track."""
+
+    view_memory: float = 0.72
+    """Weight of the views so far when a further one is added. With less, a track follows its latest views.
+
+    Chosen on: judgement.
+    """
+    view_exponent: float = 0.22
+    """Power of their number with which views weigh together; 1 would multiply them as independent ones.
+
+    Chosen on: judgement; log-odds of consecutive views of a car are correlated by .8 to .87.
+    """
+    box_memory: float = 0.5
+    """Weight of the boxes so far when a further one is added. With less, a track follows its latest boxes.
+
+    Chosen on: judgement.
+    """
+    box_weight: float = 0.75
+    """Weight of the mean evidence of the boxes beside that of the views.
+
+    Chosen on: judgement.
+    """
+    mismatch_probability: float = 0.05
+    """Probability that a proposal is not the object of its track, whose posterior is then the prior of the box.
+
+    Chosen on: judgement.
+    """
+    background_threshold: float = 0.5
+    """Posterior under equal class frequencies from which mode accurate confirms background. With less, background is
+    confirmed sooner and classified less often.
+
+    Chosen on: judgement.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class RequestTuning:
+    """Conditions under which a track asks for a classification."""
+
+    more_points_ratio: float = 1.25
+    """An unconfirmed track is classified again at this multiple of the points of its last view.
+
+    Chosen on: judgement.
+    """
+    far_more_points_ratio: float = 2.0
+    """Confirmed background that may be an object is classified again at this multiple of the points of its last view.
+
+    Chosen on: 48 simulated drives of six sensors (seeds 1000 to 1003).
+    """
+    more_points_offset: int = 5
+    """Points that are needed beyond either multiple [points]: so many vary at random.
+
+    Chosen on: judgement.
+    """
+    first_view_min_hits: int = 2
+    """Frames with a proposal that mode efficient waits for before the first view [frames]. More of them spare calls
+    on spurious proposals.
+
+    Chosen on: judgement.
+    """
+    review_age_ratio: float = 2.0
+    """A confirmed object is classified again at this multiple of its age at the last view, and `review_frames` later.
+
+    Chosen on: judgement.
+    """
+    review_frames: int = 10
+    """See `review_age_ratio` [frames].
+
+    Chosen on: judgement.
+    """
+    unconfirmed_age_ratio: float = 1.3
+    """An unconfirmed track is classified again at this multiple of its age at the last view, and `unconfirmed_frames`
+    later. With more, fewer calls are made and cars are recognised later.
+
+    Chosen on: 48 simulated drives of six sensors (seeds 1000 to 1003).
+    """
+    unconfirmed_frames: int = 2
+    """See `unconfirmed_age_ratio` [frames].
+
+    Chosen on: 48 simulated drives of six sensors (seeds 1000 to 1003).
+    """
+    likely_background: float = 0.8
+    """Posterior of background above which an unconfirmed track waits by `background_age_ratio`. With less, more
+    tracks wait longer.
+
+    Chosen on: judgement; what is probably background was asked for as often as what is not.
+    """
+    background_age_ratio: float = 2.0
+    """The `unconfirmed_age_ratio` of a track that is probably background.
+
+    Chosen on: judgement.
+    """
+    maybe_person: float = 0.25
+    """Posterior of a pedestrian or cyclist above which an unconfirmed track may be a person: one view of a few points
+    is weak evidence, and many of them are right. With less, more calls are made.
+
+    Chosen on: number of calls on simulated drives.
+    """
+    person_frames: int = 4
+    """Frames after which a possible person is classified again at the latest [frames].
+
+    Chosen on: number of calls on simulated drives.
+    """
+    first_view_points: int = 20
+    """Points of a proposal from which mode accurate classifies what may be an object by its box, whatever its motion
+    [points].
+
+    Chosen on: people who stand still and had never been classified.
+    """
+    near_m: float = 3.0
+    """Distance below which mode accurate classifies whatever may be a person by its size, however unlikely it is one
+    by its box [m].
+
+    Chosen on: tall people who stand in front of the sensor.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class FusionTuning:
+    """Fusion of all that is known of a track, and its requests for further views."""
+
+    motion: MotionTuning = field(default_factory=MotionTuning)
+    evidence: EvidenceTuning = field(default_factory=EvidenceTuning)
+    requests: RequestTuning = field(default_factory=RequestTuning)
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionTuning:
+    """Reported class, and class frequency of the stream."""
+
+    min_background_frequency: float = 0.1
+    """Least frequency of background among the proposals of a stream.
+
+    Chosen on: judgement.
+    """
+    kept_probability: float = 0.4
+    """A reported class is kept down to this probability if its threshold is higher. With less, doubtful classes stay.
+
+    Chosen on: 48 simulated drives of six sensors (seeds 700 to 702, 710).
+    """
+    start_proposals: int = 2_000
+    """Weight of the class frequency at the start, as a number of proposals.
+
+    Chosen on: judgement.
+    """
+    memory_proposals: int = 20_000
+    """Greatest weight of the stream so far, as a number of proposals. With less, the frequency changes faster.
+
+    Chosen on: judgement.
+    """
+    max_frequency_ratio: float = 5.0
+    """A class becomes at most so many times as frequent as the model assumes.
+
+    Chosen on: judgement.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class WorthTuning:
+    """Worth of a call, which decides who comes first where the budget binds."""
+
+    uncertainty_weight: float = 0.4
+    """Weight of the normalised entropy of the posterior.
+
+    Chosen on: judgement.
+    """
+    nearness_weight: float = 0.3
+    """Weight of exp(-distance / `nearness_range_m`).
+
+    Chosen on: judgement.
+    """
+    novelty_weight: float = 0.3
+    """Weight of the relative change of points since the last view.
+
+    Chosen on: judgement.
+    """
+    nearness_range_m: float = 30.0
+    """Distance at which nearness is 1/e [m]. With less, far objects wait longer.
+
+    Chosen on: judgement.
+    """
+    waiting_weight: float = 0.1
+    """Worth added per frame of waiting [1/frame], so that every call is made in the end.
+
+    Chosen on: judgement.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class CallCostTuning:
+    """Estimate of the CPU time of classifications."""
+
+    memory: float = 0.98
+    """Weight per frame of the past measurements in the fit. With less, the estimate follows the machine faster.
+
+    Chosen on: judgement.
+    """
+    start_margin: float = 1.5
+    """Estimate over the fit, at the start.
+
+    Chosen on: judgement.
+    """
+    margin_step: float = 0.05
+    """Increase of the margin's logarithm by an underestimate.
+
+    Chosen on: judgement.
+    """
+    accepted_underestimates: float = 0.005
+    """Share of underestimates at which the margin stays as it is: half of the hundredth of the frames that may exceed
+    their budget.
+
+    Chosen on: simulated frames, of which at most one in a hundred may exceed its budget.
+    """
+    warm_up_weight: float = 0.2
+    """Weight of a measurement before the first frame over that of a frame's.
+
+    Chosen on: judgement.
+    """
+    starved_frames: int = 100
+    """Frames without any call after which one call may exceed the budget, which corrects an estimate that is too high
+    [frames].
+
+    Chosen on: judgement.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class ClassificationTuning:
+    """All chosen values of the stage, one part a mechanism."""
+
+    batching: BatchingTuning = field(default_factory=BatchingTuning)
+    fusion: FusionTuning = field(default_factory=FusionTuning)
+    decision: DecisionTuning = field(default_factory=DecisionTuning)
+    worth: WorthTuning = field(default_factory=WorthTuning)
+    call_cost: CallCostTuning = field(default_factory=CallCostTuning)
+
+
+DEFAULT = ClassificationTuning()
+"""Values that every stage has unless others are given."""
