@@ -6,14 +6,14 @@ import dataclasses
 
 import numpy as np
 
-from modt.pipeline import FusionStage
-from modt.types import Bool, Float32, Int, Proposals, Tracks
+from modt.types import Proposals, Tracks
 
 
-def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposals]:
+def blobs(counts, rng):
     """Frame of blobs of the given numbers of points, 5 to 50 m away, among as many points outside any proposal."""
     n = len(counts)
-    bearing, distance = rng.uniform(-3, 3, n), rng.uniform(5, 50, n)
+    bearing = rng.uniform(-3, 3, n)
+    distance = rng.uniform(5, 50, n)
     centre = np.c_[distance * np.cos(bearing), distance * np.sin(bearing), np.full(n, -1.0)]
     total = sum(counts)
     xyz = rng.normal(0, 0.5, (total, 3)) + np.repeat(centre, counts, axis=0)
@@ -26,7 +26,7 @@ def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposa
     return points, Proposals(members, offsets, points[members, :3].T, centre, box, none)
 
 
-def new_tracks(proposals: Proposals) -> Tracks:
+def new_tracks(proposals):
     """A new track for each proposal; the world frame is the sensor frame."""
     n = len(proposals)
     tracks = Tracks.blank(n)
@@ -38,7 +38,7 @@ def new_tracks(proposals: Proposals) -> Tracks:
     return tracks
 
 
-def with_points(proposals: Proposals, *counts: int) -> Proposals:
+def with_points(proposals, *counts):
     """The proposals with other numbers of points."""
     return dataclasses.replace(proposals, offsets=np.append(0, np.cumsum(counts)))
 
@@ -49,18 +49,19 @@ ROW = np.array([0])
 class Fused:
     """Blobs of some numbers of points, their tracks, and what fuses their views."""
 
-    def __init__(self, fusion: FusionStage, *counts: int, frames: int = 1) -> None:
+    def __init__(self, fusion, *counts, frames=1):
         _, self.proposals = blobs(list(counts), np.random.default_rng(3))
-        self.fusion, self.tracks = fusion, new_tracks(self.proposals)
+        self.fusion = fusion
+        self.tracks = new_tracks(self.proposals)
         self.tracks.hits[:] = self.tracks.age[:] = frames
 
-    def asks(self, wants_class: Bool | bool = True) -> list[bool]:
+    def asks(self, wants_class=True):
         """The tracks that ask for a classification, where these or all of them want one."""
         wanted = np.zeros(len(self.tracks), np.bool_) | wants_class
         self.fusion.observe(self.tracks, self.tracks, self.proposals)
         return self.fusion.asks(self.tracks, self.tracks, self.proposals, wanted).tolist()
 
-    def fuse(self, *view: float, rows: Int = ROW) -> Bool:
+    def fuse(self, *view, rows=ROW):
         """Fuse a view, and make final what is certain, as the state machine does."""
         likelihood = np.tile(view, (len(rows), 1))
         self.tracks.final[rows] = certain = self.fusion.fuse(

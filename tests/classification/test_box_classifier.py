@@ -31,7 +31,7 @@ from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.types import Cut, Float64
+from modt.types import Cut
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.classification.scenes import blobs
 from tools.train.dataset import Sensors, crop_features
@@ -44,7 +44,7 @@ WEIGHTS = PoolWeights(network=0.8, box=0.4)
 
 
 @given(arrays(np.float64, (6, N_FEATURES), elements=st.floats(-5, 5)))
-def test_logits_agree_with_the_reference_also_in_single_precision(feature: Float64) -> None:
+def test_logits_agree_with_the_reference_also_in_single_precision(feature):
     (w0, b0), (w1, b1) = LAYERS
     for row, found in zip(feature, logits(LAYERS, feature), strict=True):
         hidden = [np.tanh(sum(row[i] * w0[i, j] for i in range(N_FEATURES)) + b0[j]) for j in range(5)]
@@ -54,17 +54,18 @@ def test_logits_agree_with_the_reference_also_in_single_precision(feature: Float
     np.testing.assert_allclose(logits(single, feature), logits(LAYERS, feature), rtol=0, atol=2e-5)
 
 
-def test_a_model_keeps_layers_in_single_precision_and_weights() -> None:
+def test_a_model_keeps_layers_in_single_precision_and_weights():
     loaded = from_metadata({METADATA_KEY: json.dumps(classifier_entry(LAYERS, WEIGHTS))})
     assert loaded.weights == WEIGHTS
-    features, whole = RNG.normal(size=(6, N_FEATURES)), np.zeros(6, np.int64)
+    features = RNG.normal(size=(6, N_FEATURES))
+    whole = np.zeros(6, np.int64)
     single = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in LAYERS]
     expected = MlpBoxClassifier(single, WEIGHTS).log_probability(features, whole)
     np.testing.assert_array_equal(loaded.log_probability(features, whole), expected)
     assert not from_metadata({}).log_probability(features, whole).any()
 
 
-def layer(value: float, inputs: int = N_FEATURES, outputs: int = 4) -> list[object]:
+def layer(value, inputs=N_FEATURES, outputs=4):
     return [[[[value] * outputs] * inputs, [0.0] * outputs]]
 
 
@@ -82,19 +83,20 @@ def layer(value: float, inputs: int = N_FEATURES, outputs: int = 4) -> list[obje
         ),
     ],
 )
-def test_malformed_metadata_is_rejected(text: str) -> None:
+def test_malformed_metadata_is_rejected(text):
     with pytest.raises((KeyError, TypeError, ValueError)):
         from_metadata({METADATA_KEY: text})
 
 
-def test_features_are_independent_of_the_resolution() -> None:
-    box, ground = np.array([[20.0, 0.0, -0.73, 4.0, 1.6, 1.4, 0.0]]), np.array([-1.73])
+def test_features_are_independent_of_the_resolution():
+    box = np.array([[20.0, 0.0, -0.73, 4.0, 1.6, 1.4, 0.0]])
+    ground = np.array([-1.73])
     fine = box_features(np.array([160]), box, ground, np.deg2rad(0.1) * np.deg2rad(0.2))
     coarse = box_features(np.array([40]), box, ground, np.deg2rad(0.2) * np.deg2rad(0.4))
     np.testing.assert_allclose(fine, coarse)
 
 
-def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds() -> None:
+def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds():
     rng = np.random.default_rng(3)
     sizes, bounds = ([(rng.normal(size=(n, 4)), rng.normal(size=4))] for n in (N_FEATURES, N_BOUND_FEATURES))
     _, blob = blobs([10] * 6, rng)
@@ -105,14 +107,15 @@ def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds() -> N
     proposals = dataclasses.replace(blob, box=box, cut=cut, ground_z_m=np.full(6, -0.3))
     scored = BoxScores(MlpBoxClassifier(sizes, 0.4, bounds), NoReflectanceClassifier(), SENSOR).of(proposals).box
     features = proposal_features(proposals, SENSOR)
-    by_size, by_bounds = logits(sizes, features), logits(bounds, bound_features(features, cut))
+    by_size = logits(sizes, features)
+    by_bounds = logits(bounds, bound_features(features, cut))
     is_bound = [False, True, True, False, True, False]
     np.testing.assert_allclose(scored, np.where(np.array(is_bound)[:, None], by_bounds, by_size))
     without = BoxScores(MlpBoxClassifier(sizes, 0.4), NoReflectanceClassifier(), SENSOR).of(proposals).box
     np.testing.assert_array_equal(without, by_size)
 
 
-def test_features_of_crops_and_proposals_agree() -> None:
+def test_features_of_crops_and_proposals_agree():
     frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
     proposals = Segmenter(SegmentationConfig(), SENSOR, FieldOfView()).segment(frame.points)
     crops = gather(proposals, np.arange(len(proposals)), 100_000)

@@ -12,7 +12,7 @@ from tests.classification.scenes import blobs
 COUNTS = st.lists(st.integers(1, 60), min_size=1, max_size=6)
 
 
-def canonical_one(xyz: np.ndarray, ground_z_m: float) -> np.ndarray:
+def canonical_one(xyz, ground_z_m):
     """Slow reference: one crop, step by step."""
     x, y = xyz[:, :2].mean(axis=0)
     bearing = np.arctan2(y, x)
@@ -25,7 +25,7 @@ def canonical_one(xyz: np.ndarray, ground_z_m: float) -> np.ndarray:
 
 
 @given(counts=COUNTS, seed=st.integers(0, 1000))
-def test_canonical_agrees_with_the_reference(counts: list[int], seed: int) -> None:
+def test_canonical_agrees_with_the_reference(counts, seed):
     points, proposals = blobs(counts, np.random.default_rng(seed))
     ground_z_m = np.linspace(-2.0, -1.0, len(counts))
     crops = canonical(gather(proposals, np.arange(len(counts)), 1000), ground_z_m)
@@ -36,7 +36,7 @@ def test_canonical_agrees_with_the_reference(counts: list[int], seed: int) -> No
 
 
 @given(own=st.integers(1, 500), most=st.integers(1, 100))
-def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
+def test_a_large_proposal_is_subsampled_evenly(own, most):
     points, proposals = blobs([own], np.random.default_rng(own))
     crops = gather(proposals, np.array([0]), most)
     kept = [int(np.flatnonzero((points[proposals.members, :3] == p).all(axis=1))[0]) for p in crops.xyz]
@@ -47,7 +47,7 @@ def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
 
 
 @given(counts=COUNTS)
-def test_padding_repeats_own_points(counts: list[int]) -> None:
+def test_padding_repeats_own_points(counts):
     _, proposals = blobs(counts, np.random.default_rng(1))
     crops = gather(proposals, np.arange(len(counts)), 100)
     batch = crops.padded(np.arange(len(counts)))

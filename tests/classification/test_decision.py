@@ -7,7 +7,9 @@ from modt.classification.tuning import DecisionTuning
 from modt.config import DecisionConfig
 from modt.types import NONE, Tracks
 
-BACKGROUND, PEDESTRIAN, CYCLIST = ObjectClass.BACKGROUND, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST
+BACKGROUND = ObjectClass.BACKGROUND
+PEDESTRIAN = ObjectClass.PEDESTRIAN
+CYCLIST = ObjectClass.CYCLIST
 ASSUMED = np.array([0.8, 0.1, 0.06, 0.04])
 
 
@@ -43,7 +45,9 @@ def test_the_likelier_object_is_reported_where_missing_it_costs_more(missed_cost
     ],
 )
 def test_the_reported_class_is_kept_until_another_one_is_clearly_likelier(cost, posteriors, reported):
-    table, decision, history = tracks(posteriors[0]), Decision(DecisionConfig(missed_cost=(cost,) * 3), ASSUMED), []
+    table = tracks(posteriors[0])
+    decision = Decision(DecisionConfig(missed_cost=(cost,) * 3), ASSUMED)
+    history = []
     for posterior in posteriors:
         table.posterior[:] = posterior
         decision.decide(table, table, table)

@@ -14,8 +14,7 @@ from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.tuning import DEFAULT
 from modt.config import FusionConfig
-from modt.pipeline import FusionStage
-from modt.types import NONE, Bool, Float64, Proposals
+from modt.types import NONE
 from tests.classification.scenes import ROW, Fused, with_points
 
 CONFIG = FusionConfig()
@@ -23,10 +22,15 @@ WEIGHTS = DEFAULT.fusion.evidence
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 ALIKE = FrequencyPrior(FREQUENCY)
 ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in (FirstViews, FurtherViews, AnyView, KeyViews)))
-WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
-DOUBTFUL, LIKE_ANY = [0.4, 0.2, 0.2, 0.2], [0.8, 0.1, 0.05, 0.05]
-SURELY_BACKGROUND, CLEARLY_A_CAR = [0.997, 0.001, 0.001, 0.001], [0.001, 0.997, 0.001, 0.001]
-PERHAPS_A_CAR, PERHAPS_A_PERSON = [0.75, 0.23, 0.01, 0.01], [0.88, 0.01, 0.1, 0.01]
+WALL = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3]
+UNCERTAIN = [0.95, 0.03, 0.01, 0.01]
+CAR = [0.2, 0.6, 0.1, 0.1]
+DOUBTFUL = [0.4, 0.2, 0.2, 0.2]
+LIKE_ANY = [0.8, 0.1, 0.05, 0.05]
+SURELY_BACKGROUND = [0.997, 0.001, 0.001, 0.001]
+CLEARLY_A_CAR = [0.001, 0.997, 0.001, 0.001]
+PERHAPS_A_CAR = [0.75, 0.23, 0.01, 0.01]
+PERHAPS_A_PERSON = [0.88, 0.01, 0.1, 0.01]
 
 
 class FixedPrior:
@@ -34,24 +38,24 @@ class FixedPrior:
 
     frequency = FREQUENCY
 
-    def __init__(self, *rows: list[float], pool_weight: float = 0.0) -> None:
+    def __init__(self, *rows, pool_weight=0.0):
         self.rows = np.array(rows)
         self._pool_weight = pool_weight
 
-    def pool_weight(self, proposals: Proposals) -> float:
+    def pool_weight(self, proposals):
         return self._pool_weight
 
-    def probability(self, proposals: Proposals) -> Float64:
+    def probability(self, proposals):
         return self.rows
 
-    def may_be_object(self, probability: Float64, threshold: float) -> Bool:
+    def may_be_object(self, probability, threshold):
         return 1.0 - probability[:, 0] >= threshold
 
 
 @pytest.mark.parametrize("fusion", ALL)
 @given(st.lists(arrays(np.float64, 4, elements=st.floats(allow_nan=True, allow_infinity=True)), max_size=8))
 @settings(max_examples=40)
-def test_posterior_stays_a_distribution_for_any_likelihood(fusion: FusionStage, views: list[Float64]) -> None:
+def test_posterior_stays_a_distribution_for_any_likelihood(fusion, views):
     subject = Fused(fusion, 50, 50, frames=3)
     for view in views:
         subject.asks()
@@ -61,7 +65,7 @@ def test_posterior_stays_a_distribution_for_any_likelihood(fusion: FusionStage, 
         np.testing.assert_allclose(subject.tracks.posterior.sum(axis=1), 1.0)
 
 
-def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
+def test_every_frame_requests_all_tracks_with_a_proposal():
     subject = Fused(EveryFrame(), 50, 50)
     subject.tracks.final[:] = True
     subject.tracks.proposal[1] = NONE
@@ -72,16 +76,14 @@ def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     ("x", "length_m", "height_m", "asked"),
     [(2.5, 0.6, 1.7, True), (3.5, 0.6, 1.7, False), (2.5, 1.5, 1.7, False), (2.5, 0.6, 0.6, False)],
 )
-def test_a_possible_person_near_by_is_classified_whatever_its_box_says(
-    x: float, length_m: float, height_m: float, asked: bool
-) -> None:
+def test_a_possible_person_near_by_is_classified_whatever_its_box_says(x, length_m, height_m, asked):
     subject = Fused(FurtherViews(CONFIG, FixedPrior(WALL, WALL)), 50, 50, frames=3)
     subject.proposals.box[:, :6] = [x, 0.0, 0.0, length_m, 0.4, height_m]
     assert subject.asks() == [asked] * 2
 
 
 @pytest.mark.parametrize("mode", [FirstViews, FurtherViews])
-def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(mode: type[FusedTracks]) -> None:
+def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(mode):
     subject = Fused(mode(CONFIG, FixedPrior(CAR, CAR)), 50, 50, frames=3)
     subject.tracks.hidden[0] = True
     assert subject.asks() == [False, True]
@@ -101,15 +103,19 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
     views, boxes = (p / p.sum(axis=1, keepdims=True) for p in (views, boxes))
     prior = FixedPrior(boxes[0].tolist(), pool_weight=pool_weight)
     subject = Fused(FusedTracks(CONFIG, prior), 50)
-    fusion, tracks = subject.fusion, subject.tracks
-    tracks.moved_m[:], tracks.observed_s[:], tracks.size_m[:] = moved_m, 3.0, 1.0
+    fusion = subject.fusion
+    tracks = subject.tracks
+    tracks.moved_m[:] = moved_m
+    tracks.observed_s[:] = 3.0
+    tracks.size_m[:] = 1.0
     motion = MotionLikelihood(DEFAULT.fusion.motion).log_ratio(tracks.moved_m, tracks.observed_s, tracks.size_m)[:, 0]
     log_frequency = np.log(FREQUENCY / FREQUENCY.sum())
-    seen: list[tuple[float, Float64]] = []
+    seen = []
     box_mean = np.zeros(4)
     for k, (view, box, count) in enumerate(zip(views, boxes, counts.tolist(), strict=True)):
         now = with_points(subject.proposals, count)
-        prior.rows, tracks.hits[:] = box[None], k + 1
+        prior.rows = box[None]
+        tracks.hits[:] = k + 1
         fusion.observe(tracks, tracks, now)
         fusion.fuse(tracks, tracks, now, ROW, view[None])
         odds = (1 / box[0] - 1) / (1 / FREQUENCY[0] - 1)  # of an object by the box, over those by frequency
@@ -128,16 +134,17 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
 
 
 @pytest.mark.parametrize("make", [FurtherViews, FirstViews])
-def test_what_is_hardly_an_object_is_not_classified(make: type[FusedTracks]) -> None:
+def test_what_is_hardly_an_object_is_not_classified(make):
     """Mode accurate does classify a person by the box who stands still, if there are points enough to tell."""
     subject = Fused(make(CONFIG, FixedPrior(WALL, UNCERTAIN, CAR, *[PERHAPS_A_PERSON] * 2)), *[50] * 4, 10, frames=3)
-    subject.tracks.observed_s[3:], subject.tracks.size_m[3:] = 5.0, 0.6
+    subject.tracks.observed_s[3:] = 5.0
+    subject.tracks.size_m[3:] = 0.6
     assert subject.asks() == [False, False, True, make is FurtherViews, False]
     assert not subject.tracks.viewed.any()
     assert subject.tracks.posterior[:2, 1].max() < 0.05 < 0.2 < subject.tracks.posterior[2, 1]
 
 
-def test_efficient_requests_one_certain_view() -> None:
+def test_efficient_requests_one_certain_view():
     subject = Fused(FirstViews(CONFIG, FixedPrior(CAR, CAR)), 50, 50, frames=3)
     assert subject.asks() == [True, True]
     assert subject.fuse(*CLEARLY_A_CAR).all()
@@ -147,7 +154,7 @@ def test_efficient_requests_one_certain_view() -> None:
 
 
 @pytest.mark.parametrize("make", [FirstViews, FurtherViews])
-def test_an_uncertain_track_is_classified_again_with_clearly_more_points(make: type[FusedTracks]) -> None:
+def test_an_uncertain_track_is_classified_again_with_clearly_more_points(make):
     subject = Fused(make(CONFIG, FixedPrior(CAR)), 40, frames=3)
     subject.asks()
     assert not subject.fuse(*DOUBTFUL).any()
@@ -166,7 +173,8 @@ def test_certain_background_is_classified_again_for_many_points_or_another_box(p
     subject.asks()
     assert subject.fuse(*SURELY_BACKGROUND).all()
     prior.rows = np.array([box])
-    subject.tracks.age[:], subject.tracks.points[:] = 200, points
+    subject.tracks.age[:] = 200
+    subject.tracks.points[:] = points
     assert any(subject.asks(False)[0] for _ in range(5)) == asked
 
 
@@ -176,7 +184,8 @@ def test_certain_background_is_classified_again_for_many_points_or_another_box(p
 )
 def test_an_object_is_classified_again_at_growing_intervals_and_background_is_not(box, view, least, most):
     """An uncertain object is classified more often, with as many points all the while."""
-    subject, asked = Fused(FurtherViews(CONFIG, FixedPrior(box)), 50), []
+    subject = Fused(FurtherViews(CONFIG, FixedPrior(box)), 50)
+    asked = []
     for frame in range(1, 80):
         subject.tracks.age[:] = subject.tracks.hits[:] = frame
         if subject.asks(~subject.tracks.final)[0]:
@@ -190,12 +199,13 @@ def test_an_object_is_classified_again_at_growing_intervals_and_background_is_no
 @pytest.mark.parametrize(
     ("moved_m", "view", "person"), [(1.5, [0.75, 0.08, 0.15, 0.02], True), (0.0, LIKE_ANY, False)]
 )
-def test_a_possible_person_is_classified_again_within_four_frames(
-    make: type[FusedTracks], moved_m: float, view: list[float], person: bool
-) -> None:
-    subject, asked = Fused(make(CONFIG, FixedPrior(FREQUENCY.tolist())), 12), []
+def test_a_possible_person_is_classified_again_within_four_frames(make, moved_m, view, person):
+    subject = Fused(make(CONFIG, FixedPrior(FREQUENCY.tolist())), 12)
+    asked = []
     tracks = subject.tracks
-    tracks.size_m[:], tracks.moved_m[:], tracks.observed_s[:] = 0.6, moved_m, 3.0
+    tracks.size_m[:] = 0.6
+    tracks.moved_m[:] = moved_m
+    tracks.observed_s[:] = 3.0
     for frame in range(1, 60):
         tracks.age[:] = tracks.hits[:] = frame
         if subject.asks(~tracks.final)[0]:
@@ -205,7 +215,7 @@ def test_a_possible_person_is_classified_again_within_four_frames(
     assert (waits.max() == 4) if person else (waits.max() > 10)
 
 
-def test_a_remembered_place_is_background_until_its_box_may_be_an_object() -> None:
+def test_a_remembered_place_is_background_until_its_box_may_be_an_object():
     for make, asked in ((FurtherViews, [False, True]), (FirstViews, [False, False])):
         subject = Fused(make(CONFIG, FixedPrior(WALL, CAR)), 50, 50, frames=3)
         subject.tracks.final[:] = True
@@ -213,12 +223,13 @@ def test_a_remembered_place_is_background_until_its_box_may_be_an_object() -> No
         assert subject.tracks.posterior.tolist() == [[1.0, 0.0, 0.0, 0.0]] * 2
 
 
-def test_lost_tracks_keep_their_posterior_and_ask_for_nothing() -> None:
+def test_lost_tracks_keep_their_posterior_and_ask_for_nothing():
     subject = Fused(FurtherViews(CONFIG, FixedPrior(CAR)), 50, frames=3)
     subject.asks()
     subject.fuse(*CLEARLY_A_CAR)
     before = subject.tracks.posterior.copy()
-    subject.tracks.proposal[:], subject.tracks.age[:] = NONE, 100
+    subject.tracks.proposal[:] = NONE
+    subject.tracks.age[:] = 100
     assert subject.asks() == [False]
     np.testing.assert_array_equal(subject.tracks.posterior, before)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import onnx
 import pytest
@@ -13,7 +10,6 @@ from onnx import TensorProto, helper, numpy_helper
 from modt import model_file
 from modt.app import assembly
 from modt.classification.onnx_check import find_flaw
-from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from tests.fuzz.execution import limits
@@ -22,17 +18,17 @@ from tests.fuzz.runs import network
 SECRET = "secret.bin"
 
 
-def saved(folder: Path, model: onnx.ModelProto) -> Path:
+def saved(folder, model):
     path = folder / "net.onnx"
     path.write_bytes(model.SerializeToString())
     return path
 
 
-def load(path: Path) -> PointNet:
+def load(path):
     return assembly.network(ClassificationConfig(model=str(path)), SensorConfig())
 
 
-def elsewhere(tensor: TensorProto) -> TensorProto:
+def elsewhere(tensor):
     """The tensor, whose numbers are in another file."""
     tensor.ClearField("raw_data")
     tensor.data_location = TensorProto.EXTERNAL
@@ -41,20 +37,20 @@ def elsewhere(tensor: TensorProto) -> TensorProto:
     return tensor
 
 
-def zeros(name: str, n: int = 1, kind: type = np.float32) -> TensorProto:
+def zeros(name, n=1, kind=np.float32):
     return numpy_helper.from_array(np.zeros(n, kind), name)
 
 
-def initializer(tensor: TensorProto) -> Callable[[onnx.ModelProto], None]:
+def initializer(tensor):
     return lambda model: model.graph.initializer.append(tensor)
 
 
-def sparse(values: TensorProto, **options: object) -> Callable[[onnx.ModelProto], None]:
+def sparse(values, **options):
     made = onnx.SparseTensorProto(values=values, **options)
     return lambda model: model.graph.sparse_initializer.append(made)
 
 
-def node(kind: str, **attributes: object) -> Callable[[onnx.ModelProto], None]:
+def node(kind, **attributes):
     return lambda model: model.graph.node.append(helper.make_node(kind, ["points"], ["x"], **attributes))
 
 
@@ -103,7 +99,7 @@ def test_an_attribute_of_another_name_may_have_the_number_of_the_type_of_text():
         assert find_flaw(model.SerializeToString()) is None
 
 
-def large(*nodes: onnx.NodeProto, **numbers: list[int]) -> onnx.ModelProto:
+def large(*nodes, **numbers):
     """A small file that makes a large tensor of what is pooled, and cuts it to the probabilities."""
     model = network()
     del model.graph.node[:], model.graph.initializer[:]

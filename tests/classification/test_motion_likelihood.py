@@ -14,13 +14,13 @@ from modt.classification.tuning import MotionTuning
 CAR, PEDESTRIAN, CYCLIST = (int(c) for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST))
 
 
-def ratios(moved_m: float, observed_s: float, length_m: float, width_m: float = 0.4) -> np.ndarray:
+def ratios(moved_m, observed_s, length_m, width_m=0.4):
     size_m = np.array([[length_m, width_m, 1.5]])
     return MotionLikelihood(MotionTuning()).log_ratio(np.array([moved_m]), np.array([observed_s]), size_m)[:, 0]
 
 
 @given(st.floats(0, 1e3), st.floats(0, 1e4), st.floats(0, 1e3))
-def test_no_motion_rules_a_class_out(moved_m: float, observed_s: float, length_m: float) -> None:
+def test_no_motion_rules_a_class_out(moved_m, observed_s, length_m):
     found = ratios(moved_m, observed_s, length_m)
     assert found[0] == 0.0
     assert np.abs(found[:CYCLIST]).max() <= np.abs(LOG_LIKELIHOOD_RATIO).max() == 1.5
@@ -49,9 +49,9 @@ def test_motion_tells_classes_apart(moved_m, observed_s, length_m, likely, unlik
         (CYCLIST, (6.0, 3.0, 1.8, 1.5), (6.0, 3.0, 1.8, 0.7)),  # was seen wider
     ],
 )
-def test_what_was_seen_too_small_or_too_large_for_a_class_is_hardly_one(class_, less, more) -> None:
+def test_what_was_seen_too_small_or_too_large_for_a_class_is_hardly_one(class_, less, more):
     assert ratios(*less)[class_] < 0 < ratios(*more)[class_]
 
 
-def test_a_young_track_weighs_little() -> None:
+def test_a_young_track_weighs_little():
     assert np.abs(ratios(0.0, 0.1, 0.7)).max() < np.abs(ratios(0.0, 3.0, 0.7)).max()

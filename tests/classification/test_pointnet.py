@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import shutil
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx
@@ -16,27 +14,25 @@ from scipy.special import softmax
 from modt import assets
 from modt.app import assembly
 from modt.classification.box_classifier import NoBoxClassifier
-from modt.classification.network import Network, ort_errors
-from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
+from modt.classification.network import Network
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
-from modt.types import Float32, Float64
 from tests.classification.scenes import blobs
 from tests.fuzz.runs import network as small_network
 from tools.train.export_pointnet import graph
 
 SIZES = (3, 32, 64, 512, 256, 128, 4)
 SENSOR = SensorConfig()
-Layers = list[tuple[Float32, Float32]]
 
 
-def random_layers(seed: int) -> Layers:
+def random_layers(seed):
     rng = np.random.default_rng(seed)
     layers = [(rng.normal(size=(a, b)) * np.sqrt(2 / a), rng.normal(0, 0.3, b)) for a, b in pairwise(SIZES)]
     return [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers]
 
 
-def textbook(layers: Layers, xyz: Float32) -> Float64:
+def textbook(layers, xyz):
     """Slow reference: one crop, bias and ReLU on every point before the maximum, in double precision."""
     h = xyz.astype(np.float64)
     for weight, bias in layers[:3]:
@@ -45,31 +41,30 @@ def textbook(layers: Layers, xyz: Float32) -> Float64:
     for weight, bias in layers[3:-1]:
         h = np.maximum(h @ weight + bias, 0)
     weight, bias = layers[-1]
-    probability: Float64 = softmax(h @ weight + bias)
-    return probability
+    return softmax(h @ weight + bias)
 
 
-def write(folder: Path, model: onnx.ModelProto) -> Path:
+def write(folder, model):
     path = folder / "net.onnx"
     path.write_bytes(model.SerializeToString())
     return path
 
 
-def save(folder: Path, layers: Layers, **options: bool) -> Path:
+def save(folder, layers, **options):
     return write(folder, graph(layers, **options))
 
 
-def network(model: str | Path, **options: Any) -> PointNet:
+def network(model, **options):
     return assembly.network(ClassificationConfig(model=str(model), **options), SENSOR)
 
 
 @pytest.fixture(scope="module")
-def shipped() -> PointNet:
+def shipped():
     return network(ClassificationConfig().model)
 
 
 @pytest.mark.parametrize("pool_first", [True, False])
-def test_the_exported_graph_agrees_with_the_textbook(tmp_path: Path, pool_first: bool) -> None:
+def test_the_exported_graph_agrees_with_the_textbook(tmp_path, pool_first):
     layers = random_layers(1)
     net = network(save(tmp_path, layers, pool_first=pool_first))
     rng = np.random.default_rng(2)
@@ -79,7 +74,7 @@ def test_the_exported_graph_agrees_with_the_textbook(tmp_path: Path, pool_first:
         np.testing.assert_allclose(net.network.infer(batch), expected, atol=1e-4)
 
 
-def test_result_is_independent_of_batch_and_order(shipped: PointNet) -> None:
+def test_result_is_independent_of_batch_and_order(shipped):
     points, proposals = blobs([5, 300, 17, 17, 90, 1, 450, 33, 60, 8, 12], np.random.default_rng(0))
     rows = np.arange(len(proposals))
     together = shipped.classify(points, proposals, rows)
@@ -91,7 +86,7 @@ def test_result_is_independent_of_batch_and_order(shipped: PointNet) -> None:
 
 
 @pytest.mark.parametrize("likelihood", ["network", "pooled"])
-def test_ground_of_the_proposals_overrides_the_profile(likelihood: str) -> None:
+def test_ground_of_the_proposals_overrides_the_profile(likelihood):
     config = ClassificationConfig(likelihood=likelihood)
     low, unknown = (assembly.network(config, SensorConfig(height_m=height_m)) for height_m in (0.4, None))
     points, proposals = blobs([40, 7, 200], np.random.default_rng(5))
@@ -104,10 +99,11 @@ def test_ground_of_the_proposals_overrides_the_profile(likelihood: str) -> None:
 
 def test_the_papers_network_stands_alone_and_takes_a_fixed_number_of_points(shipped, monkeypatch):
     points, proposals = blobs([40, 7, 500], np.random.default_rng(4))
-    paper, sizes = network(shipped.model.path, max_points=400, likelihood="network"), []
+    paper = network(shipped.model.path, max_points=400, likelihood="network")
+    sizes = []
     assert isinstance(paper.box_scores.boxes, NoBoxClassifier)
     bare = network(shipped.model.path, max_points=400)
-    bare._pooled = lambda out, *_: out  # type: ignore[method-assign]
+    bare._pooled = lambda out, *_: out
     expected = bare.classify(points, proposals, np.arange(3))
     infer = Network.infer
     monkeypatch.setattr(Network, "infer", lambda self, batch: (sizes.append(batch.shape[:2]), infer(self, batch))[1])
@@ -116,14 +112,14 @@ def test_the_papers_network_stands_alone_and_takes_a_fixed_number_of_points(ship
 
 
 @pytest.mark.parametrize("name", [path.stem for path in assets.shipped("models", ".onnx")])
-def test_every_model_has_a_card_with_its_hash_and_licence(name: str) -> None:
+def test_every_model_has_a_card_with_its_hash_and_licence(name):
     model = network(name).model
     card = model.path.with_suffix(".md").read_text(encoding="utf-8")
     assert model.sha256 in card
     assert "licence:" in card
 
 
-def test_model_that_differs_from_its_card_is_misuse(tmp_path: Path, shipped: PointNet) -> None:
+def test_model_that_differs_from_its_card_is_misuse(tmp_path, shipped):
     model = save(tmp_path, random_layers(0))
     shutil.copy(shipped.model.path.with_suffix(".md"), model.with_suffix(".md"))
     with pytest.raises(MisuseError, match=r"net\.onnx: is not the model of net\.md"):
@@ -133,26 +129,15 @@ def test_model_that_differs_from_its_card_is_misuse(tmp_path: Path, shipped: Poi
 @pytest.mark.parametrize(
     "frequency", ["[0.5, 0.2, 0.2]", "[0.7, 0.3, 0.0, 0.1]", "[0.7, 0.5, 0.4, 0.3]", "[0.7, NaN, 0.1, 0.1]"]
 )
-def test_malformed_class_frequency_is_misuse(tmp_path: Path, frequency: str) -> None:
+def test_malformed_class_frequency_is_misuse(tmp_path, frequency):
     model = graph(random_layers(0))
     onnx.helper.set_model_props(model, {CLASS_FREQUENCY_KEY: frequency})
     with pytest.raises(MisuseError, match="class frequency"):
         network(write(tmp_path, model))
 
 
-def test_refusal_without_a_message_is_misuse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = save(tmp_path, random_layers(0))
-
-    def refuse(*args: Any, **kwargs: Any) -> None:
-        raise ort_errors.Fail
-
-    monkeypatch.setattr("onnxruntime.InferenceSession", refuse)
-    with pytest.raises(MisuseError, match=r"not an ONNX model \(Fail\)"):
-        network(path)
-
-
 @pytest.mark.parametrize("width", [(4, 4), (3, 5)])
-def test_model_of_other_shapes_is_misuse(tmp_path: Path, width: tuple[int, int]) -> None:
+def test_model_of_other_shapes_is_misuse(tmp_path, width):
     model = small_network()
     model.graph.input[0].type.tensor_type.shape.dim[2].dim_value = width[0]
     model.graph.output[0].type.tensor_type.shape.dim[1].dim_value = width[1]

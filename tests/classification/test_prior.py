@@ -25,11 +25,11 @@ SENSOR = SensorConfig(height_m=1.73)
 BOXES = MlpBoxClassifier(LAYERS, PoolWeights(network=0.8, box=0.4))
 
 
-def scores_of(boxes: MlpBoxClassifier | NoBoxClassifier) -> BoxScores:
+def scores_of(boxes):
     return BoxScores(boxes, NoReflectanceClassifier(), SENSOR)
 
 
-def standing(points: int, distance_m: float, length_m: float, width_m: float, height_m: float) -> Proposals:
+def standing(points, distance_m, length_m, width_m, height_m):
     """One proposal on the ground ahead of a sensor at 1.73 m."""
     _, proposals = blobs([points], np.random.default_rng(0))
     foot_m = 0.3
@@ -37,7 +37,7 @@ def standing(points: int, distance_m: float, length_m: float, width_m: float, he
     return dataclasses.replace(proposals, box=box)
 
 
-def test_box_prior_excludes_proposals_below_the_threshold() -> None:
+def test_box_prior_excludes_proposals_below_the_threshold():
     probability = np.array([[0.995, 0.005, 0.0, 0.0], [0.97, 0.01, 0.01, 0.01], [0.1, 0.9, 0.0, 0.0]])
     prior = make_prior(scores_of(BOXES), FREQUENCY)
     assert prior.may_be_object(probability, 0.02).tolist() == [False, True, True]
@@ -45,7 +45,7 @@ def test_box_prior_excludes_proposals_below_the_threshold() -> None:
     assert prior.probability(Proposals.empty()).shape == (0, 4)
 
 
-def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
+def test_prior_is_the_class_frequency_without_a_box_classifier():
     _, proposals = blobs([10, 20], np.random.default_rng(0))
     prior = make_prior(scores_of(NoBoxClassifier()), FREQUENCY)
     assert isinstance(prior, FrequencyPrior)
@@ -55,7 +55,7 @@ def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
     assert prior.probability(Proposals.empty()).shape == (0, 4)
 
 
-def test_scores_are_of_the_frame_that_is_given() -> None:
+def test_scores_are_of_the_frame_that_is_given():
     """The scores of the last frame are kept."""
     scores = scores_of(BOXES)
     first, second = (blobs(counts, RNG)[1] for counts in ([10, 30], [20, 5, 7]))
@@ -67,7 +67,7 @@ def test_scores_are_of_the_frame_that_is_given() -> None:
 
 
 @pytest.mark.parametrize("name", ["pointnet-kitti", "pointnet-synthetic"])
-def test_box_priors_of_the_shipped_models(name: str) -> None:
+def test_box_priors_of_the_shipped_models(name):
     prior = make_prior(assembly.network(ClassificationConfig(model=name), SensorConfig()).box_scores, FREQUENCY)
     car = prior.probability(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
     person = prior.probability(standing(120, 12.0, 0.6, 0.5, 1.4))[0]

@@ -13,7 +13,6 @@ from hypothesis.extra.numpy import arrays
 from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
-from modt.types import Float64
 from tests.classification.scenes import Fused, with_points
 
 PAPER = FusionConfig(rule="product", start_frame=1)
@@ -21,7 +20,7 @@ ALIKE = FrequencyPrior(np.full(4, 0.25))
 CAR = [0.2, 0.6, 0.1, 0.1]
 
 
-def key_views(**options: object) -> Fused:
+def key_views(**options):
     return Fused(KeyViews(dataclasses.replace(PAPER, **options), ALIKE), 50)
 
 
@@ -29,8 +28,9 @@ def key_views(**options: object) -> Fused:
     arrays(np.float64, (5, 4), elements=st.floats(0.05, 1.0)),
     arrays(np.float64, (3,), elements=st.floats(0.02, 0.3)),
 )
-def test_key_views_are_fused_by_equation_6(views: Float64, prior: Float64) -> None:
-    views, full = views / views.sum(axis=1, keepdims=True), np.append(1 - prior.sum(), prior)
+def test_key_views_are_fused_by_equation_6(views, prior):
+    views = views / views.sum(axis=1, keepdims=True)
+    full = np.append(1 - prior.sum(), prior)
     subject = Fused(KeyViews(dataclasses.replace(PAPER, object_threshold=1.0), FrequencyPrior(full)), 50)
     expected = full.copy()
     for view in views:
@@ -43,7 +43,7 @@ def test_key_views_are_fused_by_equation_6(views: Float64, prior: Float64) -> No
     assert subject.tracks.views[0] == len(views)
 
 
-def test_the_first_view_of_the_efficient_mode_is_final_whatever_it_is() -> None:
+def test_the_first_view_of_the_efficient_mode_is_final_whatever_it_is():
     subject = Fused(AnyView(PAPER, ALIKE), 50)
     assert subject.asks() == [True]
     assert subject.fuse(0.4, 0.2, 0.2, 0.2).all()
@@ -62,8 +62,10 @@ def test_independence_by_the_change_of_points_that_the_most_probable_class_needs
     assert subject.asks() == [independent]
 
 
-def test_a_view_before_the_start_frame_is_not_final_however_distinct_and_replaced_there() -> None:
-    subject, misled, distinct = key_views(start_frame=3), [0.005, 0.01, 0.98, 0.005], [0.98, 0.01, 0.005, 0.005]
+def test_a_view_before_the_start_frame_is_not_final_however_distinct_and_replaced_there():
+    subject = key_views(start_frame=3)
+    misled = [0.005, 0.01, 0.98, 0.005]
+    distinct = [0.98, 0.01, 0.005, 0.005]
     assert not subject.fuse(*misled).any()
     np.testing.assert_allclose(subject.tracks.posterior[0], misled, rtol=1e-6)
     subject.tracks.age[:] = 2
@@ -75,7 +77,7 @@ def test_a_view_before_the_start_frame_is_not_final_however_distinct_and_replace
     assert subject.tracks.views.tolist() == [1]
 
 
-def test_no_class_is_excluded_for_good() -> None:
+def test_no_class_is_excluded_for_good():
     subject = key_views()
     for view in [[1.0, 0.0, 0.0, 0.0]] * 50 + [[0.01, 0.97, 0.01, 0.01]] * 4:
         subject.fuse(*view)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import logging
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.box_classifier import (
     N_FEATURES,
-    Layers,
     MlpBoxClassifier,
     from_lists,
     logits,
@@ -33,7 +31,7 @@ from modt.classification.reflectance_classifier import (
 )
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
-from modt.types import N_REFLECTANCE, Cut, Float64, Proposals
+from modt.types import N_REFLECTANCE, Cut, Proposals
 from tests.classification.scenes import blobs
 from tools.train.export_pointnet import classifier_entry, to_lists
 
@@ -51,7 +49,7 @@ WEIGHTS = PoolWeights(network=0.7, box=0.3, reflectance=0.5)
 OTHER_LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH)
 
 
-def metadata_of(classifiers: dict[str, tuple[Layers, PoolWeights]]) -> str:
+def metadata_of(classifiers):
     """Metadata entry of classifiers by their scales."""
     return json.dumps({scale: classifier_entry(*own) for scale, own in classifiers.items()})
 
@@ -63,19 +61,19 @@ METADATA = {
 }
 
 
-def measured() -> Proposals:
+def measured():
     """Three proposals with reflectance."""
     _, proposals = blobs([10, 30, 60], np.random.default_rng(0))
     return dataclasses.replace(proposals, reflectance=REFLECTANCE)
 
 
-def prior_with_reflectance(scale: str = "hdl-64e") -> BoxPrior:
+def prior_with_reflectance(scale="hdl-64e"):
     """The prior with the reflectance of a sensor's scale."""
     sensor = SensorConfig(reflectance=scale)
     return BoxPrior(BoxScores(BOXES, from_metadata(METADATA, sensor), sensor), FREQUENCY)
 
 
-def test_prior_is_box_probability_times_reflectance_likelihood_by_the_classifier_of_the_sensors_scale() -> None:
+def test_prior_is_box_probability_times_reflectance_likelihood_by_the_classifier_of_the_sensors_scale():
     proposals = measured()
     boxes = proposal_features(proposals, SENSOR)
     for scale, layers, weight in (("hdl-64e", LAYERS, 0.5), ("pandar64", OTHER_LAYERS, 0.8)):
@@ -86,8 +84,9 @@ def test_prior_is_box_probability_times_reflectance_likelihood_by_the_classifier
         assert classifier.weights == PoolWeights(reflectance=weight)
 
 
-def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.LogCaptureFixture) -> None:
-    prior, bare = prior_with_reflectance(), blobs([10, 30], RNG)[1]
+def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog):
+    prior = prior_with_reflectance()
+    bare = blobs([10, 30], RNG)[1]
     with caplog.at_level(logging.WARNING):
         assert prior.probability(Proposals.empty()).shape == (0, 4)
         assert not caplog.records  # a frame without proposals does not say whether the sensor measures it
@@ -98,8 +97,9 @@ def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.
     assert "sensor.reflectance" in caplog.text
 
 
-def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
-    prior, whole = prior_with_reflectance(), measured()
+def test_a_proposal_without_reflectance_does_not_affect_the_others():
+    prior = prior_with_reflectance()
+    whole = measured()
     statistics = REFLECTANCE.copy()
     statistics[1] = np.nan
     probability = prior.probability(dataclasses.replace(whole, reflectance=statistics))
@@ -111,12 +111,12 @@ MALFORMED = "{}", "[]", "no json", '{"hdl-64e": null}', metadata_of({"hdl-46e": 
 
 
 @pytest.mark.parametrize("text", [*MALFORMED, metadata_of({"hdl-64e": (LAYERS, PoolWeights(reflectance=2.0))})])
-def test_malformed_metadata_is_rejected(text: str) -> None:
+def test_malformed_metadata_is_rejected(text):
     with pytest.raises((KeyError, TypeError, ValueError)):
         from_metadata({METADATA_KEY: text}, SENSOR)
 
 
-def _with_metadata(path: Path, metadata: dict[str, str]) -> ClassificationConfig:
+def _with_metadata(path, metadata):
     """The shipped model with other metadata."""
     onnx = pytest.importorskip("onnx", reason="extra [train] is not installed")
     model = onnx.load(assembly.network(ClassificationConfig(), SensorConfig()).model.path)
@@ -125,9 +125,10 @@ def _with_metadata(path: Path, metadata: dict[str, str]) -> ClassificationConfig
     return ClassificationConfig(model=str(path))
 
 
-def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
+def test_network_box_and_reflectance_are_pooled(tmp_path):
     points, _ = blobs([10, 30, 60], np.random.default_rng(0))
-    proposals, which = measured(), np.array([2, 0])
+    proposals = measured()
+    which = np.array([2, 0])
     metadata = {
         box_classifier.METADATA_KEY: json.dumps(classifier_entry(BOX_LAYERS, PoolWeights(0.8, 0.2))),
         METADATA_KEY: metadata_of({"hdl-64e": (LAYERS, WEIGHTS)}),
@@ -135,8 +136,10 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     }
     alone = assembly.network(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
     model = _with_metadata(tmp_path / "pooled.onnx", metadata)
-    shape, feature = alone.classify(points, proposals, which), proposal_features(proposals, SENSOR)[which]
-    box, likelihood = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
+    shape = alone.classify(points, proposals, which)
+    feature = proposal_features(proposals, SENSOR)[which]
+    box = np.exp(logits(BOX_LAYERS, feature))
+    likelihood = np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
     object_ = (box[:, 1:].sum(axis=1) / box[:, 0]) / (FREQUENCY[1:].sum() / FREQUENCY[0])
     either = np.c_[np.ones(2), np.tile(object_[:, None], 3)]  # the same for every class of object
     bare = dataclasses.replace(proposals, reflectance=None)
@@ -153,14 +156,15 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
         assert prior.pool_weight(given) == weight
 
 
-def test_shipped_model_separates_number_plates_from_leaves() -> None:
+def test_shipped_model_separates_number_plates_from_leaves():
     model = assembly.network(ClassificationConfig(), SENSOR)
     reflectance = model.box_scores.reflectance
     assert isinstance(reflectance, MlpReflectanceClassifier)
     _, proposals = blobs([150], np.random.default_rng(0))
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
     proposals = dataclasses.replace(proposals, box=box)
-    plates, leaves = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]]), np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
+    plates = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]])
+    leaves = np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
     prior = make_prior(model.box_scores, FREQUENCY)
     car, bush = (
         prior.probability(dataclasses.replace(proposals, reflectance=statistics))[0]
@@ -170,17 +174,18 @@ def test_shipped_model_separates_number_plates_from_leaves() -> None:
     assert bush[ObjectClass.CAR] < 0.3
 
 
-def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path: Path) -> None:
+def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path):
     onnx = pytest.importorskip("onnx", reason="extra [train] is not installed")
     points, blob = blobs([10, 30, 60], np.random.default_rng(0))
     box = blob.box.copy()
-    box[:, 2], box[:, 5] = -1.0, 0.5  # lower than a person
+    box[:, 2] = -1.0
+    box[:, 5] = 0.5  # lower than a person
     proposals = dataclasses.replace(blob, box=box, cut=np.array([Cut.TOP, 0, Cut.TOP]))
     whole = dataclasses.replace(proposals, cut=np.zeros(3, np.int64))
     metadata = {box_classifier.METADATA_KEY: json.dumps(classifier_entry(BOX_LAYERS, PoolWeights(0.8, 0.2)))}
     model = _with_metadata(tmp_path / "net.onnx", metadata)
 
-    def classified(given: Proposals, *which: int) -> Float64:
+    def classified(given, *which):
         return assembly.network(model, SensorConfig()).classify(points, given, np.array(which))
 
     alone = classified(proposals, 0, 1, 2)

@@ -272,7 +272,8 @@ class FurtherViews(FusedTracks):
         """(P,) proposals that are near, at most as long as a person, and at least half as high."""
         x, y, _, length_m, _, height_m, _ = proposals.box.T
         near: Bool = x * x + y * y < self._conditions.near_m**2
-        return near & (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
+        near &= (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
+        return near
 
 
 def _by_class(column: Float64, rows: Int) -> Float64:

@@ -87,8 +87,8 @@ class Network:
 
 
 def _first_line(error: Exception) -> str:
-    """First line of an error's message, or its type if it has no message."""
-    return next(iter(str(error).splitlines()), type(error).__name__)
+    """First line of an error's message."""
+    return str(error).partition("\n")[0]
 
 
 @cache

@@ -39,7 +39,10 @@ class PoolWeights:
         Raises:
             KeyError, TypeError, ValueError: missing, not a number, or out of range.
         """
-        return cls(*(fraction(content, name) for name in ("network", "box", "reflectance")))
+        weights = [float(content[name]) for name in ("network", "box", "reflectance")]
+        if not all(0.0 <= weight <= 1.0 for weight in weights):
+            raise ValueError(f"weights {weights}, wanted 0 to 1 each")
+        return cls(*weights)
 
 
 def _log_odds(log_probability: Float64) -> Float64:
@@ -93,15 +96,3 @@ def softmax(log_probability: Float64) -> Float64:
     likelihood = np.exp(by_class - by_class.max(axis=0))
     probability: Float64 = (likelihood / likelihood.sum(axis=0)).T
     return probability
-
-
-def fraction(content: Mapping[str, Any], key: str) -> float:
-    """Number from 0 to 1 under a key.
-
-    Raises:
-        KeyError, TypeError, ValueError: missing, not a number, or out of range.
-    """
-    value = float(content[key])
-    if not 0.0 <= value <= 1.0:
-        raise ValueError(f"{key} of {value}, wanted 0 to 1")
-    return value
