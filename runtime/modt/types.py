@@ -300,11 +300,11 @@ class Evidence(Columns):
 
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen
     posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, boxes, motion)
-    witness: Float64 = column(float, N_CLASSES)  # log P(motion | class) over that of background
+    motion_evidence: Float64 = column(float, N_CLASSES)  # log P(motion | class) over that of background
     box_evidence: Float64 = column(float, N_CLASSES)  # mean log P(box | class) of the boxes seen, up to a constant
     may_be_object: Bool = column(bool)  # by the last box seen and the motion
-    evidence: Float64 = column(float, N_CLASSES)  # mean log P(view | class) of the views, up to a constant
-    weight: Float64 = column(float)  # of the views together in that mean
+    view_evidence: Float64 = column(float, N_CLASSES)  # mean log P(view | class) of the views, up to a constant
+    view_weight: Float64 = column(float)  # of the views together in that mean
     views: Int = column(int)  # views fused
     key_points: Int = column(int)  # at the last view, 0 before any
     key_age: Int = column(int)  # age at the last view

@@ -92,7 +92,7 @@ def tracks_one_by_one(r):
             "state": r.state_names[t.state[k]],
             "class": CLASS_NAMES[t.object_class[k]],
             "posterior": np.round(t.posterior[k], 6).tolist(),
-            "witness": np.round(t.witness[k], 3).tolist(),
+            "witness": np.round(t.motion_evidence[k], 3).tolist(),
             "viewed": bool(t.viewed[k]),
             "final": bool(t.final[k]),
             "uncertain": UNKNOWN_NEAR if unknown_near(r)[k] else question(t, k),

@@ -142,7 +142,7 @@ class FusedTracks:
         gain = np.maximum(1.0 / motion.hits[rows], 1.0 - self._weights.box_memory) * ~motion.hidden[rows]
         box_evidence += gain * (_log(prior) - self._log_frequency[:, None] - box_evidence)
         evidence.prior[rows] = prior.T
-        evidence.witness[rows] = motion_evidence.T
+        evidence.motion_evidence[rows] = motion_evidence.T
         evidence.box_evidence[rows] = box_evidence.T
         weighted = prior * np.exp(motion_evidence)
         evidence.may_be_object[rows] = self._may_be_object((weighted / weighted.sum(axis=0)).T)
@@ -161,16 +161,16 @@ class FusedTracks:
         prior = evidence.prior.take(rows, axis=0)
         assumed = pooled_prior(_log(prior), self._log_frequency, self._prior.pool_weight(proposals))
         view = np.log(normalise(likelihood)) - assumed
-        mean = evidence.evidence.take(rows, axis=0)
+        mean = evidence.view_evidence.take(rows, axis=0)
         weight = np.sqrt(points)
-        total = self._weights.view_memory * evidence.weight[rows] + weight
-        evidence.evidence[rows] = mean + (weight / total)[:, None] * (view - mean)
-        evidence.weight[rows] = total
+        total = self._weights.view_memory * evidence.view_weight[rows] + weight
+        evidence.view_evidence[rows] = mean + (weight / total)[:, None] * (view - mean)
+        evidence.view_weight[rows] = total
         evidence.views[rows] += 1
         evidence.key_points[rows] = points
         evidence.key_age[rows] = motion.age[rows]
         box_evidence = _by_class(evidence.box_evidence, rows)
-        motion_evidence = _by_class(evidence.witness, rows)
+        motion_evidence = _by_class(evidence.motion_evidence, rows)
         posterior = self._posterior(evidence, rows, prior.T, box_evidence, motion_evidence)
         evidence.posterior[rows] = posterior.T
         return self._is_confirmed(posterior)
@@ -186,7 +186,7 @@ class FusedTracks:
             motion: (4, R) evidence of the motion.
         """
         weight = self._weight_of_views.take(evidence.views[rows], mode="clip")
-        log_weight = self._log_frequency[:, None] + weight * _by_class(evidence.evidence, rows)
+        log_weight = self._log_frequency[:, None] + weight * _by_class(evidence.view_evidence, rows)
         log_weight += self._weights.box_weight * boxes + motion
         posterior = (1.0 - self._weights.mismatch_probability) * from_log_weights(log_weight)
         posterior += self._weights.mismatch_probability * prior

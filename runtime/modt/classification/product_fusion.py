@@ -25,9 +25,9 @@ class AnyView:
 
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiply the view into the posterior; every class is confirmed."""
-        posterior = from_log_weights((evidence.evidence[rows] + np.log(normalise(likelihood))).T).T
+        posterior = from_log_weights((evidence.view_evidence[rows] + np.log(normalise(likelihood))).T).T
         evidence.posterior[rows] = posterior
-        evidence.evidence[rows] = np.log(posterior) - self._log_frequency
+        evidence.view_evidence[rows] = np.log(posterior) - self._log_frequency
         evidence.views[rows] += 1
         evidence.key_points[rows] = proposals.count[motion.proposal[rows]]
         return np.ones(len(rows), np.bool_)
@@ -62,7 +62,7 @@ class KeyViews(AnyView):
 
         A view before the start frame is not counted, and the next one replaces it.
         """
-        evidence.evidence[rows[evidence.views[rows] == 0]] = 0.0
+        evidence.view_evidence[rows[evidence.views[rows] == 0]] = 0.0
         super().fuse(evidence, motion, proposals, rows, likelihood)
         started: Bool = motion.age[rows] >= self._start_frame
         evidence.views[rows] -= ~started

@@ -120,7 +120,7 @@ def _rows(result: FrameResult) -> text.Text:
         "state": _words(result.state_names)[tracks.state],
         "class": _words(CLASS_NAMES)[tracks.object_class],
         "posterior": _group(text.probabilities(tracks.posterior)),
-        "witness": _group(text.rounded_to_3(tracks.witness)),
+        "witness": _group(text.rounded_to_3(tracks.motion_evidence)),
         "viewed": _words(BOOLEANS)[tracks.viewed.astype(np.int64)],
         "final": _words(BOOLEANS)[tracks.final.astype(np.int64)],
         "uncertain": _words(UNCERTAIN)[_doubts(result)],

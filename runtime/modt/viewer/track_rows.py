@@ -56,4 +56,4 @@ def result_rows(result: FrameResult) -> Float64:
         np.isin(tracks.id, result.classified),
         tracks.points,
     )
-    return np.column_stack([*plain, tracks.posterior, tracks.witness, box, tracks.x]).astype(np.float64)
+    return np.column_stack([*plain, tracks.posterior, tracks.motion_evidence, box, tracks.x]).astype(np.float64)
