@@ -16,7 +16,7 @@ from modt.classification.box_classifier import (
     METADATA_KEY,
     N_BOUND_FEATURES,
     N_FEATURES,
-    MlpBoxClassifier,
+    BoxClassifier,
     bound_features,
     box_features,
     from_lists,
@@ -27,7 +27,6 @@ from modt.classification.box_classifier import (
 from modt.classification.crops import gather, ground_z_m
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxScores
-from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
@@ -60,9 +59,9 @@ def test_a_model_keeps_layers_in_single_precision_and_weights():
     features = RNG.normal(size=(6, N_FEATURES))
     whole = np.zeros(6, np.int64)
     single = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in LAYERS]
-    expected = MlpBoxClassifier(single, WEIGHTS).log_probability(features, whole)
+    expected = BoxClassifier(single, WEIGHTS).log_probability(features, whole)
     np.testing.assert_array_equal(loaded.log_probability(features, whole), expected)
-    assert not from_metadata({}).log_probability(features, whole).any()
+    assert from_metadata({}) is None
 
 
 def layer(value, inputs=N_FEATURES, outputs=4):
@@ -105,13 +104,13 @@ def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds():
     box[4, 2] = 0.6  # begins above the knees
     cut = np.array([0, Cut.TOP, Cut.TOP | Cut.NEAR, Cut.TOP, Cut.BOTTOM, Cut.BOTTOM])
     proposals = dataclasses.replace(blob, box=box, cut=cut, ground_z_m=np.full(6, -0.3))
-    scored = BoxScores(MlpBoxClassifier(sizes, 0.4, bounds), NoReflectanceClassifier(), SENSOR).of(proposals).box
+    scored = BoxScores(BoxClassifier(sizes, 0.4, bounds), None, SENSOR).of(proposals).box
     features = proposal_features(proposals, SENSOR)
     by_size = logits(sizes, features)
     by_bounds = logits(bounds, bound_features(features, cut))
     is_bound = [False, True, True, False, True, False]
     np.testing.assert_allclose(scored, np.where(np.array(is_bound)[:, None], by_bounds, by_size))
-    without = BoxScores(MlpBoxClassifier(sizes, 0.4), NoReflectanceClassifier(), SENSOR).of(proposals).box
+    without = BoxScores(BoxClassifier(sizes, 0.4), None, SENSOR).of(proposals).box
     np.testing.assert_array_equal(without, by_size)
 
 

@@ -10,10 +10,9 @@ import pytest
 
 from modt.app import assembly
 from modt.classes import ObjectClass
-from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, NoBoxClassifier, proposal_features
+from modt.classification.box_classifier import N_FEATURES, BoxClassifier, proposal_features
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxScores, FrequencyPrior, make_prior
-from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import ClassificationConfig, SensorConfig
 from modt.types import Proposals
 from tests.classification.scenes import blobs
@@ -22,11 +21,11 @@ RNG = np.random.default_rng(5)
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 LAYERS = [(RNG.normal(size=shape), RNG.normal(size=shape[1])) for shape in pairwise((N_FEATURES, 5, 4))]
 SENSOR = SensorConfig(height_m=1.73)
-BOXES = MlpBoxClassifier(LAYERS, PoolWeights(network=0.8, box=0.4))
+BOXES = BoxClassifier(LAYERS, PoolWeights(network=0.8, box=0.4))
 
 
 def scores_of(boxes):
-    return BoxScores(boxes, NoReflectanceClassifier(), SENSOR)
+    return BoxScores(boxes, None, SENSOR)
 
 
 def standing(points, distance_m, length_m, width_m, height_m):
@@ -47,7 +46,7 @@ def test_box_prior_excludes_proposals_below_the_threshold():
 
 def test_prior_is_the_class_frequency_without_a_box_classifier():
     _, proposals = blobs([10, 20], np.random.default_rng(0))
-    prior = make_prior(scores_of(NoBoxClassifier()), FREQUENCY)
+    prior = make_prior(scores_of(None), FREQUENCY)
     assert isinstance(prior, FrequencyPrior)
     np.testing.assert_allclose(prior.probability(proposals), [FREQUENCY] * 2)
     assert prior.may_be_object(prior.probability(proposals), 1.0).all()

@@ -15,7 +15,7 @@ from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.box_classifier import (
     N_FEATURES,
-    MlpBoxClassifier,
+    BoxClassifier,
     from_lists,
     logits,
     proposal_features,
@@ -25,8 +25,6 @@ from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, BoxScores, make_prior
 from modt.classification.reflectance_classifier import (
     METADATA_KEY,
-    MlpReflectanceClassifier,
-    NoReflectanceClassifier,
     from_metadata,
 )
 from modt.config import ClassificationConfig, SensorConfig
@@ -37,13 +35,13 @@ from tools.train.export_pointnet import classifier_entry, to_lists
 
 RNG = np.random.default_rng(6)
 BOX_LAYERS = from_lists([[RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4)]], N_FEATURES)
-BOXES = MlpBoxClassifier(BOX_LAYERS, PoolWeights())
+BOXES = BoxClassifier(BOX_LAYERS, PoolWeights())
 N_BOTH = N_FEATURES + N_REFLECTANCE
 LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH)
 REFLECTANCE = RNG.uniform(0, 1, (3, N_REFLECTANCE))
 FREQUENCY = np.array([0.8, 0.12, 0.05, 0.03])
 SENSOR = SensorConfig(reflectance="hdl-64e")
-WITHOUT = BoxPrior(BoxScores(BOXES, NoReflectanceClassifier(), SENSOR), FREQUENCY)
+WITHOUT = BoxPrior(BoxScores(BOXES, None, SENSOR), FREQUENCY)
 """The prior without reflectance."""
 WEIGHTS = PoolWeights(network=0.7, box=0.3, reflectance=0.5)
 OTHER_LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH)
@@ -159,7 +157,7 @@ def test_network_box_and_reflectance_are_pooled(tmp_path):
 def test_shipped_model_separates_number_plates_from_leaves():
     model = assembly.network(ClassificationConfig(), SENSOR)
     reflectance = model.box_scores.reflectance
-    assert isinstance(reflectance, MlpReflectanceClassifier)
+    assert reflectance is not None
     _, proposals = blobs([150], np.random.default_rng(0))
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
     proposals = dataclasses.replace(proposals, box=box)

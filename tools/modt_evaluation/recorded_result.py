@@ -42,7 +42,9 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     tracks.object_class[:] = [CLASS_NAMES.index(row["class"]) for row in rows]
     tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
     silent = [0.0] * len(CLASS_NAMES)  # runs of earlier versions have no "witness"
-    tracks.motion_evidence[:] = np.array([row.get("witness", silent) for row in rows]).reshape(tracks.motion_evidence.shape)
+    tracks.motion_evidence[:] = np.array([row.get("witness", silent) for row in rows]).reshape(
+        tracks.motion_evidence.shape
+    )
     tracks.size_m[:] = np.array([row.get("size", [0.0] * 3) for row in rows]).reshape(tracks.size_m.shape)
     tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]
     if (tracks.proposal < NONE).any():

@@ -26,7 +26,7 @@ from torch import Tensor, nn
 
 from modt.classes import CLASS_NAMES, N_CLASSES, ObjectClass
 from modt.classification import box_classifier
-from modt.classification.box_classifier import Layers, MlpBoxClassifier, bound_features
+from modt.classification.box_classifier import BoxClassifier, Layers, bound_features
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.classification.pool import log_pool
 from modt.types import Bool, Cut, Float64, Int
@@ -148,7 +148,7 @@ def score(probability: Float64, person: Bool) -> str:
     return f"{100 * called[person].mean():.0f} / {100 * person[called].mean() if called.any() else 0:.0f}"
 
 
-def table(first: Student, net: Student, boxes: MlpBoxClassifier, log_frequency: Float64, held: Dataset) -> list[str]:
+def table(first: Student, net: Student, boxes: BoxClassifier, log_frequency: Float64, held: Dataset) -> list[str]:
     """Markdown of the people found near, by their distance.
 
     Args:
@@ -204,7 +204,7 @@ def main() -> None:
     args.out.write_bytes(raw)
 
     classifier = box_classifier.from_metadata(metadata)
-    assert isinstance(classifier, MlpBoxClassifier)
+    assert classifier is not None
     classifier = replace(classifier, bounds=bounds)
     log_frequency = np.log(json.loads(metadata[CLASS_FREQUENCY_KEY]))
     tally = [np.bincount(d.label[d.trainable], minlength=N_CLASSES).tolist() for d in (near, streets)]

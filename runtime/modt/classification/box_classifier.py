@@ -71,18 +71,8 @@ _LENGTH_OFFSET_M = 0.05
 """Offset that keeps the logarithm of a length finite [m]."""
 
 
-class NoBoxClassifier:
-    """Box classifier of a model without one: every class is as likely as any other."""
-
-    weights = PoolWeights()
-
-    def log_probability(self, features: Float64, cut: Int) -> Float64:
-        """(R, 4) zeros."""
-        return np.zeros((len(features), N_CLASSES))
-
-
 @dataclass(frozen=True, slots=True)
-class MlpBoxClassifier:
+class BoxClassifier:
     """Multilayer perceptron, and one for cut boxes, whose sizes are lower bounds.
 
     Attributes:
@@ -101,9 +91,6 @@ class MlpBoxClassifier:
         if self.bounds is not None and len(rows := is_bound(features, cut).nonzero()[0]):
             out[rows] = logits(self.bounds, bound_features(features[rows], cut[rows]))
         return out
-
-
-BoxClassifier = NoBoxClassifier | MlpBoxClassifier
 
 
 def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64) -> Float64:
@@ -167,8 +154,8 @@ def proposal_features(proposals: Proposals, sensor: SensorConfig, beams: Beams |
     return box_features(proposals.count, box, ground_z_m(proposals, slice(None), sensor), beam_sr)
 
 
-def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None = None) -> BoxClassifier:
-    """Box classifier of a model; NoBoxClassifier where its metadata has none.
+def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None = None) -> BoxClassifier | None:
+    """Box classifier of a model; None where its metadata has none.
 
     Args:
         metadata: metadata of the model.
@@ -179,8 +166,8 @@ def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None 
     """
     text = metadata.get(METADATA_KEY)
     if text is None:
-        return NoBoxClassifier()
+        return None
     content = json.loads(text)
     bounds = from_lists(json.loads(beside[BOUNDS_KEY]), N_BOUND_FEATURES) if beside else None
     layers = from_lists(content["layers"], N_FEATURES)
-    return MlpBoxClassifier(layers, PoolWeights.from_dict(content["weights"]), bounds)
+    return BoxClassifier(layers, PoolWeights.from_dict(content["weights"]), bounds)

@@ -7,10 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.classes import ObjectClass
-from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, is_bound, proposal_features
+from modt.classes import N_CLASSES, ObjectClass
+from modt.classification.box_classifier import BoxClassifier, is_bound, proposal_features
 from modt.classification.pool import PoolWeights, softmax
-from modt.classification.reflectance_classifier import NoReflectanceClassifier, ReflectanceClassifier
+from modt.classification.reflectance_classifier import ReflectanceClassifier
 from modt.config import SensorConfig
 from modt.types import Bool, Float64, Proposals
 
@@ -39,12 +39,14 @@ class BoxScores:
     frame are kept.
 
     Args:
-        boxes: P(class | box); also an attribute.
-        reflectance: P(reflectance | class, box); also an attribute.
+        boxes: P(class | box), None if the model has none; also an attribute.
+        reflectance: P(reflectance | class, box), None if the model has none for this sensor; also an attribute.
         sensor: spacing of its beams, and its height where the proposals have none.
     """
 
-    def __init__(self, boxes: BoxClassifier, reflectance: ReflectanceClassifier, sensor: SensorConfig) -> None:
+    def __init__(
+        self, boxes: BoxClassifier | None, reflectance: ReflectanceClassifier | None, sensor: SensorConfig
+    ) -> None:
         self.boxes = boxes
         self.reflectance = reflectance
         self._sensor = sensor
@@ -54,7 +56,7 @@ class BoxScores:
     @property
     def informative(self) -> bool:
         """Whether there is either classifier."""
-        return not (isinstance(self.boxes, NoBoxClassifier) and isinstance(self.reflectance, NoReflectanceClassifier))
+        return self.boxes is not None or self.reflectance is not None
 
     def of(self, proposals: Proposals) -> Scores:
         """Scores of the proposals of a frame, worked out once as long as the frame is the same."""
@@ -64,13 +66,15 @@ class BoxScores:
 
     def _computed(self, proposals: Proposals) -> Scores:
         features = proposal_features(proposals, self._sensor, self._beams)
-        weights = None if proposals.reflectance is None else self.reflectance.weights
-        return Scores(
-            box=self.boxes.log_probability(features, proposals.cut),
-            reflectance=self.reflectance.log_likelihood(features, proposals.reflectance),
-            is_bound=is_bound(features, proposals.cut),
-            weights=weights or self.boxes.weights,
-        )
+        box = reflectance = np.zeros((len(proposals), N_CLASSES))
+        weights = PoolWeights()
+        if self.boxes is not None:
+            box = self.boxes.log_probability(features, proposals.cut)
+            weights = self.boxes.weights
+        if self.reflectance is not None:
+            reflectance = self.reflectance.log_likelihood(features, proposals.reflectance)
+            weights = weights if proposals.reflectance is None else self.reflectance.weights
+        return Scores(box, reflectance, is_bound(features, proposals.cut), weights)
 
 
 class Prior(Protocol):
@@ -140,4 +144,4 @@ class BoxPrior:
 
 def make_prior(scores: BoxScores, frequency: Float64) -> Prior:
     """BoxPrior; FrequencyPrior where the model has no box classifier."""
-    return FrequencyPrior(frequency) if isinstance(scores.boxes, NoBoxClassifier) else BoxPrior(scores, frequency)
+    return FrequencyPrior(frequency) if scores.boxes is None else BoxPrior(scores, frequency)

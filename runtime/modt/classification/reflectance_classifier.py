@@ -27,17 +27,7 @@ METADATA_KEY = "reflectance"
 """Key of the reflectance classifiers in the metadata of an ONNX model."""
 
 
-class NoReflectanceClassifier:
-    """Reflectance classifier of a model without one for this sensor: every class is as likely as any other."""
-
-    weights = None
-
-    def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) zeros."""
-        return np.zeros((len(box_features), N_CLASSES))
-
-
-class MlpReflectanceClassifier:
+class ReflectanceClassifier:
     """Multilayer perceptron over box features and reflectance statistics.
 
     Args:
@@ -70,24 +60,21 @@ class MlpReflectanceClassifier:
         return np.zeros((len(box_features), N_CLASSES))
 
 
-ReflectanceClassifier = NoReflectanceClassifier | MlpReflectanceClassifier
-
-
-def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> ReflectanceClassifier:
-    """Reflectance classifier of a model; NoReflectanceClassifier where its metadata has none of the sensor's scale.
+def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> ReflectanceClassifier | None:
+    """Reflectance classifier of a model; None where its metadata has none of the sensor's scale.
 
     Raises:
         KeyError, TypeError, ValueError: malformed entry.
     """
     text = metadata.get(METADATA_KEY)
     if text is None:
-        return NoReflectanceClassifier()
+        return None
     classifiers = {scale: _from_dict(content) for scale, content in dict(json.loads(text)).items()}
     if not classifiers or not classifiers.keys() <= set(REFLECTANCE_SCALES):
         raise ValueError(f"scales of reflectance {', '.join(classifiers) or 'none'}, not of {REFLECTANCE_SCALES}")
-    return classifiers.get(sensor.reflectance, NoReflectanceClassifier())
+    return classifiers.get(sensor.reflectance)
 
 
-def _from_dict(content: Mapping[str, Any]) -> MlpReflectanceClassifier:
+def _from_dict(content: Mapping[str, Any]) -> ReflectanceClassifier:
     layers = from_lists(content["layers"], N_FEATURES + N_REFLECTANCE)
-    return MlpReflectanceClassifier(layers, PoolWeights.from_dict(content["weights"]))
+    return ReflectanceClassifier(layers, PoolWeights.from_dict(content["weights"]))
