@@ -145,7 +145,7 @@ class Scheduler:
         """(R,) calls that the budget pays for, of calls for (R,) points by decreasing worth."""
         limit = self._time_limit(budget)
         granted = np.ones(len(points), np.bool_) if limit is None else self._within(limit, points)
-        if budget.calls is not None:
+        if budget.calls is not None and len(points) > budget.calls:
             granted &= np.cumsum(granted) <= budget.calls
         return granted
 
