@@ -1,4 +1,4 @@
-"""Synthetic proposals and tracks."""
+"""Synthetic proposals and tracks, and classifiers."""
 
 from __future__ import annotations
 
@@ -6,11 +6,17 @@ import dataclasses
 
 import numpy as np
 
+from modt.app import assembly
+from modt.config import ClassificationConfig, SensorConfig
 from modt.types import Proposals, Tracks
 
 
-def blobs(counts, rng):
-    """Frame of blobs of the given numbers of points, 5 to 50 m away, among as many points outside any proposal."""
+def blobs(counts, rng=0):
+    """Frame of blobs of the given numbers of points, 5 to 50 m away, among as many points outside any proposal.
+
+    They are placed by a generator of random numbers, or by one with a seed.
+    """
+    rng = np.random.default_rng(rng)
     n = len(counts)
     bearing = rng.uniform(-3, 3, n)
     distance = rng.uniform(5, 50, n)
@@ -24,6 +30,22 @@ def blobs(counts, rng):
     none = np.zeros(n, np.int64)
     offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
     return points, Proposals(members, offsets, points[members, :3].T, centre, box, none)
+
+
+SHIPPED = ClassificationConfig().model
+SENSOR = SensorConfig()
+
+
+def saved(folder, model):
+    """Path of an ONNX model that is written into a folder."""
+    path = folder / "net.onnx"
+    path.write_bytes(model.SerializeToString())
+    return path
+
+
+def classifier(model=SHIPPED, sensor=SENSOR, **options):
+    """The classifier with a model, by its name or path."""
+    return assembly.network(ClassificationConfig(model=str(model), **options), sensor)
 
 
 def new_tracks(proposals):
@@ -50,7 +72,7 @@ class Fused:
     """Blobs of some numbers of points, their tracks, and what fuses their views."""
 
     def __init__(self, fusion, *counts, frames=1):
-        _, self.proposals = blobs(list(counts), np.random.default_rng(3))
+        _, self.proposals = blobs(list(counts), 3)
         self.fusion = fusion
         self.tracks = new_tracks(self.proposals)
         self.tracks.hits[:] = self.tracks.age[:] = frames
@@ -62,9 +84,9 @@ class Fused:
         return self.fusion.asks(self.tracks, self.tracks, self.proposals, wanted).tolist()
 
     def fuse(self, *view, rows=ROW):
-        """Fuse a view, and make final what is certain, as the state machine does."""
+        """Fuse a view, and tell the tracks whose class is confirmed, as the state machine does."""
         likelihood = np.tile(view, (len(rows), 1))
-        self.tracks.final[rows] = certain = self.fusion.fuse(
+        self.tracks.final[rows] = confirmed = self.fusion.fuse(
             self.tracks, self.tracks, self.proposals, rows, likelihood
         )
-        return certain
+        return confirmed

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
+from dataclasses import asdict, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.classification.box_classifier import (
     METADATA_KEY,
@@ -48,9 +49,9 @@ def test_logits_agree_with_the_reference_also_in_single_precision(feature):
     for row, found in zip(feature, logits(LAYERS, feature), strict=True):
         hidden = [np.tanh(sum(row[i] * w0[i, j] for i in range(N_FEATURES)) + b0[j]) for j in range(5)]
         expected = [sum(hidden[j] * w1[j, k] for j in range(5)) + b1[k] for k in range(4)]
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+        assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
     single = from_lists(to_lists(LAYERS), N_FEATURES)
-    np.testing.assert_allclose(logits(single, feature), logits(LAYERS, feature), rtol=0, atol=2e-5)
+    assert_allclose(logits(single, feature), logits(LAYERS, feature), rtol=0, atol=2e-5)
 
 
 def test_a_model_keeps_layers_in_single_precision_and_weights():
@@ -60,7 +61,7 @@ def test_a_model_keeps_layers_in_single_precision_and_weights():
     whole = np.zeros(6, np.int64)
     single = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in LAYERS]
     expected = BoxClassifier(single, WEIGHTS).log_probability(features, whole)
-    np.testing.assert_array_equal(loaded.log_probability(features, whole), expected)
+    assert_array_equal(loaded.log_probability(features, whole), expected)
     assert from_metadata({}) is None
 
 
@@ -73,12 +74,12 @@ def layer(value, inputs=N_FEATURES, outputs=4):
     [
         *("[]", "{}", "no json"),
         *(
-            json.dumps({"weights": dataclasses.asdict(WEIGHTS), "layers": layers})
+            json.dumps({"weights": asdict(WEIGHTS), "layers": layers})
             for layers in (layer(np.nan), layer(1e300), layer(0.0, N_FEATURES - 1), layer(0.0, outputs=3), 3)
         ),
         *(
             json.dumps({"weights": weights, "layers": to_lists(LAYERS)})
-            for weights in (dataclasses.asdict(WEIGHTS) | {"network": 1.5}, {"network": 0.5, "box": 0.5}, None)
+            for weights in (asdict(WEIGHTS) | {"network": 1.5}, {"network": 0.5, "box": 0.5}, None)
         ),
     ],
 )
@@ -92,7 +93,7 @@ def test_features_are_independent_of_the_resolution():
     ground = np.array([-1.73])
     fine = box_features(np.array([160]), box, ground, np.deg2rad(0.1) * np.deg2rad(0.2))
     coarse = box_features(np.array([40]), box, ground, np.deg2rad(0.2) * np.deg2rad(0.4))
-    np.testing.assert_allclose(fine, coarse)
+    assert_allclose(fine, coarse)
 
 
 def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds():
@@ -103,15 +104,15 @@ def test_boxes_that_are_cut_where_a_person_may_go_on_are_scored_as_bounds():
     box[3, 5] = 5.0  # higher than any person
     box[4, 2] = 0.6  # begins above the knees
     cut = np.array([0, Cut.TOP, Cut.TOP | Cut.NEAR, Cut.TOP, Cut.BOTTOM, Cut.BOTTOM])
-    proposals = dataclasses.replace(blob, box=box, cut=cut, ground_z_m=np.full(6, -0.3))
+    proposals = replace(blob, box=box, cut=cut, ground_z_m=np.full(6, -0.3))
     scored = BoxScores(BoxClassifier(sizes, 0.4, bounds), None, SENSOR).of(proposals).box
     features = proposal_features(proposals, SENSOR)
     by_size = logits(sizes, features)
     by_bounds = logits(bounds, bound_features(features, cut))
     is_bound = [False, True, True, False, True, False]
-    np.testing.assert_allclose(scored, np.where(np.array(is_bound)[:, None], by_bounds, by_size))
+    assert_allclose(scored, np.where(np.array(is_bound)[:, None], by_bounds, by_size))
     without = BoxScores(BoxClassifier(sizes, 0.4), None, SENSOR).of(proposals).box
-    np.testing.assert_array_equal(without, by_size)
+    assert_array_equal(without, by_size)
 
 
 def test_features_of_crops_and_proposals_agree():

@@ -26,7 +26,7 @@ def canonical_one(xyz, ground_z_m):
 
 @given(counts=COUNTS, seed=st.integers(0, 1000))
 def test_canonical_agrees_with_the_reference(counts, seed):
-    points, proposals = blobs(counts, np.random.default_rng(seed))
+    points, proposals = blobs(counts, seed)
     ground_z_m = np.linspace(-2.0, -1.0, len(counts))
     crops = canonical(gather(proposals, np.arange(len(counts)), 1000), ground_z_m)
     for i in range(len(counts)):
@@ -35,12 +35,12 @@ def test_canonical_agrees_with_the_reference(counts, seed):
         np.testing.assert_allclose(crops.xyz[crops.offsets[i] : crops.offsets[i + 1]], expected, atol=2e-4)
 
 
-@given(own=st.integers(1, 500), most=st.integers(1, 100))
-def test_a_large_proposal_is_subsampled_evenly(own, most):
-    points, proposals = blobs([own], np.random.default_rng(own))
+@given(count=st.integers(1, 500), most=st.integers(1, 100))
+def test_a_large_proposal_is_subsampled_evenly(count, most):
+    points, proposals = blobs([count], count)
     crops = gather(proposals, np.array([0]), most)
     kept = [int(np.flatnonzero((points[proposals.members, :3] == p).all(axis=1))[0]) for p in crops.xyz]
-    assert len(kept) == min(own, most)
+    assert len(kept) == min(count, most)
     assert len(set(kept)) == len(kept)
     steps = np.diff(kept)
     assert len(steps) == 0 or steps.max() - steps.min() <= 1
@@ -48,10 +48,10 @@ def test_a_large_proposal_is_subsampled_evenly(own, most):
 
 @given(counts=COUNTS)
 def test_padding_repeats_own_points(counts):
-    _, proposals = blobs(counts, np.random.default_rng(1))
+    _, proposals = blobs(counts, 1)
     crops = gather(proposals, np.arange(len(counts)), 100)
     batch = crops.padded(np.arange(len(counts)))
     assert batch.shape == (len(counts), max(counts), 3)
-    for i, own in enumerate(batch):
+    for i, padded in enumerate(batch):
         expected = crops.xyz[crops.offsets[i] : crops.offsets[i + 1]]
-        assert {tuple(p) for p in own} == {tuple(p) for p in expected}
+        assert {tuple(p) for p in padded} == {tuple(p) for p in expected}

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose, assert_array_equal
 
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews, FusedTracks
 from modt.classification.motion_likelihood import MotionLikelihood
@@ -23,7 +24,7 @@ FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 ALIKE = FrequencyPrior(FREQUENCY)
 ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in (FirstViews, FurtherViews, AnyView, KeyViews)))
 WALL = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3]
-UNCERTAIN = [0.95, 0.03, 0.01, 0.01]
+UNLIKELY = [0.95, 0.03, 0.01, 0.01]
 CAR = [0.2, 0.6, 0.1, 0.1]
 DOUBTFUL = [0.4, 0.2, 0.2, 0.2]
 LIKE_ANY = [0.8, 0.1, 0.05, 0.05]
@@ -62,7 +63,7 @@ def test_posterior_stays_a_distribution_for_any_likelihood(fusion, views):
         subject.fuse(*view, rows=np.arange(2))
         subject.tracks.age[:] += 1
         assert (subject.tracks.posterior > 0).all()
-        np.testing.assert_allclose(subject.tracks.posterior.sum(axis=1), 1.0)
+        assert_allclose(subject.tracks.posterior.sum(axis=1), 1.0)
 
 
 def test_every_frame_requests_all_tracks_with_a_proposal():
@@ -130,13 +131,13 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
         if expected.min() < 1e-3:
             return  # the floor applies from here on
         expected = (1 - WEIGHTS.mismatch_probability) * expected + WEIGHTS.mismatch_probability * box
-        np.testing.assert_allclose(tracks.posterior[0], expected, rtol=1e-6)
+        assert_allclose(tracks.posterior[0], expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("make", [FurtherViews, FirstViews])
 def test_what_is_hardly_an_object_is_not_classified(make):
     """Mode accurate does classify a person by the box who stands still, if there are points enough to tell."""
-    subject = Fused(make(CONFIG, FixedPrior(WALL, UNCERTAIN, CAR, *[PERHAPS_A_PERSON] * 2)), *[50] * 4, 10, frames=3)
+    subject = Fused(make(CONFIG, FixedPrior(WALL, UNLIKELY, CAR, *[PERHAPS_A_PERSON] * 2)), *[50] * 4, 10, frames=3)
     subject.tracks.observed_s[3:] = 5.0
     subject.tracks.size_m[3:] = 0.6
     assert subject.asks() == [False, False, True, make is FurtherViews, False]
@@ -144,7 +145,7 @@ def test_what_is_hardly_an_object_is_not_classified(make):
     assert subject.tracks.posterior[:2, 1].max() < 0.05 < 0.2 < subject.tracks.posterior[2, 1]
 
 
-def test_efficient_requests_one_certain_view():
+def test_efficient_asks_for_one_view_that_confirms_a_class():
     subject = Fused(FirstViews(CONFIG, FixedPrior(CAR, CAR)), 50, 50, frames=3)
     assert subject.asks() == [True, True]
     assert subject.fuse(*CLEARLY_A_CAR).all()
@@ -154,7 +155,7 @@ def test_efficient_requests_one_certain_view():
 
 
 @pytest.mark.parametrize("make", [FirstViews, FurtherViews])
-def test_an_uncertain_track_is_classified_again_with_clearly_more_points(make):
+def test_an_unconfirmed_track_is_classified_again_with_clearly_more_points(make):
     subject = Fused(make(CONFIG, FixedPrior(CAR)), 40, frames=3)
     subject.asks()
     assert not subject.fuse(*DOUBTFUL).any()
@@ -167,7 +168,7 @@ def test_an_uncertain_track_is_classified_again_with_clearly_more_points(make):
     ("points", "box", "asked"),
     [(50, LIKE_ANY, False), (100, LIKE_ANY, False), (110, LIKE_ANY, True), (50, CAR, True)],
 )
-def test_certain_background_is_classified_again_for_many_points_or_another_box(points, box, asked):
+def test_confirmed_background_is_classified_again_for_many_points_or_another_box(points, box, asked):
     prior = FixedPrior(LIKE_ANY)
     subject = Fused(FurtherViews(CONFIG, prior), 50, frames=3)
     subject.asks()
@@ -183,7 +184,7 @@ def test_certain_background_is_classified_again_for_many_points_or_another_box(p
     [(CAR, CLEARLY_A_CAR, 4, 4), (CAR, PERHAPS_A_CAR, 8, 12), (LIKE_ANY, SURELY_BACKGROUND, 1, 1)],
 )
 def test_an_object_is_classified_again_at_growing_intervals_and_background_is_not(box, view, least, most):
-    """An uncertain object is classified more often, with as many points all the while."""
+    """An unconfirmed object is classified more often, with as many points all the while."""
     subject = Fused(FurtherViews(CONFIG, FixedPrior(box)), 50)
     asked = []
     for frame in range(1, 80):
@@ -231,11 +232,11 @@ def test_lost_tracks_keep_their_posterior_and_ask_for_nothing():
     subject.tracks.proposal[:] = NONE
     subject.tracks.age[:] = 100
     assert subject.asks() == [False]
-    np.testing.assert_array_equal(subject.tracks.posterior, before)
+    assert_array_equal(subject.tracks.posterior, before)
 
 
-@pytest.mark.parametrize(("make", "certain"), [(FirstViews, False), (FurtherViews, True)])
-def test_background_needs_to_be_as_certain_as_an_object_where_nobody_looks_again(make, certain):
+@pytest.mark.parametrize(("make", "confirmed"), [(FirstViews, False), (FurtherViews, True)])
+def test_background_needs_to_be_as_likely_as_an_object_where_nobody_looks_again(make, confirmed):
     subject = Fused(make(CONFIG, FixedPrior(FREQUENCY.tolist())), 50, frames=3)
     subject.asks()
-    assert subject.fuse(0.97, 0.02, 0.005, 0.005).tolist() == [certain]
+    assert subject.fuse(0.97, 0.02, 0.005, 0.005).tolist() == [confirmed]

@@ -8,27 +8,16 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from modt import model_file
-from modt.app import assembly
 from modt.classification.onnx_check import find_flaw
-from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
+from tests.classification.scenes import classifier, saved
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import network
 
 SECRET = "secret.bin"
 
 
-def saved(folder, model):
-    path = folder / "net.onnx"
-    path.write_bytes(model.SerializeToString())
-    return path
-
-
-def load(path):
-    return assembly.network(ClassificationConfig(model=str(path)), SensorConfig())
-
-
-def elsewhere(tensor):
+def external(tensor):
     """The tensor, whose numbers are in another file."""
     tensor.ClearField("raw_data")
     tensor.data_location = TensorProto.EXTERNAL
@@ -76,9 +65,9 @@ FUNCTION = helper.make_function("own", "f", ["a"], ["a"], [], [])
         (node("Constant", value_string="a"), "text"),
         (node("Constant", value_strings=["a", "b"]), "text"),
         (node("Cast", to=TensorProto.STRING), "text"),
-        (lambda model: elsewhere(model.graph.initializer[0]), "another file"),
-        (node("Constant", value=elsewhere(zeros("c", 12))), "another file"),
-        (sparse(elsewhere(zeros("s"))), "another file"),
+        (lambda model: external(model.graph.initializer[0]), "another file"),
+        (node("Constant", value=external(zeros("c", 12))), "another file"),
+        (sparse(external(zeros("s"))), "another file"),
         (node("If", then_branch=BRANCH, else_branch=BRANCH), "a graph within a node"),
         (lambda model: model.functions.append(FUNCTION), "functions"),
     ],
@@ -89,7 +78,7 @@ def test_what_reaches_beyond_the_file_is_refused_before_it_runs(change, cause, t
     model = network()
     change(model)
     with pytest.raises(MisuseError, match=rf"not an ONNX model that is run here \(.*{cause}"):
-        load(saved(tmp_path, model))
+        classifier(saved(tmp_path, model))
 
 
 def test_an_attribute_of_another_name_may_have_the_number_of_the_type_of_text():
@@ -126,7 +115,7 @@ LARGE = {
 @pytest.mark.parametrize("model", LARGE.values(), ids=LARGE)
 def test_a_small_file_that_takes_all_memory_is_refused(model, tmp_path):
     with limits(), pytest.raises(MisuseError, match="cannot run 8 proposals"):
-        load(saved(tmp_path, model))
+        classifier(saved(tmp_path, model))
 
 
 def test_an_output_of_another_shape_than_promised_is_refused(tmp_path):
@@ -135,10 +124,10 @@ def test_an_output_of_another_shape_than_promised_is_refused(tmp_path):
     model.graph.node.append(helper.make_node("Tile", ["once", "repeats"], ["probability"]))
     model.graph.initializer.append(numpy_helper.from_array(np.array([2, 1], np.int64), "repeats"))
     with pytest.raises(MisuseError, match=r"an output of shape \(16, 4\)"):
-        load(saved(tmp_path, model))
+        classifier(saved(tmp_path, model))
 
 
 def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):
     monkeypatch.setattr(model_file, "MAX_BYTES", 100)
     with pytest.raises(MisuseError, match="larger than"):
-        load(saved(tmp_path, network()))
+        classifier(saved(tmp_path, network()))

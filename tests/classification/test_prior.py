@@ -7,15 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
-from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.classification.box_classifier import N_FEATURES, BoxClassifier, proposal_features
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxScores, FrequencyPrior, make_prior
-from modt.config import ClassificationConfig, SensorConfig
+from modt.config import SensorConfig
 from modt.types import Proposals
-from tests.classification.scenes import blobs
+from tests.classification.scenes import blobs, classifier
 
 RNG = np.random.default_rng(5)
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
@@ -30,7 +30,7 @@ def scores_of(boxes):
 
 def standing(points, distance_m, length_m, width_m, height_m):
     """One proposal on the ground ahead of a sensor at 1.73 m."""
-    _, proposals = blobs([points], np.random.default_rng(0))
+    _, proposals = blobs([points])
     foot_m = 0.3
     box = np.array([[distance_m, 0.0, foot_m + height_m / 2 - 1.73, length_m, width_m, height_m, 0.0]])
     return dataclasses.replace(proposals, box=box)
@@ -45,10 +45,10 @@ def test_box_prior_excludes_proposals_below_the_threshold():
 
 
 def test_prior_is_the_class_frequency_without_a_box_classifier():
-    _, proposals = blobs([10, 20], np.random.default_rng(0))
+    _, proposals = blobs([10, 20])
     prior = make_prior(scores_of(None), FREQUENCY)
     assert isinstance(prior, FrequencyPrior)
-    np.testing.assert_allclose(prior.probability(proposals), [FREQUENCY] * 2)
+    assert_allclose(prior.probability(proposals), [FREQUENCY] * 2)
     assert prior.may_be_object(prior.probability(proposals), 1.0).all()
     assert prior.pool_weight(proposals) == 0.0
     assert prior.probability(Proposals.empty()).shape == (0, 4)
@@ -61,13 +61,13 @@ def test_scores_are_of_the_frame_that_is_given():
     for proposals in (first, first, second, first):
         found = scores.of(proposals)
         expected = BOXES.log_probability(proposal_features(proposals, SENSOR), proposals.cut)
-        np.testing.assert_array_equal(found.box, expected)
+        assert_array_equal(found.box, expected)
         assert not found.reflectance.any()
 
 
 @pytest.mark.parametrize("name", ["pointnet-kitti", "pointnet-synthetic"])
 def test_box_priors_of_the_shipped_models(name):
-    prior = make_prior(assembly.network(ClassificationConfig(model=name), SensorConfig()).box_scores, FREQUENCY)
+    prior = make_prior(classifier(name).box_scores, FREQUENCY)
     car = prior.probability(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
     person = prior.probability(standing(120, 12.0, 0.6, 0.5, 1.4))[0]
     wall = prior.probability(standing(600, 15.0, 12.0, 0.5, 2.3))[0]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose
 
 from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
@@ -39,7 +40,7 @@ def test_key_views_are_fused_by_equation_6(views, prior):
         expected /= expected.sum()
         if expected.min() < 1e-3:
             return  # the floor applies from here on
-        np.testing.assert_allclose(subject.tracks.posterior[0], expected, rtol=1e-6)
+        assert_allclose(subject.tracks.posterior[0], expected, rtol=1e-6)
     assert subject.tracks.views[0] == len(views)
 
 
@@ -67,13 +68,13 @@ def test_a_view_before_the_start_frame_is_not_final_however_distinct_and_replace
     misled = [0.005, 0.01, 0.98, 0.005]
     distinct = [0.98, 0.01, 0.005, 0.005]
     assert not subject.fuse(*misled).any()
-    np.testing.assert_allclose(subject.tracks.posterior[0], misled, rtol=1e-6)
+    assert_allclose(subject.tracks.posterior[0], misled, rtol=1e-6)
     subject.tracks.age[:] = 2
     assert subject.asks() == [False]
     subject.tracks.age[:] = 3
     assert subject.asks() == [True]
     assert subject.fuse(*distinct).all()
-    np.testing.assert_allclose(subject.tracks.posterior[0], distinct, rtol=1e-6)
+    assert_allclose(subject.tracks.posterior[0], distinct, rtol=1e-6)
     assert subject.tracks.views.tolist() == [1]
 
 

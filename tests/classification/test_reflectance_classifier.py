@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import softmax
 
-from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.box_classifier import (
@@ -27,10 +27,10 @@ from modt.classification.reflectance_classifier import (
     METADATA_KEY,
     from_metadata,
 )
-from modt.config import ClassificationConfig, SensorConfig
+from modt.config import SensorConfig
 from modt.errors import MisuseError
 from modt.types import N_REFLECTANCE, Cut, Proposals
-from tests.classification.scenes import blobs
+from tests.classification.scenes import blobs, classifier
 from tools.train.export_pointnet import classifier_entry, to_lists
 
 RNG = np.random.default_rng(6)
@@ -49,7 +49,7 @@ OTHER_LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], 
 
 def metadata_of(classifiers):
     """Metadata entry of classifiers by their scales."""
-    return json.dumps({scale: classifier_entry(*own) for scale, own in classifiers.items()})
+    return json.dumps({scale: classifier_entry(*parts) for scale, parts in classifiers.items()})
 
 
 METADATA = {
@@ -61,8 +61,8 @@ METADATA = {
 
 def measured():
     """Three proposals with reflectance."""
-    _, proposals = blobs([10, 30, 60], np.random.default_rng(0))
-    return dataclasses.replace(proposals, reflectance=REFLECTANCE)
+    _, proposals = blobs([10, 30, 60])
+    return replace(proposals, reflectance=REFLECTANCE)
 
 
 def prior_with_reflectance(scale="hdl-64e"):
@@ -77,7 +77,7 @@ def test_prior_is_box_probability_times_reflectance_likelihood_by_the_classifier
     for scale, layers, weight in (("hdl-64e", LAYERS, 0.5), ("pandar64", OTHER_LAYERS, 0.8)):
         prior = prior_with_reflectance(scale)
         expected = softmax(logits(BOX_LAYERS, boxes) + logits(layers, np.c_[boxes, REFLECTANCE]), axis=1)
-        np.testing.assert_allclose(prior.probability(proposals), expected)
+        assert_allclose(prior.probability(proposals), expected)
         classifier = from_metadata(METADATA, SensorConfig(reflectance=scale))
         assert classifier.weights == PoolWeights(reflectance=weight)
 
@@ -90,7 +90,7 @@ def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog):
         assert not caplog.records  # a frame without proposals does not say whether the sensor measures it
         for _ in range(3):
             probability = prior.probability(bare)
-            np.testing.assert_array_equal(probability, WITHOUT.probability(bare))
+            assert_array_equal(probability, WITHOUT.probability(bare))
     assert len(caplog.records) == 1
     assert "sensor.reflectance" in caplog.text
 
@@ -100,9 +100,9 @@ def test_a_proposal_without_reflectance_does_not_affect_the_others():
     whole = measured()
     statistics = REFLECTANCE.copy()
     statistics[1] = np.nan
-    probability = prior.probability(dataclasses.replace(whole, reflectance=statistics))
-    np.testing.assert_array_equal(probability[1], WITHOUT.probability(whole)[1])
-    np.testing.assert_array_equal(probability[[0, 2]], prior.probability(whole)[[0, 2]])
+    probability = prior.probability(replace(whole, reflectance=statistics))
+    assert_array_equal(probability[1], WITHOUT.probability(whole)[1])
+    assert_array_equal(probability[[0, 2]], prior.probability(whole)[[0, 2]])
 
 
 MALFORMED = "{}", "[]", "no json", '{"hdl-64e": null}', metadata_of({"hdl-46e": (LAYERS, WEIGHTS)})
@@ -117,14 +117,14 @@ def test_malformed_metadata_is_rejected(text):
 def _with_metadata(path, metadata):
     """The shipped model with other metadata."""
     onnx = pytest.importorskip("onnx", reason="extra [train] is not installed")
-    model = onnx.load(assembly.network(ClassificationConfig(), SensorConfig()).model.path)
+    model = onnx.load(classifier().model.path)
     onnx.helper.set_model_props(model, metadata)
     path.write_bytes(model.SerializeToString())
-    return ClassificationConfig(model=str(path))
+    return path
 
 
 def test_network_box_and_reflectance_are_pooled(tmp_path):
-    points, _ = blobs([10, 30, 60], np.random.default_rng(0))
+    points, _ = blobs([10, 30, 60])
     proposals = measured()
     which = np.array([2, 0])
     metadata = {
@@ -132,7 +132,7 @@ def test_network_box_and_reflectance_are_pooled(tmp_path):
         METADATA_KEY: metadata_of({"hdl-64e": (LAYERS, WEIGHTS)}),
         CLASS_FREQUENCY_KEY: json.dumps(FREQUENCY.tolist()),
     }
-    alone = assembly.network(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
+    alone = classifier(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
     model = _with_metadata(tmp_path / "pooled.onnx", metadata)
     shape = alone.classify(points, proposals, which)
     feature = proposal_features(proposals, SENSOR)[which]
@@ -140,54 +140,51 @@ def test_network_box_and_reflectance_are_pooled(tmp_path):
     likelihood = np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
     object_ = (box[:, 1:].sum(axis=1) / box[:, 0]) / (FREQUENCY[1:].sum() / FREQUENCY[0])
     either = np.c_[np.ones(2), np.tile(object_[:, None], 3)]  # the same for every class of object
-    bare = dataclasses.replace(proposals, reflectance=None)
+    bare = replace(proposals, reflectance=None)
     with_box = FREQUENCY * (shape / FREQUENCY) ** 0.8 * either**0.2
     for sensor, given, expected, weight in (
         (SENSOR, proposals, FREQUENCY * (shape / FREQUENCY) ** 0.7 * either**0.3 * likelihood**0.5, 0.3),
         (SENSOR, bare, with_box, 0.2),
         (SensorConfig(), proposals, with_box, 0.2),
     ):
-        network = assembly.network(model, sensor)
+        network = classifier(model, sensor)
         probability = network.classify(points, given, which)
-        np.testing.assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
+        assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
         prior = make_prior(network.box_scores, FREQUENCY)
         assert prior.pool_weight(given) == weight
 
 
 def test_shipped_model_separates_number_plates_from_leaves():
-    model = assembly.network(ClassificationConfig(), SENSOR)
+    model = classifier(sensor=SENSOR)
     reflectance = model.box_scores.reflectance
     assert reflectance is not None
-    _, proposals = blobs([150], np.random.default_rng(0))
+    _, proposals = blobs([150])
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
-    proposals = dataclasses.replace(proposals, box=box)
+    proposals = replace(proposals, box=box)
     plates = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]])
     leaves = np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
     prior = make_prior(model.box_scores, FREQUENCY)
-    car, bush = (
-        prior.probability(dataclasses.replace(proposals, reflectance=statistics))[0]
-        for statistics in (plates, leaves)
-    )
+    car, bush = (prior.probability(replace(proposals, reflectance=statistics))[0] for statistics in (plates, leaves))
     assert car[ObjectClass.CAR] > 0.9
     assert bush[ObjectClass.CAR] < 0.3
 
 
 def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path):
     onnx = pytest.importorskip("onnx", reason="extra [train] is not installed")
-    points, blob = blobs([10, 30, 60], np.random.default_rng(0))
+    points, blob = blobs([10, 30, 60])
     box = blob.box.copy()
     box[:, 2] = -1.0
     box[:, 5] = 0.5  # lower than a person
-    proposals = dataclasses.replace(blob, box=box, cut=np.array([Cut.TOP, 0, Cut.TOP]))
-    whole = dataclasses.replace(proposals, cut=np.zeros(3, np.int64))
+    proposals = replace(blob, box=box, cut=np.array([Cut.TOP, 0, Cut.TOP]))
+    whole = replace(proposals, cut=np.zeros(3, np.int64))
     metadata = {box_classifier.METADATA_KEY: json.dumps(classifier_entry(BOX_LAYERS, PoolWeights(0.8, 0.2)))}
     model = _with_metadata(tmp_path / "net.onnx", metadata)
 
     def classified(given, *which):
-        return assembly.network(model, SensorConfig()).classify(points, given, np.array(which))
+        return classifier(model).classify(points, given, np.array(which))
 
     alone = classified(proposals, 0, 1, 2)
-    np.testing.assert_array_equal(classified(whole, 0, 1, 2), alone)
+    assert_array_equal(classified(whole, 0, 1, 2), alone)
 
     beside = onnx.load(tmp_path / "net.onnx")
     last = next(i for i in beside.graph.initializer if i.name == "bias5")
@@ -198,8 +195,8 @@ def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path):
     (tmp_path / "net-near.onnx").write_bytes(beside.SerializeToString())
     found = classified(proposals, 2, 1, 0)
     assert (found[[0, 2], ObjectClass.PEDESTRIAN] > 0.99).all()
-    np.testing.assert_array_equal(found[1], alone[1])
-    np.testing.assert_array_equal(classified(whole, 0, 1, 2), alone)
+    assert_array_equal(found[1], alone[1])
+    assert_array_equal(classified(whole, 0, 1, 2), alone)
     onnx.helper.set_model_props(beside, {box_classifier.BOUNDS_KEY: "[]"})
     (tmp_path / "net-near.onnx").write_bytes(beside.SerializeToString())
     with pytest.raises(MisuseError, match="malformed box"):

@@ -35,7 +35,7 @@ def cost_model(max_points=400, slow=1.0):
 @given(counts=COUNTS, calls=st.none() | st.integers(1, 5), seed=st.integers(0, 100))
 def test_every_track_is_served_although_new_ones_keep_coming(counts, calls, seed):
     """By a number of calls, or by the CPU time of the largest one."""
-    _, proposals = blobs(counts, np.random.default_rng(seed))
+    _, proposals = blobs(counts, seed)
     tracks = new_tracks(proposals)
     cost = cost_model()
     budget = Budget(calls=calls) if calls else Budget(cpu_ms=cost.cost_ms(np.array([max(counts)])) + 1e-9)
@@ -50,7 +50,7 @@ def test_every_track_is_served_although_new_ones_keep_coming(counts, calls, seed
 
 
 def test_without_a_budget_all_are_served_by_decreasing_worth():
-    _, proposals = blobs([20, 20, 20], np.random.default_rng(0))
+    _, proposals = blobs([20, 20, 20])
     tracks = new_tracks(proposals)
     tracks.key_points[:] = 20
     tracks.posterior[1] = [0.97, 0.01, 0.01, 0.01]
@@ -62,7 +62,7 @@ def test_without_a_budget_all_are_served_by_decreasing_worth():
 
 
 def test_waiting_counts_deferred_frames():
-    _, proposals = blobs([20, 20, 20], np.random.default_rng(0))
+    _, proposals = blobs([20, 20, 20])
     tracks = new_tracks(proposals)
     tracks.proposal[2] = NONE
     tracks.waiting[:] = 5
@@ -153,7 +153,7 @@ def test_a_budget_of_nothing_buys_nothing(nothing):
 
 def test_a_large_proposal_is_saved_for_while_small_ones_ask():
     """Calls of less worth wait, else they would spend the budget that it needs."""
-    _, proposals = blobs([400] + [5] * 11, np.random.default_rng(0))
+    _, proposals = blobs([400] + [5] * 11)
     tracks = new_tracks(proposals)
     scheduler = Scheduler(cost_model())
     served = np.zeros(12, np.int64)

@@ -65,6 +65,7 @@ class BoxScores:
         return self._last[1]
 
     def _computed(self, proposals: Proposals) -> Scores:
+        """Scores of the proposals; 0 of a classifier that the model has not."""
         features = proposal_features(proposals, self._sensor, self._beams)
         box = reflectance = np.zeros((len(proposals), N_CLASSES))
         weights = PoolWeights()

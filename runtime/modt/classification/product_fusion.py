@@ -48,7 +48,7 @@ class KeyViews(AnyView):
 
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first or an independent view."""
-        rows = wants_class.nonzero()[0]
+        rows = wants_class.nonzero()[0]  # each has a proposal
         points = proposals.count[motion.proposal[rows]]
         key_points = evidence.key_points[rows]
         alpha = self._point_change[evidence.posterior[rows].argmax(axis=1)]  # of the likeliest class
