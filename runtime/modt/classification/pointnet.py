@@ -63,9 +63,9 @@ class PointNet:
         self._max_padding_points = tuning.max_padding_points
         metadata = self.network.metadata
         pooled = metadata if config.likelihood == "pooled" else {}
-        near = model.beside("-near") if pooled else None
-        self._near = None if near is None else Network(near)
         try:
+            near = model.beside("-near") if pooled else None
+            self._near = None if near is None else Network(near)
             boxes = box_classifier.from_metadata(pooled, self._near.metadata if self._near else None)
             reflectance = reflectance_classifier.from_metadata(pooled, sensor)
             self.box_scores = BoxScores(boxes, reflectance, sensor)
