@@ -103,11 +103,11 @@ class Scheduler:
         """The tracks to classify in this frame; writes how long the others have waited.
 
         Args:
-            requests: written.
-            motion: motion of the tracks alive.
-            evidence: evidence of the same.
+            requests: columns of the scheduler, written.
+            motion: the tracks alive.
+            evidence: their classes, as known so far.
             proposals: proposals of this frame.
-            asks: (M,) tracks that request a class.
+            asks: (M,) tracks that request a class, each with a proposal.
             budget: budget of the frame.
         """
         observed = motion.observed
