@@ -10,7 +10,6 @@ import onnx.parser
 
 from modt import assets, profile
 from modt.app import assembly
-from modt.classification.pointnet import PointNet
 from modt.cli import status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.sinks.run_directory import STATUS

@@ -151,7 +151,7 @@ class Continuity:
     """What goes on when the stages of a run are exchanged for those of another profile."""
 
     tracks: LiveTracks = field(default_factory=LiveTracks)
-    odometry: Odometry | None = None  # the last one, whose world the next one continues
+    odometry: PoseEstimator | None = None  # the last one, whose world the next one continues
 
 
 def pipeline(

@@ -12,7 +12,6 @@ import numpy as np
 
 from modt.app import assembly, inputs
 from modt.app.chosen_profile import choose
-from modt.classification.pointnet import PointNet
 from modt.classification.call_cost import padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, StageWork
@@ -138,7 +137,7 @@ def open_workload(
     workload = Workload(
         frames,
         segment=assembly.segmenter(profile, FieldOfView(), kernels).segment,
-        classify=PointNet(profile.classification, profile.sensor).classify,
+        classify=assembly.network(profile.classification, profile.sensor).classify,
         size=padded_size(profile.classification),
         ledger=Ledger(),
         windows=Windows(meters, Clocks(), Conditions(core or 0), math.inf),
