@@ -13,13 +13,13 @@ from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews, Fus
 from modt.classification.motion_likelihood import MotionLikelihood
 from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
-from modt.classification.tuning import DEFAULT
+from modt.classification.tuning import ClassificationTuning
 from modt.config import FusionConfig
 from modt.types import NONE
 from tests.classification.scenes import ROW, Fused, with_points
 
 CONFIG = FusionConfig()
-WEIGHTS = DEFAULT.fusion.evidence
+WEIGHTS = ClassificationTuning().fusion.evidence
 FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 ALIKE = FrequencyPrior(FREQUENCY)
 ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in (FirstViews, FurtherViews, AnyView, KeyViews)))
@@ -109,7 +109,9 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
     tracks.moved_m[:] = moved_m
     tracks.observed_s[:] = 3.0
     tracks.size_m[:] = 1.0
-    motion = MotionLikelihood(DEFAULT.fusion.motion).log_ratio(tracks.moved_m, tracks.observed_s, tracks.size_m)[:, 0]
+    motion = MotionLikelihood(ClassificationTuning().fusion.motion).log_ratio(
+        tracks.moved_m, tracks.observed_s, tracks.size_m
+    )[:, 0]
     log_frequency = np.log(FREQUENCY / FREQUENCY.sum())
     seen = []
     box_mean = np.zeros(4)

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from modt.segmentation.grids import SECTORS
 from modt.segmentation.groups import HEADINGS
-from modt.segmentation.tuning import DEFAULT
+from modt.segmentation.tuning import SegmentationTuning
 
 
 def within_distance(plane, radius):
@@ -32,14 +32,18 @@ def flood_fill(cells, beam_m):
                 if j is not None and component[j] < 0:
                     first = min(i, j, key=lambda k: (row[k], column[k]))
                     gap = max(low[i], low[j]) - min(high[i], high[j])
-                    if gap < DEFAULT.cells.max_gap_m + DEFAULT.cells.max_gap_beams * beam_m[first]:
+                    if (
+                        gap
+                        < SegmentationTuning().cells.max_gap_m
+                        + SegmentationTuning().cells.max_gap_beams * beam_m[first]
+                    ):
                         todo.append(j)
     return component
 
 
 def trace(lowest, stands, range_m, height_m, max_slope_deg):
     """(rings, SECTORS) ground cells, cells on and beside a ramp, and (SECTORS,) slope of the ramp at a ray's end."""
-    ground = DEFAULT.ground
+    ground = SegmentationTuning().ground
     max_slope, ramp_slope = (np.tan(np.deg2rad(v * max_slope_deg)) for v in (1.0, ground.ramp_share))
     is_ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
     last = [(-height_m, 0.0, 0.0)] * SECTORS

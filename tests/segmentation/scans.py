@@ -5,7 +5,7 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.tuning import DEFAULT
+from modt.segmentation.tuning import SegmentationTuning
 
 HDL_64E = np.deg2rad(np.linspace(-24.8, 2.0, 64))
 VLP_16 = np.deg2rad(np.linspace(-15.0, 15.0, 16))
@@ -54,7 +54,7 @@ def scan(boxes=(), height_m=1.73, elevation=HDL_64E, azimuth_deg=(-180.0, 180.0)
     return points, np.argmin(ranges, axis=0)[seen]
 
 
-def points_by_box(boxes, seed=0, step_deg=0.17, tuning=DEFAULT):
+def points_by_box(boxes, seed=0, step_deg=0.17, tuning=SegmentationTuning()):
     """Number of points of each proposal of a scene ahead by the box that they lie on."""
     points, on = scan(boxes, step_deg=step_deg, azimuth_deg=(-40, 40), seed=seed)
     sensor = SensorConfig(azimuth_step_deg=step_deg)

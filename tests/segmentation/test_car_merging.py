@@ -11,7 +11,7 @@ from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
 from modt.segmentation.strips import ViewBounds, merge_strips
-from modt.segmentation.tuning import DEFAULT, StripTuning
+from modt.segmentation.tuning import SegmentationTuning, StripTuning
 from tests.segmentation import reference, scans
 
 BEAM = np.tan(np.deg2rad(SensorConfig().elevation_step_deg))
@@ -64,7 +64,7 @@ def test_bounds_are_in_metres(bearing, range_m, width_m):
     assert bounds.max[1:, 0] == pytest.approx([range_m, 1.2, -0.3 / range_m], rel=1e-4)
 
 
-UNMERGED = replace(DEFAULT, strips=StripTuning(max_diagonal_m=0.0))
+UNMERGED = replace(SegmentationTuning(), strips=StripTuning(max_diagonal_m=0.0))
 
 
 @pytest.mark.parametrize(("x", "y"), [(28.0, 0.0), (34.0, -9.0), (40.0, 6.0)])

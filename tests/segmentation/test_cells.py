@@ -7,7 +7,7 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.cells import connect, occupied_cells
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
-from modt.segmentation.tuning import DEFAULT
+from modt.segmentation.tuning import SegmentationTuning
 from tests.segmentation import reference
 
 STEP = 0.03
@@ -30,7 +30,7 @@ def cells_of(grid, points, height):
 
 
 def components(grid, cells, beam_m):
-    gap_m = DEFAULT.cells.max_gap_m + DEFAULT.cells.max_gap_beams * beam_m
+    gap_m = SegmentationTuning().cells.max_gap_m + SegmentationTuning().cells.max_gap_beams * beam_m
     return connect(grid, cells, gap_m, np.ones(len(cells), np.bool_))
 
 

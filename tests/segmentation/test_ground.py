@@ -6,11 +6,11 @@ from hypothesis import strategies as st
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import SECTORS, PointColumns, pseudo_angle
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
-from modt.segmentation.tuning import DEFAULT
+from modt.segmentation.tuning import SegmentationTuning
 from tests.segmentation import reference, scans
 
 HEIGHT_M = 1.73
-DEFAULT_HEIGHT_M = DEFAULT.sensor_height.default_m
+DEFAULT_HEIGHT_M = SegmentationTuning().sensor_height.default_m
 MAX_SLOPE_DEG = SegmentationConfig().max_slope_deg
 PROFILES = {
     "flat": lambda x, y: np.full_like(x, -HEIGHT_M),

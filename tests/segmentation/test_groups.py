@@ -19,11 +19,11 @@ from modt.segmentation.groups import (
     reflectance_statistics,
 )
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.tuning import DEFAULT
+from modt.segmentation.tuning import SegmentationTuning
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import reference, scans
 
-SIDE_NOISE_M = DEFAULT.heading.side_noise_m
+SIDE_NOISE_M = SegmentationTuning().heading.side_noise_m
 
 
 def groups_of(sizes):

@@ -25,7 +25,7 @@ from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.tuning import DEFAULT
+from modt.segmentation.tuning import SegmentationTuning
 from modt.tracking.extent import extent_update_of
 from modt.tracking.kalman import filter_of
 from modt.tracking.states import ACCURATE
@@ -75,7 +75,7 @@ def same(one, other):
     return one == other
 
 
-def both(kernels, points, sensor=SENSOR, fov=FULL, tuning=DEFAULT):
+def both(kernels, points, sensor=SENSOR, fov=FULL, tuning=SegmentationTuning()):
     """Proposals of NumPy's kernels, which those of the compiled ones equal."""
     numpy, native = (
         Segmenter(SegmentationConfig(), sensor, fov, each, tuning).segment(points.copy()) for each in (NUMPY, kernels)
@@ -125,13 +125,15 @@ def test_rows_of_any_width_and_order(kernels):
 
 def test_every_value_of_the_tuning_reaches_both_kernels_alike(kernels):
     points = street(5, 3000)
-    for part in dataclasses.fields(DEFAULT):
-        mechanism = getattr(DEFAULT, part.name)
+    for part in dataclasses.fields(SegmentationTuning()):
+        mechanism = getattr(SegmentationTuning(), part.name)
         for field in dataclasses.fields(mechanism):
             value = getattr(mechanism, field.name)
             if isinstance(value, int | float):
                 changed = {field.name: value + 1 if isinstance(value, int) else 1.2 * value}
-                tuning = dataclasses.replace(DEFAULT, **{part.name: dataclasses.replace(mechanism, **changed)})
+                tuning = dataclasses.replace(
+                    SegmentationTuning(), **{part.name: dataclasses.replace(mechanism, **changed)}
+                )
                 both(kernels, points, tuning=tuning)
 
 
@@ -178,7 +180,11 @@ def test_groups(kernels, seed, sizes, extra):
 
 
 def some_strips(rng, n):
-    return strips(rng, n + 1), np.full(n + 1, np.deg2rad(rng.uniform(0.05, 2.0)), np.float32), DEFAULT.strips
+    return (
+        strips(rng, n + 1),
+        np.full(n + 1, np.deg2rad(rng.uniform(0.05, 2.0)), np.float32),
+        SegmentationTuning().strips,
+    )
 
 
 def some_kdops(rng, n):

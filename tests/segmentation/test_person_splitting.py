@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modt.segmentation.tuning import DEFAULT, SplitTuning
+from modt.segmentation.tuning import SegmentationTuning, SplitTuning
 from tests.segmentation import scans
 
 PERSON = (0.35, 0.5, 0.0, 1.75)
 CAR = (4.2, 1.8, 0.2, 1.5)
 
 
-WHOLE = replace(DEFAULT, split=SplitTuning(min_extent_m=10.0))
+WHOLE = replace(SegmentationTuning(), split=SplitTuning(min_extent_m=10.0))
 """No cluster is divided."""
-FINER = replace(DEFAULT, split=SplitTuning(min_cell_returns=0.1))
+FINER = replace(SegmentationTuning(), split=SplitTuning(min_cell_returns=0.1))
 """Clusters are divided where the returns lie far apart, too."""
 
 
@@ -60,7 +60,7 @@ def test_a_person_beside_something_is_split_off_it(thing):
 def test_one_object_is_not_split(thing):
     for seed in range(4):
         x, y, *rest = thing
-        for tuning in (DEFAULT, WHOLE):
+        for tuning in (SegmentationTuning(), WHOLE):
             assert len(scans.points_by_box([(x, y + 0.03 * seed, *rest)], seed, tuning=tuning)) == 1
 
 
@@ -68,6 +68,7 @@ def test_beyond_the_range_at_which_the_fine_grid_resolves_returns_nothing_is_spl
     """On a grid finer than the spacing of its returns a car would fall to pieces."""
     for seed in range(6):
         shipped, whole, finer = (
-            len(scans.points_by_box([(35.0, 4.0, *CAR)], seed, 0.35, tuning)) for tuning in (DEFAULT, WHOLE, FINER)
+            len(scans.points_by_box([(35.0, 4.0, *CAR)], seed, 0.35, tuning))
+            for tuning in (SegmentationTuning(), WHOLE, FINER)
         )
         assert shipped == whole <= finer

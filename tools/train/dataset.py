@@ -18,7 +18,7 @@ from modt.classification.crops import Crops
 from modt.config import SensorConfig
 from modt.geometry import upright_boxes
 from modt.segmentation.groups import HEADINGS, Groups, best_headings
-from modt.segmentation.tuning import DEFAULT
+from modt.segmentation.tuning import HeadingTuning
 from modt.types import NONE, Bool, Float64, Int
 
 VARIANT_NAMES = ("shipped", "clustered", "pasted", "synthetic")
@@ -248,7 +248,7 @@ def crop_features(crops: Crops, sensors: Sensors) -> Float64:
     """(R, 7) features of the boxes fitted to crops."""
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
-    heading = best_headings(x, y, groups, len(x), DEFAULT.heading.side_noise_m)
+    heading = best_headings(x, y, groups, len(x), HeadingTuning().side_noise_m)
     box = upright_boxes(np.stack([x, y, z]), groups.offsets, HEADINGS[heading])
     return box_features(crops.count, box, sensors.ground_z_m, sensors.beam_sr)
 

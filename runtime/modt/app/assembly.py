@@ -18,6 +18,7 @@ from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.scheduler import Scheduler
+from modt.classification.tuning import BatchingTuning, FusionTuning
 from modt.config import KERNELS, NATIVE, ClassificationConfig, FusionConfig, ProfileConfig, SensorConfig
 from modt.config import NUMPY as NUMPY_NAME
 from modt.energy.ledger import Ledger
@@ -25,17 +26,20 @@ from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
 from modt.geometry.kernels import GeometryKernels
+from modt.geometry.tuning import ShapeTuning
 from modt.model_file import ModelFile
 from modt.native.library import NotAvailableError, load
 from modt.odometry.pose_estimator import PoseEstimator
 from modt.pipeline import ClassificationStage, FusionStage, Pipeline, SegmentationStage
 from modt.placement import Mount
-from modt.segmentation.kernels import NUMPY, Kernels
+from modt.segmentation.kernels import Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
+from modt.segmentation.tuning import SegmentationTuning
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
 from modt.tracking.track_table import LiveTracks
 from modt.tracking.tracker import Tracker
+from modt.tuning import MethodTuning
 from modt.types import UNLIMITED, Budget, Float32, Proposals
 
 log = logging.getLogger(__name__)
@@ -52,7 +56,7 @@ class Mode:
     """
 
     machine: StateMachine
-    fusion: Callable[[FusionConfig, Prior], FusionStage]
+    fusion: Callable[[FusionConfig, Prior, FusionTuning], FusionStage]
     budget: Callable[[ProfileConfig], Budget]
 
 
@@ -60,16 +64,21 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
     return Budget(profile.scheduler.calls_per_frame, mean_ms=profile.classification_ms)
 
 
-Rule = Callable[[FusionConfig, Prior], FusionStage]
+MeanRule = Callable[[FusionConfig, Prior, FusionTuning], FusionStage]
+ProductRule = Callable[[FusionConfig, Prior], FusionStage]
 
 
-def _by_rule(mean: Rule, product: Rule) -> Rule:
-    """The fusion of the rule that the profile names."""
-    return lambda config, prior: (product if config.rule == "product" else mean)(config, prior)
+def _by_rule(mean: MeanRule, product: ProductRule) -> MeanRule:
+    """The fusion of the rule that the profile names; the product has nothing that was chosen."""
+
+    def fusion(config: FusionConfig, prior: Prior, tuning: FusionTuning) -> FusionStage:
+        return product(config, prior) if config.rule == "product" else mean(config, prior, tuning)
+
+    return fusion
 
 
 MODES = {
-    "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
+    "conventional": Mode(CONVENTIONAL, lambda config, prior, tuning: EveryFrame(), lambda profile: UNLIMITED),
     "efficient": Mode(EFFICIENT, _by_rule(FirstViews, AnyView), _profile_budget),
     "accurate": Mode(ACCURATE, _by_rule(FurtherViews, KeyViews), _profile_budget),
 }
@@ -97,7 +106,7 @@ class BlindSectorFilter:
 VARIABLE = "MODT_KERNELS"
 
 
-def chosen_kernels(wanted: str) -> Kernels:
+def chosen_kernels(wanted: str, tuning: ShapeTuning = ShapeTuning()) -> Kernels:
     """The kernels of a name in KERNELS, or of the name in the environment variable MODT_KERNELS.
 
     Raises:
@@ -107,32 +116,36 @@ def chosen_kernels(wanted: str) -> Kernels:
     if name not in KERNELS:
         raise MisuseError(VARIABLE, f"no kernels {name!r}", f"use one of: {', '.join(KERNELS)}")
     if name == NUMPY_NAME:
-        return NUMPY
+        return Kernels(tuning)
     try:
-        return NativeKernels(*load())
+        return NativeKernels(*load(), tuning)
     except NotAvailableError as error:
         if name == NATIVE:
             raise MisuseError("segmentation.kernels", f"native: {error}", f"or use {NUMPY_NAME}") from None
         log.warning("the passes over points run on NumPy: a frame takes about half as long again: %s", error)
-        return NUMPY
+        return Kernels(tuning)
 
 
-def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> SegmentationStage:
+def segmenter(
+    profile: ProfileConfig, fov: FieldOfView, kernels: Kernels, tuning: SegmentationTuning = SegmentationTuning()
+) -> SegmentationStage:
     """The first stage, the same in every mode."""
     sensor = profile.sensor
-    stage = Segmenter(profile.segmentation, sensor, fov, kernels)
+    stage = Segmenter(profile.segmentation, sensor, fov, kernels, tuning)
     if sensor.blind_sectors_deg is None:
         return stage
     return BlindSectorFilter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
 
 
-def network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
+def network(
+    config: ClassificationConfig, sensor: SensorConfig, tuning: BatchingTuning = BatchingTuning()
+) -> PointNet:
     """The classifier with the model that the configuration names.
 
     Raises:
         MisuseError: the model cannot be used.
     """
-    return PointNet(ModelFile.find(config.model), config, sensor)
+    return PointNet(ModelFile.find(config.model), config, sensor, tuning)
 
 
 def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> None:
@@ -160,6 +173,7 @@ def pipeline(
     fov: FieldOfView,
     ledger: Ledger | None = None,
     continuity: Continuity | None = None,
+    tuning: MethodTuning = MethodTuning(),
 ) -> Pipeline:
     """The stages of a mode. Without a ledger they have one of their own; without a continuity they begin anew.
 
@@ -167,22 +181,24 @@ def pipeline(
         MisuseError: the model cannot be used.
     """
     host.keep_freed_pages()
-    kernels = chosen_kernels(profile.segmentation.kernels)
+    kernels = chosen_kernels(profile.segmentation.kernels, tuning.shape)
     limits = profile.classification
-    classifier = network(limits, profile.sensor)
-    cost = LinearCost(limits.max_points, padded_size(limits))
+    batching = tuning.classification.batching
+    classifier = network(limits, profile.sensor, batching)
+    cost = LinearCost(limits.max_points, padded_size(limits, batching), tuning.classification.call_cost)
     warm_up(classifier.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost, profile)
     return stages(
         mode,
         profile,
         classifier,
-        segmenter(profile, fov, kernels),
+        segmenter(profile, fov, kernels, tuning.segmentation),
         classifier,
         cost,
         ledger or Ledger(),
         kernels,
         continuity,
+        tuning,
     )
 
 
@@ -196,15 +212,20 @@ def stages(
     ledger: Ledger,
     kernels: GeometryKernels,
     continuity: Continuity | None = None,
+    tuning: MethodTuning = MethodTuning(),
 ) -> Pipeline:
     """A pipeline around a given segmenter, and the network or a substitute of the given cost as its classifier."""
     prior = make_prior(network.box_scores, network.class_frequency)
     continuity = continuity or Continuity()
-    odometry = PoseEstimator(kernels)
+    odometry = PoseEstimator(kernels, tuning.odometry)
     if continuity.odometry is not None:
         odometry.adopt(continuity.odometry)
     continuity.odometry = odometry
-    decision = LikeliestClass if profile.decision.rule == "likeliest" else Decision
+    chosen = tuning.classification
+    if profile.decision.rule == "likeliest":
+        decision = LikeliestClass(profile.decision, network.class_frequency)
+    else:
+        decision = Decision(profile.decision, network.class_frequency, chosen.decision)
     return Pipeline(
         segmenter=segmenter,
         odometry=odometry,
@@ -214,11 +235,12 @@ def stages(
             period_s=profile.sensor.period_s,
             kernels=kernels,
             live=continuity.tracks,
+            tuning=tuning.tracking,
         ),
-        fusion=mode.fusion(profile.fusion, prior),
-        scheduler=Scheduler(cost, profile.sensor.period_s),
+        fusion=mode.fusion(profile.fusion, prior, chosen.fusion),
+        scheduler=Scheduler(cost, profile.sensor.period_s, chosen.worth),
         classifier=classifier,
-        decision=decision(profile.decision, network.class_frequency),
+        decision=decision,
         ledger=ledger,
         mount=Mount.of(profile.sensor.roll_deg, profile.sensor.pitch_deg),
     )

@@ -10,12 +10,12 @@ from itertools import product
 import numpy as np
 
 from modt.classification.crops import batches
-from modt.classification.tuning import DEFAULT, BatchingTuning, CallCostTuning
+from modt.classification.tuning import BatchingTuning, CallCostTuning
 from modt.config import ClassificationConfig
 from modt.types import Float32, Float64, Int, Proposals
 
 
-def padded_size(limits: ClassificationConfig, tuning: BatchingTuning = DEFAULT.batching) -> Callable[[Int], int]:
+def padded_size(limits: ClassificationConfig, tuning: BatchingTuning = BatchingTuning()) -> Callable[[Int], int]:
     """Function that counts the points processed by the network, padding included, for proposals of (R,) points.
 
     A call takes a batch of proposals, of max_points each at most, padded to the largest of them and to min_points.
@@ -56,7 +56,7 @@ class LinearCost:
     """
 
     def __init__(
-        self, max_points: int, size: Callable[[Int], int], tuning: CallCostTuning = DEFAULT.call_cost
+        self, max_points: int, size: Callable[[Int], int], tuning: CallCostTuning = CallCostTuning()
     ) -> None:
         self.size = size
         self._max_points = max_points

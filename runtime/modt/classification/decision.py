@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classes import N_CLASSES, ObjectClass
-from modt.classification.tuning import DEFAULT, DecisionTuning
+from modt.classification.tuning import DecisionTuning
 from modt.config import DecisionConfig
 from modt.types import Decisions, Evidence, Float64, Motion
 
@@ -53,7 +53,7 @@ class Decision(LikeliestClass):
         frequency: (4,) frequencies of the classes among the proposals of this stream, as estimated so far.
     """
 
-    def __init__(self, config: DecisionConfig, frequency: Float64, tuning: DecisionTuning = DEFAULT.decision) -> None:
+    def __init__(self, config: DecisionConfig, frequency: Float64, tuning: DecisionTuning = DecisionTuning()) -> None:
         super().__init__(config, frequency)
         self._assumed = frequency
         self._tuning = tuning

@@ -25,7 +25,7 @@ from modt.classes import N_CLASSES, PERSON_M, ObjectClass
 from modt.classification.motion_likelihood import MotionLikelihood
 from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
-from modt.classification.tuning import DEFAULT, FusionTuning
+from modt.classification.tuning import FusionTuning
 from modt.config import FusionConfig
 from modt.types import Bool, Evidence, Float64, Int, Motion, Proposals
 
@@ -119,7 +119,7 @@ class FusedTracks:
         tuning: weights of the evidence, and conditions of a view.
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior, tuning: FusionTuning = DEFAULT.fusion) -> None:
+    def __init__(self, config: FusionConfig, prior: Prior, tuning: FusionTuning = FusionTuning()) -> None:
         self._prior = prior
         self._min_object_probability = config.min_object_probability
         self._weights = tuning.evidence
@@ -215,7 +215,7 @@ class FirstViews(FusedTracks):
     a second time, so it has to be as likely as an object.
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior, tuning: FusionTuning = DEFAULT.fusion) -> None:
+    def __init__(self, config: FusionConfig, prior: Prior, tuning: FusionTuning = FusionTuning()) -> None:
         super().__init__(config, prior, tuning)
         self._is_confirmed = Confirmation(self._log_frequency, config.object_threshold, config.object_threshold)
 

@@ -13,7 +13,7 @@ from modt.classification.crops import batches, canonical, gather, ground_z_m
 from modt.classification.network import Network
 from modt.classification.pool import log_pool, softmax
 from modt.classification.prior import BoxScores
-from modt.classification.tuning import DEFAULT, BatchingTuning
+from modt.classification.tuning import BatchingTuning
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.model_file import ModelFile
@@ -54,7 +54,7 @@ class PointNet:
         model: ModelFile,
         config: ClassificationConfig,
         sensor: SensorConfig,
-        tuning: BatchingTuning = DEFAULT.batching,
+        tuning: BatchingTuning = BatchingTuning(),
     ) -> None:
         self.model = model
         self.network = Network(model)

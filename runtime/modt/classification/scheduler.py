@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.classes import N_CLASSES
 from modt.classification.call_cost import LinearCost
-from modt.classification.tuning import DEFAULT, WorthTuning
+from modt.classification.tuning import WorthTuning
 from modt.types import Bool, Budget, Evidence, Float64, Int, Motion, Proposals, Requests
 
 
@@ -80,7 +80,7 @@ class Scheduler:
         cost: as given.
     """
 
-    def __init__(self, cost: LinearCost, period_s: float = 0.1, tuning: WorthTuning = DEFAULT.worth) -> None:
+    def __init__(self, cost: LinearCost, period_s: float = 0.1, tuning: WorthTuning = WorthTuning()) -> None:
         self.cost = cost
         self._period_s = period_s
         self._tuning = tuning

@@ -6,7 +6,7 @@ the code that shares them with the training.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,9 +160,9 @@ class RequestTuning:
 class FusionTuning:
     """Fusion of all that is known of a track, and its requests for further views."""
 
-    motion: MotionTuning = field(default_factory=MotionTuning)
-    evidence: EvidenceTuning = field(default_factory=EvidenceTuning)
-    requests: RequestTuning = field(default_factory=RequestTuning)
+    motion: MotionTuning = MotionTuning()
+    evidence: EvidenceTuning = EvidenceTuning()
+    requests: RequestTuning = RequestTuning()
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,12 +269,8 @@ class CallCostTuning:
 class ClassificationTuning:
     """All chosen values of the stage, one part a mechanism."""
 
-    batching: BatchingTuning = field(default_factory=BatchingTuning)
-    fusion: FusionTuning = field(default_factory=FusionTuning)
-    decision: DecisionTuning = field(default_factory=DecisionTuning)
-    worth: WorthTuning = field(default_factory=WorthTuning)
-    call_cost: CallCostTuning = field(default_factory=CallCostTuning)
-
-
-DEFAULT = ClassificationTuning()
-"""Values that every stage has unless others are given."""
+    batching: BatchingTuning = BatchingTuning()
+    fusion: FusionTuning = FusionTuning()
+    decision: DecisionTuning = DecisionTuning()
+    worth: WorthTuning = WorthTuning()
+    call_cost: CallCostTuning = CallCostTuning()

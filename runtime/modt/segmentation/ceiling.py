@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.segmentation.tuning import DEFAULT, CeilingTuning
+from modt.segmentation.tuning import CeilingTuning
 from modt.types import Float32, Int
 
 
@@ -16,7 +16,7 @@ class CeilingFinder:
         tuning: what a ceiling is.
     """
 
-    def __init__(self, max_height_m: float, tuning: CeilingTuning = DEFAULT.ceiling) -> None:
+    def __init__(self, max_height_m: float, tuning: CeilingTuning = CeilingTuning()) -> None:
         self.max_height_m = max_height_m
         self.tuning = tuning
         self.bins = max(0, int((max_height_m - tuning.above_m) / tuning.bin_m)) + 2

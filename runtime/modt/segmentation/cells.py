@@ -13,7 +13,7 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
-from modt.segmentation.tuning import DEFAULT, CellTuning, SplitTuning
+from modt.segmentation.tuning import CellTuning, SplitTuning
 from modt.types import NONE, Bool, Float32, Int, Self
 
 
@@ -185,8 +185,8 @@ class CellClusterer:
         self,
         sensor: SensorConfig,
         config: SegmentationConfig,
-        cells: CellTuning = DEFAULT.cells,
-        split: SplitTuning = DEFAULT.split,
+        cells: CellTuning = CellTuning(),
+        split: SplitTuning = SplitTuning(),
     ) -> None:
         self.gap = cells
         self.split = split

@@ -12,7 +12,7 @@ from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.strips import ELEVATION
-from modt.segmentation.tuning import DEFAULT, SegmentationTuning
+from modt.segmentation.tuning import SegmentationTuning
 from modt.types import Bool, Float32, Int
 
 
@@ -35,7 +35,7 @@ class Clusterer:
         sensor: SensorConfig,
         config: SegmentationConfig,
         kernels: Kernels = NUMPY,
-        tuning: SegmentationTuning = DEFAULT,
+        tuning: SegmentationTuning = SegmentationTuning(),
     ) -> None:
         self.kernels = kernels
         self.config = config

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.segmentation.tuning import DEFAULT, PolarGridTuning
+from modt.segmentation.tuning import PolarGridTuning
 from modt.types import NONE, Float32, Float64, Int, Self
 
 FAR_M = np.float32(1e6)
@@ -69,7 +69,7 @@ class PolarGrid:
         tuning: width of a ring, and what is flat in a cell.
     """
 
-    def __init__(self, max_range_m: float, tuning: PolarGridTuning = DEFAULT.polar) -> None:
+    def __init__(self, max_range_m: float, tuning: PolarGridTuning = PolarGridTuning()) -> None:
         self.rings_per_unit = 1 / tuning.ring_step  # [1/sqrt(m)]
         self.rings = int(np.sqrt(max_range_m) / tuning.ring_step) + 2
         self.size = self.rings * SECTORS

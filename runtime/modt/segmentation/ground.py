@@ -10,7 +10,7 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid
 from modt.segmentation.groups import label_max, label_min
-from modt.segmentation.tuning import DEFAULT, GroundTuning, PolarGridTuning, SensorHeightTuning
+from modt.segmentation.tuning import GroundTuning, PolarGridTuning, SensorHeightTuning
 from modt.types import Bool, Float32, Int
 
 
@@ -28,8 +28,8 @@ class HeightEstimator:
     def __init__(
         self,
         sensor: SensorConfig,
-        tuning: SensorHeightTuning = DEFAULT.sensor_height,
-        polar: PolarGridTuning = DEFAULT.polar,
+        tuning: SensorHeightTuning = SensorHeightTuning(),
+        polar: PolarGridTuning = PolarGridTuning(),
     ) -> None:
         self.tuning = tuning
         max_range_m = min(tuning.max_range_m, sensor.max_range_m)
@@ -88,8 +88,8 @@ class GroundEstimator:
         self,
         sensor: SensorConfig,
         max_slope_deg: float,
-        tuning: GroundTuning = DEFAULT.ground,
-        polar: PolarGridTuning = DEFAULT.polar,
+        tuning: GroundTuning = GroundTuning(),
+        polar: PolarGridTuning = PolarGridTuning(),
     ) -> None:
         self.tuning = tuning
         self.grid = PolarGrid(sensor.max_range_m, polar)

@@ -15,7 +15,7 @@ from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, Groups, has_reflectance
 from modt.segmentation.kernels import NUMPY, Bounds, Kernels
-from modt.segmentation.tuning import DEFAULT, SegmentationTuning
+from modt.segmentation.tuning import SegmentationTuning
 from modt.segmentation.view_ends import ViewEnds
 from modt.types import NONE, Bool, Cut, Float32, Float64, Int, Proposals
 
@@ -37,7 +37,7 @@ class Segmenter:
         sensor: SensorConfig,
         fov: FieldOfView,
         kernels: Kernels = NUMPY,
-        tuning: SegmentationTuning = DEFAULT,
+        tuning: SegmentationTuning = SegmentationTuning(),
     ) -> None:
         self.sensor = sensor
         self.fov = fov

@@ -7,7 +7,7 @@ drive 0005 and on simulated streets. *Sensor study* means the labelled and simul
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from modt.class_sizes import SPLIT_PERSON, STRIP_PERSON, PersonSize
 
@@ -217,18 +217,14 @@ class ViewEndTuning:
 class SegmentationTuning:
     """All values of the stage."""
 
-    polar: PolarGridTuning = field(default_factory=PolarGridTuning)
-    sensor_height: SensorHeightTuning = field(default_factory=SensorHeightTuning)
-    ground: GroundTuning = field(default_factory=GroundTuning)
-    ceiling: CeilingTuning = field(default_factory=CeilingTuning)
-    cells: CellTuning = field(default_factory=CellTuning)
-    split: SplitTuning = field(default_factory=SplitTuning)
-    clusters: ClusterTuning = field(default_factory=ClusterTuning)
-    strips: StripTuning = field(default_factory=StripTuning)
-    view: ViewTuning = field(default_factory=ViewTuning)
-    heading: HeadingTuning = field(default_factory=HeadingTuning)
-    view_ends: ViewEndTuning = field(default_factory=ViewEndTuning)
-
-
-DEFAULT = SegmentationTuning()
-"""The values shipped: defaults of arguments alone."""
+    polar: PolarGridTuning = PolarGridTuning()
+    sensor_height: SensorHeightTuning = SensorHeightTuning()
+    ground: GroundTuning = GroundTuning()
+    ceiling: CeilingTuning = CeilingTuning()
+    cells: CellTuning = CellTuning()
+    split: SplitTuning = SplitTuning()
+    clusters: ClusterTuning = ClusterTuning()
+    strips: StripTuning = StripTuning()
+    view: ViewTuning = ViewTuning()
+    heading: HeadingTuning = HeadingTuning()
+    view_ends: ViewEndTuning = ViewEndTuning()

@@ -6,7 +6,7 @@ import numpy as np
 
 from modt.config import SensorConfig
 from modt.placement import Mount
-from modt.segmentation.tuning import DEFAULT, ViewEndTuning
+from modt.segmentation.tuning import ViewEndTuning
 from modt.types import Cut, Float32, Float64, Int
 
 
@@ -19,7 +19,7 @@ class ViewEnds:
         tuning: distances to the ends of the view within which a proposal is cut.
     """
 
-    def __init__(self, sensor: SensorConfig, max_height_m: float, tuning: ViewEndTuning = DEFAULT.view_ends) -> None:
+    def __init__(self, sensor: SensorConfig, max_height_m: float, tuning: ViewEndTuning = ViewEndTuning()) -> None:
         R_level_sensor = Mount.of(sensor.roll_deg, sensor.pitch_deg).R_level_sensor
         self._R_sensor_level = None if R_level_sensor is None else R_level_sensor.T.astype(np.float32)
         upright_share = 1.0 if R_level_sensor is None else R_level_sensor[2, 2]  # cosine of the tilt
