@@ -1,6 +1,7 @@
 """Effect of every constant of the method on accuracy, track length and CPU time; writes docs/tuning.md.
 
-    python -m tools.study.sensitivity RESULTS [--jobs N] [--seconds S] [--seeds 700:702] [--only PART] [--write]
+    python -m tools.study.sensitivity RESULTS [--jobs N] [--scenes NAME ...] [--seconds S] [--seeds 700:702]
+                                      [--only PART] [--write]
 
 Each constant of `modt.tuning` is lowered and raised by 20 %, one at a time, and the same simulated drives of six
 sensors are run with it in mode accurate. The difference to the shipped value is taken drive by drive: average
@@ -218,6 +219,7 @@ def main() -> None:
     options.add_argument("results", type=Path)
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--seconds", type=float, default=4.0)
+    options.add_argument("--scenes", nargs="+", default=SCENES)
     options.add_argument("--seeds", type=number_range, default=(700, 701))
     options.add_argument("--only", default="")
     options.add_argument("--write", action="store_true")
@@ -227,7 +229,9 @@ def main() -> None:
     missing = [one for one in wanted if one.name not in results]
     if missing:
         seeds = range(*asked.seeds)
-        drives = [simulated(scene, s, asked.seconds, seed) for s, scene, seed in product(SENSORS, SCENES, seeds)]
+        drives = [
+            simulated(scene, s, asked.seconds, seed) for s, scene, seed in product(SENSORS, asked.scenes, seeds)
+        ]
         with get_context("fork").Pool(asked.jobs) as pool:
             few = [missing[k : k + TOGETHER] for k in range(0, len(missing), TOGETHER)]
             for found in pool.imap_unordered(partial(run, drives), few):
