@@ -6,9 +6,9 @@ import ctypes
 import platform
 import struct
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +143,13 @@ def Rows(dtype: DTypeLike, *shape: int | str) -> Member:
     return Member("rows", np.dtype(dtype), shape)
 
 
+def _picker(places: list[int]) -> Callable[[tuple[int, ...]], tuple[int, ...]]:
+    """Function that picks the entries at some places of a tuple; a comprehension takes several times as long."""
+    if len(places) == 1:
+        return itemgetter(slice(places[0], places[0] + 1))
+    return itemgetter(*places)
+
+
 class Filled(bytearray):
     """A filled structure. It keeps alive the arrays that it points to."""
 
@@ -181,7 +188,11 @@ class Layout:
                 if isinstance(size, str):
                     self._places.setdefault(size, (size, None) if size in members else (array_name, axis))
         self._where = list(self._places.values())
-        self._shapes = lru_cache(maxsize=256)(self._shapes_of)
+        # Shapes are picked from the sizes in the order of their places, followed by the sizes that are constant.
+        shapes = [members[name].shape for name in self._arrays]
+        self._constants = tuple([size for shape in shapes for size in shape if isinstance(size, int)])
+        known = [*self._places, *self._constants]
+        self._pick_shapes = [_picker([known.index(size) for size in shape]) for shape in shapes]
         alignment = "0q"
         self._pack = struct.Struct("".join(member.format for member in members.values()) + alignment).pack
 
@@ -197,7 +208,7 @@ class Layout:
             arrays = [values[name] for name in self._arrays]
             sizes = tuple([values[name] if axis is None else values[name].shape[axis] for name, axis in self._where])
             if (
-                [numbers.shape for numbers in arrays] == self._shapes(sizes)
+                [numbers.shape for numbers in arrays] == self._shapes_of(sizes)
                 and [numbers.dtype for numbers in arrays] == self._dtypes
                 and len(values) == len(self.members)
             ):
@@ -224,9 +235,8 @@ class Layout:
 
     def _shapes_of(self, sizes: tuple[int, ...]) -> list[tuple[int, ...]]:
         """Shapes of the arrays, given the sizes in the order of their places."""
-        known = dict(zip(self._places, sizes, strict=True))
-        shapes = (self.members[name].shape for name in self._arrays)
-        return [tuple(known[size] if isinstance(size, str) else size for size in shape) for shape in shapes]
+        known = sizes + self._constants
+        return [pick(known) for pick in self._pick_shapes]
 
     def _filled(self, values: dict[str, Any], arrays: list[NDArray[Any]]) -> Filled:
         """Structure of values that fit."""
