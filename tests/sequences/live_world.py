@@ -263,7 +263,7 @@ class LiveWorld:
     def _bounded(self) -> None:
         poses = self.poses._poses
         assert is_bounded(self.decoder)
-        assert max(len(poses.believed), len(poses._doubted)) <= CAPACITY
+        assert max(len(poses.accepted), len(poses._doubted)) <= CAPACITY
         assert len(self.stream.faults.first) <= MAX_KEPT_FAULTS
 
     def recovers(self) -> None:

@@ -23,7 +23,7 @@ from modt.types import Float64, Frame
 log = logging.getLogger(__name__)
 
 CONFIRM_S = 0.2
-"""Time for which doubted poses must be mutually consistent to be believed [s]."""
+"""Time for which doubted poses must be mutually consistent to be accepted [s]."""
 _MIN_VOTES = 5
 """Number of votes after which a doubted sequence replaces the old one."""
 
@@ -36,7 +36,7 @@ class PoseSequence:
     set its clock or, after a leap, restarted with another world.
 
     Attributes:
-        believed: poses of the current sequence.
+        accepted: poses of the current sequence.
         restarts: number of sequences that took over with a leap.
     """
 
@@ -46,22 +46,22 @@ class PoseSequence:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all poses; the next one is believed."""
-        self.believed = PoseBuffer(self.config)
+        """Remove all poses; the next one is accepted."""
+        self.accepted = PoseBuffer(self.config)
         self._doubted = PoseBuffer(self.config)
         self._votes = 0
 
     def add(self, stamp_s: float, T: Float64, now_s: float) -> str | None:
-        """Add a (4, 4) pose received before the frame at `now_s`; the reason of a doubt, None if it is believed."""
-        doubt = self.believed.doubt(stamp_s, T, now_s)
+        """Add a (4, 4) pose received before the frame at `now_s`; the reason of a doubt, None if it is accepted."""
+        doubt = self.accepted.doubt(stamp_s, T, now_s)
         if doubt is None:
-            self.believed.add(stamp_s, T)
+            self.accepted.add(stamp_s, T)
             self._vote_against()
         elif doubt != "repeated":
             self._consider(stamp_s, T, now_s)
             if self._votes >= _MIN_VOTES and self._doubted.span_s >= CONFIRM_S:
-                self.restarts += self.believed.leaps(stamp_s, T)
-                self.believed = self._doubted
+                self.restarts += self.accepted.leaps(stamp_s, T)
+                self.accepted = self._doubted
                 self._doubted = PoseBuffer(self.config)
                 self._votes = 0
                 return None
@@ -89,7 +89,7 @@ MAX_AHEAD_S = 60.0
 class ReceivedPoses(PoseSource):
     """Poses that another process sends; refused ones are counted, and the first of each kind is logged.
 
-    `PoseSequence` decides which poses are believed. `Frame.restarts` reports a sender that restarted with another
+    `PoseSequence` decides which poses are accepted. `Frame.restarts` reports a sender that restarted with another
     world frame. A subclass takes the messages and reads them.
     """
 
@@ -119,7 +119,7 @@ class ReceivedPoses(PoseSource):
                     self._keep(*self._read(message), frame.stamp_s)
                 except Exception as error:
                     self._refuse(error)
-            T = self._poses.believed.at(frame.stamp_s)
+            T = self._poses.accepted.at(frame.stamp_s)
         except Exception as error:  # poses are optional, so the run goes on without
             T = None
             self._refuse(error)
@@ -160,7 +160,7 @@ class ReceivedPoses(PoseSource):
             raise MessageError("malformed", f"{cause}: no time in seconds")
         if stamp_s > now_s + MAX_AHEAD_S:
             raise MessageError("ahead", f"{cause}: is it the stream's clock?")
-        newest_s = self._poses.believed.newest_s
+        newest_s = self._poses.accepted.newest_s
         restarts = self.restarts
         doubt = self._poses.add(stamp_s, T, now_s)
         if self.restarts > restarts == 0:
