@@ -23,8 +23,8 @@ CLEAR = "\x1b[H\x1b[2J"
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare both commands and their options."""
-    p = commands.add_parser("status", help="say what a running modt run is doing")
-    q = commands.add_parser("top", help="show what a running modt run is doing, until Ctrl-C is pressed")
+    p = commands.add_parser("status", help="print the status of a running service")
+    q = commands.add_parser("top", help="show the status of a running service, until Ctrl-C is pressed")
     run_directory = "its run directory (default: %(default)s)"
     for command, function in ((p, run), (q, run_top)):
         command.add_argument(
