@@ -30,7 +30,7 @@ class JudgedFrame:
 
     @classmethod
     def of_result(cls, result: FrameResult, truth: FrameTruth, fov: FieldOfView | None = None) -> Self:
-        """From a result of the pipeline in memory."""
+        """Frame judged by a result of the pipeline in memory."""
         tracks = result.tracks
         seen = np.flatnonzero(tracks.proposal != NONE)
         return cls(

@@ -14,9 +14,9 @@ from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.truth import FrameTruth
 
 PAD_M = 0.15
-"""Points of an object lie up to this distance beyond its box."""
+"""Distance beyond its box up to which points belong to an object [m]."""
 FOOT_M = 0.25
-"""They lie this distance or more above its foot."""
+"""Least distance of these points above its foot [m]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ class Rules:
     sector_deg: float = 40.0  # half the sector about x in which proposals are judged: where everything is labelled
     max_range_m: float = float("inf")  # farthest judged object or proposal
     ignored: frozenset[str] = frozenset(IGNORABLE)  # kinds that are ignored
-    complete: bool = False  # whether every road user in the sector is believed to be labelled
+    complete: bool = False  # whether labels are taken for complete in the sector
 
 
 KITTI_RULES = Rules()

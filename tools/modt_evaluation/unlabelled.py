@@ -42,11 +42,11 @@ MIN_SCATTER_M = 0.05
 STEP_S = 0.5
 """Time step of the path whose straightness is computed."""
 CAR_LENGTH_M = 2.6
-"""A longer mover is taken for a car."""
+"""A longer mover is taken for a car [m]."""
 CAR_WIDTH_M = 1.3
-"""So is a wider one."""
+"""A wider mover is taken for a car [m]."""
 RIDING_MPS = 2.5
-"""Of the others, a faster one is taken for a cyclist."""
+"""A faster mover of the others is taken for a cyclist [m/s]."""
 
 
 class Sighting(NamedTuple):

@@ -23,7 +23,7 @@ HEADER = """<?xml version="1.0" encoding="UTF-8" standalone="yes" ?>
 VISIBLE = 0
 """Tracklet code of occlusion of a body of enough points."""
 LARGELY_OCCLUDED = 2
-"""The same of the others."""
+"""Tracklet code of occlusion of the other bodies."""
 MIN_VISIBLE_POINTS = 20
 """Bodies of fewer points are annotated as largely occluded."""
 

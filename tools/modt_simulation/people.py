@@ -29,7 +29,7 @@ CRANK_M = np.array([0.08, 0.0, 0.3])
 
 
 class Person(NamedTuple):
-    """What stays the same of a person over a scene."""
+    """Properties of a person that stay the same over a scene."""
 
     body: int  # index of the body
     posture: Posture  # standing, walking, cycling or sitting

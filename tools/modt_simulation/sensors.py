@@ -14,7 +14,7 @@ from modt.types import Bool, Float32, Float64, Int
 COLUMN_STEP = (np.sqrt(5) - 1) / 2
 """Step of the fired ray of a non-repetitive sensor from column to column, a share of its rays; irrational."""
 SWEEP_STEP = np.sqrt(2) - 1
-"""The same from sweep to sweep."""
+"""Step of the fired ray from sweep to sweep, a share of its rays; irrational."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class Solids:
         return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))
 
     def of(self, body: int) -> Self:
-        """The same solids as parts of a body."""
+        """Copy of the solids as parts of a body."""
         return replace(self, body=np.full(len(self), body, np.int64))
 
     def transformed(self, rotation: Float32 | Float64, translation: Float32 | Float64) -> Self:

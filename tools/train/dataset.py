@@ -65,7 +65,7 @@ class Sensors:
 
     @classmethod
     def of(cls, config: SensorConfig, box: Float64, ground_z_m: Float64) -> Sensors:
-        """The same sensor for crops in (R, 7) boxes on ground (R,), sensor frame."""
+        """Columns of one sensor for crops in (R, 7) boxes on ground (R,), sensor frame."""
         tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
         columns = ground_z_m, config.azimuth_step_deg, np.rad2deg(config.beams.step_rad(tangent.astype(np.float32)))
         return cls(*(np.full(len(box), value, np.float64) for value in columns))

@@ -1,1 +1,1 @@
-"""A run: its session, its stages, and its status."""
+"""A run: its inputs, its stages, its loop, and its status."""

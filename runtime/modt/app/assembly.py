@@ -161,7 +161,7 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
 
 @dataclass(slots=True)
 class Continuity:
-    """What goes on when the stages of a run are exchanged for those of another profile."""
+    """State that is kept when the stages of a run are exchanged for those of another profile."""
 
     tracks: LiveTracks = field(default_factory=LiveTracks)
     odometry: PoseEstimator | None = None  # the last one, whose world the next one continues

@@ -1,4 +1,4 @@
-"""From a request to the loop of a run: a replay of a recording, or a service over a live source."""
+"""Building of the loop of a request: a replay of a recording, or a service over a live source."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class LoadShedding:
         self._stepped_down_s = float("-inf")
 
     def frame(self, now_s: float, share: float) -> LoadEvent | None:
-        """A frame whose result came `share` of a period after its sweep."""
+        """Judge a frame whose result came `share` of a period after its sweep."""
         if share > BUSY_SHARE:
             self._slack_since_s = now_s
         if share > AMPLE_SHARE:
@@ -79,7 +79,7 @@ class LoadShedding:
         return None
 
     def power(self, now_s: float, watts: float, limit_W: float) -> LoadEvent | None:
-        """A window of the meters."""
+        """Judge a window of the meters."""
         if watts <= NEAR_SHARE * limit_W:
             return None
         self._slack_since_s = now_s
@@ -87,7 +87,11 @@ class LoadShedding:
         return self._apply(LoadEvent.OVER_POWER, now_s) if watts > limit_W else None
 
     def _apply(self, event: LoadEvent, now_s: float) -> LoadEvent | None:
-        """Change the step by one, at ample slack to the first; returns the event if that changes anything."""
+        """Step up on overload, down on slack; ample slack returns to ALL.
+
+        Returns:
+            The event if it changes the step, else None.
+        """
         before = self.step
         change = {LoadEvent.AMPLE: -before, LoadEvent.SLACK: -1}.get(event, 1)
         self.step = Step(min(max(before + change, Step.ALL), Step.DROPPED))

@@ -14,7 +14,7 @@ SEGMENTATION = "segmentation"
 CLASSIFICATION = "classification"
 _HARMLESS_MARKS = frozenset({"wrap"})
 _MAX_W = 10_000.0
-"""Power above which the record of a window is not believed [W]."""
+"""Power above which the record of a window is not accepted [W]."""
 
 
 def usable(window: EnergyWindow) -> bool:

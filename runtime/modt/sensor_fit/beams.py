@@ -74,7 +74,7 @@ WINDOW_BINS = 250
 ORIGINS_M = np.arange(0.0, 0.26, 0.01)
 """Tried heights of the beams' origin above that of the frame [m]."""
 COARSE_ORIGINS_M = ORIGINS_M[::2]
-"""The same for a single sweep, in which time counts."""
+"""Tried heights of that origin for a single sweep, in which time counts [m]."""
 FRAME_ORIGIN_FAVOUR = 1.1
 """Factor on the peaks of the frame's own origin."""
 MIN_POINTS = 1000
@@ -290,7 +290,7 @@ MAX_SPACING_DEG = 10.0
 EVEN_DEG = 0.05
 """Deviation from even spacing up to which beams need no table [deg]."""
 EVEN_SHARE = 0.05
-"""The same as a share of the spacing; the greater of both counts."""
+"""Deviation as a share of the spacing; the greater of both limits counts."""
 
 
 def cell_m(spacing_deg: float, azimuth_step_deg: float) -> float:

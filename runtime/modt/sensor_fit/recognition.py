@@ -31,7 +31,7 @@ MAX_AZIMUTH_RATIO = 1.6
 MAX_HEIGHT_M = 0.15
 """Greatest difference of the height [m]."""
 MAX_HEIGHT_SHARE = 0.2
-"""The same as a share of the height; the greater of both counts."""
+"""Greatest difference as a share of the height; the greater of both limits counts."""
 
 
 @dataclass(frozen=True, slots=True)

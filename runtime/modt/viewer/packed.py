@@ -55,7 +55,7 @@ class Cells:
     level: Int  # (n,) height above ground [LEVEL_M], 0 for ground
 
     def thinned(self, most: int) -> Cells:
-        """At most `most` cells. Cells of the ground are left out first."""
+        """Cells, `most` of them at most. Cells of the ground are left out first."""
         kept = [np.flatnonzero(self.level > 0), np.flatnonzero(self.level == 0)]
         for group, rows in enumerate(kept):
             room = max(most - (len(kept[0]) if group else 0), 0)

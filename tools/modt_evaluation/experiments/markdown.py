@@ -75,7 +75,7 @@ def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str
 
 
 def _spread(values: Sequence[float]) -> list[float]:
-    """At most _MOST of the values, the ends included."""
+    """Values thinned to _MOST at most, the ends included."""
     if len(values) <= _MOST:
         return list(values)
     return [values[round(k * (len(values) - 1) / (_MOST - 1))] for k in range(_MOST)]

@@ -29,7 +29,7 @@ class Quantity:
         return plain if self.low is None else plain | {"low": self.low, "high": self.high}
 
     def scaled(self, factor: float, unit: str) -> Quantity:
-        """The same in another unit."""
+        """Quantity in another unit."""
 
         def scale(number: float | None) -> float | None:
             return None if number is None else factor * number

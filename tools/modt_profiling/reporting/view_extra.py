@@ -1,4 +1,4 @@
-"""What needs the extra `view`: import of its libraries (Matplotlib, Jinja and Pillow), and pages as files."""
+"""Use of the extra `view`: import of its libraries (Matplotlib, Jinja and Pillow), and pages as files."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ SILENT_S = 2.0
 READ_S = 0.2
 """Time that the receiving thread waits for a message before it checks for its end [s]."""
 JITTER_S = 0.1
-"""Change of the least delay from stamp to arrival [s]; beyond it the stamps have stepped."""
+"""A larger change of the least stamp-to-arrival delay means that the stamps stepped [s]."""
 LATE_S = 1.0
 """Greatest age of a sweep or packet that is used [s]."""
 

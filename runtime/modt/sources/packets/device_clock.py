@@ -11,7 +11,7 @@ MAX_ERROR_S = 1.0
 WINDOW_S = 10.0
 """Time in which the least delay is searched that shows whether the host's clock was set [s]."""
 STEP_S = 0.02
-"""If the least delay of a window exceeds the known one by this time, the host's clock was set forward [s]."""
+"""Excess of the least delay of a window over the known one from which the host's clock was set forward [s]."""
 
 
 class DeviceClock:

@@ -133,7 +133,7 @@ Timed = tuple[float, bytes]
 RECOGNISED_BY = 20
 """Number of packets by which the model is recognised."""
 LONGEST_TURN_S = 0.3
-"""Duration of the slowest turn, and half of it in addition [s]."""
+"""1.5 times the slowest turn [s]."""
 LEAST_TURN = 1000
 """A phase that falls by more begins another turn; if it falls by less, the head stands still [0.01 deg]."""
 SILENCE_S = 1.0
@@ -144,7 +144,7 @@ NO_TURN = Turn(0.0, None)
 class TurnDecoder(PacketDecoder):
     """Cuts the packets behind the sensor and decodes a turn at a time.
 
-    Each beam's part of a turn is cut where the beam looks backwards, not the head. Packets before the first cut are
+    The seam is behind the sensor for each beam, not for the head. Packets before the first cut are
     discarded. The packets of one model are followed; a subclass knows the models and their packets.
     """
 
