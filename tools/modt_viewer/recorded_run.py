@@ -51,7 +51,7 @@ class RecordedRun:
 
     @classmethod
     def read(cls, run: Path) -> RecordedRun:
-        """The run of a directory; it may still be going on.
+        """The run of a directory, which may be in progress.
 
         Raises:
             MisuseError: not the directory of a run, no frame so far, or a broken record.

@@ -137,7 +137,7 @@ def varied(crops: Crops, rng: Generator) -> tuple[Crops, Int]:
 
 
 def cut_near(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sensors, Int, Int]:
-    """The crops that a random sensor still shows at a random mount and distance.
+    """The crops that a random sensor shows at a random mount and distance.
 
     Args:
         crops: in the frame of the sensors that measured them.

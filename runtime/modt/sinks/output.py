@@ -132,7 +132,7 @@ class LineFile(Generic[T]):
         return False
 
     def removed(self) -> bool:
-        """Whether the file has no name any more, so that closing it loses its content."""
+        """Whether the file has lost its name, so that closing it loses its content."""
         with suppress(OSError):
             return os.fstat(self._file.fileno()).st_nlink == 0
         return False
