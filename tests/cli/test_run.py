@@ -96,7 +96,7 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
     page = tmp_path / "page.html"
     assert here("report", tmp_path / "run", "--html", page, program=modt_profile) == 0
-    assert "<h2>Lateness</h2>" in page.read_text()
+    assert "<h3>Lateness</h3>" in page.read_text()
     pytest.importorskip("foxglove")
     assert here("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap") == 0
     assert (tmp_path / "run.mcap").stat().st_size > len(frames) * 100_000  # with the points

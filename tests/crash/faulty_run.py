@@ -234,7 +234,7 @@ class FaultyRun:
         missing = recording.write.call_count + recording.ledger.call_count - sum(map(len, records.values()))
         for schema, numbers in records.items():
             assert len(numbers) == len({*numbers}), f"{schema} twice"
-        assert missing <= health.lost_lines, f"{missing} lines are missing, {health['lost_lines']} are counted"
+        assert missing <= health.lost_lines, f"{missing} lines are missing, {health.lost_lines} are counted"
         late = {frame for frame, at_s in self.frames.items() if at_s > self.faults.last_s + BACK_S}
         assert late <= {*records[SCHEMA]}, "frames are missing after the fault"
         if self.faults.last_s + BACK_S < self.faults.now_s - 1.0:

@@ -76,7 +76,7 @@ def test_how_many_are_as_late_or_later(tmp_path):
     late = Deadlines(0.1)
     punctual = Deadlines(0.1)
     for ms in (0.2, 0.2, 3.0, 40.0):
-        late.lateness.add(round(1e6 * ms))
+        late.lateness_ns.add(round(1e6 * ms))
     found = late.late_or_later()
     none = punctual.late_or_later()
     assert found["ms"] == pytest.approx([0.2, 3.0, 40.0], rel=0.03)
