@@ -10,7 +10,7 @@ from tests.results import CAR, frame_record, result
 
 
 def test_a_recorded_frame_has_the_record_and_the_boxes_of_the_result():
-    made = [*replay("street-vlp-16", "accurate"), result(3, [], {}), result(4, [], {}, {7: CAR}, lost=(7,))]
+    made = [*replay("accurate"), result(3, [], {}), result(4, [], {}, {7: CAR}, lost=(7,))]
     assert any((one.tracks.proposal == NONE).any() for one in made)
     for one in made:
         again = recorded_result(frame_record(one))
