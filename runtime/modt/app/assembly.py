@@ -161,7 +161,7 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
 
 @dataclass(slots=True)
 class Continuity:
-    """State that is kept when the stages of a run are exchanged for those of another profile."""
+    """Tracks and world that go on when the stages of a run are exchanged for those of another profile."""
 
     tracks: LiveTracks = field(default_factory=LiveTracks)
     odometry: PoseEstimator | None = None  # the last one, whose world the next one continues

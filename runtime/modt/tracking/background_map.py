@@ -20,7 +20,7 @@ class BackgroundMap:
     Args:
         kernels: passes over pairs.
         capacity: greatest number of places; with 0 the map recalls nothing.
-        tuning: what counts as within a place.
+        tuning: limits within which something counts as a place.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from modt.class_sizes import IS_PERSON, MAX_SIZE_M
 from modt.classes import N_CLASSES, ObjectClass
 from modt.geometry.kdop import DIRECTIONS
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT64, INT64, Array, Layout, Number, declare
+from modt.native.library import FLOAT64, INT64, Array, Filled, Layout, Number, declare
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import ExtentTuning
@@ -51,7 +51,7 @@ class ExtentUpdate:
             tracks: written.
             rows: (R,) tracks that have a proposal.
             proposals: (R,) the proposal of each.
-            observations: of the frame.
+            observations: all proposals in the world.
             position: (R, 2) measured position of each [m, world].
             dt_s: time since the frame before [s].
         """
@@ -176,6 +176,9 @@ class NativeExtentUpdate(ExtentUpdate):
         self._library = library
         self._tuning = _TUNING.of(tuning)
         self._limits = _LIMITS.of(self, max_length_m=MAX_LENGTH_M)
+        # Filled once a table: it is the same from the births of one frame to those of the next.
+        self._table: TrackTable | None = None
+        self._columns: Filled | None = None
 
     def __call__(
         self,
@@ -187,8 +190,11 @@ class NativeExtentUpdate(ExtentUpdate):
         dt_s: float,
     ) -> None:
         """Write the columns of the extent."""
+        if tracks is not self._table:
+            self._columns = _COLUMNS.of(tracks)
+            self._table = tracks
         self._library.modt_update_extent(
-            _COLUMNS.of(tracks),
+            self._columns,
             _OBSERVATIONS.of(observations, n=len(observations)),
             rows,
             proposals,

@@ -43,9 +43,10 @@ def _known_parts(now: Situation) -> Joins:
     host = now.assignment.proposal_of_track[pairs.rows]
     joins = pairs.free & (pairs.within > now.tuning.min_part_coverage) & (host != NONE) & (host != pairs.proposals)
     joins &= (tracks.hits[pairs.rows] >= now.tuning.min_hits) & pairs.joinable[pairs.rows]
-    rows = pairs.rows[joins]
-    parts = pairs.proposals[joins]
-    hosts = host[joins]
+    joined = joins.nonzero()[0]
+    rows = pairs.rows[joined]
+    parts = pairs.proposals[joined]
+    hosts = host[joined]
 
     is_car = tracks.object_class == ObjectClass.CAR.value
     known_m = widths(tracks.known_kdops(rows))

@@ -139,8 +139,8 @@ def locate_pieces(
         now: situation before the edits.
         rows: (S,) tracks of the pieces, each matched.
         kdop: (8, S) k-DOPs of the pieces [m, world].
-        matches: of the frame.
-        variance: of a measured position [m2].
+        matches: the frame's, which number the pieces.
+        variance: square of the deviation of a measured position [m2].
     """
     tracks = now.tracks
     expected = tracks.predicted_kdops(rows)

@@ -41,12 +41,13 @@ def find_takes(now: Situation) -> Takes:
     size = np.zeros(len(tracks), np.int64)
     held = (proposal_of_track != NONE).nonzero()[0]
     size[held] = count[proposal_of_track[held]]
-    larger = pairs.free & (count[pairs.proposals] > size[pairs.rows])
+    larger = (pairs.free & (count[pairs.proposals] > size[pairs.rows])).nonzero()[0]
     rows = pairs.rows[larger]
     proposals = pairs.proposals[larger]
-    known = tracks.box[rows]  # where the filter expects it now
-    known[:, :2] += tracks.x[rows, :2] - tracks.anchor[rows]
-    fits = fit_together(known, now.observations.box[proposals], MAX_SIZE_M[tracks.object_class[rows]])
+    known = tracks.box.take(rows, axis=0)  # where the filter expects it now
+    known[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
+    seen = now.observations.box.take(proposals, axis=0)
+    fits = fit_together(known, seen, MAX_SIZE_M.take(tracks.object_class[rows], axis=0)).nonzero()[0]
     return _exchanges(rows[fits].tolist(), proposals[fits].tolist(), proposal_of_track, track_of_proposal)
 
 

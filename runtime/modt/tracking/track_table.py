@@ -74,10 +74,9 @@ class LiveTracks:
     def renew(self, kept: Int, n_new: int) -> Int:
         """Keep these rows, in their order, and add blank ones with new identities, whose rows are returned."""
         self._hold(self.table.renewed(kept, n_new))
-        new = np.arange(len(kept), len(kept) + n_new)
-        self.table.id[new] = np.arange(self.next_id, self.next_id + n_new)
+        self.table.id[len(kept) :] = np.arange(self.next_id, self.next_id + n_new)
         self.next_id += n_new
-        return new
+        return np.arange(len(kept), len(kept) + n_new)
 
     def tracked(self, proposals: Proposals, wants_class: Bool) -> TrackedFrame:
         """The tracks by owner, for the stages after the tracker."""

@@ -280,14 +280,15 @@ class Tracker:
         proposals = (~matched).nonzero()[0]
         known = self.background_map.recall(self.tracks, kept[settled[kept]], observations, proposals)
         rows = self._live.renew(kept, len(proposals))
+        new = slice(len(kept), None)  # the same rows; faster where one is enough
         t = self.tracks
-        t.state[rows] = self.machine.proposal
+        t.state[new] = self.machine.proposal
         self._advance(rows, np.where(known, StateEvent.ASSOCIATED.value, StateEvent.UNASSOCIATED.value))
         self._advance(rows[known], StateEvent.JOINS_FINAL)
         position = self.association.initial_position(observations).take(proposals, axis=0)
-        t.x[rows, :2] = t.rest_position[rows] = position  # speed and heading begin at zero
-        t.P[rows] = self._P_new
-        t.age[rows] = t.hits[rows] = 1
-        t.lagged_kdop[rows] = observations.kdop.T.take(proposals, axis=0)
-        t.size_m[rows] = observations.box.take(proposals, axis=0)[:, 3:6]
+        t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
+        t.P[new] = self._P_new
+        t.age[new] = t.hits[new] = 1
+        t.lagged_kdop[new] = observations.kdop.T.take(proposals, axis=0)
+        t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]
         self._update_extent(t, rows, proposals, observations, position, 0.0)
