@@ -52,18 +52,18 @@ class Observations:
         box[:, :2] += step
         return replace(self, box=box, centroid=self.centroid + step, kdop=self.kdop + DIRECTIONS.T @ step.T)
 
-    def regrouped(self, source: Int, changed: Int, renewed: Observations) -> Observations:
+    def regrouped(self, source: Int, changed: Int, observed: Observations) -> Observations:
         """Observations of proposals in another grouping.
 
         Args:
             source: (Q,) former proposal whose observation each takes over.
-            changed: (R,) those, of Q, that are observed anew.
-            renewed: (R,) their observations.
+            changed: (R,) those, of Q, whose members changed.
+            observed: (R,) their observations.
         """
 
         def merged(column: str, axis: int = 0) -> NDArray[Any]:
             entries: NDArray[Any] = getattr(self, column).take(source, axis=axis)
-            entries[(slice(None),) * axis + (changed,)] = getattr(renewed, column)
+            entries[(slice(None),) * axis + (changed,)] = getattr(observed, column)
             return entries
 
         return Observations(

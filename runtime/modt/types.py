@@ -173,18 +173,19 @@ def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float
     )
 
 
-def regrouped(
+def sort_members(
     members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int
 ) -> tuple[Int, Float32, Int]:
     """Sort members (K,) and (3, K) coordinates by label, below n, and count (n,) the members of each label.
 
-    Members keep their order within a label. A group, by offsets (G + 1,), has one label (G,). The rows `moved` (S,),
-    ascending, have a label (S,) of their own instead.
+    Members keep their order within a label. A group, by offsets (G + 1,), has one label (G,). `moved` are rows of the
+    members (S,), ascending, that have a label (S,) of their own instead.
     """
     label = label.repeat(offsets[1:] - offsets[:-1])
-    label[moved[0]] = moved[1]
-    # Sixteen bits hold every number of a proposal, and are sorted by radix.
-    order = label.astype(np.uint16).argsort(kind="stable")
+    member_rows, own_label = moved
+    label[member_rows] = own_label
+    # In the smallest type that holds n: up to sixteen bits are sorted by radix, which is several times faster.
+    order = label.astype(np.min_scalar_type(n)).argsort(kind="stable")
     return members.take(order), coordinates.take(order, axis=1), np.bincount(label, minlength=n)
 
 
@@ -275,8 +276,8 @@ class Motion(Columns):
     age: Int = column(int)  # frames since birth, the birth frame counting as 1
     hits: Int = column(int)  # frames with a proposal
     missed: Int = column(int)  # frames since the last proposal
-    moved_m: Float64 = column(float)  # displacement within about two seconds, as far as both ends show it
-    observed_s: Float64 = column(float)  # from the first proposal to the last
+    moved_m: Float64 = column(float)  # displacement in about ExtentTuning.lag_s, as far as both ends show it
+    observed_s: Float64 = column(float)  # sum of the steps that ended with a proposal: of a gap the last one alone
     size_m: Float64 = column(float, 3)  # length, width and height that were seen for some frames
     hidden: Bool = column(bool)  # a person of whom the view cuts off the upper half
 
@@ -347,7 +348,7 @@ class TrackedFrame:
 
     motion: Motion  # read-only
     evidence: Evidence  # read-only
-    own_evidence: Evidence  # the same, written by the fusion
+    own_evidence: Evidence  # the same arrays, written by the fusion
     requests: Requests  # written by the scheduler
     decisions: Decisions  # written by the decision
     proposals: Proposals  # of the frame, regrouped where the tracks know better; each belongs to one track

@@ -248,7 +248,7 @@ PASSES = {
     "measured": some_displacements,
     "pair_costs": some_pairs,
     "assign": some_assignments,
-    "regrouped": some_members,
+    "sort_members": some_members,
 }
 
 

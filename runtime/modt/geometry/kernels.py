@@ -20,7 +20,7 @@ from modt.geometry.kdop import (
     widths,
 )
 from modt.geometry.tuning import ShapeTuning
-from modt.types import Float32, Float64, Int, copy_runs, regrouped
+from modt.types import Float32, Float64, Int, copy_runs, sort_members
 
 
 def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
@@ -69,7 +69,7 @@ class GeometryKernels:
     upright_boxes = staticmethod(upright_boxes)
     kdop_ends = staticmethod(kdop_ends)
     copy_runs = staticmethod(copy_runs)
-    regrouped = staticmethod(regrouped)
+    sort_members = staticmethod(sort_members)
     overlapping_pairs = staticmethod(overlapping_pairs)
     assign = staticmethod(assign)
 

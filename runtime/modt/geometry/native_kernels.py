@@ -55,7 +55,7 @@ _SIGNATURES: Signatures = {
     "modt_pair_costs": (None, (_SHAPES, _SHAPES, FLOAT64, _D, INT64, INT64, _L, _WEIGHTS, _TUNING, Own, Own, Own)),
     "modt_certain_pairs": (None, (INT64, INT64, FLOAT64, _L, _D, _L, _L, Own, Own, Own, Own, Own)),
     "modt_settle_pairs": (ctypes.c_int, (INT64, INT64, FLOAT64, _L, _D, Own, Own, _ASSIGNMENT, Own)),
-    "modt_regrouped": (None, (_MEMBERS, INT64, _L, INT64, INT64, INT64, _L, _L, Own, Own, _MEMBERS)),
+    "modt_sort_members": (None, (_MEMBERS, INT64, _L, INT64, INT64, INT64, _L, _L, Own, Own, _MEMBERS)),
 }
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
@@ -189,18 +189,18 @@ class NativeGeometryKernels(GeometryKernels):
                 raise ValueError("no assignment has a finite cost")
         return state.nonzero()[0]
 
-    def regrouped(
+    def sort_members(
         self, members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int
     ) -> tuple[Int, Float32, Int]:
         """Members and (3, K) coordinates by the label of their group or, if moved, their own; (n,) count of each."""
-        moved_members, moved_labels = moved
+        member_rows, own_label = moved
         sorted_members = np.empty_like(members)
         sorted_coordinates = np.empty_like(coordinates)
         count = np.empty(n, int64)
         given = _MEMBERS(index=members, xyz=coordinates)
         out = _MEMBERS(index=sorted_members, xyz=sorted_coordinates)
-        self.library.modt_regrouped(
-            given, offsets, len(label), label, moved_members, moved_labels, len(moved_members), n,
+        self.library.modt_sort_members(
+            given, offsets, len(label), label, member_rows, own_label, len(member_rows), n,
             np.empty(n, int64), count, out,
         )  # fmt: skip
         return sorted_members, sorted_coordinates, count

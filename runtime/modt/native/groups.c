@@ -42,11 +42,11 @@ EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i
         }
 }
 
-/* regrouped: rows of n_groups groups by label, below n, in their order within it, and the count of each label. A
+/* sort_members: rows of n_groups groups by label, below n, in their order within it, and the count of each label. A
  * row has the label of its group, but for the n_moved rows `moved`, ascending, whose labels are `label_of_moved`.
  * Scratch: `next` of n, the place of the next row of each label. */
-EXPORT void modt_regrouped(const Rows *rows, const i64 *offsets, i64 n_groups, const i64 *label, const i64 *moved,
-                           const i64 *label_of_moved, i64 n_moved, i64 n, i64 *next, i64 *count, Rows *sorted)
+EXPORT void modt_sort_members(const Rows *rows, const i64 *offsets, i64 n_groups, const i64 *label, const i64 *moved,
+                              const i64 *label_of_moved, i64 n_moved, i64 n, i64 *next, i64 *count, Rows *sorted)
 {
     /* 1. Rows of each label: those of its groups, less those that moved away, and those that moved to it. */
     i64 total = 0;

@@ -9,7 +9,7 @@ import numpy as np
 from modt.class_sizes import IS_PERSON, MAX_CAR_M, PART_PERSON, USUAL_CAR_M
 from modt.classes import ObjectClass
 from modt.geometry.kdop import widths
-from modt.tracking.pairs import Situation, first_of_each, fit_together, holds_of
+from modt.tracking.pairs import Situation, first_of_each, fit_together, mask_at
 from modt.types import NONE, Bool, Int
 
 
@@ -52,7 +52,7 @@ def _known_parts(now: Situation) -> Joins:
     known_m = widths(tracks.known_kdops(rows))
     # Background joins parts as a car does, if it is no longer than one, but no person and no part of a car.
     may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
-    of_car = holds_of(is_car, now.assignment.track_of_proposal[parts])
+    of_car = mask_at(is_car, now.assignment.track_of_proposal[parts])
     joins = is_car[rows] | (may_be_car & ~_may_be_person(now, parts) & ~of_car)
     kdop = now.observations.kdop
     together = np.maximum(kdop.take(parts, axis=1), kdop.take(hosts, axis=1))
@@ -71,7 +71,7 @@ def _new_parts(now: Situation) -> Joins:
     count = now.observations.count
     rows = ((tracks.object_class == ObjectClass.CAR.value) & (proposal_of_track != NONE)).nonzero()[0]
     new = (tracks.hits < now.tuning.min_hits) & ~IS_PERSON[tracks.object_class]
-    parts = ((owner == NONE) | holds_of(new, owner)).nonzero()[0]
+    parts = ((owner == NONE) | mask_at(new, owner)).nonzero()[0]
     around = kdop.take(proposal_of_track[rows], axis=1) + now.tuning.beside_m
     which_row, which_part = now.kernels.overlapping_pairs(around, kdop.take(parts, axis=1))
     rows = rows[which_row]
@@ -91,5 +91,5 @@ def _new_parts(now: Situation) -> Joins:
 
 def _may_be_person(now: Situation, proposals: Int) -> Bool:
     """(k,) proposals that may be a person by their sizes."""
-    extent_m = now.pairs.extent_m[proposals]
-    return PART_PERSON.fits(extent_m, now.observations.bottom[proposals], now.observations.top[proposals])
+    max_width_m = now.pairs.max_width_m[proposals]
+    return PART_PERSON.fits(max_width_m, now.observations.bottom[proposals], now.observations.top[proposals])

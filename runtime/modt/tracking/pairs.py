@@ -35,17 +35,18 @@ class Assignment(NamedTuple):
 class Pairs(NamedTuple):
     """Tracks and the proposals that overlap their known extents, by falling seniority of the tracks.
 
-    With them, facts of all tracks (M,) and proposals (P,) that several steps need.
+    Only tracks that were observed twice or more are listed. With them, facts of all tracks (M,) and proposals (P,)
+    that several steps need. `free` follows from the assignment before takes; joins use it beside the one after them.
     """
 
     rows: Int  # (K,) track of each pair
     proposals: Int  # (K,) proposal of each pair
     within: Float64  # (K,) part of the proposal that lies within the known extent
     around: Float64  # (K,) part of the track, as it is expected, that lies within the proposal
-    free: Bool  # (K,) the track may take the proposal, and most of one lies within the other
-    joinable: Bool  # (M,) tracks whose parts are joined: no person, except the legs of one whom the view cuts off
+    free: Bool  # (K,) within or around exceeds min_coverage, and the track may take the proposal
+    joinable: Bool  # (M,) tracks that parts may be joined to: no people, save those of whom only the legs are seen
     expected: Float64  # (8, M) k-DOPs of the tracks, where the filter expects them
-    extent_m: Float64  # (P,) greatest width of the k-DOP of each proposal
+    max_width_m: Float64  # (P,) greatest width of the k-DOP of each proposal
 
 
 class Situation(NamedTuple):
@@ -102,14 +103,15 @@ def _listed(
     owner = assignment.track_of_proposal[proposals]
     owned = (owner != NONE).nonzero()[0]
     free[owned] &= _may_take(tracks, rank, joinable, rows[owned], owner[owned])
-    extent_m = widths(observations.kdop).max(axis=0)
-    return Pairs(rows, proposals, within, around, free, joinable, expected, extent_m)
+    max_width_m = widths(observations.kdop).max(axis=0)
+    return Pairs(rows, proposals, within, around, free, joinable, expected, max_width_m)
 
 
 def _may_take(tracks: TrackTable, rank: Int, joinable: Bool, rows: Int, owners: Int) -> Bool:
     """(k,) tracks that may take a proposal of its owner: their own, or that of a junior track of a like class.
 
-    Background and cars are easily confused, so they count as alike; people are taken by their own class alone.
+    Background and cars are easily confused, so they count as alike. A person of whom only the legs are seen may take
+    either, since legs alone may be taken for either. People are taken by their own class alone.
     """
     alike = tracks.object_class[rows] == tracks.object_class[owners]
     alike |= joinable[rows] & ~IS_PERSON[tracks.object_class[owners]]
@@ -117,11 +119,11 @@ def _may_take(tracks: TrackTable, rank: Int, joinable: Bool, rows: Int, owners: 
     return may_take
 
 
-def holds_of(owned_by: Bool, rows: Int) -> Bool:
-    """(K,) whether a track is there, and is one of a mask (M,), of (K,) rows some of which are NONE."""
-    holds: Bool = rows != NONE
-    holds[holds] = owned_by[rows[holds]]
-    return holds
+def mask_at(mask: Bool, rows: Int) -> Bool:
+    """(K,) mask[rows] for a mask (M,) and (K,) rows; False where a row is NONE."""
+    is_set: Bool = rows != NONE
+    is_set[is_set] = mask[rows[is_set]]
+    return is_set
 
 
 def first_of_each(group: Int, n_groups: int) -> Int:

@@ -47,7 +47,7 @@ class _Numbering(NamedTuple):
     of_proposal: Int  # (P,) number that each proposal gets, or the one that it is joined to
     of_piece: Int  # (S,) number of each piece
     source: Int  # (Q,) former proposal whose columns each takes over; that of a piece is the one it is split off
-    renewed: Int  # (R,) numbers of those whose members changed, ascending; the pieces are the last
+    changed: Int  # (R,) numbers of those whose members changed, ascending; the pieces are the last
 
     @classmethod
     def after(cls, n: int, joins: Joins, splits: Splits) -> _Numbering:
@@ -58,12 +58,12 @@ class _Numbering(NamedTuple):
         of_proposal[joins.parts] = of_proposal[joins.hosts]
         n_remaining = n - len(joins.parts)
         of_piece = np.arange(n_remaining, n_remaining + len(splits.rows))
-        renewed = np.zeros(n_remaining + len(of_piece), np.bool_)
-        renewed[of_proposal[joins.hosts]] = True
-        renewed[of_proposal[splits.hosts]] = True
-        renewed[of_piece] = True
+        changed = np.zeros(n_remaining + len(of_piece), np.bool_)
+        changed[of_proposal[joins.hosts]] = True
+        changed[of_proposal[splits.hosts]] = True
+        changed[of_piece] = True
         source = np.concatenate([remains.nonzero()[0], splits.hosts])
-        return cls(of_proposal, of_piece, source, renewed.nonzero()[0])
+        return cls(of_proposal, of_piece, source, changed.nonzero()[0])
 
 
 class Regrouping:
@@ -90,89 +90,96 @@ class Regrouping:
         if not len(frame.proposals) or not len(tracks):
             return frame
         before = Situation.of(tracks, frame, placement, self._kernels, self._tuning)
-        takes = find_takes(before)
-        now = before._replace(assignment=takes.applied(before.assignment))
-        joins = find_joins(now)
-        splits = find_splits(now)
-        matches = _matches_after(before, now, frame.matches, joins, splits)
+        after_takes = before._replace(assignment=find_takes(before).applied(before.assignment))
+        joins = find_joins(after_takes)
+        splits = find_splits(after_takes)
+        matches = _matches_after(before, after_takes, frame.matches, joins, splits)
         if not len(joins.parts) + len(splits.rows):
             return frame._replace(matches=matches)
-        return self._applied(now, matches, joins, splits)
+        return self._applied(after_takes, matches, joins, splits)
 
-    def _applied(self, now: Situation, matches: Matches, joins: Joins, splits: Splits) -> Associated:
+    def _applied(self, after_takes: Situation, matches: Matches, joins: Joins, splits: Splits) -> Associated:
         """The frame after joins and splits. The matches given number the pieces after the former proposals."""
-        numbering = _Numbering.after(len(now.proposals), joins, splits)
-        renewed = numbering.renewed
-        proposals = self._regrouped(now.proposals, splits, numbering)
+        tracks = after_takes.tracks
+        placement = after_takes.placement
+        numbering = _Numbering.after(len(after_takes.proposals), joins, splits)
+        changed = numbering.changed
+        proposals = self._regrouped(after_takes.proposals, splits, numbering)
         yaw = proposals.box[:, 6].copy()
-        turn = yaw_of(now.placement.T_world_sensor)
-        yaw[numbering.of_piece] = now.tracks.box[splits.rows, 6] - turn
+        turn = yaw_of(placement.T_world_sensor)
+        yaw[numbering.of_piece] = tracks.box[splits.rows, 6] - turn
         # A host has the heading of its track, since a part may lie across the car.
-        rows_of_hosts = now.assignment.track_of_proposal[joins.hosts]
-        yaw[numbering.of_proposal[joins.hosts]] = now.tracks.box[rows_of_hosts, 6] - turn
-        few = self._renewed(proposals, yaw[renewed], renewed)
-        observed = observe(few, now.placement.T_world_sensor, self._kernels)
-        observed = observed.moved(now.placement.deskew(observed.centroid))
+        rows_of_hosts = after_takes.assignment.track_of_proposal[joins.hosts]
+        yaw[numbering.of_proposal[joins.hosts]] = tracks.box[rows_of_hosts, 6] - turn
+        few = self._reboxed(proposals, yaw[changed], changed)
+        observed = observe(few, placement.T_world_sensor, self._kernels)
+        # The bearing of the centroid says when a proposal was seen. The odometry does the same, except across the
+        # seam of the sweep, where it averages over the bearings of the box.
+        observed = observed.moved(placement.deskew(observed.centroid))
         if len(splits.rows):
-            observed, matches = self._with_pieces(now, splits, observed, matches)
+            observed, matches = self._with_pieces(after_takes, splits, observed, matches)
         number = np.concatenate([numbering.of_proposal, numbering.of_piece])
+        # The reflectance of single points is not known here. A host keeps its statistics, though it gained or lost
+        # points; those of a piece are unknown, since it is another object. Flags and ground come from the source.
         reflectance = proposals.reflectance
         return Associated(
             proposals=replace(
                 proposals,
-                box=with_rows(proposals.box, renewed, few.box),
-                centroid=with_rows(proposals.centroid, renewed, few.centroid),
+                box=with_rows(proposals.box, changed, few.box),
+                centroid=with_rows(proposals.centroid, changed, few.centroid),
                 reflectance=None if reflectance is None else with_rows(reflectance, numbering.of_piece, np.nan),
             ),
-            observations=now.observations.regrouped(numbering.source, renewed, observed),
+            observations=after_takes.observations.regrouped(numbering.source, changed, observed),
             matches=matches._replace(proposals=number[matches.proposals]),
         )
 
     def _regrouped(self, former: Proposals, splits: Splits, numbering: _Numbering) -> Proposals:
         """Proposals of the members in their new order; boxes and other columns are those of their sources."""
-        members, coordinates, count = self._kernels.regrouped(
+        members, coordinates, count = self._kernels.sort_members(
             former.members,
             former.coordinates,
             former.offsets,
             numbering.of_proposal,
-            (splits.members, numbering.of_piece[splits.piece]),
+            (splits.member_rows, numbering.of_piece[splits.piece]),
             len(numbering.source),
         )
         return former.regrouped(members, coordinates, count, numbering.source)
 
-    def _renewed(self, proposals: Proposals, yaw: Float64, renewed: Int) -> Proposals:
+    def _reboxed(self, proposals: Proposals, yaw: Float64, changed: Int) -> Proposals:
         """The proposals (R,) whose members changed, alone: boxes at headings (R,) and centroids of their points."""
         kernels = self._kernels
-        runs = np.array((proposals.offsets[renewed], proposals.offsets[renewed + 1]))
+        runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
         members, coordinates = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
-        few = proposals.regrouped(members, coordinates, proposals.count[renewed], renewed)
+        few = proposals.regrouped(members, coordinates, proposals.count[changed], changed)
         box = kernels.upright_boxes(few.coordinates, few.offsets, yaw)
         centroid = (kernels.group_sums(few.coordinates, few.offsets) / few.count).T
         return replace(few, box=box, centroid=centroid)
 
     def _with_pieces(
-        self, now: Situation, splits: Splits, observed: Observations, matches: Matches
+        self, after_takes: Situation, splits: Splits, observed: Observations, matches: Matches
     ) -> tuple[Observations, Matches]:
-        """Observations (R,), the last of which are the pieces, and matches, where pieces show positions alone.
+        """Observations (R,), the last of which are the pieces, and matches, where pieces show where their tracks are.
 
-        Their extent is that of their tracks.
+        k-DOP, bottom and top of a piece are those of its track. Box, centroid and count are those of its points.
         """
         rows = splits.rows
         pieces = np.arange(len(observed) - len(rows), len(observed))
         kdop = observed.kdop.copy()
-        kdop[:, pieces], matches = locate_pieces(now, rows, kdop[:, pieces], matches, self._position_variance)
-        bottom = with_rows(observed.bottom, pieces, now.tracks.bottom[rows])
-        top = with_rows(observed.top, pieces, now.tracks.top[rows])
+        kdop[:, pieces], matches = locate_pieces(after_takes, rows, kdop[:, pieces], matches, self._position_variance)
+        bottom = with_rows(observed.bottom, pieces, after_takes.tracks.bottom[rows])
+        top = with_rows(observed.top, pieces, after_takes.tracks.top[rows])
         return replace(observed, kdop=kdop, bottom=bottom, top=top), matches
 
 
-def _matches_after(before: Situation, taken: Situation, matches: Matches, joins: Joins, splits: Splits) -> Matches:
+def _matches_after(
+    before: Situation, after_takes: Situation, matches: Matches, joins: Joins, splits: Splits
+) -> Matches:
     """The matches after all edits; pieces are numbered after the former proposals.
 
     A track measures nothing by a proposal that is new to it, or that another track takes points of.
     """
-    proposal_of_track = taken.assignment.proposal_of_track.copy()
-    track_of_proposal = taken.assignment.track_of_proposal
+    proposal_of_track = after_takes.assignment.proposal_of_track.copy()
+    track_of_proposal = after_takes.assignment.track_of_proposal
     loses_all = track_of_proposal[joins.parts]
     proposal_of_track[loses_all[loses_all != NONE]] = NONE
     n = len(track_of_proposal)

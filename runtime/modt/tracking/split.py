@@ -22,7 +22,7 @@ class Splits(NamedTuple):
 
     rows: Int  # (S,) track of each piece, ascending
     hosts: Int  # (S,) proposal that it is split off
-    members: Int  # (K,) members of the frame that are split off, ascending
+    member_rows: Int  # (K,) rows of Proposals.members that are split off, ascending
     piece: Int  # (K,) piece of each of these
 
 
@@ -32,25 +32,29 @@ NO_SPLITS = Splits(*np.zeros((4, 0), np.int64))
 class _Points(NamedTuple):
     """Points of the longer proposals that lie where a track is expected."""
 
-    members: Int  # (K,) ascending
+    member_rows: Int  # (K,) rows of Proposals.members, ascending, each once
     piece: Int  # (K,) piece that each would belong to
     height_m: Float64  # (K,) z of each [m, world]
 
 
 def find_splits(now: Situation) -> Splits:
-    """Pieces for the tracks seen a frame ago that have no proposal, or an odd one."""
+    """Pieces for the tracks seen a frame ago that have no proposal, or an odd one.
+
+    A track that was observed once gets none, since it has no pairs (`Pairs`).
+    """
     rows, hosts = _hosts(now)
     if not len(rows):
         return NO_SPLITS
+    # Each point is given to one piece first. A piece that is not made leaves its points to the host, not to a rival.
     points = _expected_points(now, rows, hosts)
     made = _worth_making(now, points, rows, hosts)
     split = made[points.piece]
     number = made.cumsum() - 1
-    return Splits(rows[made], hosts[made], points.members[split], number[points.piece[split]])
+    return Splits(rows[made], hosts[made], points.member_rows[split], number[points.piece[split]])
 
 
 def _hosts(now: Situation) -> tuple[Int, Int]:
-    """Tracks (R,) that seek a piece, and the longer proposal (R,) that covers most of where each is expected."""
+    """Tracks (R,), ascending, that seek a piece, and the longer proposal (R,) that covers most of each."""
     pairs = now.pairs
     seeks = _seeking(now)
     covered = (seeks[pairs.rows] & (pairs.around > now.tuning.min_coverage)).nonzero()[0]
@@ -60,7 +64,7 @@ def _hosts(now: Situation) -> tuple[Int, Int]:
     rows = pairs.rows[covered]
     hosts = pairs.proposals[covered]
     expected_m = widths(pairs.expected.take(rows, axis=1)).max(axis=0)
-    longer = (pairs.extent_m[hosts] > expected_m + now.tuning.longer_m).nonzero()[0]
+    longer = (pairs.max_width_m[hosts] > expected_m + now.tuning.longer_m).nonzero()[0]
     best = longer[first_of_each(rows[longer], len(now.tracks))]
     return rows[best], hosts[best]
 
@@ -75,7 +79,7 @@ def _seeking(now: Situation) -> Bool:
     held = (seeks & (now.assignment.proposal_of_track != NONE)).nonzero()[0]
     class_ = tracks.object_class[held]
     proposal = now.assignment.proposal_of_track[held]
-    too_long = now.pairs.extent_m[proposal] > MAX_SIZE_M[class_, 0]
+    too_long = now.pairs.max_width_m[proposal] > MAX_SIZE_M[class_, 0]
     few_points = now.observations.count[proposal] < now.tuning.min_share * tracks.points[held]
     likely = tracks.posterior[held, class_] >= now.tuning.min_probability
     seeks[held] = (too_long | few_points) & likely
@@ -83,19 +87,18 @@ def _seeking(now: Situation) -> Bool:
 
 
 def _expected_points(now: Situation, rows: Int, hosts: Int) -> _Points:
-    """Members of the hosts (R,) that lie where the tracks (R,) are expected; the first of two tracks gets a point."""
-    # Each host's members are listed once a piece: `piece` and `member` are parallel.
+    """Members of the hosts (R,) that lie where the tracks (R,), ascending, are expected.
+
+    A point where two are expected goes to the track of the lower row, which is the older one, not always the senior.
+    """
     proposals = now.proposals
     T_world_sensor = now.placement.T_world_sensor
     margin_m = now.tuning.margin_m
-    count = proposals.count[hosts]
-    piece = np.arange(len(rows)).repeat(count)
-    begin = proposals.offsets[hosts + 1] - count.cumsum()
-    member = np.arange(len(piece)) + begin.repeat(count)
+    piece, member_rows = _rows_of_groups(proposals.offsets, hosts)
     R = T_world_sensor[:3, :3].astype(np.float32)
-    xyz = R @ proposals.coordinates.take(member, axis=1) + T_world_sensor[:3, 3:]
+    xyz = R @ proposals.coordinates.take(member_rows, axis=1) + T_world_sensor[:3, 3:]
     below = (xyz[2] < now.tracks.top[rows[piece]] + margin_m).nonzero()[0]
-    member = member[below]
+    member_rows = member_rows[below]
     piece = piece[below]
     xyz = xyz.take(below, axis=1)
     # What the sensor saw as it turned is moved to the stamp, by the place where the track is expected.
@@ -103,16 +106,28 @@ def _expected_points(now: Situation, rows: Int, hosts: Int) -> _Points:
     xy = xyz[:2] + step.T.take(piece, axis=1)
     limit = now.pairs.expected.take(rows[piece], axis=1) + margin_m
     within = (DIRECTIONS.T @ xy <= limit).all(axis=0).nonzero()[0]
-    members, first = np.unique(member[within], return_index=True)
+    once, first = np.unique(member_rows[within], return_index=True)
     chosen = within[first]
-    return _Points(members, piece[chosen], xyz[2, chosen])
+    return _Points(once, piece[chosen], xyz[2, chosen])
+
+
+def _rows_of_groups(offsets: Int, groups: Int) -> tuple[Int, Int]:
+    """All rows of the groups (R,), one group after the other, each with the index of its group among the R.
+
+    A group has the rows from offsets[i] to offsets[i + 1], and may be given several times.
+    """
+    begin = offsets[groups]
+    count = offsets[groups + 1] - begin
+    index = np.arange(len(groups)).repeat(count)
+    n_before = count.cumsum() - count
+    return index, np.arange(len(index)) + (begin - n_before).repeat(count)
 
 
 def _worth_making(now: Situation, points: _Points, rows: Int, hosts: Int) -> Bool:
     """(R,) pieces of enough points that are as high as their tracks, and leave enough of their hosts.
 
-    A track whose proposal is split itself keeps it if the other pieces leave nothing else. So these pieces are given
-    up first; then the others, where the rest is still too small.
+    If too little of a host remains, first the piece of the host's own track is dropped, which then has all that the
+    other pieces leave. If that is too little as well, all its pieces are dropped.
     """
     tracks = now.tracks
     tuning = now.tuning
@@ -121,8 +136,8 @@ def _worth_making(now: Situation, points: _Points, rows: Int, hosts: Int) -> Boo
     np.maximum.at(highest_m, points.piece, points.height_m)
     made: Bool = size >= np.maximum(tuning.min_points, tuning.min_share * tracks.points[rows])
     made &= highest_m >= tracks.top[rows] - tuning.max_drop_m
-    keeps_host = now.assignment.proposal_of_track[rows] == hosts
-    for given_up in (keeps_host, np.ones(len(rows), np.bool_)):
+    is_own_host = now.assignment.proposal_of_track[rows] == hosts
+    for given_up in (is_own_host, np.ones(len(rows), np.bool_)):
         rest = now.proposals.count - np.bincount(hosts, size * made, len(now.proposals))
         made &= ~given_up | (rest[hosts] >= tuning.min_points)
     return made
@@ -136,16 +151,17 @@ def locate_pieces(
     A piece shows where its track is, by the ends at which nothing touches it, and nothing new of its shape.
 
     Args:
-        now: situation before the edits.
-        rows: (S,) tracks of the pieces, each matched.
+        now: situation after the takes, before joins and splits.
+        rows: (S,) tracks of the pieces.
         kdop: (8, S) k-DOPs of the pieces [m, world].
-        matches: the frame's, which number the pieces.
+        matches: matches after all edits, in which each of these tracks has its piece, and its expected position.
         variance: square of the deviation of a measured position [m2].
     """
     tracks = now.tracks
     expected = tracks.predicted_kdops(rows)
     mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ tracks.x.take(rows, axis=0)[:, :2].T
-    # An end that is touched is as far from its expected place as the opposite one, and unknown if both are.
+    # An end that is touched is taken to be as far from its expected place as the opposite one. If both are touched,
+    # the axis is known weakly: its variance is the greatest that `measured` allows for the width of the object.
     touched = kdop > expected + (now.tuning.margin_m - now.tuning.touch_m)
     both = touched & touched[OPPOSITE]
     off = kdop - mean
@@ -153,10 +169,11 @@ def locate_pieces(
     before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
     shift, covariance, end_variance = now.kernels.measured(mean, mean + off, variance, before)
     at = (matches.rows == rows[:, None]).argmax(axis=1)
+    # The pieces are new to their tracks, so the matches hold the expected positions, from which the shift leads.
     measured = matches._replace(
         position=with_rows(matches.position, at, matches.position[at] + shift),
         covariance=with_rows(matches.covariance, at, covariance),
         end_variance=with_rows(matches.end_variance, at, end_variance.T),
     )
-    at_measured: Float64 = expected + DIRECTIONS.T @ shift.T
-    return at_measured, measured
+    kdop_there: Float64 = expected + DIRECTIONS.T @ shift.T
+    return kdop_there, measured

@@ -199,7 +199,8 @@ class RegroupingTuning:
     Chosen on: judgement."""
 
     min_share: float = 0.4
-    """Least share of the points last seen in a piece, and in a proposal that is not split. Greater: fewer splits.
+    """Least share of the points last seen of a track that its piece holds. A track whose own proposal holds less
+    would leave it for a piece. Greater: fewer splits.
     Chosen on: judgement."""
 
     max_drop_m: float = 0.4
