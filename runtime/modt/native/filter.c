@@ -155,11 +155,13 @@ typedef struct {
     const uint8_t *final;
 } TrackColumns;
 
-/* The n proposals of a frame in the world: kdop is eight rows of n. */
+/* The n proposals of a frame in the world: kdop is eight rows of n. Since the frame before dt_s have passed, in which
+ * a lagged k-DOP moves by the share lag_gain of a displacement. */
 typedef struct {
     const double *kdop, (*box)[7], *bottom, *top;
     const i64 *count;
     i64 n;
+    double dt_s, lag_gain;
 } Observations;
 
 /* tracking.tuning.ExtentTuning */
@@ -170,26 +172,27 @@ typedef struct {
 /* Limits of tracking.extent, by class where they are arrays. */
 typedef struct {
     const double *max_length_m, *confirmed_growth;
+    i64 n_classes;
     double agreement_m;
 } ExtentLimits;
 
 /* extent.ExtentUpdate: writes what n proposals show of n rows of the table.
  *
- * positions are the measured ones, given along the eight directions of k-DOPs too. follow is the share of a
- * displacement by which the lagged k-DOP follows. The displacement is found before the lagged k-DOP is moved, and the
- * class and the hits of a track are read alone. */
+ * Positions are the measured ones, given along the eight directions of k-DOPs too. The hits of a track count this
+ * frame already, and a new one has its size and lagged k-DOP. The displacement is found before that is moved. */
 EXPORT void modt_update_extent(const TrackColumns *tracks, const Observations *seen, const i64 *rows,
                                const i64 *proposals, i64 n, const double (*position)[2],
                                const double (*position_along)[N_ENDS], const ExtentTuning *tuning,
-                               const ExtentLimits *limits, double follow, double dt_s)
+                               const ExtentLimits *limits)
 {
     for (i64 m = 0; m < n; m++) {
         const i64 row = rows[m], proposal = proposals[m], class = tracks->object_class[row];
-        PROVEN(proposal >= 0 && proposal < seen->n && class >= 0 && class < 4);
-        double end[N_ENDS], about[N_ENDS], shift[N_ENDS];
+        PROVEN(proposal >= 0 && proposal < seen->n && class >= 0 && class < limits->n_classes);
+        /* The k-DOP in the world, relative to the measured position, and since the place where the track lags. */
+        double end[N_ENDS], relative[N_ENDS], shift[N_ENDS];
         for (int k = 0; k < N_ENDS; k++) {
             end[k] = seen->kdop[k * seen->n + proposal];
-            about[k] = end[k] - position_along[m][k];
+            relative[k] = end[k] - position_along[m][k];
             shift[k] = end[k] - tracks->lagged_kdop[row][k];
         }
         /* Along each axis the track went as far as the end that moved less; 0 or less where the ends part. */
@@ -197,21 +200,21 @@ EXPORT void modt_update_extent(const TrackColumns *tracks, const Observations *s
         for (int k = 0; k < N_AXES; k++) {
             double ahead = shift[k], behind = -shift[k + N_AXES];
             double together = high(low(ahead, behind), -high(ahead, behind));
-            longest = high(about[k] + about[k + N_AXES], longest);
+            longest = high(relative[k] + relative[k + N_AXES], longest);
             moved = high(together, moved);
         }
-        const int merged = longest > limits->max_length_m[class]; /* with other objects: nothing new is known */
+        const int too_long = longest > limits->max_length_m[class]; /* its envelope alone stays as it is */
         const double weight = low(1.0 - 1.0 / (double)tracks->hits[row], tuning->mean_decay);
         const double decay = tuning->known_decay;
         for (int k = 0; k < N_ENDS; k++) {
             double *envelope = &tracks->envelope[row][k];
-            double off = tracks->mean_kdop[row][k] - about[k];
-            if (!merged)
-                *envelope = high(about[k], decay * *envelope + (1 - decay) * about[k]);
-            tracks->mean_kdop[row][k] =
-                __builtin_fabs(off) < limits->agreement_m ? about[k] + weight * off : about[k]; /* else it jumped */
+            double off = tracks->mean_kdop[row][k] - relative[k];
+            if (!too_long)
+                *envelope = high(relative[k], decay * *envelope + (1 - decay) * relative[k]);
+            const int agrees = __builtin_fabs(off) < limits->agreement_m; /* else the end jumped */
+            tracks->mean_kdop[row][k] = agrees ? relative[k] + weight * off : relative[k];
             tracks->kdop[row][k] = end[k];
-            tracks->lagged_kdop[row][k] += follow * shift[k];
+            tracks->lagged_kdop[row][k] += seen->lag_gain * shift[k];
         }
         const double growth = tracks->final[row] ? limits->confirmed_growth[class] : tuning->growth;
         for (int k = 0; k < 3; k++) {
@@ -223,7 +226,7 @@ EXPORT void modt_update_extent(const TrackColumns *tracks, const Observations *s
         for (int k = 0; k < 2; k++)
             tracks->anchor[row][k] = position[m][k];
         tracks->moved_m[row] = moved;
-        tracks->observed_s[row] += dt_s;
+        tracks->observed_s[row] += seen->dt_s;
         tracks->bottom[row] = seen->bottom[proposal];
         tracks->top[row] = seen->top[proposal];
         tracks->points[row] = seen->count[proposal];

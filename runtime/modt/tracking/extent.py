@@ -19,7 +19,7 @@ from modt.tracking.tuning import ExtentTuning
 from modt.types import Float64, Int
 
 MAX_LENGTH_M: Float64 = np.where(np.arange(N_CLASSES) == ObjectClass.BACKGROUND, np.inf, MAX_SIZE_M[:, 0])
-"""(4,) length of a track of each class beyond which it is merged with others."""
+"""(4,) length of a track of each class beyond which it is taken to be merged with others."""
 
 
 class ExtentUpdate:
@@ -48,7 +48,7 @@ class ExtentUpdate:
         """Write the columns of the extent.
 
         Args:
-            tracks: written.
+            tracks: written. Their hits count this frame, and new tracks have their size and lagged k-DOP already.
             rows: (R,) tracks that have a proposal.
             proposals: (R,) the proposal of each.
             observations: all proposals in the world.
@@ -57,9 +57,9 @@ class ExtentUpdate:
         """
         kdop = observations.kdop.T.take(proposals, axis=0)
         box = observations.box.take(proposals, axis=0)
-        about = kdop - position @ DIRECTIONS
-        self._envelope(tracks, rows, about)
-        self._mean(tracks, rows, about)
+        relative = kdop - position @ DIRECTIONS
+        self._envelope(tracks, rows, relative)
+        self._mean(tracks, rows, relative)
         self._displacement(tracks, rows, kdop, dt_s)
         self._size(tracks, rows, box[:, 3:6])
         tracks.observed_s[rows] += dt_s
@@ -71,23 +71,23 @@ class ExtentUpdate:
         tracks.points[rows] = observations.count[proposals]
         tracks.proposal[rows] = proposals
 
-    def _envelope(self, tracks: TrackTable, rows: Int, about: Float64) -> None:
-        """The known extent grows to what is seen (R, 8), and decays slowly towards it.
+    def _envelope(self, tracks: TrackTable, rows: Int, relative: Float64) -> None:
+        """The known extent grows to what is seen (R, 8), relative to the position, and decays slowly towards it.
 
-        It stays as it is for an object longer than its class, which is merged with others.
+        It stays as it is for an object longer than its class, which is taken to be merged with others.
         """
         known = tracks.envelope.take(rows, axis=0)
         decay = self.tuning.known_decay
-        grown = np.maximum(about, decay * known + (1 - decay) * about)
+        grown = np.maximum(relative, decay * known + (1 - decay) * relative)
         longest_m = MAX_LENGTH_M[tracks.object_class[rows]]
-        merged = (about[:, :4] + about[:, 4:] > longest_m[:, None]).any(axis=1, keepdims=True)
-        tracks.envelope[rows] = np.where(merged, known, grown)
+        too_long = (relative[:, :4] + relative[:, 4:] > longest_m[:, None]).any(axis=1, keepdims=True)
+        tracks.envelope[rows] = np.where(too_long, known, grown)
 
-    def _mean(self, tracks: TrackTable, rows: Int, about: Float64) -> None:
-        """The mean k-DOP follows what is seen (R, 8); an end that jumped begins anew."""
-        off = tracks.mean_kdop.take(rows, axis=0) - about
+    def _mean(self, tracks: TrackTable, rows: Int, relative: Float64) -> None:
+        """The mean k-DOP follows what is seen (R, 8), relative to the position; an end that jumped begins anew."""
+        off = tracks.mean_kdop.take(rows, axis=0) - relative
         weight = np.minimum(1.0 - 1.0 / tracks.hits[rows], self.tuning.mean_decay)[:, None]
-        tracks.mean_kdop[rows] = about + (np.abs(off) < self.agreement_m) * weight * off
+        tracks.mean_kdop[rows] = relative + (np.abs(off) < self.agreement_m) * weight * off
 
     def _displacement(self, tracks: TrackTable, rows: Int, kdop: Float64, dt_s: float) -> None:
         """The place that a track comes from follows its k-DOP (R, 8) with a lag; the displacement is from there.
@@ -101,7 +101,7 @@ class ExtentUpdate:
         behind = -shift[:, 4:]
         together = np.maximum(np.minimum(ahead, behind), -np.maximum(ahead, behind))
         tracks.moved_m[rows] = together.max(axis=1, initial=0.0)
-        tracks.lagged_kdop[rows] = lagged + self._follow(dt_s) * shift
+        tracks.lagged_kdop[rows] = lagged + self._lag_gain(dt_s) * shift
 
     def _size(self, tracks: TrackTable, rows: Int, seen_m: Float64) -> None:
         """The size follows a larger box (R, 3) fast, and a smaller one slowly, since a part may be hidden."""
@@ -111,8 +111,8 @@ class ExtentUpdate:
         growth = np.where(tracks.final[rows], confirmed, self.tuning.growth)[:, None]
         tracks.size_m[rows] = size_m + np.where(change > 0, growth, self.tuning.shrinkage) * change
 
-    def _follow(self, dt_s: float) -> float:
-        """Share of a displacement by which the place that it is measured from follows."""
+    def _lag_gain(self, dt_s: float) -> float:
+        """Share of a displacement by which the lagged k-DOP moves in this time."""
         return 1.0 - math.exp(-dt_s / self.tuning.lag_s)
 
 
@@ -143,28 +143,18 @@ _OBSERVATIONS = Layout(
     top=Array(np.float64, "n"),
     count=Array(np.int64, "n"),
     n=Number(np.int64),
+    dt_s=Number(np.float64),
+    lag_gain=Number(np.float64),
 )
 _TUNING = Layout("ExtentTuning", **{field.name: Number(np.float64) for field in fields(ExtentTuning)})
 _LIMITS = Layout(
     "ExtentLimits",
-    max_length_m=Array(np.float64, N_CLASSES),
-    confirmed_growth=Array(np.float64, N_CLASSES),
+    max_length_m=Array(np.float64, "n_classes"),
+    confirmed_growth=Array(np.float64, "n_classes"),
+    n_classes=Number(np.int64),
     agreement_m=Number(np.float64),
 )
-_DOUBLE = ctypes.c_double
-_ARGUMENTS = (
-    _COLUMNS,
-    _OBSERVATIONS,
-    INT64,
-    INT64,
-    ctypes.c_int64,
-    FLOAT64,
-    FLOAT64,
-    _TUNING,
-    _LIMITS,
-    _DOUBLE,
-    _DOUBLE,
-)
+_ARGUMENTS = (_COLUMNS, _OBSERVATIONS, INT64, INT64, ctypes.c_int64, FLOAT64, FLOAT64, _TUNING, _LIMITS)
 
 
 class NativeExtentUpdate(ExtentUpdate):
@@ -175,7 +165,7 @@ class NativeExtentUpdate(ExtentUpdate):
         declare(library, {"modt_update_extent": (None, _ARGUMENTS)})
         self._library = library
         self._tuning = _TUNING.of(tuning)
-        self._limits = _LIMITS.of(self, max_length_m=MAX_LENGTH_M)
+        self._limits = _LIMITS.of(self, max_length_m=MAX_LENGTH_M, n_classes=N_CLASSES)
         # Filled once a table: it is the same from the births of one frame to those of the next.
         self._table: TrackTable | None = None
         self._columns: Filled | None = None
@@ -195,7 +185,7 @@ class NativeExtentUpdate(ExtentUpdate):
             self._table = tracks
         self._library.modt_update_extent(
             self._columns,
-            _OBSERVATIONS.of(observations, n=len(observations)),
+            _OBSERVATIONS.of(observations, n=len(observations), dt_s=dt_s, lag_gain=self._lag_gain(dt_s)),
             rows,
             proposals,
             len(rows),
@@ -203,8 +193,6 @@ class NativeExtentUpdate(ExtentUpdate):
             position @ DIRECTIONS,
             self._tuning,
             self._limits,
-            self._follow(dt_s),
-            dt_s,
         )
 
 
