@@ -33,7 +33,7 @@ from modt.types import (
 SOURCE, *_, SINK = LEDGER_STAGES
 SEGMENTATION, ODOMETRY, TRACKING, SCHEDULING, CLASSIFICATION, FUSION = STAGES = LEDGER_STAGES[1:-1]
 """Names of the stages in the ledger."""
-_NOTHING: Bool = np.zeros(0, np.bool_)
+_NONE_CONFIRMED: Bool = np.zeros(0, np.bool_)
 
 
 class SegmentationStage(Protocol):
@@ -116,16 +116,17 @@ class Pipeline:
         tracked = run(TRACKING, self.tracker.track, frame.time_s, proposals, located)
         proposals = tracked.proposals
         motion = tracked.motion
-        evidence = tracked.evidence
+        evidence = tracked.evidence  # shares its arrays with own_evidence, so it shows what the fusion writes
         run(FUSION, self.fusion.observe, tracked.own_evidence, motion, proposals)
         asks = run(FUSION, self.fusion.asks, evidence, motion, proposals, tracked.wants_class)
         chosen = run(SCHEDULING, self.scheduler.select, tracked.requests, motion, evidence, proposals, asks, budget)
         rows = chosen.rows
-        confirmed = _NOTHING
+        confirmed = _NONE_CONFIRMED
         if len(rows):
             likelihood = self._classify(frame.points, proposals, motion.proposal[rows], budget)
             confirmed = run(FUSION, self.fusion.fuse, tracked.own_evidence, motion, proposals, rows, likelihood)
         run(FUSION, self.decision.decide, tracked.decisions, evidence, motion)
+        # Last, since it takes the snapshot of all columns, the reported class among them.
         tracks = run(TRACKING, self.tracker.confirm, rows, confirmed)
         return FrameResult(
             frame=frame,

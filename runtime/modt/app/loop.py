@@ -46,7 +46,9 @@ REPORT_S = 1.0
 
 @dataclass(kw_only=True, eq=False)
 class Loop:
-    """Drives the stages by the frames of a source. This class replays a recording; Service adds what a robot needs.
+    """Drives the stages by the frames of a source. As it is, it replays a recording by a Playback.
+
+    Service narrows the source to a LiveStream, and adds what a robot needs.
 
     Attributes:
         source, stages, recording: give the frames, process them, and keep the records.
@@ -101,7 +103,8 @@ class Loop:
         """
         self._on_frame = on_frame or self._on_frame
         with self.recording.directory.locked(), ExitStack() as at_end:
-            # At the end these are called in the reverse order: the last window, the sources, the sinks, the summary.
+            # At the end these are called last first: the signal handlers are restored, the last window is written,
+            # systemd is told of the end, the source, the poses and the sinks are closed, and the summary is written.
             self.recording.start()
             at_end.callback(self._finish)
             at_end.callback(close_together, self.sinks.values())
@@ -116,7 +119,8 @@ class Loop:
     def process_frames(self, notifier: Notifier) -> None:
         """Process frames until a signal, or the end of the source. The first one identifies the sensor.
 
-        Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
+        Garbage is collected once at the start, and what is left is frozen. Later collections leave that out, so they
+        are short.
 
         Raises:
             ModtError: a failure that cannot be contained.
@@ -151,7 +155,11 @@ class Loop:
             self._serve(notifier)
 
     def _process(self, received: Received) -> None:
-        """Process a frame. Its failure is contained: the tracks are those of the frame before."""
+        """Process a frame. Its failure is contained: the tracks are those of the frame before.
+
+        The time of the last frame, remembered background, odometry, savings of the scheduler and class frequencies of
+        the decision are not rolled back. After RENEW_AFTER failures in a row new stages begin without tracks.
+        """
         try:
             line = self._step(received)
         except ModtError:
@@ -202,7 +210,7 @@ class Loop:
             sink.ledger(line)
 
     def _serve(self, notifier: Notifier) -> None:
-        """Report the status and reload the profile, which a replay does not."""
+        """Nothing; Service reports the status and reloads the profile."""
 
     def pace(self) -> dict[str, Any]:
         """Figures of the pace for the summary."""

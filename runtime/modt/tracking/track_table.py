@@ -27,9 +27,9 @@ class TrackTable(Tracks):
     """Tracks with the columns that only the tracker needs; k-DOPs as in geometry/kdop.py."""
 
     kdop: Float64 = column(float, 8)  # last observed [m, world]
-    lagged_kdop: Float64 = column(float, 8)  # which follows the last observed with a lag [m, world]
-    envelope: Float64 = column(float, 8, fill=-np.inf)  # of all observed, slowly decaying, about the position [m]
-    mean_kdop: Float64 = column(float, 8)  # about the position; an end that jumped begins anew [m]
+    lagged_kdop: Float64 = column(float, 8)  # moves towards the last observed with a lag [m, world]
+    envelope: Float64 = column(float, 8, fill=-np.inf)  # known extent relative to the position, slowly decaying [m]
+    mean_kdop: Float64 = column(float, 8)  # relative to the position; an end that jumped begins anew [m]
     end_variance: Float64 = column(float, 4)  # of the position along each axis, by ends that disagreed [m2]
     bottom: Float64 = column(float)  # lowest point last observed [m, world]
     top: Float64 = column(float)  # highest point last observed [m, world]
@@ -44,13 +44,13 @@ class TrackTable(Tracks):
         return kdop
 
     def known_kdops(self, rows: Int) -> Float64:
-        """(8, R) k-DOPs of all that was observed of the rows, where the filter expects them now."""
+        """(8, R) known extents of the rows in the world, where the filter expects them now."""
         kdop: Float64 = (self.envelope.take(rows, axis=0) + self.x.take(rows, axis=0)[:, :2] @ DIRECTIONS).T.copy()
         return kdop
 
 
 class LiveTracks:
-    """The tracks alive, and what else goes on from frame to frame. The stages may be exchanged around it.
+    """The tracks alive, the next identity and the time, which outlast an exchange of the stages.
 
     Attributes:
         table: the tracks as the tracker has them: its own columns can be written to, the others are read-only.
@@ -91,13 +91,13 @@ class LiveTracks:
         )
 
     def save(self) -> Tracks:
-        """Copy the tracks at the end of a frame, for `roll_back`; the copy is read-only."""
+        """Copy the tracks at the end of a frame, for `roll_back`; returns the copy, read-only."""
         saved = self.table.copy()
         self._saved = saved, self.next_id
         return Tracks.of(saved).lock()
 
     def roll_back(self) -> None:
-        """Return to the tracks that were saved last."""
+        """Return to the tracks that were saved last, and to the next identity of then, but not to the time."""
         saved, self.next_id = self._saved
         self._hold(saved.copy())
 

@@ -38,7 +38,7 @@ class Tracker:
     """Follows every proposal from frame to frame.
 
     Args:
-        config: its parameters.
+        config: association, extensions and the frames that a track is kept without a proposal.
         machine: the table that drives the states.
         association: association of proposals with tracks; by default the configured one.
         period_s: time between sweeps; a track that is not seen is kept for `max_missed` of them.
@@ -97,7 +97,9 @@ class Tracker:
         )
 
     def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
-        """Match a frame's proposals, regrouped where the tracks know better, with the tracks; each belongs to one.
+        """Match a frame's proposals with the tracks, and regroup them where the tracks know better.
+
+        Each of the proposals returned belongs to one track, a new one where none matched. `confirm` ends the frame.
 
         Args:
             stamp_s: time of the frame [s].
@@ -105,7 +107,7 @@ class Tracker:
             located: the same in the world.
 
         Returns:
-            The tracks by owner, the proposals, and which tracks want a class.
+            The tracks, in parts by the stage that writes them, the proposals, and which tracks want a class.
         """
         self._forget(stamp_s)
         dt_s = self._predict(stamp_s)
@@ -155,7 +157,11 @@ class Tracker:
         return (self.config.max_missed + frames) * self._period_s
 
     def _forget(self, stamp_s: float) -> None:
-        """Delete the tracks that would have expired in a gap; beyond N frames of it, the scene may be another one."""
+        """Delete the tracks that would have expired in a gap; beyond N frames of it, the scene may be another one.
+
+        An odometry that registers asks for the tracks before `track`, so this is called once or twice a frame; the
+        second call changes nothing.
+        """
         t = self.tracks
         lapse_s = self._lapse_s(stamp_s)
         most_s = self._coasting_s(1.5)
@@ -204,7 +210,7 @@ class Tracker:
         """Give people whom the view cuts off above their former height, in the tracks and in the proposals returned.
 
         Args:
-            frame: regrouped.
+            frame: frame after regrouping.
             box_before: (R, 7) boxes of the matched tracks before the frame [m, world].
         """
         t = self.tracks
@@ -248,7 +254,7 @@ class Tracker:
         return near
 
     def _settled_background(self, near_rest: Bool) -> Bool:
-        """(M,) tracks that are confirmed background, and near their rest position."""
+        """(M,) tracks that are confirmed background, and near their rest position, given which are near theirs."""
         background: Bool = self.tracks.object_class == ObjectClass.BACKGROUND.value
         return self.tracks.final & background & near_rest
 
