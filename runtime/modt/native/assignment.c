@@ -21,7 +21,7 @@ static void find_two_cheapest(const i64 *row, const double *cost, i64 n_pairs, d
             second_cost[i] = cost[cheapest[i]];
             cheapest[i] = pair;
         } else
-            second_cost[i] = low(cost[pair], second_cost[i]);
+            second_cost[i] = mind(cost[pair], second_cost[i]);
     }
 }
 

@@ -67,8 +67,8 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
     }
     for (i64 i = 0; i < n; i++) {
         i64 c = cell[i] = table[cell[i]];
-        cells->low[c] = least(height[i], cells->low[c]);
-        cells->high[c] = most(height[i], cells->high[c]);
+        cells->low[c] = minf(height[i], cells->low[c]);
+        cells->high[c] = maxf(height[i], cells->high[c]);
         cells->entries[c]++;
     }
     for (i32 c = 0; c < count; c++) {
@@ -216,7 +216,7 @@ static i32 unite_cells(const Cells *cells, i32 used, i64 n_cells, i32 side, cons
         i32 begins = -(place != s->spans[n].place); /* all bits set, if a span begins: a mask, and minus one */
         i4 anew = {begins, begins, begins, begins};
         f4 so_far = (f4)(((i4)none & anew) | ((i4)ends & ~anew));
-        ends = least4((f4){cells->low[i], -cells->high[i]}, so_far);
+        ends = min4((f4){cells->low[i], -cells->high[i]}, so_far);
         n -= begins;
         s->spans[n] = (Span){place, ends[0], -ends[1], s->max_gap_m[i]};
         s->last_cell[n] = i;
@@ -254,7 +254,7 @@ static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32
         f4 low = {left->low, behind_left->low, behind_same->low, behind_right->low};
         f4 high = {left->high, behind_left->high, behind_same->high, behind_right->high};
         f4 max_gap_m = {left->max_gap_m, behind_left->max_gap_m, behind_same->max_gap_m, behind_right->max_gap_m};
-        f4 gap_m = most4(low, spread(here->low)) - least4(high, spread(here->high));
+        f4 gap_m = max4(low, spread(here->low)) - min4(high, spread(here->high));
         i4 connected = (places == place - back) & (gap_m < max_gap_m);
 
         i4 alone = {k, k, k, k};
@@ -345,8 +345,8 @@ static void measure(const Cells *cells, const PointColumns *points, const float 
                 continue;
             f4 low = {points->x[i], points->y[i], cells->low[i]};
             f4 high = {points->x[i], points->y[i], cells->high[i]};
-            ends[g][LOW] = least4(low, ends[g][LOW]);
-            ends[g][HIGH] = most4(high, ends[g][HIGH]);
+            ends[g][LOW] = min4(low, ends[g][LOW]);
+            ends[g][HIGH] = max4(high, ends[g][HIGH]);
             sizes->points[g] += cells->entries[i];
             sizes->cell[g] = i > sizes->cell[g] ? i : sizes->cell[g];
         }
@@ -466,8 +466,8 @@ EXPORT void modt_view_bounds(const Cells *cells, const PointColumns *sampled, co
         float least_of[VIEW] = {direction, range_m, low, (low + ground) / range_m};
         float most_of[VIEW] = {direction, range_m, high, (high + ground) / range_m};
         for (int v = 0; v < VIEW; v++) {
-            bounds->min[v][g] = least(least_of[v], bounds->min[v][g]);
-            bounds->max[v][g] = most(most_of[v], bounds->max[v][g]);
+            bounds->min[v][g] = minf(least_of[v], bounds->min[v][g]);
+            bounds->max[v][g] = maxf(most_of[v], bounds->max[v][g]);
         }
         float across = magnitude(x) + magnitude(y);
         bounds->scale_m[g] = across * across / range_m;
@@ -483,17 +483,17 @@ typedef struct {
 /* ViewBounds.width_m of strips a and b together, at the scale of a; b may be a */
 static inline float width_of(const ViewBounds *bounds, i64 a, i64 b)
 {
-    float right = least(bounds->min[DIRECTION][a], bounds->min[DIRECTION][b]);
-    float left = most(bounds->max[DIRECTION][a], bounds->max[DIRECTION][b]);
+    float right = minf(bounds->min[DIRECTION][a], bounds->min[DIRECTION][b]);
+    float left = maxf(bounds->max[DIRECTION][a], bounds->max[DIRECTION][b]);
     return (left - right) * bounds->scale_m[a];
 }
 
 /* strips.fits, of strips a and b together; b may be a */
 static inline int fits(const StripRules *r, const ViewBounds *bounds, i64 a, i64 b)
 {
-    float width = width_of(bounds, a, b), near = least(bounds->min[RANGE][a], bounds->min[RANGE][b]);
-    float depth = most(bounds->max[RANGE][a], bounds->max[RANGE][b]) - near;
-    float top = most(bounds->max[HEIGHT][a], bounds->max[HEIGHT][b]);
+    float width = width_of(bounds, a, b), near = minf(bounds->min[RANGE][a], bounds->min[RANGE][b]);
+    float depth = maxf(bounds->max[RANGE][a], bounds->max[RANGE][b]) - near;
+    float top = maxf(bounds->max[HEIGHT][a], bounds->max[HEIGHT][b]);
     return width * width + depth * depth < r->max_diagonal_m * r->max_diagonal_m && width < r->max_width_m &&
            top < r->max_top_m;
 }
@@ -512,8 +512,8 @@ static int one_car(const StripRules *r, const PersonSize *person, const ViewBoun
            gap_beams < r->max_gap_beams && !may_be_person(person, bounds, near) &&
            !may_be_person(person, bounds, far) && fits(r, bounds, near, far) &&
            width_of(bounds, near, far) > r->min_width_m &&
-           most(bounds->max[HEIGHT][near], bounds->max[HEIGHT][far]) > r->min_top_m &&
-           least(bounds->min[HEIGHT][near], bounds->min[HEIGHT][far]) < r->max_bottom_m;
+           maxf(bounds->max[HEIGHT][near], bounds->max[HEIGHT][far]) > r->min_top_m &&
+           minf(bounds->min[HEIGHT][near], bounds->min[HEIGHT][far]) < r->max_bottom_m;
 }
 
 /* merge_strips: first of the strips that make one car with each of n. `order` is that of their least directions,
@@ -537,8 +537,8 @@ EXPORT void modt_merge_strips(const StripRules *r, const PersonSize *person, con
     for (i64 g = 0; g < n; g++) {
         i32 first = parent[g] = parent[parent[g]];
         for (int v = 0; v < VIEW; v++) {
-            cars->min[v][first] = first == g ? bounds->min[v][g] : least(bounds->min[v][g], cars->min[v][first]);
-            cars->max[v][first] = first == g ? bounds->max[v][g] : most(bounds->max[v][g], cars->max[v][first]);
+            cars->min[v][first] = first == g ? bounds->min[v][g] : minf(bounds->min[v][g], cars->min[v][first]);
+            cars->max[v][first] = first == g ? bounds->max[v][g] : maxf(bounds->max[v][g], cars->max[v][first]);
         }
         cars->scale_m[first] = bounds->scale_m[first];
     }

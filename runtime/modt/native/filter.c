@@ -199,18 +199,18 @@ EXPORT void modt_update_extent(const TrackColumns *tracks, const Observations *s
         double longest = 0.0, moved = 0.0;
         for (int k = 0; k < N_AXES; k++) {
             double ahead = shift[k], behind = -shift[k + N_AXES];
-            double together = high(low(ahead, behind), -high(ahead, behind));
-            longest = high(relative[k] + relative[k + N_AXES], longest);
-            moved = high(together, moved);
+            double together = maxd(mind(ahead, behind), -maxd(ahead, behind));
+            longest = maxd(relative[k] + relative[k + N_AXES], longest);
+            moved = maxd(together, moved);
         }
         const int too_long = longest > limits->max_length_m[class]; /* its envelope alone stays as it is */
-        const double weight = low(1.0 - 1.0 / (double)tracks->hits[row], tuning->mean_decay);
+        const double weight = mind(1.0 - 1.0 / (double)tracks->hits[row], tuning->mean_decay);
         const double decay = tuning->known_decay;
         for (int k = 0; k < N_ENDS; k++) {
             double *envelope = &tracks->envelope[row][k];
             double off = tracks->mean_kdop[row][k] - relative[k];
             if (!too_long)
-                *envelope = high(relative[k], decay * *envelope + (1 - decay) * relative[k]);
+                *envelope = maxd(relative[k], decay * *envelope + (1 - decay) * relative[k]);
             const int agrees = __builtin_fabs(off) < limits->agreement_m; /* else the end jumped */
             tracks->mean_kdop[row][k] = agrees ? relative[k] + weight * off : relative[k];
             tracks->kdop[row][k] = end[k];

@@ -30,11 +30,11 @@ static ALWAYS_INLINE void extent_along(const float *x, const float *y, const flo
     for (; i < end; i += 2)
         for (int k = 0; k < 2; k++) {
             f4 along = axes[0] * spread(x[i + k]) + axes[1] * spread(y[i + k]) + axes[2] * spread(z[i + k]);
-            low[k] = least4(along, low[k]);
-            high[k] = most4(along, high[k]);
+            low[k] = min4(along, low[k]);
+            high[k] = max4(along, high[k]);
         }
-    *least = least4(low[0], low[1]);
-    *greatest = most4(high[0], high[1]);
+    *least = min4(low[0], low[1]);
+    *greatest = max4(high[0], high[1]);
 }
 
 /* kdop_ends: k-DOPs (8, n_groups) of groups of points, given the axes (3, 4). */
@@ -175,7 +175,7 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
             double end_b = b->kdop[k * b->n + j], back_b = b->kdop[(k + AXES) * b->n + j];
             double ahead = end_b - end_a, behind = -(back_b - back_a);
             moved[k] = __builtin_fabs(ahead) < __builtin_fabs(behind) ? ahead : behind;
-            common[k] = high(low(end_a, end_b) + low(back_a, back_b) + tuning->area_padding_m, 0.0);
+            common[k] = maxd(mind(end_a, end_b) + mind(back_a, back_b) + tuning->area_padding_m, 0.0);
             width_a[k] = end_a + back_a + tuning->area_padding_m;
             width_b[k] = end_b + back_b + tuning->area_padding_m;
             size += difference(b->log_width[k * b->n + j], a->log_width[k * a->n + i]);
@@ -186,10 +186,10 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
             double area_a = width_a[k] * width_a[k + 2], area_b = width_b[k] * width_b[k + 2];
             double shared = common[k] * common[k + 2];
             overlap[k] = shared / (area_a + area_b - shared);
-            covered[k] = shared / low(area_a, area_b);
+            covered[k] = shared / mind(area_a, area_b);
         }
         double height = difference(a->top[i], b->top[j]) + difference(a->bottom[i], b->bottom[j]);
-        double shape = weights->size * (size / 4) + weights->overlap * (1 - low(overlap[0], overlap[1]));
+        double shape = weights->size * (size / 4) + weights->overlap * (1 - mind(overlap[0], overlap[1]));
         shape += weights->height * height / 2 + weights->points * difference(a->log_points[i], b->log_points[j]);
         /* Squared Mahalanobis distance of the displacement. */
         double xx = covariance[i] + variance, xy = covariance[a->n + i], yy = covariance[2 * a->n + i] + variance;
@@ -198,7 +198,7 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
         double distance = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant;
         spread[pair] = determinant / (variance * variance);
         cost[pair] = distance / 2 + shape;
-        coverage[pair] = low(covered[0], covered[1]);
+        coverage[pair] = mind(covered[0], covered[1]);
     }
 }
 
@@ -213,10 +213,10 @@ EXPORT void modt_coverage(const double *a, i64 n_a, const double *b, i64 n_b, co
         PROVEN(i >= 0 && i < n_a && j >= 0 && j < n_b);
         for (int k = 0; k < AXES; k++) {
             double end = a[k * n_a + i], back = a[(k + AXES) * n_a + i];
-            double common = low(end, b[k * n_b + j] + jitter_m) + low(back, b[(k + AXES) * n_b + j] + jitter_m);
-            share[k] = high(common, 0.0) / high(end + back, jitter_m);
+            double common = mind(end, b[k * n_b + j] + jitter_m) + mind(back, b[(k + AXES) * n_b + j] + jitter_m);
+            share[k] = maxd(common, 0.0) / maxd(end + back, jitter_m);
         }
-        coverage[pair] = low(share[EAST] * share[NORTH], share[NORTH_EAST] * share[NORTH_WEST]);
+        coverage[pair] = mind(share[EAST] * share[NORTH], share[NORTH_EAST] * share[NORTH_WEST]);
     }
 }
 
@@ -235,17 +235,17 @@ EXPORT void modt_measured(const double *a, const double *b, i64 n, double varian
             double width = b[k * n + i] + b[(k + AXES) * n + i];
             both[k] = ahead - behind;
             growth[k] = ahead + behind;
-            widest = high(widest, width);
-            longest = high(longest, high(width, width - growth[k])); /* after and before */
+            widest = maxd(widest, width);
+            longest = maxd(longest, maxd(width, width - growth[k])); /* after and before */
         }
         double weight[AXES], weighted[AXES];
         for (int k = 0; k < AXES; k++) {
             double relative_growth = growth[k] * (longest / tuning->agreement_m);
-            double agreement = high(1 - relative_growth * relative_growth, 0.0);
+            double agreement = maxd(1 - relative_growth * relative_growth, 0.0);
             double disagreement = 1 - agreement * agreement;
-            double by_ends = high(doubt * disagreement * (growth[k] * growth[k]),
+            double by_ends = maxd(doubt * disagreement * (growth[k] * growth[k]),
                                   tuning->end_variance_decay * before[k * n + i]);
-            by_ends = low(by_ends, doubt * (widest * widest));
+            by_ends = mind(by_ends, doubt * (widest * widest));
             end_variance[k * n + i] = by_ends;
             weight[k] = 0.5 / (variance + by_ends);
             weighted[k] = weight[k] * ((both[k] - disagreement * __builtin_copysign(growth[k], both[k])) / 2);

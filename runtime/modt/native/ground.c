@@ -105,7 +105,7 @@ static void place_points(const Ground *g, const u4 *points, i64 n, float *restri
         float here_x = known ? x[i] : 0.0f, here_y = known ? y[i] : 0.0f;
         z[i] = known ? z[i] : 0.0f;
         sqrt_range[i] = __builtin_sqrtf(__builtin_sqrtf(here_x * here_x + here_y * here_y));
-        i32 ring = (i32)least(sqrt_range[i] * g->rings_per_unit, last_ring);
+        i32 ring = (i32)minf(sqrt_range[i] * g->rings_per_unit, last_ring);
         i32 sector = (i32)(pseudo_angle(here_x, here_y) * sectors_per_unit) & mask;
         cell[i] = (ring << bits) + sector;
     }
@@ -129,8 +129,8 @@ static void find_ends(const Ground *g, float height_m, i64 n, const float *z, co
         for (i64 i = k; i < n; i += APART) {
             PROVEN(cell[i] >= 0 && cell[i] < outside);
             float *of_cell = ends[cell[i]];
-            of_cell[0] = least(candidate[i][0], of_cell[0]);
-            of_cell[1] = least(candidate[i][1], of_cell[1]);
+            of_cell[0] = minf(candidate[i][0], of_cell[0]);
+            of_cell[1] = minf(candidate[i][1], of_cell[1]);
         }
     for (i64 i = 0; i < n; i++) {
         int used = (sqrt_range[i] > g->min_sqrt_range) & (sqrt_range[i] < g->max_sqrt_range);
@@ -151,12 +151,12 @@ static void trace_ring(const Ground *g, float range_m, float flat_m, float (*res
         lowest[k] = ends[k][0];
         float gap = range_m - range[k];
         float rise = lowest[k] - height[k];
-        float residual = rise - slope[k] * least(gap, c.max_gap_m);
+        float residual = rise - slope[k] * minf(gap, c.max_gap_m);
         float flat = -ends[k][1] > lowest[k] + flat_m ? 0.0f : 1.0f;
-        float bound = least(gap, rise_range_m[k]) * c.max_slope * flat + c.noise_m;
+        float bound = minf(gap, rise_range_m[k]) * c.max_slope * flat + c.noise_m;
         int found = (residual < bound) & (residual > -(gap * c.max_slope + c.noise_m));
         float newest = slope[k] + c.slope_gain * (rise / gap - slope[k]);
-        newest = least(most(newest, -c.max_slope), c.max_slope);
+        newest = minf(maxf(newest, -c.max_slope), c.max_slope);
         surface[k] = height[k] = found ? lowest[k] : height[k];
         range_before[k] = range[k] = found ? range_m : range[k];
         slope[k] = found ? newest : slope[k];
@@ -210,14 +210,14 @@ static void blend(const Ground *g, i32 ring, const uint8_t *restrict kind, float
     const Ground c = *g; /* a copy, which no store through a pointer can change */
     float range_m = c.range_m[ring], first_m = c.range_m[0];
     for (i32 k = 0; k < c.sectors; k++) {
-        float from = surface[k], from_range = most(range_before[k], first_m);
+        float from = surface[k], from_range = maxf(range_before[k], first_m);
         float to = height[k], to_range = range[k];
         height[k] = to = kind[k] & GROUND ? from : to;
         range[k] = to_range = kind[k] & GROUND ? range_m : to_range;
         float since = range_m - from_range;
-        float between = from + (to - from) * (since / most(to_range - from_range, 1e-3f));
-        float ramp = from + slope[k] * least(since, c.max_gap_m);
-        float beyond = least(ramp, most(lowest[k], from)); /* a ramp rises above no return */
+        float between = from + (to - from) * (since / maxf(to_range - from_range, 1e-3f));
+        float ramp = from + slope[k] * minf(since, c.max_gap_m);
+        float beyond = minf(ramp, maxf(lowest[k], from)); /* a ramp rises above no return */
         surface[k] = to_range < 0.0f ? beyond : between;
     }
 }
@@ -243,7 +243,7 @@ static void median_across(i32 sectors, i32 step, const float *row, float *restri
     close_round(row, step * sizeof *row, sectors * sizeof *row, round);
     for (i32 k = 0; k < sectors; k++) {
         float left = round[k], here = round[k + step], right = round[k + 2 * step];
-        median[k] = most(least(left, here), least(most(left, here), right));
+        median[k] = maxf(minf(left, here), minf(maxf(left, here), right));
     }
 }
 
@@ -317,7 +317,7 @@ EXPORT i64 modt_above_ground(const Ground *g, const u4 *points, i64 n, float hei
         find_ends(g, height_m, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
     }
     for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* far away, right behind it */
-        s->ends[k][1] = least(s->ends[k][1], s->ends[k + g->sectors][1]);
+        s->ends[k][1] = minf(s->ends[k][1], s->ends[k + g->sectors][1]);
     trace(g, height_m, s);
     interpolate(g, s);
     smooth(g, s);

@@ -191,17 +191,17 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
             for (int v = 0; v < 2; v++)
                 for (i32 a = 0; a < padded; a++) {
                     float along = c[v][a] * here_x + s[v][a] * here_y;
-                    e.low[v][a] = least(along, e.low[v][a]);
-                    e.high[v][a] = most(along, e.high[v][a]);
+                    e.low[v][a] = minf(along, e.low[v][a]);
+                    e.high[v][a] = maxf(along, e.high[v][a]);
                 }
         }
         for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
             float here_x = x[rows[i]], here_y = y[rows[i]];
             for (i32 a = 0; a < padded; a++) {
                 float u = c[0][a] * here_x + s[0][a] * here_y, v = c[1][a] * here_x + s[1][a] * here_y;
-                float to_u = least(u - e.low[0][a], e.high[0][a] - u);
-                float to_v = least(v - e.low[1][a], e.high[1][a] - v);
-                closeness[a] += 1.0f / most(least(to_u, to_v), noise_m);
+                float to_u = minf(u - e.low[0][a], e.high[0][a] - u);
+                float to_v = minf(v - e.low[1][a], e.high[1][a] - v);
+                closeness[a] += 1.0f / maxf(minf(to_u, to_v), noise_m);
             }
         }
         best[g] = 0;
@@ -232,7 +232,7 @@ EXPORT void modt_reflectance_statistics(const float *points, i64 width, const i6
             squares += r * r;
             n_bright += r > bright;
             n_dark += r < dark;
-            greatest = most(r, greatest);
+            greatest = maxf(r, greatest);
         }
         double count = (double)n_measured, mean = total / count;
         double variance = squares / count - mean * mean;

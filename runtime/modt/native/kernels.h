@@ -35,12 +35,12 @@ typedef i32 i4 __attribute__((vector_size(16)));
 #define MIXED(a, b, ...) __builtin_shuffle(a, b, (i4){__VA_ARGS__})
 #endif
 
-static inline float least(float a, float b) { return a < b ? a : b; }
-static inline float most(float a, float b) { return a > b ? a : b; }
-static inline double low(double a, double b) { return a < b ? a : b; }
-static inline double high(double a, double b) { return a > b ? a : b; }
-static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
-static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
+static inline float minf(float a, float b) { return a < b ? a : b; }
+static inline float maxf(float a, float b) { return a > b ? a : b; }
+static inline double mind(double a, double b) { return a < b ? a : b; }
+static inline double maxd(double a, double b) { return a > b ? a : b; }
+static inline f4 min4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
+static inline f4 max4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
 static inline f4 spread(float a) { return (f4){a, a, a, a}; }
 static inline float magnitude(float a) { return __builtin_fabsf(a); }
 
@@ -52,7 +52,7 @@ typedef struct {
 /* pseudo_angle of grids.py: direction of a point as a number from 0 to 4 */
 static ALWAYS_INLINE float pseudo_angle(float x, float y)
 {
-    float turn = y / most(magnitude(x) + magnitude(y), 1e-6f);
+    float turn = y / maxf(magnitude(x) + magnitude(y), 1e-6f);
     return (x < 0.0f ? 2.0f - turn : turn) + 1.0f;
 }
 
