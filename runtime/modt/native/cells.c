@@ -113,17 +113,19 @@ typedef struct {
     float max_gap_m; /* vertical gap below which it is connected with those after it */
 } Span;
 
-/* Scratch of modt_cluster, for n cells and a fine grid of `side` rows. A cell is called wide on the grid in use,
- * which may be twice as wide. Spans and the arrays beside them begin at 1: wide cell 0 is nowhere, for cells that
+/* Scratch of modt_cluster, for n cells and a fine grid of `side` rows. The coarse grid has no more rows, so that the
+ * scratch serves both. A cell is called wide on the grid in use, which may be twice as wide. Spans and the arrays beside them begin at 1: wide cell 0 is nowhere, for cells that
  * are not used. */
 typedef struct {
     float *max_gap_m;               /* (n,) vertical gap below which a cell is connected */
     uint8_t *use;                   /* (n,) whether a cell takes part */
     i64 *part;                      /* (n,) part on the fine grid of each cell */
-    i32 *number;                    /* (n,) whether a cluster is divided; then the cluster of a part, or NONE */
+    uint8_t *divided;               /* (n,) whether a cluster is divided into parts */
+    i32 *cluster_of_part;           /* (n,) number of the cluster that a part becomes, NONE if it does not leave */
     u4 (*ends)[2];                  /* (n,) least and greatest x, y and height of a cluster */
-    i32 *next_in_row;               /* (side,) counts of the radix sort; then the last span of each column */
-    i32 *next_in_column;            /* (side,) */
+    i32 *next_in_row;               /* (side,) counts of the radix sort, then where the next of a row goes */
+    i32 *next_in_column;            /* (side,) the same of columns */
+    i32 *latest;                    /* (side,) latest span of each column, see find_components */
     Place *by_cell, *by_column;     /* (n,) places in the order of cells and of columns */
     Place *by_row;                  /* (n,) and of the grid: by row, then column, then cell */
     Span *spans;                    /* (n + 1,) */
@@ -138,22 +140,24 @@ typedef struct {
 static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
 {
     uintptr_t end = (uintptr_t)memory;
-    TAKE(s->max_gap_m, n);
-    TAKE(s->use, n);
-    TAKE(s->part, n);
-    TAKE(s->number, n);
-    TAKE(s->ends, n);
-    TAKE(s->next_in_row, side);
-    TAKE(s->next_in_column, side);
-    TAKE(s->by_cell, n);
-    TAKE(s->by_column, n);
-    TAKE(s->by_row, n);
-    TAKE(s->spans, n + 1);
-    TAKE(s->parent, n + 1);
-    TAKE(s->last_cell, n + 1);
-    TAKE(s->span_of_cell, n);
-    TAKE(s->span_in_order, n + 1);
-    TAKE(s->component_of_root, n + 1);
+    TAKE(&end, s->max_gap_m, n);
+    TAKE(&end, s->use, n);
+    TAKE(&end, s->part, n);
+    TAKE(&end, s->divided, n);
+    TAKE(&end, s->cluster_of_part, n);
+    TAKE(&end, s->ends, n);
+    TAKE(&end, s->next_in_row, side);
+    TAKE(&end, s->next_in_column, side);
+    TAKE(&end, s->latest, side);
+    TAKE(&end, s->by_cell, n);
+    TAKE(&end, s->by_column, n);
+    TAKE(&end, s->by_row, n);
+    TAKE(&end, s->spans, n + 1);
+    TAKE(&end, s->parent, n + 1);
+    TAKE(&end, s->last_cell, n + 1);
+    TAKE(&end, s->span_of_cell, n);
+    TAKE(&end, s->span_in_order, n + 1);
+    TAKE(&end, s->component_of_root, n + 1);
     return (i64)(end - (uintptr_t)memory);
 }
 
@@ -213,11 +217,12 @@ static i32 unite_cells(const Cells *cells, i32 used, i64 n_cells, i32 side, cons
         s->span_of_cell[i] = 0; /* that of the cells not used */
     for (i32 k = 0; k < used; k++) {
         i32 i = s->by_row[k].cell, place = s->by_row[k].row * side + s->by_row[k].column;
-        i32 begins = -(place != s->spans[n].place); /* all bits set, if a span begins: a mask, and minus one */
-        i4 anew = {begins, begins, begins, begins};
-        f4 so_far = (f4)(((i4)none & anew) | ((i4)ends & ~anew));
+        i32 begins = place != s->spans[n].place; /* 1 if a span begins with this cell, else 0 */
+        i32 mask = -begins;                      /* all bits set if a span begins, else none */
+        i4 anew = {mask, mask, mask, mask};
+        f4 so_far = (f4)(((i4)none & anew) | ((i4)ends & ~anew)); /* `none` where a span begins, without a branch */
         ends = min4((f4){cells->low[i], -cells->high[i]}, so_far);
-        n -= begins;
+        n += begins;
         s->spans[n] = (Span){place, ends[0], -ends[1], s->max_gap_m[i]};
         s->last_cell[n] = i;
         s->span_of_cell[i] = n;
@@ -228,11 +233,16 @@ static i32 unite_cells(const Cells *cells, i32 used, i64 n_cells, i32 side, cons
 /* Sets the parent of each of n spans to the first span of its component. Neighbours whose vertical gap is below
  * the max_gap_m of the earlier one are connected.
  *
- * Spans come in the order of the grid. Of the eight neighbours of a span, four come before it: the one to its
- * left, and three in the row before, which `latest` holds by column. A span of `latest` may be of an earlier row;
- * its place tells. The span first takes the least of the roots of those that it is connected with, or itself. Only
- * where these roots differ, rarely, are their trees joined: apart from that there are no branches, since no
- * processor foresees which neighbours there are. */
+ * Spans come in the order of the grid, so of the eight neighbours of span k four come before it: the one to its left,
+ * which can only be span k - 1, and three in the row before. When span k is looked at, `latest` holds the last span of
+ * each column among those up to k - 2, and span k - 1, too, if that is of an earlier row. So the entries of the three
+ * columns around that of k hold the neighbours in the row before, if there are any. Other spans are there, too, of
+ * earlier rows, or 0; their places tell that they are no neighbours.
+ *
+ * A span becomes the child of the least of itself and an ancestor of each neighbour that it is connected with. Any
+ * ancestor is of the same component. The second one, the parent's parent, is mostly the root, so that mostly all are the
+ * same, and no trees have to be joined. Apart from the joins there are no branches, since no processor foresees which
+ * neighbours there are. */
 static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32 *parent)
 {
     const i4 back = {1, side + 1, side, side - 1}; /* from the place of a span to those of its neighbours */
@@ -243,13 +253,14 @@ static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32
     for (i32 k = 1; k <= n; k++) {
         i32 place = spans[k].place;
         for (; place >= row_start + side; row_start += side)
-            latest[column_before] = k - 1; /* the row of the span before is behind this one */
+            latest[column_before] = k - 1; /* the row of the span before is an earlier one */
         i32 column = place - row_start;
-        const i32 *behind = latest + column - 1;
+        const i32 *behind = latest + column - 1; /* to the left behind, behind, and to the right behind */
         const Span *here = &spans[k], *left = here - 1;
         const Span *behind_left = &spans[behind[0]], *behind_same = &spans[behind[1]];
         const Span *behind_right = &spans[behind[2]];
 
+        /* The four that may be neighbours, each in its lane. */
         i4 places = {left->place, behind_left->place, behind_same->place, behind_right->place};
         f4 low = {left->low, behind_left->low, behind_same->low, behind_right->low};
         f4 high = {left->high, behind_left->high, behind_same->high, behind_right->high};
@@ -257,25 +268,25 @@ static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32
         f4 gap_m = max4(low, spread(here->low)) - min4(high, spread(here->high));
         i4 connected = (places == place - back) & (gap_m < max_gap_m);
 
-        i4 alone = {k, k, k, k};
-        i4 roots = {parent[parent[k - 1]], parent[parent[behind[0]]], parent[parent[behind[1]]],
-                    parent[parent[behind[2]]]};
-        roots = (roots & connected) | (alone & ~connected);
-        i32 one = roots[0] < roots[1] ? roots[0] : roots[1];
-        i32 other = roots[2] < roots[3] ? roots[2] : roots[3];
-        i32 first = one < other ? one : other;
-        parent[k] = first;
-        i4 apart = (roots != alone) & (roots != first);
-        for (int j = 0; j < 4 && (apart[0] | apart[1] | apart[2] | apart[3]); j++)
-            if (apart[j])
-                join(parent, roots[j], first);
+        i4 itself = {k, k, k, k};
+        i4 ancestors = {parent[parent[k - 1]], parent[parent[behind[0]]], parent[parent[behind[1]]],
+                        parent[parent[behind[2]]]};
+        ancestors = (ancestors & connected) | (itself & ~connected);
+        i32 least_of_left = ancestors[0] < ancestors[1] ? ancestors[0] : ancestors[1];
+        i32 least_of_right = ancestors[2] < ancestors[3] ? ancestors[2] : ancestors[3];
+        i32 least = least_of_left < least_of_right ? least_of_left : least_of_right;
+        parent[k] = least;
+        i4 to_join = (ancestors != itself) & (ancestors != least);
+        for (int j = 0; j < 4 && (to_join[0] | to_join[1] | to_join[2] | to_join[3]); j++)
+            if (to_join[j])
+                join(parent, ancestors[j], least);
 
-        /* The span before goes into `latest` only now: if it is the left neighbour of this one, its column had to
-         * hold what lies behind it, `behind_left`. */
+        /* Span k - 1 goes into `latest` only now: if it is the left neighbour, the entry of its column had to be
+         * `behind_left` until here. */
         latest[column_before] = k - 1;
         column_before = column;
     }
-    for (i32 k = 1; k <= n; k++) /* parents come first, so their parents are roots by now */
+    for (i32 k = 1; k <= n; k++) /* parents come first, so the parent's parent is a root by now */
         parent[k] = parent[parent[k]];
 }
 
@@ -302,16 +313,16 @@ static i64 number_components(i64 n_cells, i32 n, const ClusterScratch *s, i64 *c
     return count;
 }
 
-/* connect, with a shift of 0, and connect_coarse, with 1: component of the cell 2^shift times as wide, of a grid
- * of side * side, in which each of the cells lies that are used, NONE for the others. Returns how many components
- * there are.
+/* connect, with a shift of 0, and connect_coarse, with 1. Labels each used cell with the component of its cell on the
+ * grid 2^shift times as coarse (side * side), NONE if it is not used. Returns how many components there are.
  *
- * The order of the grid, in which neighbours lie side by side in memory, is used inside alone. */
+ * Cells and components keep their order outside. Inside, spans are in the order of the grid, in which neighbours lie
+ * side by side in memory. */
 static i64 connect(const Cells *cells, i64 n_cells, int shift, i32 side, const ClusterScratch *s, i64 *component)
 {
     i32 used = sort_places(cells, n_cells, shift, side, s);
     i32 n = unite_cells(cells, used, n_cells, side, s);
-    find_components(s->spans, n, side, s->next_in_row, s->parent);
+    find_components(s->spans, n, side, s->latest, s->parent);
     return number_components(n_cells, n, s, component);
 }
 
@@ -321,11 +332,11 @@ static i64 connect(const Cells *cells, i64 n_cells, int shift, i32 side, const C
 typedef struct {
     i64 *points, *cell;                                         /* (n,) */
     float *extent_m, *bottom_m, *top_m, *sqrt_range, *beam_m;   /* (n,) */
-    uint8_t *is_part;                                           /* (n,) */
+    uint8_t *of_oversized;                                      /* (n,) */
 } ClusterSizes;
 
-/* ClusterSizes.of_cells of n clusters. `ends` is scratch, of n. */
-static void measure(const Cells *cells, const PointColumns *points, const float *beam_m, const i64 *cluster,
+/* ClusterSizes.of_cells of n clusters, given one point of each cell. `ends` is scratch, of n. */
+static void measure(const Cells *cells, const PointColumns *sampled, const float *beam_m, const i64 *cluster,
                     i64 n_cells, i64 n, u4 (*ends)[2], const ClusterSizes *sizes)
 {
     enum { LOW, HIGH };
@@ -343,8 +354,8 @@ static void measure(const Cells *cells, const PointColumns *points, const float 
             PROVEN(g >= NONE && g < n);
             if (g == NONE)
                 continue;
-            f4 low = {points->x[i], points->y[i], cells->low[i]};
-            f4 high = {points->x[i], points->y[i], cells->high[i]};
+            f4 low = {sampled->x[i], sampled->y[i], cells->low[i]};
+            f4 high = {sampled->x[i], sampled->y[i], cells->high[i]};
             ends[g][LOW] = min4(low, ends[g][LOW]);
             ends[g][HIGH] = max4(high, ends[g][HIGH]);
             sizes->points[g] += cells->entries[i];
@@ -355,9 +366,9 @@ static void measure(const Cells *cells, const PointColumns *points, const float 
         sizes->bottom_m[g] = ends[g][LOW][Z];
         sizes->top_m[g] = ends[g][HIGH][Z];
         sizes->extent_m[g] = __builtin_sqrtf(width * width + depth * depth);
-        sizes->sqrt_range[g] = points->sqrt_range[sizes->cell[g]];
+        sizes->sqrt_range[g] = sampled->sqrt_range[sizes->cell[g]];
         sizes->beam_m[g] = beam_m[sizes->cell[g]];
-        sizes->is_part[g] = 0;
+        sizes->of_oversized[g] = 0;
     }
 }
 
@@ -388,16 +399,18 @@ static ClusterSizes sizes_from(const ClusterSizes *s, i64 n)
                           .top_m = s->top_m + n,
                           .sqrt_range = s->sqrt_range + n,
                           .beam_m = s->beam_m + n,
-                          .is_part = s->is_part + n};
+                          .of_oversized = s->of_oversized + n};
 }
 
 /* CellClusterer.cluster: cluster of each cell, given one point of each and the distance of beams there. Returns
- * how many clusters there are; there is room for the sizes of 2 n_cells. */
+ * how many clusters there are, the tried parts after those of the coarse grid; there is room for the sizes of
+ * 2 n_cells. */
 EXPORT i64 modt_cluster(const ClusterRules *rules, const PersonSize *person, const Cells *cells,
                         const PointColumns *sampled, const float *beam_m, i64 n_cells, void *memory, i64 *cluster,
                         const ClusterSizes *sizes)
 {
     ClusterScratch scratch, *s = &scratch;
+    PROVEN(rules->coarse_side <= rules->fine_side);
     place_scratch(n_cells, rules->fine_side, memory, s);
 
     /* 1. Clusters on the coarse grid. */
@@ -410,27 +423,29 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const PersonSize *person, con
 
     /* 2. Parts, on the fine grid, of those that are oversized or may hold a person and more. */
     for (i64 g = 0; g < n; g++)
-        s->number[g] = is_divided(rules, person, sizes, g);
+        s->divided[g] = (uint8_t)is_divided(rules, person, sizes, g);
     for (i64 i = 0; i < n_cells; i++)
-        s->use[i] = (uint8_t)s->number[cluster[i]];
+        s->use[i] = s->divided[cluster[i]];
     i64 n_parts = connect(cells, n_cells, 0, rules->fine_side, s, s->part);
     ClusterSizes parts = sizes_from(sizes, n);
     measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
 
-    /* 3. Parts of oversized clusters, and those of a person's size, leave their clusters; the others stay, and are
-     * empty. */
+    /* 3. Parts of oversized clusters, and those of a person's size, leave their clusters. A part that does not leave
+     * keeps its number, with no points. Of a cluster that parts leave, the number of points alone is corrected.
+     * Points of a part that stays become zero before they are subtracted from those of its cluster, and `cluster` is
+     * read for all parts before their cells are moved. */
     for (i64 p = 0; p < n_parts; p++) {
         i64 whole = cluster[parts.cell[p]];
-        parts.is_part[p] = sizes->extent_m[whole] >= rules->max_extent_m;
+        parts.of_oversized[p] = sizes->extent_m[whole] >= rules->max_extent_m;
         int fits = fits_person(person, parts.extent_m[p], parts.bottom_m[p], parts.top_m[p]);
-        int leaves = parts.is_part[p] || (fits && parts.points[p] >= rules->min_points);
-        s->number[p] = leaves ? (i32)(n + p) : NONE;
+        int leaves = parts.of_oversized[p] || (fits && parts.points[p] >= rules->min_points);
+        s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
         parts.points[p] = leaves ? parts.points[p] : 0;
         sizes->points[whole] -= parts.points[p];
     }
     for (i64 i = 0; i < n_cells; i++)
-        if (s->part[i] != NONE && s->number[s->part[i]] != NONE)
-            cluster[i] = s->number[s->part[i]];
+        if (s->part[i] != NONE && s->cluster_of_part[s->part[i]] != NONE)
+            cluster[i] = s->cluster_of_part[s->part[i]];
     return n + n_parts;
 }
 

@@ -38,15 +38,15 @@ static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
 {
     uintptr_t end = (uintptr_t)memory;
     i64 cells = (i64)g->rings * g->sectors + 1;
-    TAKE(s->lowest, cells);
-    TAKE(s->surface, cells);
-    TAKE(s->range_before, cells);
-    TAKE(s->ends, cells);
-    TAKE(s->kind, cells);
-    TAKE(s->rays, 4 * g->sectors);
-    TAKE(s->z, n);
-    TAKE(s->sqrt_range, n);
-    TAKE(s->cell, n);
+    TAKE(&end, s->lowest, cells);
+    TAKE(&end, s->surface, cells);
+    TAKE(&end, s->range_before, cells);
+    TAKE(&end, s->ends, cells);
+    TAKE(&end, s->kind, cells);
+    TAKE(&end, s->rays, 4 * g->sectors);
+    TAKE(&end, s->z, n);
+    TAKE(&end, s->sqrt_range, n);
+    TAKE(&end, s->cell, n);
     return (i64)(end - (uintptr_t)memory);
 }
 

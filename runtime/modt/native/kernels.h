@@ -56,11 +56,11 @@ static ALWAYS_INLINE float pseudo_angle(float x, float y)
     return (x < 0.0f ? 2.0f - turn : turn) + 1.0f;
 }
 
-/* Takes an array of scratch of this many elements, after those taken before it, which end at `end`. A pass takes
- * its arrays in one function: with the address of its memory that places them, and with 0 it tells the caller how
- * much memory that is. In a checked build each array is allocated alone and never freed, so that AddressSanitizer
- * sees where it ends. */
-#define TAKE(array, elements) array = take(&end, (elements) * sizeof *array)
+/* Takes an array of scratch of this many elements, at the address `*end`, at which those taken before it end, and
+ * advances that. A pass takes its arrays in one function: with the address of its memory that places them, and with 0
+ * it tells the caller how much memory that is. In a checked build each array is allocated alone and never freed, so
+ * that AddressSanitizer sees where it ends. */
+#define TAKE(end, array, elements) ((array) = take(end, (elements) * sizeof *(array)))
 static inline void *take(uintptr_t *end, uintptr_t bytes)
 {
     enum { CACHE_LINE = 64 };

@@ -98,13 +98,13 @@ class ClusterSizes:
     top_m: Float32  # (G,) greatest height above ground [m]
     sqrt_range: Float32  # (G,) square root of the range of the last cell [sqrt(m)]
     beam_m: Float32  # (G,) vertical distance of neighbouring beams there [m]
-    is_part: Bool  # (G,) part of an oversized cluster
+    of_oversized: Bool  # (G,) part of an oversized cluster; False for a person split off another one
 
     def __len__(self) -> int:
         return len(self.points)
 
     @classmethod
-    def of_cells(cls, cells: Cells, points: PointColumns, beam_m: Float32, cluster: Int) -> Self:
+    def of_cells(cls, cells: Cells, sampled: PointColumns, beam_m: Float32, cluster: Int) -> Self:
         """Sizes of clusters by (C,) a point of each cell, the distance of beams there [m], its cluster or NONE."""
         n = int(cluster.max(initial=NONE)) + 1
         used = np.flatnonzero(cluster != NONE)
@@ -113,7 +113,7 @@ class ClusterSizes:
         np.maximum.at(last, label, used)
         low = cells.low.take(used)
         high = cells.high.take(used)
-        x, y = (column.take(used) for column in (points.x, points.y))
+        x, y = (column.take(used) for column in (sampled.x, sampled.y))
         width, depth = (label_max(v, label, n) - label_min(v, label, n) for v in (x, y))
         return cls(
             points=np.bincount(label, cells.entries.take(used), n).astype(np.int64),
@@ -121,9 +121,9 @@ class ClusterSizes:
             extent_m=np.sqrt(np.square(width) + np.square(depth)),
             bottom_m=label_min(low, label, n),
             top_m=label_max(high, label, n),
-            sqrt_range=points.sqrt_range.take(last),
+            sqrt_range=sampled.sqrt_range.take(last),
             beam_m=beam_m.take(last),
-            is_part=np.zeros(n, np.bool_),
+            of_oversized=np.zeros(n, np.bool_),
         )
 
     def followed_by(self, other: Self) -> Self:
@@ -192,36 +192,39 @@ class CellClusterer:
         self.split = split
         self.max_extent_m = config.max_extent_m
         step = config.cell_m / np.sqrt(10.0)
+        # Points are placed on the fine grid alone, and a coarse cell is two by two fine ones. So the centre of the
+        # coarse grid, which is not half that of the fine one, is never used. It has at most as many rows.
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
         # A cell is step * sqrt(range) wide, and returns of a beam are range * azimuth_step apart.
         spacing = split.min_cell_returns * np.deg2rad(sensor.azimuth_step_deg)
         self.max_split_sqrt_range = np.float32(self.fine.step / spacing)
 
-    def cluster(self, cells: Cells, points: PointColumns, beam_m: Float32) -> tuple[Int, ClusterSizes]:
+    def cluster(self, cells: Cells, sampled: PointColumns, beam_m: Float32) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes.
 
-        Every cell is in a cluster. The parts that were tried come after the clusters of the coarse grid; those that
-        are not split off are empty.
+        Every cell is in a cluster. The parts that were tried come after the clusters of the coarse grid. A part that
+        is not split off keeps its number, with no points. Of a cluster that parts leave, only `points` is corrected;
+        its other sizes include what left.
         """
         max_gap_m = np.float32(self.gap.max_gap_m) + np.float32(self.gap.max_gap_beams) * beam_m
         cluster = connect_coarse(self.coarse, cells, max_gap_m)
-        sizes = ClusterSizes.of_cells(cells, points, beam_m, cluster)
+        sizes = ClusterSizes.of_cells(cells, sampled, beam_m, cluster)
         oversized = sizes.extent_m >= self.max_extent_m
         divided = oversized | self._may_hold_person(sizes)
 
         part = connect(self.fine, cells, max_gap_m, divided.take(cluster))
-        parts = ClusterSizes.of_cells(cells, points, beam_m, part)
-        cluster_of_part = cluster.take(parts.cell)
-        of_oversized = oversized.take(cluster_of_part)
+        parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
+        whole = cluster.take(parts.cell)  # (parts,) cluster that each part is of, before any cell leaves it
+        of_oversized = oversized.take(whole)
         is_split = of_oversized | self._may_be_person(parts)
 
-        split_points = parts.points * is_split
-        points_left = sizes.points - np.bincount(cluster_of_part, split_points, len(sizes)).astype(np.int64)
+        split_points = parts.points * is_split  # none of a part that stays, so that its cluster keeps them
+        points_left = sizes.points - np.bincount(whole, split_points, len(sizes)).astype(np.int64)
         cell_in_part = np.flatnonzero(part != NONE)
         split_cell = cell_in_part[is_split.take(part.take(cell_in_part))]
         cluster[split_cell] = len(sizes) + part[split_cell]
-        parts = replace(parts, points=split_points, is_part=of_oversized)
+        parts = replace(parts, points=split_points, of_oversized=of_oversized)
         return cluster, replace(sizes, points=points_left).followed_by(parts)
 
     def _may_hold_person(self, sizes: ClusterSizes) -> Bool:

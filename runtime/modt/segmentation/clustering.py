@@ -50,7 +50,7 @@ class Clusterer:
         cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.cells.fine, points, height)
         cluster, sizes = self.kernels.cluster(self.cells, cells, sampled, self._beam_m(sampled))
         clusters = Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, len(sizes))
-        strip = (self._is_valid(sizes) | ~sizes.is_part) & self.may_be_strips(sizes)
+        strip = (self._is_valid(sizes) | ~sizes.of_oversized) & self.may_be_strips(sizes)
         target = self._merged(clusters, strip)
         valid = self._is_valid(sizes.merged(target))
         cluster_of_cell = consecutive(valid)[target].take(cluster)
@@ -94,5 +94,5 @@ class Clusterer:
         line = (sizes.points >= self.valid.min_line_points) & (sizes.top_m > self.valid.min_line_top_m)
         valid &= line | (sizes.top_m - sizes.bottom_m >= config.min_height_m)
         stands_out = (sizes.top_m >= self.valid.min_part_top_m) & (sizes.points >= self.valid.min_part_points)
-        valid &= ~sizes.is_part | stands_out
+        valid &= ~sizes.of_oversized | stands_out
         return valid

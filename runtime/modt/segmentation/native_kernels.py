@@ -64,7 +64,7 @@ CLUSTER_SIZES = Layout(
     "ClusterSizes",
     **_members(Array(_i64, "n"), "points", "cell"),
     **_members(Array(_f32, "n"), "extent_m", "bottom_m", "top_m", "sqrt_range", "beam_m"),
-    is_part=Array(np.bool_, "n"),
+    of_oversized=Array(np.bool_, "n"),
 )
 VIEW_BOUNDS = Layout("ViewBounds", **_members(Rows(_f32, 4, "n"), "min", "max"), scale_m=Array(_f32, "n"))
 STRIP_RULES = Layout(
@@ -171,21 +171,21 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         return _first(cells, n), sample[:n], _first(sampled, n), cell_of_point
 
     def cluster(
-        self, clusterer: CellClusterer, cells: Cells, points: PointColumns, beam_m: Float32
+        self, clusterer: CellClusterer, cells: Cells, sampled: PointColumns, beam_m: Float32
     ) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and the distance of beams there [m]; their sizes."""
         n = len(cells)
         scratch = self._memory(self.library.modt_cluster_scratch(n, clusterer.fine.side))
         cluster = np.empty(n, np.int64)
         count, cell = np.empty((2, 2 * n), np.int64)
-        extent_m, bottom_m, top_m, sqrt_range, beam = np.empty((5, 2 * n), np.float32)
-        is_part = np.empty(2 * n, np.bool_)
-        sizes = ClusterSizes(count, cell, extent_m, bottom_m, top_m, sqrt_range, beam, is_part)
+        extent_m, bottom_m, top_m, sqrt_range, last_beam_m = np.empty((5, 2 * n), np.float32)
+        of_oversized = np.empty(2 * n, np.bool_)
+        sizes = ClusterSizes(count, cell, extent_m, bottom_m, top_m, sqrt_range, last_beam_m, of_oversized)
         g = self.library.modt_cluster(
             self._structure(_cluster_rules, clusterer),
             self._structure(PERSON_SIZE.of, clusterer.split.person),
             CELLS.of(cells),
-            POINT_COLUMNS.of(points),
+            POINT_COLUMNS.of(sampled),
             beam_m,
             n,
             scratch,
