@@ -20,7 +20,7 @@ PROBE_S = 3.0
 MAX_PATIENCE_S = 30.0
 """Longest wait before a step down [s]."""
 DEFERRED_EVERY = 5
-"""While classification is deferred, one call is made every so many frames: the one that has waited longest."""
+"""While classification is deferred, one call is made every so many frames: the one of greatest worth."""
 
 
 class Step(IntEnum):

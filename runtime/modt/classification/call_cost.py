@@ -76,6 +76,11 @@ class LinearCost:
         """Upper estimate of the CPU time of classifying proposals of (R,) points together [ms]."""
         return float(self._terms(points) @ self._terms_ms())
 
+    @property
+    def fixed_ms(self) -> float:
+        """Upper estimate of the CPU time that a frame's calls take together, whatever their number [ms]."""
+        return float(self._terms_ms()[0])
+
     def added_ms(self, points: Int) -> Float64:
         """(R,) least CPU time that each proposal of (R,) points adds to the frame's, without padding [ms]."""
         _, call_ms, points_ms = self._terms_ms()

@@ -29,19 +29,19 @@ class Savings:
 
     Attributes:
         saved_ms: CPU time saved [ms].
-        full: True if as much is saved as can be, so that a call may be made on credit.
+        may_borrow: True if as much is saved as can be, so that a call may be made on credit.
     """
 
     def __init__(self, period_s: float) -> None:
         self.saved_ms = 0.0
-        self.full = False
+        self.may_borrow = False
         self._period_s = period_s
 
     def add(self, mean_ms: float) -> None:
         """Save the budget of a further frame."""
         most_ms = mean_ms * max(1.0 / self._period_s, 1.0)
         self.saved_ms = min(self.saved_ms + mean_ms, most_ms)
-        self.full = self.saved_ms >= most_ms > 0.0
+        self.may_borrow = self.saved_ms >= most_ms > 0.0
 
     def spend(self, cpu_ms: float) -> None:
         """Take the CPU time of classifications from what is saved, if it was measured at all."""
@@ -55,13 +55,13 @@ class TimeLimit:
     Attributes:
         now_ms: CPU time that they may take in this frame [ms].
         later_ms: CPU time that they may take in a frame for which enough is saved [ms].
-        is_strict: True if `later_ms` is the budget of a frame, which only an outdated estimate may exceed.
+        of_frame: True if `later_ms` is the budget of a frame, which saving cannot raise.
         has_credit: True if one call may take more than is saved.
     """
 
     now_ms: float
     later_ms: float
-    is_strict: bool
+    of_frame: bool
     has_credit: bool
 
 
@@ -142,7 +142,12 @@ class Scheduler:
         return value
 
     def _affordable(self, points: Int, budget: Budget) -> Bool:
-        """(R,) calls that the budget pays for, of calls for (R,) points by decreasing worth."""
+        """(R,) calls that the budget pays for, of calls for (R,) points by decreasing worth.
+
+        The mean budget of the frame is saved first. A frame in which no call fits may be counted (`_try_exception`).
+        """
+        if budget.mean_ms is not None:
+            self._savings.add(budget.mean_ms)
         limit = self._time_limit(budget)
         granted = np.ones(len(points), np.bool_) if limit is None else self._within(limit, points)
         if budget.calls is not None and len(points) > budget.calls:
@@ -150,22 +155,29 @@ class Scheduler:
         return granted
 
     def _time_limit(self, budget: Budget) -> TimeLimit | None:
-        """Limit of this frame's CPU time, None without any. The mean budget of the frame is saved first."""
+        """Limit of this frame's CPU time, None without any.
+
+        Where only a mean is given, the calls of a frame may take one period, however much is saved: longer ones would
+        delay the next frame.
+        """
         if budget.mean_ms is None:
             return None if budget.cpu_ms is None else TimeLimit(budget.cpu_ms, budget.cpu_ms, True, False)
-        self._savings.add(budget.mean_ms)
-        is_strict = budget.cpu_ms is not None
+        of_frame = budget.cpu_ms is not None
         later_ms = max(1e3 * self._period_s, budget.mean_ms) if budget.cpu_ms is None else budget.cpu_ms
-        return TimeLimit(min(self._savings.saved_ms, later_ms), later_ms, is_strict, self._savings.full)
+        return TimeLimit(min(self._savings.saved_ms, later_ms), later_ms, of_frame, self._savings.may_borrow)
 
     def _within(self, limit: TimeLimit, points: Int) -> Bool:
-        """(R,) calls within a limit of the CPU time; the first one beyond it where it would never be made else."""
+        """(R,) calls that a limit of the CPU time allows.
+
+        Where none fits, the first call is made beyond the limit if `_try_exception` allows it. Else a call that is
+        dearer than every limit would never be made.
+        """
         granted = self._fitting(limit, points)
         # Padding is not in the prices of single calls: the last ones go until all together are within the limit.
         while granted.any() and self.cost.cost_ms(points[granted]) > limit.now_ms:
             granted[granted.nonzero()[0][-1]] = False
         if len(points) and not granted.any():
-            granted[0] = self._is_excepted(limit, points[:1])
+            granted[0] = self._try_exception(limit, points[:1])
         return granted
 
     def _fitting(self, limit: TimeLimit, points: Int) -> Bool:
@@ -175,23 +187,24 @@ class Scheduler:
         it wait too, since they would spend what is saved for it.
         """
         granted = np.zeros(len(points), np.bool_)
-        frame_ms = self.cost.cost_ms(points[:0])
-        left_ms = limit.now_ms - frame_ms
+        fixed_ms = self.cost.fixed_ms
+        left_ms = limit.now_ms - fixed_ms
         can_save = limit.now_ms < limit.later_ms
         for call, added_ms in enumerate(self.cost.added_ms(points).tolist()):
             if added_ms <= left_ms:
                 granted[call] = True
                 left_ms -= added_ms
-            elif can_save and added_ms <= limit.later_ms - frame_ms:
+            elif can_save and added_ms <= limit.later_ms - fixed_ms:
                 break
         return granted
 
-    def _is_excepted(self, limit: TimeLimit, points: Int) -> bool:
-        """True if the first call, for (1,) points, is made beyond the limit: on credit, or to correct an estimate.
+    def _try_exception(self, limit: TimeLimit, points: Int) -> bool:
+        """Whether the first call, for (1,) points, is made beyond the limit: on credit, or to correct an estimate.
 
-        The budget of a frame is exceeded only after so many frames without a call that the estimate is outdated.
+        A call that costs more than the budget of a frame is refused, and the frame is counted as one without a call.
+        After so many of them that the estimate is outdated, the call is made, to measure it.
         """
-        if limit.is_strict and self.cost.cost_ms(points) > limit.later_ms:
+        if limit.of_frame and self.cost.cost_ms(points) > limit.later_ms:
             self.cost.starve()
             return self.cost.outdated and limit.later_ms > 0
         return limit.has_credit
