@@ -154,8 +154,13 @@ def in_plane(along: Float64) -> tuple[Float64, Float64]:
 def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
     """Pairs that a least-cost assignment keeps for certain, and those that it must decide among.
 
-    A pair is kept for certain if the second cheapest pairs of its row and of its column together cost more than the
-    pair and limit, the most that their partners then lose.
+    A pair is certain if the second cheapest costs of its row and of its column together exceed its cost by more than
+    limit. An assignment without the pair spends at least these two costs on its row and its column; with the pair,
+    the partners that they had there are left over, and cost at most limit together. Only a pair that is the cheapest
+    of both its row and its column can be certain.
+
+    A pair is contested if neither the cheapest pair of its row nor that of its column is certain. All other pairs,
+    rivals of a certain one, are left out.
 
     Args:
         rows: (K,) first index of each pair.
@@ -164,7 +169,7 @@ def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple
         limit: cost of leaving a row or a column without a partner.
 
     Returns:
-        (C,) and (D,) indices of pairs, ascending.
+        (C,) indices of the certain pairs and (D,) of the contested ones, ascending.
     """
     cheapest_of_row, second_cost_of_row = _two_cheapest(rows, cost, limit)
     cheapest_of_column, second_cost_of_column = _two_cheapest(columns, cost, limit)
@@ -174,7 +179,7 @@ def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple
 
 
 def _two_cheapest(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
-    """Rivals of each pair: those with the same index, itself included.
+    """Cheapest pair, and cost of the second cheapest, of the row (or column) of each pair.
 
     Args:
         index: (K,) row, or column, of each pair.
@@ -182,8 +187,8 @@ def _two_cheapest(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64
         limit: cost of having no partner.
 
     Returns:
-        cheapest: (K,) cheapest pair of the same index, the last one of equals.
-        second_cost: (K,) cost of the second cheapest, limit where there is none.
+        cheapest: (K,) cheapest pair of the row of each pair, the last one of equals; it may be the pair itself.
+        second_cost: (K,) cost of the second cheapest of that row, limit where there is none.
     """
     latest_first = -np.arange(len(index))
     order = np.lexsort((latest_first, cost, index))

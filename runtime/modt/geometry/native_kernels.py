@@ -187,7 +187,7 @@ class NativeGeometryKernels(GeometryKernels):
                 rows, columns, cost, n_pairs, limit, row_number, column_number, assignment, state
             ):
                 raise ValueError("no assignment has a finite cost")
-        return state.nonzero()[0]
+        return state.nonzero()[0]  # 0: left out, see assignment.c
 
     def sort_members(
         self, members: Int, coordinates: Float32, offsets: Int, label: Int, moved: tuple[Int, Int], n: int

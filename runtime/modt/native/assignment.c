@@ -1,7 +1,10 @@
 /* Assignment of rows to columns at least cost, given candidate pairs of both: modt.geometry.kernels.assign. */
 #include "kernels.h"
 
-enum { LEFT_OUT, CERTAIN, CONTESTED }; /* state of a pair */
+/* State of a pair. modt_certain_pairs gives one of the three; modt_settle_pairs then makes each contested pair
+ * certain or left out. In the end the pairs whose state is not 0 are those that are kept, on which
+ * NativeGeometryKernels.assign relies. */
+enum { LEFT_OUT = 0, CERTAIN = 1, CONTESTED = 2 };
 
 /* _two_cheapest: the cheapest pair of each row (or column), the last one of equals, and the cost of the second cheapest;
  * NONE and `limit` where there is none. */
@@ -41,7 +44,8 @@ static i64 number_contested(const i64 *row, const uint8_t *state, i64 n_pairs, i
 }
 
 /* certain_pairs: state of each of n_pairs pairs. The rows and columns of the contested ones are numbered, and
- * `contested` is how many of both there are. Scratch: `second_cost`; the numbers serve as scratch, too. */
+ * `contested` is how many of both there are. Scratch: `second_cost`, of n_rows + n_columns. Until the rows and columns
+ * are numbered, at the end, the arrays of their numbers hold the cheapest pair of each. */
 EXPORT void modt_certain_pairs(const i64 *rows, const i64 *columns, const double *cost, i64 n_pairs, double limit,
                                i64 n_rows, i64 n_columns, double *second_cost, i64 *row_number, i64 *column_number,
                                uint8_t *state, i64 contested[2])
@@ -146,7 +150,7 @@ static int assign_rows(const Assignment *a)
     return 1;
 }
 
-/* assign: keep (1) or leave out (0) each contested of n_pairs pairs, given the numbers of contested rows and columns.
+/* assign: keep (CERTAIN) or leave out each contested of n_pairs pairs, given the numbers of contested rows and columns.
  * Returns 0 where no assignment has a finite cost, else 1. Scratch: `a`, of which the sizes are given. */
 EXPORT int modt_settle_pairs(const i64 *rows, const i64 *columns, const double *cost, i64 n_pairs, double limit,
                              const i64 *row_number, const i64 *column_number, const Assignment *a, uint8_t *state)
@@ -163,6 +167,6 @@ EXPORT int modt_settle_pairs(const i64 *rows, const i64 *columns, const double *
         return 0;
     for (i64 pair = 0; pair < n_pairs; pair++)
         if (state[pair] == CONTESTED)
-            state[pair] = a->column_of_row[row_number[rows[pair]]] == column_number[columns[pair]];
+            state[pair] = a->column_of_row[row_number[rows[pair]]] == column_number[columns[pair]] ? CERTAIN : LEFT_OUT;
     return 1;
 }
