@@ -16,12 +16,17 @@ from modt.placement import Placement, PlanarMotion
 from modt.types import Float64, Frame, Proposals
 
 FAR_M = 1e5
-"""Greatest coordinate of a first pose [m] whose world is kept. Beyond it float32, which the association uses, is
-coarser than a centimetre, so the world has its origin at the position of that pose."""
+"""Greatest coordinate of a first pose [m] whose world is kept; farther away, the world has its origin at the position
+of that pose. Positions are in double precision, but pairs of k-DOPs are compared in single precision first, whose
+step is 8 mm at this coordinate and half a metre at a northing of 5000 km. The coarser it is, the more pairs that do
+not overlap are compared a second time, in double precision."""
 
 
 class PoseEstimator:
     """Places sweeps by their poses, or, where a sweep has none, by registration against stationary tracks.
+
+    Registration begins at a prediction: the sensor moves as it did between the two frames before. Frames are taken to
+    be equally far apart in time; a frame left out makes the prediction wrong by the motion in its time.
 
     Args:
         kernels: passes over points and pairs.
@@ -34,13 +39,17 @@ class PoseEstimator:
         self._registration = Registration(kernels, tuning.registration)
         self._landmarks = LandmarkMap(tuning.landmarks)
         self._time_s: float | None = None
-        self._T_world_before = np.eye(4)
-        self._T_world_last = np.eye(4)
+        self._T_world_before = np.eye(4)  # pose two frames ago
+        self._T_world_last = np.eye(4)  # pose one frame ago
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
 
     def adopt(self, other: PoseEstimator) -> None:
-        """Continue in the world of another estimator, at its last pose."""
+        """Continue in the world of another estimator, at its last pose.
+
+        Landmarks are forgotten. The state of this estimator's registration stays: whether a motion was known, and the
+        inliers of the last fit.
+        """
         self._landmarks.clear()
         self._time_s = other._time_s
         self._T_world_before = other._T_world_before
@@ -54,23 +63,25 @@ class PoseEstimator:
         Args:
             frame: sweep; its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
             proposals: proposals of the frame.
-            static_tracks: function of a time that returns the tracks that a frame may continue. It is called if the
-                frame has no pose, or one that is not aligned with the world of the tracks yet.
+            static_tracks: function of a time that returns the tracks that a frame may continue, and forgets the
+                expired ones. It is called if the frame has no pose, or one that is not aligned with the world of the
+                tracks yet.
         """
-        given = frame.T_world_sensor
+        # The world of a frame's pose is that of its odometry, which begins anew with each restart.
+        T_odometry_sensor = frame.T_world_sensor
         if frame.restarts != self._restarts:
             self._restarts = frame.restarts
             self._T_world_odometry = None
-        if self._time_s is None and given is not None:
-            self._begin(given)
+        if self._time_s is None and T_odometry_sensor is not None:
+            self._begin(T_odometry_sensor)
         sweep = self._sweep(frame, proposals)
-        if given is not None and self._T_world_odometry is not None:
-            self._landmarks.clear()
-            placement = sweep.place(self._T_world_odometry @ given)
+        if T_odometry_sensor is not None and self._T_world_odometry is not None:
+            self._landmarks.clear()  # the registration keeps whether a motion was known, and its inliers
+            placement = sweep.place(self._T_world_odometry @ T_odometry_sensor)
         else:
             placement = self._register(sweep, self._landmarks.update(static_tracks(frame.time_s)))
-            if given is not None:  # an odometry that begins late or restarts is aligned with the world of the tracks
-                self._T_world_odometry = placement.T_world_sensor @ inverse(given)
+            if T_odometry_sensor is not None:  # an odometry that begins late or restarts is aligned with the world
+                self._T_world_odometry = placement.T_world_sensor @ inverse(T_odometry_sensor)
         self._T_world_before = self._T_world_last
         self._T_world_last = placement.T_world_sensor
         self._time_s = frame.time_s
@@ -87,13 +98,16 @@ class PoseEstimator:
         """The frame after the last one, to be placed."""
         first = self._time_s is None
         dt_s = 0.0 if self._time_s is None else frame.time_s - self._time_s
-        if 2 * dt_s < abs(frame.turn_s):  # the errors of the poses would be extrapolated, so no motion is assumed
+        if 2 * dt_s < abs(frame.turn_s):
+            # Motion over less than half the sweep would extrapolate the errors of the poses, so none is assumed: any
+            # displacement over an infinite time is a velocity of zero.
             dt_s = np.inf
         delay_s = None if first or not frame.turn_s else delays(proposals, frame.turn_s)
         return _Sweep(proposals, self._T_world_last, dt_s, frame.turn_s, delay_s, self._kernels)
 
     def _register(self, sweep: _Sweep, landmarks: Landmarks) -> Placement:
         """Placement of a sweep without a pose, by stationary objects."""
+        # The motion between the last two frames goes on, by the same displacement.
         last_motion = inverse(self._T_world_before) @ self._T_world_last
         predicted = sweep.place(self._T_world_last @ last_motion)
         placement = self._corrected(predicted, sweep, landmarks)
@@ -115,7 +129,7 @@ class _Sweep:
     Attributes:
         proposals: proposals of the sweep.
         T_world_last: (4, 4) pose of the sweep before.
-        dt_s: time since then; infinite if no motion is to be assumed.
+        dt_s: time since then [s]; infinite if no motion is to be assumed.
         turn_s: as in Frame.
         delay_s: (P,) time after the stamp at which each proposal was seen; None if all were seen at the stamp.
         kernels: passes over points.

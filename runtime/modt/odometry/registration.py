@@ -87,12 +87,16 @@ class LandmarkMap:
 
 _SCALES = (8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 """Factors on the scale of the errors in the iterations of a fit, from coarse to fine against local minima."""
-_MATCH_ROUNDS = 4
-"""Rounds of matching and fitting in a wide search, and number of the coarsest scales that each fit uses."""
+_COARSE_SCALES = _SCALES[:4]
+"""Factors in the iterations of each fit of a wide search: the coarsest of them."""
+_WIDE_ROUNDS = 4
+"""Rounds of matching and fitting in a wide search."""
 _INITIAL_TURNS = (0, 1, -1, 2, -2, 3, -3)
 """Turns that are tried while no motion is known, in steps of RegistrationTuning.initial_turn_rad."""
 _MIN_LANDMARKS = 3
-"""Fewest pairs of a fit. A planar motion needs two, and the third one checks it."""
+"""Fewest candidate pairs for which a motion is fitted, and fewest inliers that support it. A planar motion needs two
+pairs, and the third one checks it. A fit may have fewer pairs than candidates: only those that are the best match of
+both their landmark and their observation count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +152,8 @@ class Registration:
         self._kernels = kernels
         self._tuning = tuning
         self._initialised = False  # whether a motion was known once
-        self._motion_known = False  # whether that of the last frame is
-        self._inliers = 0  # of the last frame
+        self._motion_known = False  # whether the last call of `correct` gave a motion with support
+        self._inliers = 0  # of the fit of that call
 
     def correct(
         self, landmarks: Landmarks, observations: Observations, motion_share: Float64 | float = 1.0
@@ -162,7 +166,8 @@ class Registration:
             motion_share: (P,) share of the motion that applies to each observation, by the time of its view.
 
         Returns:
-            (4, 4) motion of the pose; identity without support for another one.
+            (4, 4) motion of the pose: the best fit, however few its inliers are. It is the identity if fewer than
+            _MIN_LANDMARKS candidate pairs are within reach, or if the fit exceeds `reach_m` or `max_turn_rad`.
         """
         view = _View(landmarks, observations, _jacobian(observations) * motion_share)
         fit = None
@@ -181,7 +186,7 @@ class Registration:
         return _turn_about_sensor(fit.motion, observations.sensor_xy)
 
     def _is_convincing(self, fit: Fit) -> bool:
-        """Whether a fit within the gate agrees with most pairs, and with about as many as in the last frame."""
+        """Whether a fit within the gate agrees with most pairs, and with about as many as the last fit."""
         enough = self._tuning.inlier_drop * self._inliers
         return fit.supported(self._tuning.inlier_ratio) and fit.inliers >= enough
 
@@ -197,7 +202,7 @@ class Registration:
 
     def _solve_coarsely(self, view: _View, motion: Float64) -> Fit | None:
         """Motion within reach of a given one, matched several times, with the coarsest scales of the errors."""
-        return self._solve(view, motion, self._tuning.reach_m, _SCALES[:_MATCH_ROUNDS], _MATCH_ROUNDS)
+        return self._solve(view, motion, self._tuning.reach_m, _COARSE_SCALES, _WIDE_ROUNDS)
 
     def _solve(
         self, view: _View, motion: Float64, reach_m: float, scales: tuple[float, ...], match_rounds: int
@@ -249,7 +254,11 @@ def _distance(a: Float64, b: Float64, tuning: ShapeTuning) -> Float64:
 
 
 def _jacobian(observations: Observations) -> Float64:
-    """(3, 8, P) outward displacement of each end of the k-DOPs, per metre of x and y and per radian."""
+    """(3, 8, P) outward displacement of each end of the k-DOPs, per metre of x and y and per radian.
+
+    A turn about the sensor shifts a k-DOP as a whole, as it does its centre. It does not turn its shape, which small
+    turns hardly change.
+    """
     x, y = (observations.position - observations.sensor_xy).T
     jacobian = np.empty((3, 8, len(x)))
     jacobian[:2] = DIRECTIONS[:, :, None]
@@ -291,7 +300,8 @@ def _fit(
     """Motion that undoes the displacement of the ends of k-DOPs, by iteratively reweighted least squares.
 
     An end that comes into view moves while the other stays, so each end has its own weight, by a Cauchy distribution.
-    A millionth of the weights pulls towards no motion, which keeps the normal equations regular.
+    A millionth of the weights pulls towards no motion, that is towards the predicted pose, and keeps the normal
+    equations regular.
 
     Args:
         outward_shift: (8, K) displacement of each end outward, from landmark to observation [m].
@@ -309,11 +319,12 @@ def _fit(
     # Weighted sums of these rows are the normal matrix J W J', its upper triangle, and the right side J W shift.
     products = np.concatenate([J[_UPPER_ROW] * J[_UPPER_COLUMN], J * shift])
     for scale in scales:
-        residual = motion @ J
-        residual += shift
-        residual *= residual
-        residual += scale**2 * variance
-        sums = products @ (1.0 / residual)
+        # The inverse of the weight: the square of each end's residual, softened by that of its scale.
+        softened = motion @ J
+        softened += shift
+        softened *= softened
+        softened += scale**2 * variance
+        sums = products @ (1.0 / softened)
         normal = sums.take(_PLACE_IN_UPPER)
         normal.flat[::4] += 1e-6 * (normal[0, 0] + normal[1, 1] + normal[2, 2])
         motion = -np.asarray(np.linalg.solve(normal, sums[6:]), np.float64)

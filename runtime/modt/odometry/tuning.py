@@ -68,7 +68,7 @@ class RegistrationTuning:
     Chosen on: judgement."""
 
     inlier_drop: float = 0.5
-    """Share of the last frame's inliers below which pairs are sought farther away, since a few may agree by chance.
+    """Share of the last fit's inliers below which pairs are sought farther away, since a few may agree by chance.
     Chosen on: judgement."""
 
     initial_turn_rad: float = 0.05
