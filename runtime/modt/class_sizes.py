@@ -23,19 +23,22 @@ IS_PERSON: Bool = np.array([spec.person for spec in CLASSES.values()])
 
 @dataclass(frozen=True, slots=True)
 class PersonSize:
-    """Exclusive bounds on the size of a possible person [m]. They depend on what is measured and what an error costs.
-
-    Attributes:
-        max_extent_m, min_extent_m: extent seen from above.
-        min_height_m: height of the visible part.
-        min_top_m, max_top_m: height of its top above the ground.
-    """
+    """Exclusive bounds on the size of a possible person. They depend on what is measured and what an error costs."""
 
     max_extent_m: float
+    """Greatest extent seen from above [m]. Less takes people in stride for other things.
+    Chosen on: sensor study for parts, KITTI scans thinned to fewer beams for strips."""
     min_height_m: float
+    """Least height of the visible part [m]. Less takes bags and strips of cars for people.
+    Chosen on: sensor study for parts, KITTI scans thinned to fewer beams for strips."""
     min_top_m: float = -np.inf
+    """Least height of the top above the ground [m]. More misses children.
+    Chosen on: sensor study for parts, KITTI scans thinned to fewer beams for strips."""
     max_top_m: float = np.inf
+    """Greatest height of the top above the ground [m]. Less misses tall people on a kerb.
+    Chosen on: sensor study."""
     min_extent_m: float = -np.inf
+    """Least extent seen from above [m]. Less takes posts for people. Chosen on: sensor study."""
 
     def fits(self, extent_m: Float32 | Float64, bottom_m: Float32 | Float64, top_m: Float32 | Float64) -> Bool:
         """(k,) which objects may be a person, by (k,) extent from above, bottom and top."""

@@ -13,7 +13,7 @@ class CeilingFinder:
 
     Args:
         max_height_m: greatest height above ground at which returns are used.
-        tuning: what a ceiling is.
+        tuning: bounds on the heights and the number of returns of a ceiling.
     """
 
     def __init__(self, max_height_m: float, tuning: CeilingTuning = CeilingTuning()) -> None:

@@ -80,7 +80,7 @@ class GroundEstimator:
     Args:
         sensor: range.
         max_slope_deg: steepest ground.
-        tuning: what continues the ground of a ray.
+        tuning: bounds on ground that continues that of a ray.
         polar: cells of the polar grid.
     """
 
