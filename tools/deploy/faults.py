@@ -150,20 +150,20 @@ def _hangup(_world: World, on: bool) -> None:
         os.kill(os.getpid(), signal.SIGHUP)
 
 
-def _late_frames(session: Any) -> int:
+def _late_frames(service: Any) -> int:
     """Frames that began late, and steps of load shedding; a hog need not cost a deadline."""
-    lateness = session.deadlines.late_or_later()
+    lateness = service.deadlines.late_or_later()
     late = max((n for ms, n in zip(lateness["ms"], lateness["frames"], strict=True) if ms > LATE_MS), default=0)
-    return int(late) + session.deadlines.changes.total()
+    return int(late) + service.deadlines.changes.total()
 
 
-def _refused(session: Any) -> int:
+def _refused(service: Any) -> int:
     """Messages and sweeps that were not used."""
-    return sum(session.source.health()["refused_messages"].values()) + int(session.source.faults.skipped)
+    return sum(service.source.health()["refused_messages"].values()) + int(service.source.faults.skipped)
 
 
-def _incomplete(session: Any) -> int:
-    health = session.source.health()
+def _incomplete(service: Any) -> int:
+    health = service.source.health()
     return int(health["incomplete_sweeps"] + health["lost_messages"])
 
 

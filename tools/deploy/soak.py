@@ -71,7 +71,7 @@ class ResultLog:
     """A sink that notes when results come, what has been missed, the memory and the open descriptors."""
 
     def __init__(self) -> None:
-        self.session: Service | None = None
+        self.service: Service | None = None
         self.times_s: list[float] = []
         self.full: list[bool] = []  # nothing was given up
         self.missed: list[int] = []
@@ -80,8 +80,8 @@ class ResultLog:
 
     def write(self, result: FrameResult) -> None:
         """Note a result."""
-        assert self.session is not None
-        deadlines = self.session.deadlines
+        assert self.service is not None
+        deadlines = self.service.deadlines
         self.times_s.append(time.monotonic())
         self.full.append(deadlines.shedding.step is Step.ALL)
         self.missed.append(deadlines.missed)
@@ -112,7 +112,7 @@ class FaultyReader:
         self._rest_s += WARM_UP_S
         self._end_s = self._begin_s + seconds
         self._waiting: list[Fault] = []
-        self.session: Service | None = None
+        self.service: Service | None = None
         self.episodes: list[Episode] = []
         self._now: Episode | None = None
 
@@ -139,16 +139,16 @@ class FaultyReader:
 
     def ask(self) -> None:
         """Read the counter of the last fault."""
-        if self.episodes and self.session is not None:
-            self.episodes[-1].after = self.episodes[-1].fault.counter(self.session)
+        if self.episodes and self.service is not None:
+            self.episodes[-1].after = self.episodes[-1].fault.counter(self.service)
 
     def _turn_on(self, now_s: float) -> None:
         if not self._waiting:
             self._waiting = [FAULTS[k] for k in self._rng.permutation(len(FAULTS))]
         fault = self._waiting.pop()
-        assert self.session is not None
+        assert self.service is not None
         self.ask()
-        self._now = Episode(fault, now_s, fault.counter(self.session))
+        self._now = Episode(fault, now_s, fault.counter(self.service))
         self.episodes.append(self._now)
         self._send(fault)
         fault.switch(self._world, True)
@@ -179,11 +179,11 @@ def start_sender(drive: Path | None) -> tuple[subprocess.Popen[str], int]:
     return sender, port
 
 
-def judge(log: ResultLog, episodes: list[Episode], session: Service) -> list[str]:
+def judge(log: ResultLog, episodes: list[Episode], service: Service) -> list[str]:
     """Print the figures; returns the broken promises."""
     print(f"{'fault':<16}{'times':>6}{'counted':>8}{'recovery':>10}  (s, worst)")
     wrong = [line for fault in FAULTS for line in _of_fault(fault, log, episodes)]
-    return [*wrong, *_between_faults(log, episodes, session), *_of_memory(log)]
+    return [*wrong, *_between_faults(log, episodes, service), *_of_memory(log)]
 
 
 def _of_fault(fault: Fault, log: ResultLog, episodes: list[Episode]) -> Iterator[str]:
@@ -205,7 +205,7 @@ def _of_fault(fault: Fault, log: ResultLog, episodes: list[Episode]) -> Iterator
         yield f"{fault.name}: recovery took {worst_s:.1f} s"
 
 
-def _between_faults(log: ResultLog, episodes: list[Episode], session: Service) -> Iterator[str]:
+def _between_faults(log: ResultLog, episodes: list[Episode], service: Service) -> Iterator[str]:
     """Print the deadlines that were missed between faults, and what the recording has lost."""
     times_s = np.array(log.times_s)
     clear = np.ones(len(times_s), np.bool_)
@@ -213,10 +213,10 @@ def _between_faults(log: ResultLog, episodes: list[Episode], session: Service) -
         clear &= (times_s < e.begin_s) | (times_s > e.end_s + SETTLE_S)
     missed = int(np.diff(log.missed, prepend=0)[clear].sum())
     share = missed / max(int(clear.sum()), 1)
-    recording = session.recording.health()
+    recording = service.recording.health()
     lost = recording.lost_lines - sum(e.after - e.before for e in episodes if e.fault.name == FULL_DISK)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
-    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.status().loop}")
+    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {service.status().loop}")
     print(f"recording {recording}")
     if share > MAX_MISSED:
         yield f"{missed} deadlines missed between faults"
@@ -269,16 +269,16 @@ def main(arguments: list[str] | None = None) -> int:
         reader = FaultyReader(source.reader, sender, world, 60 * given.minutes, given.seed)
         source.reader = reader
         request = Request(profile=[given.profile] if given.profile else ())
-        session = build.service(request, source, {"results": log}, given.out, None, core, ["soak"])
-    log.session = reader.session = session
+        service = build.service(request, source, {"results": log}, given.out, None, core, ["soak"])
+    log.service = reader.service = service
     try:
-        session.run(Notifier())
+        service.run(Notifier())
     finally:
         world.set_hogs(False)
         sender.kill()
         sender.wait()
     reader.ask()
-    wrong = judge(log, reader.episodes, session)
+    wrong = judge(log, reader.episodes, service)
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"peak memory {peak_mb:.0f} MB")
     print("verdict: " + ("; ".join(wrong) or "good"))

@@ -80,7 +80,7 @@ FIRST = FAULTS[0].name
 )
 def test_the_verdict_names_each_shortcoming(seen, fault, counted, lost, wrong, capsys):
     recording = SimpleNamespace(health=lambda: SimpleNamespace(lost_lines=lost))
-    session = SimpleNamespace(status=lambda: SimpleNamespace(loop={}), recording=recording)
-    found = judge(seen, [Episode(NAMED[fault], 48.0, 3, 50.0, 3 + counted)], session)
+    service = SimpleNamespace(status=lambda: SimpleNamespace(loop={}), recording=recording)
+    found = judge(seen, [Episode(NAMED[fault], 48.0, 3, 50.0, 3 + counted)], service)
     assert [wrong in line for line in found] == ([True] if wrong else [])
     assert fault in capsys.readouterr().out
