@@ -20,9 +20,6 @@ else:
 ROOT = Path(__file__).resolve().parents[1]
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-FOLDERS = ("docs", "runtime", "tools", "systemd")
-TEXTS = {".md", ".py", ".conf", ".service", ".yaml", ".txt"}
-CLONE = "in a clone of modt"
 
 
 def test_the_lock_of_the_service_holds_each_dependency_within_its_bounds_and_with_hashes():
@@ -41,13 +38,6 @@ def test_citation_and_changelog_name_this_version():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     heading = re.search(r"^## \[(.+)\] - ", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert heading[1] == citation["version"] == modt.__version__
-
-
-def test_no_text_installs_modt_from_an_index_where_nobody_has_published_it():
-    files = [p for p in chain(ROOT.glob("*.md"), *(ROOT.joinpath(f).rglob("*") for f in FOLDERS)) if p.is_file()]
-    named = re.compile(r"pip install [^\n]*?(?<![\w/.-])modt(?![\w/.-])")
-    found = {p for p in files if p.suffix in TEXTS and named.search(p.read_text(encoding="utf-8").replace(CLONE, ""))}
-    assert found == set()
 
 
 def test_the_remedy_for_a_missing_extra_names_one_that_exists():

@@ -35,7 +35,6 @@ BUDGET = "scheduler: {energy_mJ_per_frame: 5}\n"
 @pytest.mark.parametrize(
     ("texts", "parts"),
     [
-        (["sensr: {}\n"], ["a.yaml:1", "unknown key 'sensr'", "'sensor'"]),
         (["sensor:\n  height_m: 1.0\n  heigth: 2\n"], ["a.yaml:3", "'heigth'", "'height_m'"]),
         (["segmentation:\n  min_points: 5\n  cell_m: 99\n"], ["a.yaml:3", "cell_m", "out of range"]),
         (["segmentation:\n  min_points: 2.5\n"], ["a.yaml:2", "min_points", "whole number"]),

@@ -70,7 +70,7 @@ def _azimuths(first: int, step: int) -> Callable[[bytes, Sequence[int]], bytes]:
 _XT_32 = next(model for model in hesai.MODELS if model.profile == "xt-32")
 
 
-def _xt_16(payload: bytes) -> bytes:
+def xt_16(payload: bytes) -> bytes:
     """The packet of a model with half the channels."""
     blocks = b"".join(payload[k : k + 66] for k in range(12, 1052, 130))
     return payload[:6] + b"\x10" + payload[7:12] + blocks + payload[1052:]
@@ -138,7 +138,7 @@ MAKERS = {
     ),
     "hesai": Maker(
         lambda: hesai.HesaiDecoder("sensor"),
-        lambda: (whole_turn("xt-32"), tuple(map(_xt_16, whole_turn("xt-32")))),
+        lambda: (whole_turn("xt-32"), tuple(map(xt_16, whole_turn("xt-32")))),
         _of_wire(HesaiStamps(_XT_32)),
         (0, 2, 6, 7, 9, _XT_32.tail + _XT_32.layout.mode),
         _azimuths(12, 130),

@@ -60,7 +60,7 @@ MAKERS = {
         lambda: list(packets("xt-32", 4)),
         (400, 401, 430),
         edited(12, b"\xff\xff"),
-        lambda p: edited(6, b"\x10")(p[:12] + b"".join(p[k : k + 66] for k in range(12, 1052, 130)) + p[1052:]),
+        makers.xt_16,
         {"no packet of a Hesai": 4, OTHER: 1},
     ),
     "livox": Maker(
