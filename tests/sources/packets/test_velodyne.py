@@ -45,7 +45,7 @@ def test_after_a_silence_or_a_restart_sweeps_begin_at_the_next_seam(heard, gap_s
     assert np.diff([s.stamp_s for s in sweeps]) == pytest.approx([*steps_s, 0.1, 0.1], abs=2e-3)
 
 
-@pytest.mark.parametrize(("first", "lost"), [(160, 60), (160, 140), (160, 200)])
+@pytest.mark.parametrize(("first", "lost"), [(160, 60), (160, 200)])
 def test_a_burst_of_losses_is_counted_whole(first, lost):
     timed = packets(sweeps=8)
     sweeps, reception = sweeps_of(timed[:first] + timed[first + lost :])
