@@ -11,7 +11,7 @@ from modt import model_file
 from modt.classification.onnx_check import find_flaw
 from modt.errors import MisuseError
 from tests.classification.scenes import classifier, saved
-from tests.fuzz.execution import limits
+from tests.fuzz.execution import execute, limits
 from tests.fuzz.runs import network
 
 SECRET = "secret.bin"
@@ -86,6 +86,29 @@ def test_an_attribute_of_another_name_may_have_the_number_of_the_type_of_text():
         model = network()
         node("Cast", **attributes)(model)
         assert find_flaw(model.SerializeToString()) is None
+
+
+def field(number, content):
+    """A field of a message that holds bytes, as protocol buffers write it."""
+    size = bytearray()
+    length = len(content)
+    while length >= 0x80:
+        size.append(length & 0x7F | 0x80)
+        length >>= 7
+    return bytes([number << 3 | 2, *size, length]) + content
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize(("last", "flaw"), [(1, "a tensor of more numbers than the file holds"), (0, None)])
+def test_a_million_bytes_of_dimensions_are_checked_in_no_time(packed, last, flaw):
+    dims = [bytes([0xFF] * 8 + [0x7F])] * 140_000 + [bytes([last])]  # each but the last 2^63 - 1
+    tensor = field(1, b"".join(dims)) if packed else b"".join(b"\x08" + dim for dim in dims)
+
+    def check(content):
+        assert find_flaw(content) == flaw
+
+    with limits():
+        assert execute(check, field(7, field(5, tensor)), ()) is None
 
 
 def large(*nodes, **numbers):

@@ -7,8 +7,7 @@ more work and memory than its size tells. It is a protocol buffer: nested messag
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 _MODEL, _GRAPH, _NODE, _ATTRIBUTE, _TENSOR, _SPARSE_TENSOR = range(6)
 _INNER_MESSAGES = {
@@ -47,6 +46,7 @@ def find_flaw(content: bytes) -> str | None:
 
 def _flaws(content: memoryview) -> Iterator[str]:
     """Parts of a model that are refused. Fields are not collected: a hostile file has millions of them."""
+    too_many = 2 * len(content) + 1
     waiting = [(_MODEL, content)]
     while waiting:
         kind, message = waiting.pop()
@@ -59,12 +59,13 @@ def _flaws(content: memoryview) -> Iterator[str]:
             if number in refused:
                 yield refused[number]
             if (kind, number) in _DIMENSIONS and value is not None:
-                n_numbers *= value if isinstance(value, int) else math.prod(_varints(value))
+                dimensions = (value,) if isinstance(value, int) else _varints(value)
+                n_numbers = _product(n_numbers, dimensions, too_many)
             if number in inner and isinstance(value, memoryview):
                 waiting.append((inner[number], value))
         if _makes_text(kind, last):
             yield "text"
-        if n_numbers > 2 * len(content):
+        if n_numbers == too_many:
             yield "a tensor of more numbers than the file holds"
 
 
@@ -77,6 +78,17 @@ def _makes_text(kind: int, fields: dict[int, memoryview | int | None]) -> bool:
         return False
     label = bytes(name)
     return label == b"value_string" or (label == b"to" and fields.get(_ATTRIBUTE_INTEGER) == _TEXT)
+
+
+def _product(start: int, factors: Iterable[int], limit: int) -> int:
+    """Product of numbers that are not negative, or limit where it is greater.
+
+    It is cut at every factor: the exact product of a million dimensions takes minutes. A later 0 makes it 0.
+    """
+    product = start
+    for factor in factors:
+        product = min(product * factor, limit)
+    return product
 
 
 def _varints(packed: memoryview) -> Iterator[int]:
