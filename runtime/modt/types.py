@@ -267,19 +267,19 @@ class Motion(Columns):
 
     id: Int = column(int, fill=NONE)  # never used twice in a run
     state: Int = column(int)  # value of the state machine's enumeration
-    final: Bool = column(bool)  # the class of that state is confirmed, and asked for only if the view improves
+    final: Bool = column(bool)  # the class is confirmed in this state
     x: Float64 = column(float, 4)  # filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1)
     P: Float64 = column(float, 4, 4)  # its covariance
     box: Float64 = column(float, 7)  # last box seen, world frame
-    proposal: Int = column(int, fill=NONE)  # of this frame, NONE while the track is lost
-    points: Int = column(int)  # of the last proposal
+    proposal: Int = column(int, fill=NONE)  # proposal in this frame, NONE while lost
+    points: Int = column(int)  # points of the last proposal
     age: Int = column(int)  # frames since birth, the birth frame counting as 1
     hits: Int = column(int)  # frames with a proposal
     missed: Int = column(int)  # frames since the last proposal
-    moved_m: Float64 = column(float)  # displacement in about ExtentTuning.lag_s, as far as both ends show it
-    observed_s: Float64 = column(float)  # sum of the steps that ended with a proposal: of a gap the last one alone
-    size_m: Float64 = column(float, 3)  # length, width and height that were seen for some frames
-    hidden: Bool = column(bool)  # a person of whom the view cuts off the upper half
+    moved_m: Float64 = column(float)  # displacement from `lagged_kdop`, along the axis where both ends moved most [m]
+    observed_s: Float64 = column(float)  # sum of the steps that ended with a proposal, so a gap adds its last one [s]
+    size_m: Float64 = column(float, 3)  # smoothed length, width and height of the boxes seen [m]
+    hidden: Bool = column(bool)  # a person whose upper half the view cuts off
 
     @property
     def observed(self) -> Bool:
@@ -303,11 +303,12 @@ class Evidence(Columns):
     posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, boxes, motion)
     motion_evidence: Float64 = column(float, N_CLASSES)  # log P(motion | class) over that of background
     box_evidence: Float64 = column(float, N_CLASSES)  # mean log P(box | class) of the boxes seen, up to a constant
-    may_be_object: Bool = column(bool)  # by the last box seen and the motion
+    may_be_object: Bool = column(bool)  # the last box seen and the motion allow an object
     view_evidence: Float64 = column(float, N_CLASSES)  # mean log P(view | class) of the views, up to a constant
-    view_weight: Float64 = column(float)  # of the views together in that mean
+    # Weight of the past in `view_evidence`: sum of the views' weights, discounted by `view_memory`.
+    view_weight: Float64 = column(float)
     views: Int = column(int)  # views fused
-    key_points: Int = column(int)  # at the last view, 0 before any
+    key_points: Int = column(int)  # points at the last view, 0 before any
     key_age: Int = column(int)  # age at the last view
 
     @property
@@ -351,7 +352,7 @@ class TrackedFrame:
     own_evidence: Evidence  # the same arrays, written by the fusion
     requests: Requests  # written by the scheduler
     decisions: Decisions  # written by the decision
-    proposals: Proposals  # of the frame, regrouped where the tracks know better; each belongs to one track
+    proposals: Proposals  # proposals of the frame after regrouping; each belongs to one track
     wants_class: Bool  # (M,) tracks with a proposal whose state asks for a class
 
 
@@ -371,10 +372,10 @@ UNLIMITED = Budget()
 class FrameResult:
     """Result of a frame."""
 
-    frame: Frame  # level, as are the frame of the sensor in all that follows and its pose
+    frame: Frame  # the frame, turned level. All results in the sensor frame, and the pose, refer to the level frame.
     T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp, as the odometry placed it
     proposals: Proposals
     tracks: Tracks  # a snapshot of those alive after the frame, read-only
-    state_names: tuple[str, ...]  # of each value of tracks.state
+    state_names: tuple[str, ...]  # name of each value of tracks.state
     n_deferred: int  # tracks whose request for a class waits for the next frame's budget
     classified: Int = field(default_factory=lambda: np.zeros(0, np.int64))  # identities of the tracks

@@ -63,8 +63,8 @@ def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int
     """(R,) band of the length, and (R,) cell of the motion: by the displacement, or by the age of what stays.
 
     Args:
-        moved_m: (R,) displacement within about the last two seconds [m].
-        observed_s: (R,) time since the first proposal [s].
+        moved_m: (R,) displacement from the k-DOP lagged by about `ExtentTuning.lag_s` [m].
+        observed_s: (R,) sum of the time steps that ended with a proposal [s].
         length_m: (R,) length of the track [m].
     """
     staying = YOUNG_S.searchsorted(observed_s, side="right")
@@ -87,8 +87,8 @@ class MotionLikelihood:
         """(4, R) log P(motion, size | class) over that of background.
 
         Args:
-            moved_m: (R,) displacement within about the last two seconds [m].
-            observed_s: (R,) time since the first proposal [s].
+            moved_m: (R,) displacement from the k-DOP lagged by about `ExtentTuning.lag_s` [m].
+            observed_s: (R,) sum of the time steps that ended with a proposal [s].
             size_m: (R, 3) length, width and height of the track [m].
         """
         length_band, cell = cells(moved_m, observed_s, size_m[:, 0])

@@ -22,7 +22,7 @@ class Matches(NamedTuple):
         proposals: (K,) proposals of this frame.
         position: (K, 2) position of each track as its proposal measures it [m, world].
         covariance: (K, 2, 2) covariance of that position [m2].
-        end_variance: (K, 4) part of it by ends of the k-DOP that disagree, along each axis [m2].
+        end_variance: (K, 4) part of that variance along each axis, left by ends of the k-DOP that disagree [m2].
     """
 
     rows: Int
@@ -32,9 +32,9 @@ class Matches(NamedTuple):
     end_variance: Float64
 
     def reassigned(self, tracks: TrackTable, rows: Int, proposals: Int) -> Matches:
-        """The matches with other proposals, NONE for none, of the tracks given (R,).
+        """Matches after the tracks `rows` (R,) exchanged their proposals; NONE removes one.
 
-        A proposal that changes its track measures nothing: its k-DOP is not that of the track.
+        An exchanged proposal measures no position, since its k-DOP is not that of the track.
         """
         changed = np.zeros(len(tracks), np.bool_)
         changed[rows] = True

@@ -48,7 +48,10 @@ class BackgroundMap:
         self._top = np.concatenate([self._top, tracks.top[rows]])[first:]
 
     def recall(self, tracks: TrackTable, rows: Int, observations: Observations, which: Int) -> Bool:
-        """(n,) whether background stood, or as rows of the tracks stands, where the observations which (n,) are."""
+        """(n,) whether each of the observations `which` lies at a remembered place, or on a settled track of `rows`.
+
+        It lies there if the place covers enough of it, and it rises little above the place.
+        """
         known = np.zeros(len(which), np.bool_)
         if not self.capacity or not len(which):
             return known

@@ -19,15 +19,15 @@ from modt.tracking.tuning import ExtentTuning
 from modt.types import Float64, Int
 
 MAX_LENGTH_M: Float64 = np.where(np.arange(N_CLASSES) == ObjectClass.BACKGROUND, np.inf, MAX_SIZE_M[:, 0])
-"""(4,) length of a track of each class beyond which it is taken to be merged with others."""
+"""(4,) length beyond which a proposal of a track of each class is taken for several merged objects [m]."""
 
 
 class ExtentUpdate:
-    """Writes what proposals show of their tracks: the reference in NumPy.
+    """Writes the columns of the extent from the proposals: the reference in NumPy.
 
     Args:
         tuning: weights of what is seen and what was seen before.
-        agreement_m: an end of the mean k-DOP that is further off jumped, as in ShapeTuning [m].
+        agreement_m: distance beyond which an end of the mean k-DOP has jumped, as in ShapeTuning [m].
     """
 
     def __init__(self, tuning: ExtentTuning, agreement_m: float) -> None:
@@ -74,7 +74,8 @@ class ExtentUpdate:
     def _envelope(self, tracks: TrackTable, rows: Int, relative: Float64) -> None:
         """The known extent grows to what is seen (R, 8), relative to the position, and decays slowly towards it.
 
-        It stays as it is for an object longer than its class, which is taken to be merged with others.
+        It stays unchanged in a frame whose proposal is longer than the class of its track allows. Such a proposal is
+        taken for several merged objects.
         """
         known = tracks.envelope.take(rows, axis=0)
         decay = self.tuning.known_decay
@@ -84,16 +85,17 @@ class ExtentUpdate:
         tracks.envelope[rows] = np.where(too_long, known, grown)
 
     def _mean(self, tracks: TrackTable, rows: Int, relative: Float64) -> None:
-        """The mean k-DOP follows what is seen (R, 8), relative to the position; an end that jumped begins anew."""
+        """The mean k-DOP follows what is seen (R, 8), relative to the position; an end that jumps restarts."""
         off = tracks.mean_kdop.take(rows, axis=0) - relative
         weight = np.minimum(1.0 - 1.0 / tracks.hits[rows], self.tuning.mean_decay)[:, None]
         tracks.mean_kdop[rows] = relative + (np.abs(off) < self.agreement_m) * weight * off
 
     def _displacement(self, tracks: TrackTable, rows: Int, kdop: Float64, dt_s: float) -> None:
-        """The place that a track comes from follows its k-DOP (R, 8) with a lag; the displacement is from there.
+        """Write the displacement of the k-DOPs (R, 8) from the lagged k-DOPs, then move the lagged ones.
 
-        At a constant speed v it tends to v * lag_s. Along each axis it is that of the end that moved less, and
-        nothing where the ends moved apart: a changing view moves one of them alone.
+        Per axis the displacement is the smaller one of both ends, or 0 if they moved in opposite directions, since a
+        changing view moves one end alone. The greatest over the axes counts. At a constant speed v along an axis it
+        tends to v * lag_s.
         """
         lagged = tracks.lagged_kdop.take(rows, axis=0)
         shift = kdop - lagged
@@ -158,7 +160,7 @@ _ARGUMENTS = (_COLUMNS, _OBSERVATIONS, INT64, INT64, ctypes.c_int64, FLOAT64, FL
 
 
 class NativeExtentUpdate(ExtentUpdate):
-    """The same in C (`modt.native`)."""
+    """`ExtentUpdate` in C (`modt.native`)."""
 
     def __init__(self, library: ctypes.CDLL, tuning: ExtentTuning, agreement_m: float) -> None:
         super().__init__(tuning, agreement_m)
@@ -197,7 +199,7 @@ class NativeExtentUpdate(ExtentUpdate):
 
 
 def extent_update_of(kernels: GeometryKernels, tuning: ExtentTuning = ExtentTuning()) -> ExtentUpdate:
-    """The update where the other passes are."""
+    """The update: native if the kernels have a library, else in NumPy."""
     agreement_m = kernels.shape_tuning.agreement_m
     if kernels.library is None:
         return ExtentUpdate(tuning, agreement_m)

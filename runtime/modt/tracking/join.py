@@ -24,7 +24,7 @@ def find_joins(now: Situation) -> Joins:
     """Parts within the known extents of tracks, then parts that come into view beside cars."""
     known = _known_parts(now)
     new = _new_parts(now)
-    # Who comes first gets the part: the most senior track that knows it, else the last of the cars that it is beside.
+    # Priority of hosts: the most senior track that knows the part, else the last listed car beside it.
     parts = np.concatenate([known.parts, new.parts[::-1]])
     hosts = np.concatenate([known.hosts, new.hosts[::-1]])
     first = first_of_each(parts, len(now.proposals))
@@ -37,7 +37,10 @@ def find_joins(now: Situation) -> Joins:
 
 
 def _known_parts(now: Situation) -> Joins:
-    """Proposals within the known extent of an established track, with that of the track; the most senior first."""
+    """Proposals within the known extent of an established track, each with the proposal of that track.
+
+    Those of the most senior track come first.
+    """
     tracks = now.tracks
     pairs = now.pairs
     host = now.assignment.proposal_of_track[pairs.rows]
@@ -50,13 +53,13 @@ def _known_parts(now: Situation) -> Joins:
 
     is_car = tracks.object_class == ObjectClass.CAR.value
     known_m = widths(tracks.known_kdops(rows))
-    # Background joins parts as a car does, if it is no longer than one, but no person and no part of a car.
+    # A background track no longer than a car also joins parts, but no possible person and no part of a car.
     may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
     of_car = mask_at(is_car, now.assignment.track_of_proposal[parts])
     joins = is_car[rows] | (may_be_car & ~_may_be_person(now, parts) & ~of_car)
     kdop = now.observations.kdop
     together = np.maximum(kdop.take(parts, axis=1), kdop.take(hosts, axis=1))
-    joins &= (widths(together) < known_m + now.tuning.longer_m).all(axis=0)
+    joins &= (widths(together) < known_m + now.tuning.max_excess_m).all(axis=0)
     return Joins(parts[joins], hosts[joins])
 
 

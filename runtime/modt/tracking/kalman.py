@@ -200,7 +200,7 @@ _SIGNATURES: Signatures = {
 
 
 class NativeFilter(Filter):
-    """The filter in C (`modt.native`)."""
+    """`Filter` in C (`modt.native`)."""
 
     def __init__(self, library: ctypes.CDLL, tuning: FilterTuning) -> None:
         super().__init__(tuning)
@@ -228,5 +228,5 @@ class NativeFilter(Filter):
 
 
 def filter_of(kernels: GeometryKernels, tuning: FilterTuning = FilterTuning()) -> Filter:
-    """The filter where the other passes are."""
+    """The filter: native if the kernels have a library, else in NumPy."""
     return Filter(tuning) if kernels.library is None else NativeFilter(kernels.library, tuning)

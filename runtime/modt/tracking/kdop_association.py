@@ -80,14 +80,15 @@ class KdopAssociation:
         return observations.position
 
     def _reach(self, covariance: Float64) -> Float64:
-        """(M,) distance beyond which no pair of a track is listed, by xx, xy, yy (3, M) of its position [m].
+        """(M,) search radius [m] of tracks whose positions have the covariance xx, xy, yy (3, M).
 
-        It is three deviations, or fewer where a pair would cost more than the greatest cost: shapes that do not
-        overlap cost the weight of the overlap at least, and an uncertain position costs its uncertainty.
+        It is a margin of 0.5 m and three standard deviations of the position. The deviations are fewer where the
+        missing overlap and the uncertainty of the position leave less of `max_cost` for the displacement.
         """
         xx, xy, yy = covariance
         least = self._jump_variance
         uncertainty = np.log(((xx + least) * (yy + least) - xy * xy) / least**2)
+        # Greatest squared displacement in standard deviations: 9 stands for three of them.
         left = np.minimum(2 * (self._tuning.max_cost - self._weights.overlap) - uncertainty, 9.0)
         reach: Float64 = 0.5 + np.sqrt(np.maximum(left, 0.0) * np.maximum(xx, yy))
         return reach

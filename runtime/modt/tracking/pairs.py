@@ -18,7 +18,7 @@ from modt.types import NONE, Bool, Float64, Int, Proposals
 
 
 class Assignment(NamedTuple):
-    """Which track has which proposal; each has one of the other, or none."""
+    """One-to-one assignment of tracks and proposals; either may have no partner."""
 
     proposal_of_track: Int  # (M,) proposal of each track, NONE where it has none
     track_of_proposal: Int  # (P,) row of the track of each proposal, NONE where it has none
@@ -41,10 +41,10 @@ class Pairs(NamedTuple):
 
     rows: Int  # (K,) track of each pair
     proposals: Int  # (K,) proposal of each pair
-    within: Float64  # (K,) part of the proposal that lies within the known extent
-    around: Float64  # (K,) part of the track, as it is expected, that lies within the proposal
-    free: Bool  # (K,) within or around exceeds min_coverage, and the track may take the proposal
-    joinable: Bool  # (M,) tracks that parts may be joined to: no people, save those of whom only the legs are seen
+    within: Float64  # (K,) share of the proposal inside the known extent
+    around: Float64  # (K,) share of the expected track inside the proposal
+    free: Bool  # (K,) the track may take the proposal, and one covers enough of the other (min_coverage)
+    joinable: Bool  # (M,) tracks that may gain parts: all but people, and people whose upper half is cut off
     expected: Float64  # (8, M) k-DOPs of the tracks, where the filter expects them
     max_width_m: Float64  # (P,) greatest width of the k-DOP of each proposal
 

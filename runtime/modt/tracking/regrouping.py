@@ -1,8 +1,8 @@
 """Regrouping: which proposals, and which part of a proposal, make up the object of each track.
 
 Segmentation cuts a car at the pole before it, and joins a person to the wall that is touched. The tracks know better.
-Pairs of a track and a proposal within its known extent are listed once. From them follow three kinds of edits, which
-are records, and are applied together at the end:
+Pairs of a track and a proposal that overlaps its known extent are listed once. From them follow three kinds of edits,
+which are records. Takes are applied first. Joins and splits are found from the result, and are applied together:
 
 - *Take*: a track takes the larger part of its object from a junior track, which gets the other part.
 - *Join*: parts of a car, or of background that may be one, are joined to the proposal of its track. So are new
@@ -10,11 +10,10 @@ are records, and are applied together at the end:
 - *Split*: the track of an object that is expected within a longer proposal takes the points where it is expected, if
   it has no proposal of its own, one that is too long for its class, or one of few points.
 
-The senior of two tracks is that of which more points were seen, as frames with a proposal times points of the last
-one, not the older one: a fragment begins in the frame in which its car does, and a bush is older than the car that
-passes it.
+The senior track has the greater product of hits and last points. Age would mislead: a fragment is as old as its car,
+and a bush is older than the car that passes it.
 
-The risk: a person who steps close to a parked car, and is not classified yet, becomes a part of it.
+Limit: a person who steps close to a parked car, and is not classified yet, may become a part of it.
 """
 
 from __future__ import annotations
@@ -158,9 +157,10 @@ class Regrouping:
     def _with_pieces(
         self, after_takes: Situation, splits: Splits, observed: Observations, matches: Matches
     ) -> tuple[Observations, Matches]:
-        """Observations (R,), the last of which are the pieces, and matches, where pieces show where their tracks are.
+        """Observations (R,) and matches in which the pieces, the last rows, measure the positions of their tracks.
 
-        k-DOP, bottom and top of a piece are those of its track. Box, centroid and count are those of its points.
+        Replace the k-DOP, bottom and top of the pieces by those of their tracks, since a piece measures a position
+        only. Box, centroid and count are those of its points.
         """
         rows = splits.rows
         pieces = np.arange(len(observed) - len(rows), len(observed))
@@ -176,7 +176,8 @@ def _matches_after(
 ) -> Matches:
     """The matches after all edits; pieces are numbered after the former proposals.
 
-    A track measures nothing by a proposal that is new to it, or that another track takes points of.
+    A track whose proposal is new to it, or loses points to another track, gets no measurement from it here. The
+    pieces are measured later, by `locate_pieces`.
     """
     proposal_of_track = after_takes.assignment.proposal_of_track.copy()
     track_of_proposal = after_takes.assignment.track_of_proposal

@@ -38,7 +38,7 @@ class _Points(NamedTuple):
 
 
 def find_splits(now: Situation) -> Splits:
-    """Pieces for the tracks seen a frame ago that have no proposal, or an odd one.
+    """Pieces for the object tracks seen in the last frame that have no proposal, or a doubtful one.
 
     A track that was observed once gets none, since it has no pairs (`Pairs`).
     """
@@ -64,15 +64,16 @@ def _hosts(now: Situation) -> tuple[Int, Int]:
     rows = pairs.rows[covered]
     hosts = pairs.proposals[covered]
     expected_m = widths(pairs.expected.take(rows, axis=1)).max(axis=0)
-    longer = (pairs.max_width_m[hosts] > expected_m + now.tuning.longer_m).nonzero()[0]
+    longer = (pairs.max_width_m[hosts] > expected_m + now.tuning.max_excess_m).nonzero()[0]
     best = longer[first_of_each(rows[longer], len(now.tracks))]
     return rows[best], hosts[best]
 
 
 def _seeking(now: Situation) -> Bool:
-    """(M,) objects seen a frame ago that have no proposal, or, if they likely are of their class, an odd one.
+    """(M,) object tracks seen in the last frame that have no proposal, or a doubtful one.
 
-    A proposal is odd that is too long for the class of its track, or of few points.
+    A proposal is doubtful if it is too long for the class of its track, or has few points. A doubtful one counts only
+    if the class is probable.
     """
     tracks = now.tracks
     seeks: Bool = (tracks.missed == 0) & (tracks.object_class != ObjectClass.BACKGROUND.value)
@@ -101,7 +102,7 @@ def _expected_points(now: Situation, rows: Int, hosts: Int) -> _Points:
     member_rows = member_rows[below]
     piece = piece[below]
     xyz = xyz.take(below, axis=1)
-    # What the sensor saw as it turned is moved to the stamp, by the place where the track is expected.
+    # Points are deskewed to the stamp as if seen where the track is expected.
     step = now.placement.deskew(now.tracks.x[rows, :2])
     xy = xyz[:2] + step.T.take(piece, axis=1)
     limit = now.pairs.expected.take(rows[piece], axis=1) + margin_m
@@ -126,8 +127,8 @@ def _rows_of_groups(offsets: Int, groups: Int) -> tuple[Int, Int]:
 def _worth_making(now: Situation, points: _Points, rows: Int, hosts: Int) -> Bool:
     """(R,) pieces of enough points that are as high as their tracks, and leave enough of their hosts.
 
-    If too little of a host remains, first the piece of the host's own track is dropped, which then has all that the
-    other pieces leave. If that is too little as well, all its pieces are dropped.
+    If too few points would remain in a host, the piece of the track that owns the host is dropped first. If they are
+    too few after that, all its other pieces are dropped.
     """
     tracks = now.tracks
     tuning = now.tuning
@@ -148,7 +149,7 @@ def locate_pieces(
 ) -> tuple[Float64, Matches]:
     """Positions that pieces measure: k-DOPs (8, S) of the tracks there, and the matches with these positions.
 
-    A piece shows where its track is, by the ends at which nothing touches it, and nothing new of its shape.
+    A piece measures the position of its track by the ends that nothing touches. The shape of the track stays.
 
     Args:
         now: situation after the takes, before joins and splits.
@@ -160,8 +161,8 @@ def locate_pieces(
     tracks = now.tracks
     expected = tracks.predicted_kdops(rows)
     mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ tracks.x.take(rows, axis=0)[:, :2].T
-    # An end that is touched is taken to be as far from its expected place as the opposite one. If both are touched,
-    # the axis is known weakly: its variance is the greatest that `measured` allows for the width of the object.
+    # A touched end takes the displacement of the opposite end. If both are touched, the axis is known weakly: its
+    # variance is the greatest that `measured` allows for the width of the object.
     touched = kdop > expected + (now.tuning.margin_m - now.tuning.touch_m)
     both = touched & touched[OPPOSITE]
     off = kdop - mean

@@ -2,8 +2,8 @@
 
 A row names an event, the state that it leaves and the state that it leads to. In each state an event has one row at
 most, so arrays of states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are
-extensions: the paper has no budget, so it has no object that waits for its first class, no second look at a final
-class, no background map.
+extensions: the paper has no budget, so it has no object that waits for its first class, no review of a
+confirmed class, no background map.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ class StateEvent(IntEnum):
     ASSOCIATED = 0
     """Proposal and track were associated."""
     UNASSOCIATED = 1
-    """They were not."""
+    """The proposal has no track, or the track has no proposal."""
     EXPIRED = 2
     """The track went without a proposal for more than N frames."""
     JOINS_FINAL = 3
-    """The proposal joins a track whose class is final, or takes over that of a remembered place."""
+    """The proposal joins a track whose class is confirmed, or takes over the class of a remembered place."""
     JOINS_UNCERTAIN = 4
-    """The proposal joins a track that was classified without certainty."""
+    """The proposal joins a track that was classified, but whose class is unconfirmed."""
     JOINS_WAITING = 5
     """The proposal joins a track that waits for its first classification."""
     CLASSIFIED = 6
-    """Classified: the class is certain."""
+    """A classification confirms the class."""
     UNDECIDED = 7
-    """Classified without certainty."""
+    """A classification leaves the class unconfirmed."""
     WITHDRAWN = 8
     """An inherited class does not hold."""
 
@@ -51,8 +51,8 @@ class State:
     Attributes:
         name: as in the paper's figure.
         wants_class: the class is asked for.
-        final: the class is final.
-        joining: event that a proposal meets which joins a track in this state, once that was associated.
+        final: the class is confirmed.
+        joining: event of a proposal that joins a track in this state, fired after ASSOCIATED.
     """
 
     name: str
@@ -66,9 +66,9 @@ class Transition:
     """One row of a table.
 
     Attributes:
-        source: state it leaves.
-        label: the table's name of it.
-        target: state it leads to.
+        source: state that it leaves.
+        label: name of the row in the table.
+        target: state that it leads to.
         event: event that fires it.
         meaning: the table's description, in a phrase.
     """
@@ -123,12 +123,12 @@ class StateMachine:
 
     @cached_property
     def final(self) -> Bool:
-        """(S,) whether the class is final."""
+        """(S,) whether the class is confirmed."""
         return np.array([state.final for state in self.states])
 
     @cached_property
     def joining(self) -> Int:
-        """(S,) event that a proposal meets which joins a track in each state."""
+        """(S,) event of a proposal that joins a track in each state."""
         return np.array([state.joining for state in self.states])
 
     def transition(self, states: Int, events: StateEvent | Int) -> Int:
@@ -177,7 +177,7 @@ EFFICIENT = StateMachine(
         Transition("proposal", "a1", "matched", _E.ASSOCIATED, "associated with an existing object"),
         Transition("proposal", "a2", "unmatched", _E.UNASSOCIATED, "associated with none"),
         Transition("unmatched", "a3", "tracked", _E.CLASSIFIED, "classified"),
-        Transition("unmatched", "e13", "unmatched", _E.UNDECIDED, "classified, uncertain"),
+        Transition("unmatched", "e13", "unmatched", _E.UNDECIDED, "classified, unconfirmed"),
         Transition("tracked", "a4", "tracked", _E.ASSOCIATED, "its proposal updates its location"),
         Transition("matched", "a5", "tracked", _E.JOINS_FINAL, "given the object's class"),
         Transition("tracked", "a6", "lost", _E.UNASSOCIATED, "no proposal"),
@@ -199,7 +199,7 @@ CONVENTIONAL = replace(
         Transition("tracked", "e7", "tracked", _E.CLASSIFIED, "classified in every frame"),
     ),
 )
-"""Tracking by detection over the same states: no class is final."""
+"""Tracking by detection over the same states. `final` is false in all of them, as each frame is classified anew."""
 
 ACCURATE = StateMachine(
     title="Table II",
@@ -217,12 +217,12 @@ ACCURATE = StateMachine(
     transitions=(
         Transition("proposal", "a1", "matched", _E.ASSOCIATED, "associated with an existing object"),
         Transition("proposal", "a2", "unmatched", _E.UNASSOCIATED, "associated with none"),
-        Transition("unmatched", "a3", "tracked_unclassified", _E.UNDECIDED, "classified, uncertain"),
-        Transition("unmatched", "a4", "tracked_classified", _E.CLASSIFIED, "classified, distinct"),
+        Transition("unmatched", "a3", "tracked_unclassified", _E.UNDECIDED, "classified, unconfirmed"),
+        Transition("unmatched", "a4", "tracked_classified", _E.CLASSIFIED, "classified, confirmed"),
         Transition("matched", "a5", "tracked_unclassified", _E.JOINS_UNCERTAIN, "joins an unclassified object"),
         Transition("matched", "a6", "tracked_classified", _E.JOINS_FINAL, "joins a classified object"),
         Transition("tracked_classified", "a7", "tracked_classified", _E.ASSOCIATED, "its proposal updates it"),
-        Transition("tracked_unclassified", "a8", "tracked_classified", _E.CLASSIFIED, "fused views are certain"),
+        Transition("tracked_unclassified", "a8", "tracked_classified", _E.CLASSIFIED, "views confirm it"),
         Transition("tracked_unclassified", "a9", "tracked_unclassified", _E.ASSOCIATED, "its proposal updates it"),
         Transition("tracked_classified", "a10", "lost_classified", _E.UNASSOCIATED, "no proposal"),
         Transition("lost_classified", "a11", "tracked_classified", _E.ASSOCIATED, "re-associated"),
@@ -231,15 +231,15 @@ ACCURATE = StateMachine(
         Transition("lost_classified", "a14", "deleted", _E.EXPIRED, "no proposal for N frames"),
         Transition("lost_unclassified", "a14", "deleted", _E.EXPIRED, "no proposal for N frames"),
         *_WAITING,
-        Transition("tracked_unclassified", "e7", "tracked_unclassified", _E.UNDECIDED, "fused views are uncertain"),
+        Transition("tracked_unclassified", "e7", "tracked_unclassified", _E.UNDECIDED, "views leave it unconfirmed"),
         Transition("lost_classified", "e8", "lost_classified", _E.UNASSOCIATED, "still no proposal"),
         Transition("lost_unclassified", "e9", "lost_unclassified", _E.UNASSOCIATED, "still no proposal"),
-        Transition("tracked_classified", "e10", "tracked_classified", _E.CLASSIFIED, "a second look confirms it"),
-        Transition("tracked_classified", "e11", "tracked_unclassified", _E.UNDECIDED, "a second look leaves doubt"),
+        Transition("tracked_classified", "e10", "tracked_classified", _E.CLASSIFIED, "review confirms it"),
+        Transition("tracked_classified", "e11", "tracked_unclassified", _E.UNDECIDED, "review leaves it unconfirmed"),
         Transition("tracked_classified", "e12", "unmatched", _E.WITHDRAWN, "leaves the place of its class"),
     ),
 )
-"""Table II and Fig. 6: classify until certain.
+"""Table II and Fig. 6: classify until the class is confirmed.
 
 The paper's a12 repeats the words of a10 ("tracked classified objects are not associated"); Fig. 6 and a13 leave only
 one meaning, that of the unclassified ones.

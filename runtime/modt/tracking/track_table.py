@@ -26,17 +26,18 @@ from modt.types import (
 class TrackTable(Tracks):
     """Tracks with the columns that only the tracker needs; k-DOPs as in geometry/kdop.py."""
 
-    kdop: Float64 = column(float, 8)  # last observed [m, world]
-    lagged_kdop: Float64 = column(float, 8)  # moves towards the last observed with a lag [m, world]
-    envelope: Float64 = column(float, 8, fill=-np.inf)  # known extent relative to the position, slowly decaying [m]
-    mean_kdop: Float64 = column(float, 8)  # relative to the position; an end that jumped begins anew [m]
-    end_variance: Float64 = column(float, 4)  # of the position along each axis, by ends that disagreed [m2]
+    kdop: Float64 = column(float, 8)  # k-DOP last observed [m, world]
+    # `kdop` smoothed with time constant lag_s; `moved_m` is measured from it [m, world]
+    lagged_kdop: Float64 = column(float, 8)
+    envelope: Float64 = column(float, 8, fill=-np.inf)  # known extent: largest k-DOP about the position, decaying [m]
+    mean_kdop: Float64 = column(float, 8)  # mean of the k-DOP about the position; an end that jumps restarts [m]
+    end_variance: Float64 = column(float, 4)  # extra position variance along each axis, by ends that disagreed [m2]
     bottom: Float64 = column(float)  # lowest point last observed [m, world]
     top: Float64 = column(float)  # highest point last observed [m, world]
-    anchor: Float64 = column(float, 2)  # position that the last k-DOP was assigned [m, world]
-    rest_position: Float64 = column(float, 2)  # at which the track was last known to rest [m, world]
+    anchor: Float64 = column(float, 2)  # measured position when `kdop` was observed [m, world]
+    rest_position: Float64 = column(float, 2)  # position at which the track was last known to rest [m, world]
     stationary: Bool = column(bool)  # the track is at rest
-    unseen_s: Float64 = column(float)  # since the last proposal [s]
+    unseen_s: Float64 = column(float)  # time since the last proposal; a stalled clock adds one period a frame [s]
 
     def predicted_kdops(self, rows: Int | slice = slice(None)) -> Float64:
         """(8, R) k-DOPs last observed of the rows, of all by default, where the filter expects them now."""
@@ -50,7 +51,7 @@ class TrackTable(Tracks):
 
 
 class LiveTracks:
-    """The tracks alive, the next identity and the time, which outlast an exchange of the stages.
+    """State that survives an exchange of the stages: the track table, the next id and the time of the last frame.
 
     Attributes:
         table: the tracks as the tracker has them: its own columns can be written to, the others are read-only.

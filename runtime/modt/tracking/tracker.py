@@ -84,8 +84,8 @@ class Tracker:
         return self.machine.names
 
     def static_tracks(self, stamp_s: float) -> StaticTracks:
-        """Facts that the odometry needs of the tracks that a frame at this time may continue."""
-        self._forget(stamp_s)
+        """Delete tracks that a gap has ended, and return what the odometry needs of the others."""
+        self._end_after_gap(stamp_s)
         t = self.tracks
         return StaticTracks(
             id=t.id,
@@ -97,7 +97,7 @@ class Tracker:
         )
 
     def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
-        """Match a frame's proposals with the tracks, and regroup them where the tracks know better.
+        """Match the proposals of a frame with the tracks, and regroup them by known extents.
 
         Each of the proposals returned belongs to one track, a new one where none matched. `confirm` ends the frame.
 
@@ -109,7 +109,7 @@ class Tracker:
         Returns:
             The tracks, in parts by the stage that writes them, the proposals, and which tracks want a class.
         """
-        self._forget(stamp_s)
+        self._end_after_gap(stamp_s)
         dt_s = self._predict(stamp_s)
         matches = self.association.match(self.tracks, located.observations)
         frame = Associated(proposals, located.observations, matches)
@@ -140,46 +140,47 @@ class Tracker:
         return self._live.save()
 
     def _advance(self, rows: Int, events: StateEvent | Int) -> None:
-        """Move rows to the states that events lead to, and write whether the class is final there."""
+        """Move rows to the states that events lead to, and write whether the class is confirmed there."""
         t = self.tracks
         if not len(rows):
             return
         t.state[rows] = self.machine.transition(t.state[rows], events)
         t.final[rows] = self.machine.final[t.state[rows]]
 
-    def _lapse_s(self, stamp_s: float) -> float:
-        """Time since the last frame, zero where the clock went back."""
+    def _elapsed_s(self, stamp_s: float) -> float:
+        """Time since the last frame [s], 0 if there is none or the clock went back."""
         last_s = self._live.stamp_s
         return 0.0 if last_s is None else max(0.0, stamp_s - last_s)
 
-    def _coasting_s(self, frames: float) -> float:
-        """Time that N frames, and some more, take."""
+    def _max_unseen_s(self, frames: float) -> float:
+        """(max_missed + `frames`) periods [s]."""
         return (self.config.max_missed + frames) * self._period_s
 
-    def _forget(self, stamp_s: float) -> None:
-        """Delete the tracks that would have expired in a gap; beyond N frames of it, the scene may be another one.
+    def _end_after_gap(self, stamp_s: float) -> None:
+        """Delete tracks unseen for more than max_missed + 1.5 periods, and remember those of settled background.
 
-        An odometry that registers asks for the tracks before `track`, so this is called once or twice a frame; the
-        second call changes nothing.
+        After a gap that long, forget remembered background too, since the scene may be another one. An odometry
+        that registers asks for the tracks before `track`, so this is called once or twice a frame. The second call
+        changes nothing.
         """
         t = self.tracks
-        lapse_s = self._lapse_s(stamp_s)
-        most_s = self._coasting_s(1.5)
-        gone = t.unseen_s + lapse_s > most_s
+        elapsed_s = self._elapsed_s(stamp_s)
+        most_s = self._max_unseen_s(1.5)
+        gone = t.unseen_s + elapsed_s > most_s
         if gone.any():
             settled = self._settled_background(self._near_rest())
             self.background_map.add(t, (gone & settled).nonzero()[0])
             self._live.renew((~gone).nonzero()[0], 0)
-        if lapse_s > most_s:
+        if elapsed_s > most_s:
             self.background_map.clear()
 
     def _predict(self, stamp_s: float) -> float:
-        """Equation 1, over the time since the last frame, which is returned [s]."""
-        dt_s = self._lapse_s(stamp_s)
+        """Predict the tracks over the time since the last frame (Equation 1), and return that time [s]."""
+        dt_s = self._elapsed_s(stamp_s)
         self._live.stamp_s = stamp_s
         t = self.tracks
-        creeps = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
-        t.unseen_s[:] += self._period_s if creeps else dt_s
+        clock_stalled = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
+        t.unseen_s[:] += self._period_s if clock_stalled else dt_s
         self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
@@ -199,7 +200,7 @@ class Tracker:
         t.proposal[:] = NONE
 
     def _update(self, matches: Matches, observations: Observations, dt_s: float) -> None:
-        """Equation 1's filter on the matched positions, and what the proposals show of their tracks."""
+        """Update the filter with the matched positions, and the extents with the matched proposals."""
         t = self.tracks
         rows = matches.rows
         self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
@@ -207,7 +208,9 @@ class Tracker:
         self._update_extent(t, rows, matches.proposals, observations, matches.position, dt_s)
 
     def _keep_top(self, frame: Associated, box_before: Float64) -> Proposals:
-        """Give people whom the view cuts off above their former height, in the tracks and in the proposals returned.
+        """Keep the former height of people whose top the view cuts off, in the tracks and in the returned proposals.
+
+        Write which tracks are people whose upper half is cut off (`hidden`).
 
         Args:
             frame: frame after regrouping.
@@ -259,19 +262,21 @@ class Tracker:
         return self.tracks.final & background & near_rest
 
     def _withdraw(self, near_rest: Bool) -> None:
-        """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
+        """Withdraw an inherited background class from tracks that leave their place without a view (e12)."""
         t = self.tracks
         withdrawn = t.inherited & ~near_rest & t.observed
         self._advance(withdrawn.nonzero()[0], StateEvent.WITHDRAWN)
 
     def _expire(self, settled: Bool) -> Int:
-        """After the time of N frames a track ends (a9, a14); settled background (M,) goes into the map.
+        """End tracks unseen for more than max_missed + 0.5 periods (a9, a14, e6).
+
+        Those that are settled background (M,) are remembered.
 
         Returns:
             The rows (A,) of the other tracks.
         """
         t = self.tracks
-        expired: Bool = ~t.observed & (t.unseen_s > self._coasting_s(0.5))
+        expired: Bool = ~t.observed & (t.unseen_s > self._max_unseen_s(0.5))
         self.background_map.add(t, (expired & settled).nonzero()[0])
         self._advance(expired.nonzero()[0], StateEvent.EXPIRED)
         return (~expired).nonzero()[0]

@@ -101,8 +101,8 @@ class ExtentTuning:
     Chosen on: judgement."""
 
     known_decay: float = 0.98
-    """Share of the known extent beyond what is seen that is kept a frame. Less: parts that come back into view are
-    not joined.
+    """Share of the known extent beyond the visible one that is left after a frame with a proposal. Less: parts
+    that come back into view are not joined.
     Chosen on: judgement."""
 
     mean_decay: float = 0.8
@@ -158,7 +158,7 @@ class RestTuning:
 
 @dataclass(frozen=True, slots=True)
 class RegroupingTuning:
-    """Which parts of proposals make up the object of a track."""
+    """Limits of regrouping."""
 
     min_coverage: float = 0.45
     """Least part of a proposal within the known extent of a track, or of the expected track within a proposal. Less:
@@ -170,8 +170,9 @@ class RegroupingTuning:
     joined.
     Chosen on: judgement."""
 
-    longer_m: float = 0.3
-    """A joined object exceeds the known extent by at most this; a proposal longer by more holds two objects [m].
+    max_excess_m: float = 0.3
+    """A known part is joined only if the joined object exceeds the known extent by less than this; a proposal that
+    exceeds the expected extent by more may be split [m]. New parts beside a car are limited by USUAL_CAR_M instead.
     Greater: more is joined and less is split.
     Chosen on: judgement."""
 
@@ -191,7 +192,8 @@ class RegroupingTuning:
     Chosen on: judgement."""
 
     min_probability: float = 0.5
-    """Probability of its class from which a track leaves its proposal for a piece. Less: false people live longer.
+    """A track gives up its proposal for a piece only if the posterior of its class is at least this. Less: tracks of
+    false people become longer.
     Chosen on: drives with false people, by the length of their tracks."""
 
     min_points: int = 8
@@ -199,8 +201,8 @@ class RegroupingTuning:
     Chosen on: judgement."""
 
     min_share: float = 0.4
-    """Least share of the points last seen of a track that its piece holds. A track whose own proposal holds less
-    would leave it for a piece. Greater: fewer splits.
+    """Least share of a track's last points that a piece must hold; a proposal with less may be replaced by a piece.
+    Greater: fewer splits.
     Chosen on: judgement."""
 
     max_drop_m: float = 0.4
@@ -209,7 +211,8 @@ class RegroupingTuning:
     Chosen on: judgement."""
 
     min_hits: int = 4
-    """Frames in which a track was observed from which parts are joined with it. Greater: fewer joins of new cars.
+    """Hits a track needs before known parts are joined to it. A proposal whose own track has fewer may become a new
+    part of a car beside it. Greater: fewer known parts and more new parts are joined.
     Chosen on: judgement."""
 
 
