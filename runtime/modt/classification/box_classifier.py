@@ -120,7 +120,7 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
 
 
 def is_bound(features: Float64, cut: Int) -> Bool:
-    """(R,) boxes that the view cuts where a person may go on, so that their sizes are lower bounds.
+    """(R,) boxes cut at the top or bottom within a person's height, so the size is a lower bound.
 
     Args:
         features: (R, 7) features of the boxes.

@@ -4,8 +4,8 @@ A posterior holds for the class frequencies that the model was trained to assume
 from the posteriors themselves (M. Saerens et al., "Adjusting the outputs of a classifier to new a priori
 probabilities", Neural Computation 2002), slowly and within bounds: no object becomes rarer than the model assumes,
 since the first of its class may yet come. An object is reported where its expected cost, if it were missed, exceeds
-that of a false one. The class that was reported last needs less, since a posterior also falls while the object is
-half hidden.
+that of a false one. A reported class is kept down to `kept_probability`, since a posterior also falls while the
+object is half hidden.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Decision(LikeliestClass):
         # Sums of the posteriors of proposals: as if seen before the start, and seen since then.
         self._start_mass = tuning.start_proposals * self.frequency
         self._mass = np.zeros(N_CLASSES)
-        # Share of its threshold that a class needs which was reported last.
+        # A reported class is kept down to this share of its threshold.
         self._kept_share = np.append(1.0, np.minimum(tuning.kept_probability / self._threshold, 1.0))
 
     def decide(self, decisions: Decisions, evidence: Evidence, motion: Motion) -> None:

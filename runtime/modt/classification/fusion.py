@@ -1,8 +1,8 @@
 """Selection of views and fusion of all that is known of a track (section V-C): one `pipeline.FusionStage` a mode.
 
 `observe` adds the boxes and the motion of a frame to the evidence of the tracks. `asks` selects the tracks whose view
-is worth a classification. `fuse` adds the classifier's likelihoods and returns which classes are confirmed, upon
-which the state machine leads a track to its next state. `observe` and `fuse` write the evidence in place.
+is worth a classification. `fuse` adds the classifier's likelihoods and returns which classes are confirmed. The
+tracker passes the result to the state machine. `observe` and `fuse` write the evidence in place.
 
 The posterior of a track after t frames, with views Y, boxes B and motion M, is
 
@@ -137,7 +137,7 @@ class FusedTracks:
         prior = self._prior.probability(proposals).T.take(motion.proposal[rows], axis=1)
         size_m = motion.size_m.take(rows, axis=0)
         motion_evidence = self._motion_likelihood.log_ratio(motion.moved_m[rows], motion.observed_s[rows], size_m)
-        # The mean of the boxes is exact at first and forgets later; a hidden person's box tells nothing.
+        # Plain mean of the first boxes, then an exponential one; boxes of hidden people are left out.
         box_evidence = _by_class(evidence.box_evidence, rows)
         gain = np.maximum(1.0 / motion.hits[rows], 1.0 - self._weights.box_memory) * ~motion.hidden[rows]
         box_evidence += gain * (_log(prior) - self._log_frequency[:, None] - box_evidence)
@@ -211,8 +211,8 @@ class FirstViews(FusedTracks):
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
     minimum number of observations, since spurious proposals do not last. An unconfirmed track is classified again
-    once it shows clearly more points, and every few frames where it may be a person. Nobody looks at background
-    a second time, so it has to be as likely as an object.
+    once it shows clearly more points, and every few frames where it may be a person. Background gets no review, so it
+    needs the same threshold as an object.
     """
 
     def __init__(self, config: FusionConfig, prior: Prior, tuning: FusionTuning = FusionTuning()) -> None:
@@ -234,11 +234,12 @@ class FirstViews(FusedTracks):
 class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is confirmed, and where something changes (Table II).
 
-    A track, at a remembered place too, is classified as soon as it may be an object by box and motion, by a box of
-    many points alone, or a person near by: the box prior takes tall people who stand for background. An unconfirmed
-    one is classified again where it shows clearly more points, and at growing intervals, as is a confirmed object.
-    Confirmed background is only where it shows far more points and may be an object. A person is not while the view
-    cuts off more than half.
+    A track, at a remembered place too, has its first view as soon as box and motion, a box of many points alone, or a
+    nearby box of a person's size allow an object. The last condition is there because the box prior takes tall people
+    who stand for background. An unconfirmed track is classified again when it shows more points, at growing
+    intervals, and every few frames if it may be a person. A confirmed object is classified again at longer intervals.
+    Confirmed background is classified again only with far more points, if it may be an object. A person whose upper
+    half is cut off is not classified.
     """
 
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:

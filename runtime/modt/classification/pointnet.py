@@ -26,7 +26,8 @@ CLASS_FREQUENCY_KEY = "class_frequency"
 class PointNet:
     """P(class | points, box, reflectance): log-linear pool of the network and the classifiers in its metadata.
 
-    What the view cuts where a person may go on is judged by the network beside it, NAME-near.onnx, if there is one.
+    A proposal cut at the top or bottom within a person's height is classified by the network beside it,
+    NAME-near.onnx, if there is one.
 
     The cost of a proposal follows its number of points: crops of similar size share a batch, so that padding is
     small, and a batch is small enough for its features to stay in the cache.

@@ -22,7 +22,7 @@ class Scores:
     Attributes:
         box: (P, 4) log P(class | box), up to a constant a row.
         reflectance: (P, 4) log P(reflectance | class, box), up to a constant a row.
-        is_bound: (P,) proposals that the view cuts where a person may go on.
+        is_bound: (P,) proposals cut at the top or bottom within a person's height, so the size is a lower bound.
         weights: weights in the pool with the network, which counts more where the sweep has no reflectance.
     """
 

@@ -167,10 +167,10 @@ class Scheduler:
         return TimeLimit(min(self._savings.saved_ms, later_ms), later_ms, of_frame, self._savings.may_borrow)
 
     def _within(self, limit: TimeLimit, points: Int) -> Bool:
-        """(R,) calls that a limit of the CPU time allows.
+        """(R,) calls within the limit.
 
-        Where none fits, the first call is made beyond the limit if `_try_exception` allows it. Else a call that is
-        dearer than every limit would never be made.
+        If none fits, the first call may run by `_try_exception`. Without it, a call that costs more than every limit
+        would never run.
         """
         granted = self._fitting(limit, points)
         # Padding is not in the prices of single calls: the last ones go until all together are within the limit.

@@ -47,7 +47,7 @@ class EvidenceTuning:
     Chosen on: judgement.
     """
     view_exponent: float = 0.22
-    """Power of their number with which views weigh together; 1 would multiply them as independent ones.
+    """n views count as n^view_exponent independent ones; 1 treats them as independent.
 
     Chosen on: judgement; log-odds of consecutive views of a car are correlated by .8 to .87.
     """
@@ -62,7 +62,7 @@ class EvidenceTuning:
     Chosen on: judgement.
     """
     mismatch_probability: float = 0.05
-    """Probability that a proposal is not the object of its track, whose posterior is then the prior of the box.
+    """Probability of a wrong association; the posterior is mixed with the box prior by it.
 
     Chosen on: judgement.
     """
@@ -89,7 +89,7 @@ class RequestTuning:
     Chosen on: 48 simulated drives of six sensors (seeds 1000 to 1003).
     """
     more_points_offset: int = 5
-    """Points that are needed beyond either multiple [points]: so many vary at random.
+    """Extra points beyond either multiple [points], the noise of the count from frame to frame.
 
     Chosen on: judgement.
     """
@@ -124,7 +124,7 @@ class RequestTuning:
     """Posterior of background above which an unconfirmed track waits by `background_age_ratio`. With less, more
     tracks wait longer.
 
-    Chosen on: judgement; what is probably background was asked for as often as what is not.
+    Chosen on: judgement.
     """
     background_age_ratio: float = 2.0
     """The `unconfirmed_age_ratio` of a track that is probably background.
@@ -135,7 +135,7 @@ class RequestTuning:
     """Posterior of a pedestrian or cyclist above which an unconfirmed track may be a person: one view of a few points
     is weak evidence, and many of them are right. With less, more calls are made.
 
-    Chosen on: judgement; far walkers stayed below their threshold for a second and more.
+    Chosen on: judgement, for far walkers whose posterior stays below the threshold for a second or more.
     """
     person_frames: int = 4
     """Frames after which a possible person is classified again at the latest [frames].
@@ -146,7 +146,7 @@ class RequestTuning:
     """Points of a proposal from which mode accurate classifies what may be an object by its box, whatever its motion
     [points].
 
-    Chosen on: people who stand still and had never been classified.
+    Chosen on: people who stand still.
     """
     near_m: float = 3.0
     """Distance below which mode accurate classifies whatever may be a person by its size, however unlikely it is one
@@ -247,7 +247,7 @@ class CallCostTuning:
     Chosen on: judgement.
     """
     accepted_underestimates: float = 0.005
-    """Share of underestimates at which the margin stays as it is: half of the hundredth of the frames that may exceed
+    """Share of underestimates at which the margin stays constant: half of the hundredth of the frames that may exceed
     their budget.
 
     Chosen on: simulated frames, of which at most one in a hundred may exceed its budget.

@@ -154,10 +154,10 @@ def in_plane(along: Float64) -> tuple[Float64, Float64]:
 def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
     """Pairs that a least-cost assignment keeps for certain, and those that it must decide among.
 
-    A pair is certain if the second cheapest costs of its row and of its column together exceed its cost by more than
-    limit. An assignment without the pair spends at least these two costs on its row and its column; with the pair,
-    the partners that they had there are left over, and cost at most limit together. Only a pair that is the cheapest
-    of both its row and its column can be certain.
+    A pair is certain if taking the second-cheapest pairs of its row and its column instead would cost more than the
+    pair and one missing partner, which costs limit. An assignment without the pair spends at least these two costs on
+    its row and its column. With the pair, the partners that they had there are left over, and cost at most limit
+    together. Only a pair that is the cheapest of both its row and its column can be certain.
 
     A pair is contested if neither the cheapest pair of its row nor that of its column is certain. All other pairs,
     rivals of a certain one, are left out.

@@ -68,7 +68,7 @@ class NativeGeometryKernels(GeometryKernels):
 
     Args:
         library: the compiled library (`modt.native.library`).
-        tuning: how k-DOPs are compared.
+        tuning: comparison of k-DOPs.
     """
 
     def __init__(self, library: ctypes.CDLL, tuning: ShapeTuning = ShapeTuning()) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ShapeTuning:
-    """How k-DOPs are compared. The kernels hold it, for every stage that compares some."""
+    """Comparison of k-DOPs. The kernels hold it, for every stage that compares some."""
 
     end_jitter_m: float = 0.15
     """Jitter of the ends of a k-DOP from frame to frame [m]. Coverage extends the covering k-DOP by it, and no k-DOP
@@ -24,9 +24,9 @@ class ShapeTuning:
     Chosen on: judgement, a third of `width_softening_m`."""
 
     agreement_m: float = 0.6
-    """The two ends along an axis agree fully where their displacements are equal, and not at all where they differ by
-    this much, of a k-DOP up to a metre long; the limit falls with the length [m]. Greater: an end that comes into
-    view is taken for motion.
+    """Difference between the displacements of both ends along an axis from which they do not agree at all [m]. It is
+    divided by the length of a k-DOP that is longer than a metre. Greater: an end that comes into view is taken for
+    motion.
     Chosen on: simulated crossings and streets, by the error of positions and of walkers' speeds."""
 
     disagreement: float = 0.3

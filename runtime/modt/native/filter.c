@@ -179,7 +179,8 @@ typedef struct {
 /* extent.ExtentUpdate: writes what n proposals show of n rows of the table.
  *
  * Positions are the measured ones, given along the eight directions of k-DOPs too. The hits of a track count this
- * frame already, and a new one has its size and lagged k-DOP. The displacement is found before that is moved. */
+ * frame already, and a new one has its size and lagged k-DOP. The displacement is computed before `lagged_kdop` is
+ * updated. object_class, hits and final are only read. */
 EXPORT void modt_update_extent(const TrackColumns *tracks, const Observations *seen, const i64 *rows,
                                const i64 *proposals, i64 n, const double (*position)[2],
                                const double (*position_along)[N_ENDS], const ExtentTuning *tuning,

@@ -82,8 +82,8 @@ enum { LANES = 8, HALVES = 2, BLOCK = LANES * HALVES, SIDES = 4 }; /* k-DOPs com
 /* overlapping_pairs: pairs of k-DOPs a (8, n_a) and b (8, n_b) that overlap along x and along y, as indices among both.
  * Returns how many there are; no more than `limit` are written.
  *
- * An end of a has to reach as far as the opposite end of b on each of the four sides. Single precision decides first,
- * sixteen of b together: rounding keeps the order of numbers, so pairs that do not overlap there need no other look.
+ * An end of a has to reach as far as the opposite end of b on each of the four sides. Sixteen of b are compared
+ * together in single precision first. That suffices to exclude a pair, since rounding keeps order.
  * Scratch: `reach`, for each block of sixteen of b, the coordinates to be reached on each side. */
 EXPORT i64 modt_overlapping_pairs(const double *a, i64 n_a, const double *b, i64 n_b, f8 (*reach)[SIDES][HALVES],
                                   i64 n_blocks, i64 limit, i64 *rows, i64 *columns)

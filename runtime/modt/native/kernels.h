@@ -1,8 +1,8 @@
 /* Passes over points, cells and groups, and over pairs of k-DOPs.
  *
- * Each function does what the NumPy function named beside it does, to the byte: single precision throughout, no
- * contraction; sums in double precision, which may differ in their last bit. Arrays are contiguous and do not
- * overlap, but where said; lengths and indices are proven by the caller, and asserted in a build with -DMODT_CHECKED.
+ * Each function does what the NumPy function named beside it does, to the byte: in the same precision, and without
+ * contraction. Sums in double precision may differ in their last bit. Arrays are contiguous and do not overlap, but
+ * where said. Lengths and indices are proven by the caller, and asserted in a build with -DMODT_CHECKED.
  */
 #ifndef MODT_KERNELS_H
 #define MODT_KERNELS_H
@@ -56,10 +56,10 @@ static ALWAYS_INLINE float pseudo_angle(float x, float y)
     return (x < 0.0f ? 2.0f - turn : turn) + 1.0f;
 }
 
-/* Takes an array of scratch of this many elements, at the address `*end`, at which those taken before it end, and
- * advances that. A pass takes its arrays in one function: with the address of its memory that places them, and with 0
- * it tells the caller how much memory that is. In a checked build each array is allocated alone and never freed, so
- * that AddressSanitizer sees where it ends. */
+/* Reserves scratch for an array of this many elements at the address `*end`, which then moves past it. A pass
+ * reserves all its arrays in one function. Run with address 0, that function returns the size needed; with memory it
+ * sets the pointers. In a checked build each array is allocated alone and never freed, so that AddressSanitizer sees
+ * where it ends. */
 #define TAKE(end, array, elements) ((array) = take(end, (elements) * sizeof *(array)))
 static inline void *take(uintptr_t *end, uintptr_t bytes)
 {

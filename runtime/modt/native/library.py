@@ -71,11 +71,6 @@ def address(numbers: Any) -> int:
         return data
 
 
-def structure(*fields: NDArray[Any] | int) -> array[int]:
-    """A C structure of pointers to contiguous arrays, and of 64-bit numbers."""
-    return array("Q", [field if isinstance(field, int) else address(field) for field in fields])
-
-
 def pointers(*arrays: NDArray[Any]) -> array[int]:
     """A C structure of pointers to contiguous arrays, and to each row of those of two dimensions."""
     addresses: list[int] = []
@@ -218,11 +213,11 @@ class Layout:
         raise self._refusal(values)
 
     def of(self, source: object, **others: Any) -> Filled:
-        """Fill a structure with others, and with the attributes of an object that have the names of the rest."""
+        """Fill a structure: members from `others`, the rest from attributes of `source` with the same names."""
         return self(**{name: getattr(source, name) for name in self.members if name not in others}, **others)
 
     def room(self, **numbers: int) -> Filled:
-        """Fill a structure with arrays that hold nothing yet; its numbers are given, and are all sizes of arrays."""
+        """Fill a structure with new arrays, whose contents are undefined. The numbers are the sizes of the arrays."""
         shapes = self._shapes_of(tuple(numbers[size] for size in self._places))
         arrays = list(map(np.empty, shapes, self._dtypes))
         return self._filled(numbers | dict(zip(self._arrays, arrays, strict=True)), arrays)

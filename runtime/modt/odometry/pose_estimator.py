@@ -88,7 +88,7 @@ class PoseEstimator:
         return Located(placement, sweep.observe(placement))
 
     def _begin(self, T_odometry_sensor: Float64) -> None:
-        """Let the world begin at the first pose: at its origin, or at its position if that is far away."""
+        """Start the world at the odometry's own origin, or at the first pose's position if that is beyond FAR_M."""
         position = T_odometry_sensor[:3, 3]
         far = np.abs(position).max() > FAR_M
         self._T_world_odometry = se3(np.eye(3), -position if far else np.zeros(3))
@@ -158,7 +158,7 @@ class _Sweep:
     def correction_share(self) -> Float64 | float:
         """(P,) share of a correction of the pose that applies at the time of view of each proposal.
 
-        A sensor that went farther since the sweep before had gone farther by the same share at any time.
+        A correction scales the motion since the last sweep, so a proposal seen later gets more of it.
         """
         return 1.0 if self.delay_s is None else 1.0 + self.delay_s / self.dt_s
 

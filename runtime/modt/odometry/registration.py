@@ -186,7 +186,7 @@ class Registration:
         return _turn_about_sensor(fit.motion, observations.sensor_xy)
 
     def _is_convincing(self, fit: Fit) -> bool:
-        """Whether a fit within the gate agrees with most pairs, and with about as many as the last fit."""
+        """Whether most pairs of a fit agree, and its inliers are at least `inlier_drop` of those of the last fit."""
         enough = self._tuning.inlier_drop * self._inliers
         return fit.supported(self._tuning.inlier_ratio) and fit.inliers >= enough
 

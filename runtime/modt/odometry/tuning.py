@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class LandmarkTuning:
-    """How the mean k-DOP of a stationary track is kept."""
+    """Mean k-DOPs of landmarks, which are stationary tracks."""
 
     established_frames: int = 3
     """Frames at rest from which the mean is the position of the landmark; before, it is the filter's prediction.
@@ -26,7 +26,7 @@ class LandmarkTuning:
 
 @dataclass(frozen=True, slots=True)
 class RegistrationTuning:
-    """How the pose of a sweep is fitted to landmarks."""
+    """Fit of a pose to landmarks."""
 
     reach_m: float = 2.5
     """Greatest correction of a pose, and greatest error of the first prediction [m]. A larger correction is refused.

@@ -42,7 +42,7 @@ class CeilingFinder:
         return limit_m
 
     def within_m(self, histogram: Int) -> float | None:
-        """The limit under a ceiling that is wholly within the heights used.
+        """Limit under a ceiling that lies wholly within the heights used; None without one.
 
         Most of the returns above people's heads are at one height there; on walls, trees and houses they spread.
         """
@@ -60,7 +60,7 @@ class CeilingFinder:
         return tuning.above_m + tuning.bin_m * first - tuning.clearance_m
 
     def grazing_m(self, z: Float32, sensor_height_m: float) -> float | None:
-        """The limit under a ceiling about the greatest height used, of which the lowest returns alone are used."""
+        """Limit under a ceiling at about `max_height_m`, so only its lower returns are used; None without one."""
         tuning = self.tuning
         z = np.ascontiguousarray(z)
         upper = z.compress(z > np.float32(tuning.above_m - sensor_height_m)) + np.float32(sensor_height_m)

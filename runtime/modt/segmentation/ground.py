@@ -73,8 +73,8 @@ class GroundEstimator:
 
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` over a
     short way, on and beside a ramp over a longer one. It may not rise at all where something stands in the cell or,
-    far away, right behind it, since it may be a flank. It may lie lower by `max_slope_deg` all the way, since nothing
-    else does. Cells without ground are interpolated along the ray; beyond its last one, the ground is level, but a
+    far away, right behind it, since it may be a flank. It may fall by `max_slope_deg` over any gap, since only ground
+    lies lower. Cells without ground are interpolated along the ray; beyond its last one, the ground is level, but a
     ramp goes on for `max_gap_m`.
 
     Args:

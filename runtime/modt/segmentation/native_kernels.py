@@ -93,7 +93,10 @@ _SIGNATURES: Signatures = {
 
 
 def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
-    """Structure of others, and of the attribute of each other name of the first source that has it."""
+    """Fill a layout.
+
+    A member is taken from `others`, else from the first source that has an attribute of its name.
+    """
     for name in layout.members.keys() - others:
         others[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
     return layout(**others)
@@ -119,7 +122,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     Args:
         library: the compiled library (`modt.native.library`).
         instructions: the set that it is compiled for.
-        tuning: how k-DOPs are compared.
+        tuning: comparison of k-DOPs.
     """
 
     def __init__(self, library: ctypes.CDLL, instructions: str, tuning: ShapeTuning = ShapeTuning()) -> None:

@@ -52,7 +52,7 @@ class Segmenter:
         self.ends = ViewEnds(sensor, tuning.split.person.max_top_m, tuning.view_ends)
 
     def facts(self) -> dict[str, str]:
-        """Which kernels it runs on."""
+        """Name of the kernels."""
         return {"kernels": self.kernels.name}
 
     def segment(self, points: Float32) -> Proposals:
@@ -105,7 +105,7 @@ class Segmenter:
         return rows.take(kept), above.take(kept), height.take(kept)
 
     def _above_ground_in_view(self, points: Float32) -> tuple[Int, PointColumns, Float32]:
-        """The same of the points in the field of view and its margin."""
+        """`above_ground`, restricted to the view and its margin."""
         if self.fov.full:
             return self.above_ground(points)
         region = np.flatnonzero(self.fov.depth(points) > -self.tuning.view.margin_m)

@@ -57,7 +57,7 @@ class GroundTuning:
     """Greatest distance over which ground may rise by `max_slope_deg` between two ground cells of a ray [m].
     More takes flanks of cars for ground. Chosen on: KITTI scans."""
     max_gap_m: float = 6.0
-    """The same on and beside a ramp, and the distance over which the slope of a ray is extrapolated [m].
+    """`near_m` on and beside a ramp, and the distance over which the slope of a ray is extrapolated [m].
     Chosen on: simulated ramps."""
     ramp_share: float = 0.3
     """Share of `max_slope_deg` above which the running slope of a ray is a ramp. Chosen on: simulated ramps."""
@@ -124,7 +124,7 @@ class SplitTuning:
     """Extent above which a cluster may hold a person and more [m]. Less divides single people.
     Chosen on: sensor study."""
     min_cell_returns: float = 0.9
-    """Spacings of returns that a fine cell must be wide; on finer ones one object falls to pieces.
+    """Least width of a fine cell [spacings of the returns]; narrower ones split objects.
     Chosen on: sensor study."""
     min_points: int = 8
     """Points below which a part is not split off. Chosen on: sensor study."""
