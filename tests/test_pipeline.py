@@ -59,7 +59,7 @@ def test_without_a_selection_nothing_is_classified(pipe):
 )
 def test_points_are_counted_and_the_cost_model_learns_where_cpu_time_binds(pipe, budget, learns, monkeypatch):
     paid = []
-    monkeypatch.setattr(pipe.scheduler, "paid", lambda points, cpu_ms: paid.append((sorted(points), cpu_ms)))
+    monkeypatch.setattr(pipe.scheduler, "record_cost", lambda points, cpu_ms: paid.append((sorted(points), cpu_ms)))
     result = pipe.step(FRAMES[3], budget)
     classified = np.isin(result.tracks.id, result.classified)
     points = result.proposals.count[result.tracks.proposal[classified]]

@@ -146,5 +146,5 @@ class Pipeline:
         likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
         self.ledger.count(CLASSIFICATION, points=cost.size(count))
         if budget.cpu_ms is not None or budget.mean_ms is not None:
-            self.scheduler.paid(count, cpu_ns / 1e6)
+            self.scheduler.record_cost(count, cpu_ns / 1e6)
         return likelihood

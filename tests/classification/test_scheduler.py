@@ -98,7 +98,7 @@ def drive(budget, n, cost=None, seed=0, slow=1.0, ask=1.0, period_s=0.1):
         points = proposals.count[rows]
         if len(rows):
             times[k] = work_ms(points, slow) * rng.lognormal(0.0, 0.12)
-            scheduler.paid(points, times[k])
+            scheduler.record_cost(points, times[k])
     return times, calls
 
 
@@ -161,7 +161,7 @@ def test_a_large_proposal_is_saved_for_while_small_ones_ask():
         rows = scheduler.select(tracks, tracks, tracks, proposals, np.ones(12, np.bool_), Budget(mean_ms=0.3)).rows
         served[rows] += 1
         if len(rows):
-            scheduler.paid(proposals.count[rows], work_ms(proposals.count[rows]))
+            scheduler.record_cost(proposals.count[rows], work_ms(proposals.count[rows]))
     assert served.min() > 2
 
 
@@ -180,7 +180,7 @@ def test_cost_model_survives_any_measurement(frames):
     cost = cost_model()
     for points, cpu_ms in frames:
         cost.update(np.full(3, points), cpu_ms if abs(cpu_ms) < 1e6 else np.nan)
-        cost.starve()
+        cost.record_starved_frame()
     price = np.array([cost.cost_ms(np.array([1])), cost.cost_ms(np.array([400]))])
     assert np.isfinite(price).all()
     assert (price >= 0).all()

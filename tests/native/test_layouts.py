@@ -124,5 +124,5 @@ def test_a_missing_member_and_another_structure_are_refused():
 
 def test_room_has_the_declared_sizes():
     layout = Layout("Room", cost=Array(np.float64, "rows", 2), next=Array(np.int64, "rows"), rows=Number(np.int64))
-    cost, following = layout.room(rows=3).arrays
+    cost, following = layout.allocate(rows=3).arrays
     assert (cost.shape, cost.dtype, following.shape, following.dtype) == ((3, 2), np.float64, (3,), np.int64)

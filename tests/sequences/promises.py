@@ -51,9 +51,9 @@ class Watched:
         self._frames = 0
         self._spent_ms = 0.0
 
-    def paid(self, points: Any, cpu_ms: float) -> None:
+    def record_cost(self, points: Any, cpu_ms: float) -> None:
         self._spent_ms += max(cpu_ms, 0.0)
-        self._scheduler.paid(points, cpu_ms)
+        self._scheduler.record_cost(points, cpu_ms)
 
     def select(
         self, requests: Any, motion: Any, evidence: Any, proposals: Any, asks: Any, budget: Budget

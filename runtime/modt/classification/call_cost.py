@@ -101,7 +101,7 @@ class LinearCost:
             self._learn(terms, cpu_ms, 1.0)
             self._starved = 0
 
-    def starve(self) -> None:
+    def record_starved_frame(self) -> None:
         """Add a frame that allowed none of the calls asked for."""
         self._adapt_margin(underestimated=False)
         self._starved += 1

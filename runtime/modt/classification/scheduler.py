@@ -86,7 +86,7 @@ class Scheduler:
         self._tuning = tuning
         self._savings = Savings(period_s)
 
-    def paid(self, points: Int, cpu_ms: float) -> None:
+    def record_cost(self, points: Int, cpu_ms: float) -> None:
         """Take note of the measured CPU time of classifying proposals of (R,) points together."""
         self.cost.update(points, cpu_ms)
         self._savings.spend(cpu_ms)
@@ -205,6 +205,6 @@ class Scheduler:
         After so many of them that the estimate is outdated, the call is made, to measure it.
         """
         if limit.of_frame and self.cost.cost_ms(points) > limit.later_ms:
-            self.cost.starve()
+            self.cost.record_starved_frame()
             return self.cost.outdated and limit.later_ms > 0
         return limit.has_credit

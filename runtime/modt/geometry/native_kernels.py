@@ -13,7 +13,18 @@ from numpy import float32, float64, int64
 from modt.geometry.kdop import PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
 from modt.geometry.tuning import ShapeTuning
-from modt.native.library import FLOAT32, FLOAT64, INT64, Array, Layout, Number, Own, Rows, Signatures, declare
+from modt.native.library import (
+    FLOAT32,
+    FLOAT64,
+    INT64,
+    Array,
+    Layout,
+    Number,
+    OutputArgument,
+    Rows,
+    Signatures,
+    declare,
+)
 from modt.types import Float32, Float64, Int
 
 _D = ctypes.c_double
@@ -45,17 +56,64 @@ _ASSIGNMENT = Layout(
     columns=Number(int64),
 )
 _SIGNATURES: Signatures = {
-    "modt_upright_boxes": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT64, Own, Own, Own)),
-    "modt_kdop_ends": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT32, Own)),
-    "modt_group_sums": (None, (FLOAT32, _L, _L, INT64, _L, Own)),
+    "modt_upright_boxes": (
+        None,
+        (*[FLOAT32] * 3, INT64, _L, FLOAT64, OutputArgument, OutputArgument, OutputArgument),
+    ),
+    "modt_kdop_ends": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT32, OutputArgument)),
+    "modt_group_sums": (None, (FLOAT32, _L, _L, INT64, _L, OutputArgument)),
     "modt_copy_runs": (None, (_MEMBERS, INT64, INT64, _L, _MEMBERS)),
-    "modt_overlapping_pairs": (_L, (FLOAT64, _L, FLOAT64, _L, Own, _L, _L, Own, Own)),
-    "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _TUNING, Own)),
-    "modt_measured": (None, (FLOAT64, FLOAT64, _L, _D, FLOAT64, _TUNING, Own, Own, Own)),
-    "modt_pair_costs": (None, (_SHAPES, _SHAPES, FLOAT64, _D, INT64, INT64, _L, _WEIGHTS, _TUNING, Own, Own, Own)),
-    "modt_certain_pairs": (None, (INT64, INT64, FLOAT64, _L, _D, _L, _L, Own, Own, Own, Own, Own)),
-    "modt_settle_pairs": (ctypes.c_int, (INT64, INT64, FLOAT64, _L, _D, Own, Own, _ASSIGNMENT, Own)),
-    "modt_sort_members": (None, (_MEMBERS, INT64, _L, INT64, INT64, INT64, _L, _L, Own, Own, _MEMBERS)),
+    "modt_overlapping_pairs": (
+        _L,
+        (FLOAT64, _L, FLOAT64, _L, OutputArgument, _L, _L, OutputArgument, OutputArgument),
+    ),
+    "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _TUNING, OutputArgument)),
+    "modt_measured": (
+        None,
+        (FLOAT64, FLOAT64, _L, _D, FLOAT64, _TUNING, OutputArgument, OutputArgument, OutputArgument),
+    ),
+    "modt_pair_costs": (
+        None,
+        (
+            _SHAPES,
+            _SHAPES,
+            FLOAT64,
+            _D,
+            INT64,
+            INT64,
+            _L,
+            _WEIGHTS,
+            _TUNING,
+            OutputArgument,
+            OutputArgument,
+            OutputArgument,
+        ),
+    ),
+    "modt_certain_pairs": (
+        None,
+        (
+            INT64,
+            INT64,
+            FLOAT64,
+            _L,
+            _D,
+            _L,
+            _L,
+            OutputArgument,
+            OutputArgument,
+            OutputArgument,
+            OutputArgument,
+            OutputArgument,
+        ),
+    ),
+    "modt_settle_pairs": (
+        ctypes.c_int,
+        (INT64, INT64, FLOAT64, _L, _D, OutputArgument, OutputArgument, _ASSIGNMENT, OutputArgument),
+    ),
+    "modt_sort_members": (
+        None,
+        (_MEMBERS, INT64, _L, INT64, INT64, INT64, _L, _L, OutputArgument, OutputArgument, _MEMBERS),
+    ),
 }
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
@@ -182,7 +240,7 @@ class NativeGeometryKernels(GeometryKernels):
             rows, columns = columns, rows
             row_number, column_number = column_number, row_number
         if few:
-            assignment = _ASSIGNMENT.room(rows=few, columns=many)
+            assignment = _ASSIGNMENT.allocate(rows=few, columns=many)
             if not self.library.modt_settle_pairs(
                 rows, columns, cost, n_pairs, limit, row_number, column_number, assignment, state
             ):

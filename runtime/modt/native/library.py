@@ -31,7 +31,7 @@ def declare(library: ctypes.CDLL, signatures: Signatures) -> None:
         function.argtypes = arguments
 
 
-class Given:
+class ArrayArgument:
     """An argument that is a contiguous array of one kind; another one is a ctypes.ArgumentError."""
 
     def __init__(self, kind: type) -> None:
@@ -47,13 +47,13 @@ class Given:
             return ctypes.c_void_p(address(numbers))
 
 
-class Own:
+class OutputArgument:
     """An argument that is an array made for the call: result, scratch, or a structure."""
 
     from_param = staticmethod(_start)
 
 
-FLOAT32, FLOAT64, INT32, INT64, BOOL = map(Given, (np.float32, np.float64, np.int32, np.int64, np.bool_))
+FLOAT32, FLOAT64, INT32, INT64, BOOL = map(ArrayArgument, (np.float32, np.float64, np.int32, np.int64, np.bool_))
 
 
 def address(numbers: Any) -> int:
@@ -216,7 +216,7 @@ class Layout:
         """Fill a structure: members from `others`, the rest from attributes of `source` with the same names."""
         return self(**{name: getattr(source, name) for name in self.members if name not in others}, **others)
 
-    def room(self, **numbers: int) -> Filled:
+    def allocate(self, **numbers: int) -> Filled:
         """Fill a structure with new arrays, whose contents are undefined. The numbers are the sizes of the arrays."""
         shapes = self._shapes_of(tuple(numbers[size] for size in self._places))
         arrays = list(map(np.empty, shapes, self._dtypes))

@@ -13,7 +13,19 @@ from numpy.typing import NDArray
 from modt.class_sizes import PersonSize
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.geometry.tuning import ShapeTuning
-from modt.native.library import FLOAT32, INT64, Array, Filled, Layout, Member, Number, Own, Rows, Signatures, declare
+from modt.native.library import (
+    FLOAT32,
+    INT64,
+    Array,
+    Filled,
+    Layout,
+    Member,
+    Number,
+    OutputArgument,
+    Rows,
+    Signatures,
+    declare,
+)
 from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, Members
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
@@ -79,16 +91,35 @@ MEMBERS = Layout("Members", offsets=Array(_i64, "ends"), index=Array(_i64, "room
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
     "modt_ground_scratch": (_L, (GROUND, _L)),
-    "modt_above_ground": (_L, (GROUND, FLOAT32, _L, _F, Own, ABOVE_GROUND)),
-    "modt_occupied_cells": (_L, (POINT_COLUMNS, FLOAT32, _L, GRID, Own, POINT_COLUMNS, Own, CELLS)),
+    "modt_above_ground": (_L, (GROUND, FLOAT32, _L, _F, OutputArgument, ABOVE_GROUND)),
+    "modt_occupied_cells": (
+        _L,
+        (POINT_COLUMNS, FLOAT32, _L, GRID, OutputArgument, POINT_COLUMNS, OutputArgument, CELLS),
+    ),
     "modt_cluster_scratch": (_L, (_L, _I)),
-    "modt_cluster": (_L, (CLUSTER_RULES, PERSON_SIZE, CELLS, POINT_COLUMNS, FLOAT32, _L, Own, Own, CLUSTER_SIZES)),
+    "modt_cluster": (
+        _L,
+        (
+            CLUSTER_RULES,
+            PERSON_SIZE,
+            CELLS,
+            POINT_COLUMNS,
+            FLOAT32,
+            _L,
+            OutputArgument,
+            OutputArgument,
+            CLUSTER_SIZES,
+        ),
+    ),
     "modt_view_bounds": (None, (CELLS, POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, _L, VIEW_BOUNDS)),
-    "modt_merge_strips": (None, (STRIP_RULES, PERSON_SIZE, VIEW_BOUNDS, FLOAT32, _L, INT64, Own, VIEW_BOUNDS, Own)),
-    "modt_group": (_L, (INT64, _L, _L, Own, Own)),
+    "modt_merge_strips": (
+        None,
+        (STRIP_RULES, PERSON_SIZE, VIEW_BOUNDS, FLOAT32, _L, INT64, OutputArgument, VIEW_BOUNDS, OutputArgument),
+    ),
+    "modt_group": (_L, (INT64, _L, _L, OutputArgument, OutputArgument)),
     "modt_members": (None, (POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, INT64, _L, _L, MEMBERS)),
-    "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, Own)),
-    "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, Own)),
+    "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, OutputArgument)),
+    "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, OutputArgument)),
 }
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from modt.geometry import wrap
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT64, INT64, Own, Signatures, declare
+from modt.native.library import FLOAT64, INT64, OutputArgument, Signatures, declare
 from modt.tracking.tuning import FilterTuning
 from modt.types import Float64, Int
 
@@ -193,8 +193,11 @@ def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
 _D = ctypes.c_double
 _L = ctypes.c_int64
 _SIGNATURES: Signatures = {
-    "modt_predict": (None, (FLOAT64, FLOAT64, _L, Own, Own, _D, _D, _D, _D)),
-    "modt_update": (None, (FLOAT64, FLOAT64, INT64, _L, Own, Own, Own, FLOAT64, FLOAT64)),
+    "modt_predict": (None, (FLOAT64, FLOAT64, _L, OutputArgument, OutputArgument, _D, _D, _D, _D)),
+    "modt_update": (
+        None,
+        (FLOAT64, FLOAT64, INT64, _L, OutputArgument, OutputArgument, OutputArgument, FLOAT64, FLOAT64),
+    ),
     "modt_observe_speed": (None, (FLOAT64, FLOAT64, INT64, _L, _D, _D)),
 }
 
