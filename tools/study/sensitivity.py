@@ -1,12 +1,13 @@
 """Effect of every constant of the method on accuracy, track length and CPU time; writes docs/tuning.md.
 
     python -m tools.study.sensitivity RESULTS [--jobs N] [--scenes NAME ...] [--seconds S] [--seeds 700:702]
-                                      [--only PART] [--write]
+                                      [--only PART] [--cpu] [--write]
 
 Each constant of `modt.tuning` is lowered and raised by 20 %, one at a time, and the same simulated drives of six
 sensors are run with it in mode accurate. The difference to the shipped value is taken drive by drive: average
-precision and track length [points], classifications and CPU time of a frame [%]. A difference counts where its 95 %
-interval excludes zero.
+precision and track length [points], and classifications of a frame [%]. With --cpu its CPU time [%] is shown as
+well, which means something only on a machine that does nothing else. A difference counts where its 95 % interval
+excludes zero.
 
 RESULTS is a JSON file to which every result is added as it comes; constants that it holds are not run again. --only
 runs the constants whose name begins with PART. --write puts the tables of all results into the page.
@@ -51,6 +52,12 @@ SCENES = ("street", "crossing")
 MODE = "accurate"
 CHANGE = 0.2
 """Share by which a value is lowered and raised."""
+TOP = 10
+TOGETHER = 5
+"""Constants that are compared with the same run of the shipped values."""
+MEASURES = ("AP", "length", "calls", "CPU")
+SIGNS = {"-": -CHANGE, "+": CHANGE}
+TOP = 10
 TOGETHER = 5
 """Constants that are compared with the same run of the shipped values."""
 MEASURES = ("AP", "length", "calls", "CPU")
@@ -157,11 +164,16 @@ def differences(changed: Sequence[Score], shipped: Sequence[Score]) -> Float64:
     return np.concatenate([after[:2] - before[:2], 100.0 * (after[2:] / np.maximum(before[2:], 1e-9) - 1.0)])
 
 
+def margin(difference: Float64) -> float:
+    """Half of the 95 % interval of the mean of the (D,) differences of the drives."""
+    n = len(difference)
+    return float(student_t.ppf(0.975, n - 1) * difference.std(ddof=1) / np.sqrt(n))
+
+
 def summary(difference: Float64) -> str:
-    """Mean of the (D,) differences of the drives, bold where its 95 % interval excludes zero."""
+    """Mean of the (D,) differences of the drives, bold where its 95 % interval excludes zero; 0 if all are zero."""
     mean = difference.mean()
-    error = difference.std(ddof=1) / np.sqrt(len(difference))
-    if abs(mean) > student_t.ppf(0.975, len(difference) - 1) * error:
+    if abs(mean) > margin(difference):
         return f"**{mean:+.1f}**"
     return f"{mean:+.1f}" if difference.any() else "0"
 
@@ -186,32 +198,52 @@ def _both_ways(drives: Sequence[Drive], constant: Constant, shipped: Sequence[Sc
     return found
 
 
-def tables(results: Mapping[str, Mapping[str, Any]]) -> str:
-    """Markdown of every stage, its constants in the order of their effect on accuracy and track length."""
+def tables(results: Mapping[str, Mapping[str, Any]], measures: Sequence[str]) -> str:
+    """Markdown of the constants that matter most, and of every stage, with some of MEASURES."""
     known = [constant for constant in constants(tuning.MethodTuning()) if constant.name in results]
-    lines = [f"At commit `{commit()}`; made by `python -m {MARK}`."]
+    known.sort(key=lambda constant: _weight(results[constant.name]), reverse=True)
+    missing = len(list(constants(tuning.MethodTuning()))) - len(known)
+    drives = len(next(iter(results.values()))["+"][0])
+    lines = [
+        f"At commit `{commit()}`, {drives} drives; made by `python -m {MARK}`. {missing} values were not measured.",
+        "By chance alone one difference in twenty is bold.",
+        "",
+        f"### The {TOP} that matter most",
+        "",
+        *_table([(constant.name, constant) for constant in known[:TOP]], results, measures),
+    ]
     for stage in [field.name for field in fields(tuning.MethodTuning)]:
-        own = [constant for constant in known if constant.path[0] == stage]
-        own.sort(key=lambda constant: _weight(results[constant.name]), reverse=True)
-        lines += ["", f"### {stage.capitalize()}", "", HEAD, "|---" * HEAD.count(" |") + "|"]
-        for constant in own:
-            cells = [cell for sign in SIGNS for cell in _cells(results[constant.name][sign])]
-            meaning, _, chosen = constant.meaning.partition("Chosen on: ")
-            name = constant.name.removeprefix(f"{stage}.")
-            lines.append(f"| `{name}` | {constant.value:g} | {meaning.strip()} | {chosen} | {' | '.join(cells)} |")
+        own = [(constant.name.removeprefix(f"{stage}."), constant) for constant in known if constant.path[0] == stage]
+        lines += ["", f"### {stage.capitalize()}", "", *_table(own, results, measures)]
     return "\n".join(lines)
 
 
-def _weight(result: Mapping[str, Any]) -> float:
-    """Largest mean effect on accuracy or track length [points]."""
-    sides = [np.array(result[sign]) for sign in SIGNS if not isinstance(result[sign], str)]
-    return max((float(abs(side[:2].mean(axis=1)).max()) for side in sides), default=0.0)
+def _table(
+    named: Sequence[tuple[str, Constant]], results: Mapping[str, Mapping[str, Any]], measures: Sequence[str]
+) -> Iterator[str]:
+    """Rows of constants under the names that are shown."""
+    shown = [f"{measure}, {sign}20 %" for sign in SIGNS for measure in measures]
+    head = ["constant", "value", "meaning", "chosen on", *shown]
+    yield f"| {' | '.join(head)} |"
+    yield "|---" * len(head) + "|"
+    for name, constant in named:
+        cells = [cell for sign in SIGNS for cell in _cells(results[constant.name][sign], len(measures))]
+        meaning, _, chosen = constant.meaning.partition("Chosen on: ")
+        yield f"| `{name}` | {constant.value:g} | {meaning.strip()} | {chosen} | {' | '.join(cells)} |"
 
 
-def _cells(side: str | list[list[float]]) -> list[str]:
+def _weight(result: Mapping[str, Any]) -> tuple[float, float]:
+    """Largest effect on accuracy or track length whose interval excludes zero, then the largest of all [points]."""
+    found = [np.array(row) for sign in SIGNS if not isinstance(result[sign], str) for row in result[sign][:2]]
+    effects = [(abs(float(row.mean())), margin(row)) for row in found]
+    certain = [effect for effect, width in effects if effect > width]
+    return max(certain, default=0.0), max((effect for effect, _ in effects), default=0.0)
+
+
+def _cells(side: str | list[list[float]], n: int = len(MEASURES)) -> list[str]:
     if isinstance(side, str):
-        return ["refused"] * len(MEASURES)
-    return [summary(np.array(difference)) for difference in side]
+        return ["refused"] * n
+    return [summary(np.array(difference)) for difference in side[:n]]
 
 
 def main() -> None:
@@ -222,6 +254,7 @@ def main() -> None:
     options.add_argument("--scenes", nargs="+", default=SCENES)
     options.add_argument("--seeds", type=number_range, default=(700, 701))
     options.add_argument("--only", default="")
+    options.add_argument("--cpu", action="store_true")
     options.add_argument("--write", action="store_true")
     asked = options.parse_args()
     results: dict[str, Any] = json.loads(asked.results.read_text()) if asked.results.exists() else {}
@@ -240,7 +273,9 @@ def main() -> None:
                 for result in found:
                     print(result["name"], *(" ".join(_cells(result[sign])) for sign in SIGNS), sep="  ", flush=True)
     if asked.write:
-        PAGE.write_text(replace_section(PAGE.read_text(), MARK, tables(results)))
+        PAGE.write_text(
+            replace_section(PAGE.read_text(), MARK, tables(results, MEASURES if asked.cpu else MEASURES[:-1]))
+        )
 
 
 if __name__ == "__main__":
