@@ -56,11 +56,15 @@ def stream(request: Request) -> Stream:
     """The requested stream, or the embedded one without a path.
 
     Raises:
-        MisuseError: the path is no stream.
+        MisuseError: the path is no stream, or none is built in.
     """
     if request.path is None:
-        (embedded,) = entry_points(group="modt.streams", name="embedded")
-        whole: Stream = embedded.load()()
+        embedded = [*entry_points(group="modt.streams", name="embedded")]
+        if not embedded:
+            raise MisuseError(
+                "no recording", "none is built in here", "give one, or install modt with its tools again"
+            )
+        whole: Stream = embedded[0].load()()
     else:
         from modt.sources.recognise import open_stream
 
