@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 
 from modt.errors import MisuseError, install
 from modt.sinks.output import writing
@@ -33,14 +35,14 @@ def importing(subject: object) -> Iterator[None]:
 
 
 @cache
-def _keep_cache_in_memory() -> TemporaryDirectory[str] | None:
+def _keep_cache_in_memory() -> None:
     """Let Matplotlib keep its list of fonts as long as this process: a command writes only what was asked for."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # its notes on fonts are no warnings of a run
     if "MPLCONFIGDIR" in os.environ:
-        return None
-    folder = TemporaryDirectory(prefix="modt-", dir=MEMORY if MEMORY.is_dir() else None)
-    os.environ["MPLCONFIGDIR"] = folder.name
-    return folder
+        return
+    folder = mkdtemp(prefix="modt-", dir=MEMORY if MEMORY.is_dir() else None)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ["MPLCONFIGDIR"] = folder
 
 
 def save(path: Path, page: Page) -> None:
