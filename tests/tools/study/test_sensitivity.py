@@ -1,0 +1,40 @@
+"""The study of sensitivities reaches every chosen value, and its page shows the values that are shipped."""
+
+import re
+
+import numpy as np
+import pytest
+
+from modt.tuning import MethodTuning
+from tools.study import sensitivity
+
+CONSTANTS = list(sensitivity.constants(MethodTuning()))
+
+
+def test_one_value_is_changed_and_no_other():
+    for constant in CONSTANTS:
+        changed = sensitivity.with_value(MethodTuning(), constant.path, constant.changed(0.2))
+        before_and_after = zip(CONSTANTS, sensitivity.constants(changed), strict=True)
+        assert [a.name for a, b in before_and_after if a.value != b.value] == [constant.name]
+
+
+def test_every_value_says_what_it_does():
+    assert [constant.name for constant in CONSTANTS if not constant.meaning] == []
+
+
+@pytest.mark.parametrize(
+    ("difference", "text"), [([0, 0, 0], "0"), ([1, 1.1, 0.9], "**+1.0**"), ([-3, 3, 0.3], "+0.1")]
+)
+def test_a_difference_is_bold_where_its_interval_excludes_zero(difference, text):
+    assert sensitivity.summary(np.array(difference, float)) == text
+
+
+def test_the_page_shows_the_shipped_values():
+    stages = re.split(r"^### ", sensitivity.PAGE.read_text(), flags=re.MULTILINE)[2:]
+    shown = {}
+    for stage in stages:
+        rows = re.findall(r"^\| `(\S+)` \| (\S+) \|", stage, re.MULTILINE)
+        shown |= {f"{stage.split()[0].lower()}.{name}": value for name, value in rows}
+    shipped = {constant.name: f"{constant.value:g}" for constant in CONSTANTS}
+    assert shown
+    assert shown == {name: shipped.get(name) for name in shown}
