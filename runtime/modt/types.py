@@ -7,7 +7,7 @@ the number of proposals in a frame, M the number of tracks alive, N the number o
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from enum import IntFlag
+from enum import IntEnum, IntFlag
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ else:
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int = NDArray[np.int64]
+Int8 = NDArray[np.int8]
 Bool = NDArray[np.bool_]
 
 NONE = -1
@@ -82,6 +83,23 @@ class Cut(IntFlag):
     NEAR = 8  # at the nearest range used
 
 
+class PointKind(IntEnum):
+    """What a point of a frame is. Every point has exactly one kind."""
+
+    MEMBER = 0  # belongs to a proposal
+    GROUND = -1
+    STRUCTURE = -2  # above the ground, part of a surface that is no object: wall, hedge, shelf, beam
+    LOW = -3  # above the ground, of a group too low for an object
+    SPARSE = -4  # above the ground, of a group with too few points for an object
+    OVERHEAD = -5  # of the ceiling, or higher than what is looked for
+    OUT_OF_RANGE = -6  # too near, too far, in a blind sector, or no return
+    OUT_OF_VIEW = -7  # outside the field of view
+
+
+OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE
+"""Kinds, besides members of proposals, of what stands above the ground and below the ceiling."""
+
+
 @dataclass(frozen=True, slots=True)
 class Proposals:
     """The segments of one frame that could be objects.
@@ -98,6 +116,7 @@ class Proposals:
     cut: Int  # (P,) flags of Cut
     ground_z_m: Float64 | None = None  # (P,) z of the ground beneath each [m, sensor frame], None where not known
     reflectance: Float64 | None = None  # (P, 5)
+    kind: Int8 | None = None  # (N,) PointKind of each point of the frame, None where not known
 
     def lock(self) -> Self:
         """These proposals, whose columns nobody can write to from here on.
@@ -143,11 +162,12 @@ class Proposals:
             cut=self.cut[source],
             ground_z_m=None if self.ground_z_m is None else self.ground_z_m.take(source),
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
+            kind=self.kind,
         )
 
     @classmethod
-    def empty(cls) -> Proposals:
-        """No proposals."""
+    def empty(cls, kind: Int8 | None = None) -> Proposals:
+        """No proposals; with the (N,) PointKind of each point of the frame."""
         return cls(
             members=np.zeros(0, np.int64),
             offsets=np.zeros(1, np.int64),
@@ -155,6 +175,7 @@ class Proposals:
             centroid=np.zeros((0, 3)),
             box=np.zeros((0, 7)),
             cut=np.zeros(0, np.int64),
+            kind=kind,
         )
 
 
@@ -379,3 +400,29 @@ class FrameResult:
     state_names: tuple[str, ...]  # name of each value of tracks.state
     n_deferred: int  # tracks whose request for a class waits for the next frame's budget
     classified: Int = field(default_factory=lambda: np.zeros(0, np.int64))  # identities of the tracks
+
+    @property
+    def labels(self) -> Int:
+        """(N,) identity of the track that each point of the frame belongs to, else its PointKind, which is negative.
+
+        Raises:
+            ValueError: the proposals come from a record, which does not hold the kinds of the points.
+        """
+        kind = self.proposals.kind
+        if kind is None:
+            raise ValueError("the proposals do not tell the kinds of the points")
+        labels = kind.astype(np.int64)
+        row_of_proposal = self.tracks.row_of_proposal(len(self.proposals))
+        labels[self.proposals.members] = self.tracks.id[row_of_proposal].repeat(self.proposals.count)
+        return labels
+
+    def obstacles(self) -> Int:
+        """(K,) rows of the points that stand above the ground and below the ceiling, whatever they belong to."""
+        labels = self.labels
+        return np.flatnonzero((labels >= 0) | np.isin(labels, OBSTACLES))
+
+    def left_out(self) -> dict[PointKind, int]:
+        """Number of points of each kind that belong to no proposal."""
+        kind = self.proposals.kind
+        counts = np.zeros(len(PointKind), np.int64) if kind is None else np.bincount(-kind, minlength=len(PointKind))
+        return {each: int(counts[-each]) for each in PointKind if each != PointKind.MEMBER}

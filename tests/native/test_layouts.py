@@ -21,6 +21,7 @@ C_TYPES = {
     "int32_t": np.int32,
     "i64": np.int64,
     "int64_t": np.int64,
+    "int8_t": np.int8,
     "uint8_t": np.uint8,
 }
 SHAPES = Layout(

@@ -158,7 +158,8 @@ def test_cells_and_components(kernels, seed, n, sigma):
     kept, own = np.unique(clustered[0][0][use], return_inverse=True)
     n, used = len(kept), np.full(len(cells), len(kept))
     used[use] = own
-    clusters = Clusters(points, height, cell, cells, sample, sampled, used, n + 1)
+    kind = np.zeros(len(cells), np.int8)
+    clusters = Clusters(points, height, cell, cells, sample, sampled, used, kind, n + 1)
     number = consecutive(np.append(rng.random(n) < 0.7, [False]))
     assert same(*(k.view_bounds(clusters, number, number.max() + 1) for k in (NUMPY, kernels)))
 

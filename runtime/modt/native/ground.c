@@ -60,8 +60,11 @@ typedef struct {
     i64 *rows;      /* (room,) of the points kept; room for one more than there are points */
     float *kept[5]; /* (room,) x, y, z, square root of range, and height above ground */
     i64 *histogram; /* (bins,) of the heights */
+    int8_t *kind;   /* (room,) PointKind of all points */
 } AboveGround;
 
+/* PointKind of types.py, as far as it is known here. */
+enum { MEMBER_KIND = 0, GROUND_KIND = -1, OVERHEAD_KIND = -5, OUT_OF_RANGE_KIND = -6 };
 enum { BLOCK = 512, GROUP = 8 }; /* points in the first-level cache; points kept or left out together */
 /* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */
 typedef enum { GROUND = 1, STEEP = 2, RAMP = 4 } Kind;
@@ -277,6 +280,10 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
         height[i] = s->z[start + i] - s->surface[s->cell[start + i]];
     for (i64 i = 0; i < n; i++)
         is_kept[i] = (height[i] > low) & (height[i] < high);
+    for (i64 i = 0; i < n; i++) { /* one that is out of range lies infinitely low */
+        int8_t other = height[i] >= high ? OVERHEAD_KIND : height[i] > -INFINITY ? GROUND_KIND : OUT_OF_RANGE_KIND;
+        out->kind[start + i] = is_kept[i] ? MEMBER_KIND : other;
+    }
     for (i64 first = 0; first < n; first += GROUP) {
         i64 row = start + first;
         uint64_t group;

@@ -87,11 +87,12 @@ typedef struct {
     float *columns;       /* (4, m) x, y, z, and z of the ground beneath */
 } Members;
 
-/* members_of: points by cluster, in input order within a cluster, given the cell of each point and the cluster of
- * each of the cells. `index` holds the row of each point in the sweep. */
+/* members_of: points by cluster, in input order within a cluster, given the cell of each point, and the cluster and
+ * the kind of each of the cells. `index` holds the row of each point in the sweep; `kind`, that of every point of it,
+ * takes those of the cells. */
 EXPORT void modt_members(const PointColumns *points, const float *height, const i64 *index, const i64 *cell_of_point,
-                         i64 n_points, const i64 *cluster_of_cell, const i64 *entries, i64 n_cells, i64 n,
-                         const Members *members)
+                         i64 n_points, const i64 *cluster_of_cell, const int8_t *kind_of_cell, const i64 *entries,
+                         i64 n_cells, i64 n, int8_t *kind, const Members *members)
 {
     /* 1. Sizes of the clusters, and from them where each begins. As its points are placed, `next` goes from the
      * start of a cluster to its end, which is the offset that it shall hold. */
@@ -113,6 +114,7 @@ EXPORT void modt_members(const PointColumns *points, const float *height, const 
         PROVEN(cell_of_point[i] >= 0 && cell_of_point[i] < n_cells);
         i64 g = cluster_of_cell[cell_of_point[i]];
         PROVEN(g >= NONE && g < n);
+        kind[index[i]] = kind_of_cell[cell_of_point[i]];
         if (g != NONE)
             members->index[next[g]++] = i;
     }

@@ -53,7 +53,8 @@ class OutputArgument:
     from_param = staticmethod(_start)
 
 
-FLOAT32, FLOAT64, INT32, INT64, BOOL = map(ArrayArgument, (np.float32, np.float64, np.int32, np.int64, np.bool_))
+FLOAT32, FLOAT64, BOOL = map(ArrayArgument, (np.float32, np.float64, np.bool_))
+INT8, INT32, INT64 = map(ArrayArgument, (np.int8, np.int32, np.int64))
 
 
 def address(numbers: Any) -> int:

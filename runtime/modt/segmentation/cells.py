@@ -14,7 +14,7 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
 from modt.segmentation.tuning import CellTuning, SplitTuning
-from modt.types import NONE, Bool, Float32, Int, Self
+from modt.types import NONE, Bool, Float32, Int, Int8, PointKind, Self
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,16 +159,20 @@ class Clusters:
     sample: Int  # (C,) last point of each cell
     sampled: PointColumns  # (C,) that point
     cluster_of_cell: Int  # (C,) NONE where it cannot be an object
+    kind_of_cell: Int8  # (C,) PointKind of its points, MEMBER of a cluster
     n: int
 
-    def select(self, keep: Bool) -> Clusters:
-        """The clusters of an (n,) mask, renumbered."""
+    def select(self, keep: Bool, kind: PointKind) -> Clusters:
+        """The clusters of an (n,) mask, renumbered; the points of the others are of a kind."""
         if keep.all():
             return self
         clustered = np.flatnonzero(self.cluster_of_cell != NONE)
         cluster_of_cell = np.full(len(self.cells), NONE)
         cluster_of_cell[clustered] = consecutive(keep)[self.cluster_of_cell[clustered]]
-        return replace(self, cluster_of_cell=cluster_of_cell, n=int(keep.sum()))
+        dropped = clustered[cluster_of_cell[clustered] == NONE]
+        kind_of_cell = self.kind_of_cell.copy()
+        kind_of_cell[dropped] = kind
+        return replace(self, cluster_of_cell=cluster_of_cell, kind_of_cell=kind_of_cell, n=int(keep.sum()))
 
 
 class CellClusterer:
@@ -249,8 +253,12 @@ class Members:
     columns: Float32  # (4, M) x, y, z, and z of the ground beneath [m, sensor frame]
 
 
-def members_of(clusters: Clusters, index: Int) -> Members:
-    """Points of each cluster, given (K,) the row of each point in the sweep."""
+def members_of(clusters: Clusters, index: Int, kind: Int8) -> Members:
+    """Points of each cluster, given (K,) the row of each point in the sweep.
+
+    Into (N,) kinds of all points of the sweep go those of the K.
+    """
+    kind[index] = clusters.kind_of_cell.take(clusters.cell_of_point)
     groups = Groups.from_labels(clusters.cluster_of_cell.take(clusters.cell_of_point), clusters.n)
     points = clusters.points
     x, y, z, height = (v.take(groups.rows) for v in (points.x, points.y, points.z, clusters.height))

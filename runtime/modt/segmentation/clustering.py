@@ -13,7 +13,7 @@ from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.strips import ELEVATION
 from modt.segmentation.tuning import SegmentationTuning
-from modt.types import Bool, Float32, Int
+from modt.types import Bool, Float32, Int, Int8, PointKind
 
 
 class Clusterer:
@@ -49,14 +49,17 @@ class Clusterer:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
         cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.cells.fine, points, height)
         cluster, sizes = self.kernels.cluster(self.cells, cells, sampled, self._beam_m(sampled))
-        clusters = Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, len(sizes))
-        strip = (self._is_valid(sizes) | ~sizes.of_oversized) & self.may_be_strips(sizes)
+        kind_of_cell = np.zeros(len(cells), np.int8)  # not known before strips are merged
+        clusters = Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, kind_of_cell, len(sizes))
+        strip = ((self._kind(sizes) == PointKind.MEMBER) | ~sizes.of_oversized) & self.may_be_strips(sizes)
         target = self._merged(clusters, strip)
-        valid = self._is_valid(sizes.merged(target))
+        kind = self._kind(sizes.merged(target))
+        valid = kind == PointKind.MEMBER
         cluster_of_cell = consecutive(valid)[target].take(cluster)
+        kind_of_cell = kind[target].take(cluster)
         n = int(np.count_nonzero(valid))
-        # `replace` of the two fields that differ takes longer.
-        return Clusters(points, height, cell_of_point, cells, sample, sampled, cluster_of_cell, n)
+        # `replace` of the three fields that differ takes longer.
+        return Clusters(points, height, cell_of_point, cells, sample, sampled, cluster_of_cell, kind_of_cell, n)
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""
@@ -87,12 +90,15 @@ class Clusterer:
             target[cluster_of_strip] = cluster_of_strip[first_strip]
         return target
 
-    def _is_valid(self, sizes: ClusterSizes) -> Bool:
-        """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""
+    def _kind(self, sizes: ClusterSizes) -> Int8:
+        """(G,) PointKind: MEMBER of an object's size. A part of an oversized cluster must stand out from it."""
         config = self.config
-        valid: Bool = (sizes.points >= config.min_points) & (sizes.extent_m < config.max_extent_m)
-        line = (sizes.points >= self.valid.min_line_points) & (sizes.top_m > self.valid.min_line_top_m)
-        valid &= line | (sizes.top_m - sizes.bottom_m >= config.min_height_m)
+        oversized = sizes.extent_m >= config.max_extent_m
         stands_out = (sizes.top_m >= self.valid.min_part_top_m) & (sizes.points >= self.valid.min_part_points)
-        valid &= ~sizes.of_oversized | stands_out
-        return valid
+        tall = sizes.top_m - sizes.bottom_m >= config.min_height_m
+        line = (sizes.points >= self.valid.min_line_points) & (sizes.top_m > self.valid.min_line_top_m)
+        kind = np.full(len(sizes), PointKind.MEMBER, np.int8)
+        kind[~(tall | line)] = PointKind.LOW
+        kind[sizes.points < config.min_points] = PointKind.SPARSE
+        kind[oversized | (sizes.of_oversized & ~stands_out)] = PointKind.STRUCTURE
+        return kind

@@ -13,7 +13,7 @@ from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
 from modt.segmentation.strips import merge_strips, view_bounds
-from modt.types import Float32, Int
+from modt.types import Float32, Int, Int8, PointKind
 
 
 class Bounds(NamedTuple):
@@ -23,6 +23,16 @@ class Bounds(NamedTuple):
     max_height_m: float
     min_sqrt_range: float  # [sqrt(m)]
     max_sqrt_range: float
+
+
+class Above(NamedTuple):
+    """K of the N points of a sweep: those above the ground, within bounds of height and range."""
+
+    rows: Int  # (K,) rows of the sweep
+    points: PointColumns  # (K,)
+    height_m: Float32  # (K,) above the ground
+    histogram: Int  # (bins,) of the heights, in which a ceiling shows
+    kind: Int8  # (N,) PointKind of all points; MEMBER of the K
 
 
 class Kernels(GeometryKernels):
@@ -40,18 +50,18 @@ class Kernels(GeometryKernels):
 
     def above_ground(
         self, ground: GroundEstimator, ceiling: CeilingFinder, points: Float32, sensor_height_m: float, bounds: Bounds
-    ) -> tuple[Int, PointColumns, Float32, Int]:
-        """(K,) rows of (N, 4) or wider points within bounds, those points, their (K,) heights above ground [m].
-
-        With them comes the histogram of the heights in which a ceiling shows.
-        """
+    ) -> Above:
+        """Those of (N, 4) or wider points within bounds."""
         sweep = PointColumns.from_array(points)
         height = ground.height_above(sweep, sensor_height_m)
-        used = (height > bounds.min_height_m) & (height < bounds.max_height_m)
-        used &= (sweep.sqrt_range > bounds.min_sqrt_range) & (sweep.sqrt_range < bounds.max_sqrt_range)
-        rows = np.flatnonzero(used)
+        in_range = (sweep.sqrt_range > bounds.min_sqrt_range) & (sweep.sqrt_range < bounds.max_sqrt_range)
+        kind = np.full(len(points), PointKind.OUT_OF_RANGE, np.int8)
+        kind[in_range] = PointKind.GROUND
+        kind[in_range & (height > bounds.min_height_m)] = PointKind.MEMBER
+        kind[in_range & (height >= bounds.max_height_m)] = PointKind.OVERHEAD
+        rows = np.flatnonzero(kind == PointKind.MEMBER)
         height = height.take(rows)
-        return rows, sweep.take(rows), height, ceiling.histogram(height)
+        return Above(rows, sweep.take(rows), height, ceiling.histogram(height), kind)
 
 
 NUMPY = Kernels()

@@ -15,6 +15,7 @@ from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.geometry.tuning import ShapeTuning
 from modt.native.library import (
     FLOAT32,
+    INT8,
     INT64,
     Array,
     Filled,
@@ -31,13 +32,13 @@ from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
-from modt.segmentation.kernels import Bounds, Kernels
+from modt.segmentation.kernels import Above, Bounds, Kernels
 from modt.segmentation.strips import DIRECTION, ViewBounds
 from modt.segmentation.tuning import StripTuning
-from modt.types import N_REFLECTANCE, Float32, Float64, Int
+from modt.types import N_REFLECTANCE, Float32, Float64, Int, Int8
 
 T = TypeVar("T", Cells, PointColumns, ClusterSizes)
-_f32, _i32, _i64 = map(np.dtype, (np.float32, np.int32, np.int64))
+_f32, _i8, _i32, _i64 = map(np.dtype, (np.float32, np.int8, np.int32, np.int64))
 
 
 def _members(kind: Member, *names: str) -> dict[str, Member]:
@@ -53,7 +54,11 @@ GROUND = Layout(
     **_members(Number(_f32), "max_gap_m", "flank_m", "above_m", "bin_m", *Bounds._fields),
 )
 ABOVE_GROUND = Layout(
-    "AboveGround", rows=Array(_i64, "room"), kept=Rows(_f32, 5, "room"), histogram=Array(_i64, "bins")
+    "AboveGround",
+    rows=Array(_i64, "room"),
+    kept=Rows(_f32, 5, "room"),
+    histogram=Array(_i64, "bins"),
+    kind=Array(_i8, "room"),
 )
 POINT_COLUMNS = Layout("PointColumns", **_members(Array(_f32, "n"), "x", "y", "z", "sqrt_range"))
 GRID = Layout(
@@ -117,7 +122,10 @@ _SIGNATURES: Signatures = {
         (STRIP_RULES, PERSON_SIZE, VIEW_BOUNDS, FLOAT32, _L, INT64, OutputArgument, VIEW_BOUNDS, OutputArgument),
     ),
     "modt_group": (_L, (INT64, _L, _L, OutputArgument, OutputArgument)),
-    "modt_members": (None, (POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, INT64, _L, _L, MEMBERS)),
+    "modt_members": (
+        None,
+        (POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, INT8, INT64, _L, _L, OutputArgument, MEMBERS),
+    ),
     "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, OutputArgument)),
     "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, OutputArgument)),
 }
@@ -165,8 +173,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
 
     def above_ground(
         self, ground: GroundEstimator, ceiling: CeilingFinder, points: Float32, sensor_height_m: float, bounds: Bounds
-    ) -> tuple[Int, PointColumns, Float32, Int]:
-        """(K,) rows of the points within bounds, those points, their (K,) heights above ground [m] and histogram."""
+    ) -> Above:
+        """Those of (N, 4) or wider points within bounds."""
         if points.shape[1] < 4:
             raise ValueError(f"rows of x, y, z and reflectance are needed, not of shape {points.shape}")
         points = np.ascontiguousarray(points[:, :4], np.float32)
@@ -176,11 +184,11 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         rows = np.empty(n + 1, np.int64)
         kept = np.empty((5, n + 1), np.float32)
         histogram = np.zeros(ceiling.bins, np.int64)
-        k = self.library.modt_above_ground(
-            structure, points, n, sensor_height_m, scratch, ABOVE_GROUND(rows=rows, kept=kept, histogram=histogram)
-        )
+        kind = np.empty(n + 1, np.int8)
+        out = ABOVE_GROUND(rows=rows, kept=kept, histogram=histogram, kind=kind)
+        k = self.library.modt_above_ground(structure, points, n, sensor_height_m, scratch, out)
         *columns, height = kept[:, :k]
-        return rows[:k], PointColumns(*columns), height, histogram
+        return Above(rows[:k], PointColumns(*columns), height, histogram, kind[:n])
 
     def occupied_cells(
         self, grid: SqrtRangeGrid, points: PointColumns, height: Float32
@@ -267,8 +275,8 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         offsets = np.empty(n + 1, np.int64)
         return Groups(rows[: self.library.modt_group(labels, len(labels), n, rows, offsets)], offsets)
 
-    def members_of(self, clusters: Clusters, index: Int) -> Members:
-        """Points of each cluster, given (K,) the row of each point in the sweep."""
+    def members_of(self, clusters: Clusters, index: Int, kind: Int8) -> Members:
+        """Points of each cluster, given (K,) the row of each point; their kinds go into (N,) those of the sweep."""
         k = len(index)
         offsets = np.empty(clusters.n + 1, np.int64)
         rows = np.empty(k, np.int64)
@@ -280,9 +288,11 @@ class NativeKernels(NativeGeometryKernels, Kernels):
             clusters.cell_of_point,
             k,
             clusters.cluster_of_cell,
+            clusters.kind_of_cell,
             clusters.cells.entries,
             len(clusters.cells),
             clusters.n,
+            kind,
             MEMBERS(offsets=offsets, index=rows, columns=columns),
         )
         m = int(offsets[-1])

@@ -14,10 +14,10 @@ from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, Groups, has_reflectance
-from modt.segmentation.kernels import NUMPY, Bounds, Kernels
+from modt.segmentation.kernels import NUMPY, Above, Bounds, Kernels
 from modt.segmentation.tuning import SegmentationTuning
 from modt.segmentation.view_ends import ViewEnds
-from modt.types import NONE, Bool, Cut, Float32, Float64, Int, Proposals
+from modt.types import NONE, Bool, Cut, Float32, Float64, PointKind, Proposals
 
 
 class Segmenter:
@@ -57,17 +57,17 @@ class Segmenter:
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""
-        rows, above, height = self._above_ground_in_view(points)
-        if not len(rows):
-            return Proposals.empty()
-        clusters = self.clusterer.cluster(above, height)
+        above = self._above_ground_in_view(points)
+        if not len(above.rows):
+            return Proposals.empty(above.kind)
+        clusters = self.clusterer.cluster(above.points, above.height_m)
         depth = None if self.fov.full else self.fov.depth(clusters.sampled.xyz())
         if depth is not None:
-            clusters = clusters.select(self._in_view(clusters, depth))
+            clusters = clusters.select(self._in_view(clusters, depth), PointKind.OUT_OF_VIEW)
+        members = self.kernels.members_of(clusters, above.rows, above.kind)
         if not clusters.n:
-            return Proposals.empty()
+            return Proposals.empty(above.kind)
         cells_of_cluster = self.kernels.group(clusters.cluster_of_cell, clusters.n)
-        members = self.kernels.members_of(clusters, rows)
         box = self._boxes(clusters.sampled, cells_of_cluster, members)
         cut = self.ends.cut(members.columns[:3], members.offsets, box)
         if depth is not None:
@@ -82,6 +82,7 @@ class Segmenter:
             cut=cut,
             ground_z_m=mean[3],
             reflectance=self._reflectance(points, members),
+            kind=above.kind,
         ).lock()
 
     def sensor_height_m(self, points: Float32) -> float:
@@ -89,28 +90,28 @@ class Segmenter:
         known = self.sensor.height_m
         return self.height_estimator.height_m(points) if known is None else known
 
-    def above_ground(self, points: Float32) -> tuple[Int, PointColumns, Float32]:
-        """(K,) rows of the points within range, and `clearance_m` to `max_height_m` or the ceiling above ground.
-
-        With them come those points and their (K,) heights above ground [m].
-        """
+    def above_ground(self, points: Float32) -> Above:
+        """Those of (N, 4) points within range, and `clearance_m` to `max_height_m` or the ceiling above ground."""
         sensor_height_m = self.sensor_height_m(points)
-        rows, above, height, histogram = self.kernels.above_ground(
-            self.ground, self.ceiling, points, sensor_height_m, self.bounds
-        )
-        limit_m = self.ceiling.limit_m(histogram, points[:, 2], sensor_height_m)
+        above = self.kernels.above_ground(self.ground, self.ceiling, points, sensor_height_m, self.bounds)
+        limit_m = self.ceiling.limit_m(above.histogram, points[:, 2], sensor_height_m)
         if limit_m is None:
-            return rows, above, height
-        kept = np.flatnonzero(height < np.float32(limit_m))
-        return rows.take(kept), above.take(kept), height.take(kept)
+            return above
+        below = above.height_m < np.float32(limit_m)
+        above.kind[above.rows[~below]] = PointKind.OVERHEAD
+        kept = np.flatnonzero(below)
+        rows = above.rows.take(kept)
+        return Above(rows, above.points.take(kept), above.height_m.take(kept), above.histogram, above.kind)
 
-    def _above_ground_in_view(self, points: Float32) -> tuple[Int, PointColumns, Float32]:
+    def _above_ground_in_view(self, points: Float32) -> Above:
         """`above_ground`, restricted to the view and its margin."""
         if self.fov.full:
             return self.above_ground(points)
         region = np.flatnonzero(self.fov.depth(points) > -self.tuning.view.margin_m)
-        rows, above, height = self.above_ground(points[region])
-        return region[rows], above, height
+        above = self.above_ground(points[region])
+        kind = np.full(len(points), PointKind.OUT_OF_VIEW, np.int8)
+        kind[region] = above.kind
+        return above._replace(rows=region[above.rows], kind=kind)
 
     def _in_view(self, clusters: Clusters, depth: Float32) -> Bool:
         """(n,) clusters in the field of view or close to it, given the (C,) depth of each cell in it [m]."""
