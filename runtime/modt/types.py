@@ -6,7 +6,7 @@ the number of proposals in a frame, M the number of tracks alive, N the number o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum, IntFlag
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -94,6 +94,7 @@ class PointKind(IntEnum):
     OVERHEAD = -5  # of the ceiling, or higher than what is looked for
     OUT_OF_RANGE = -6  # too near, too far, in a blind sector, or no return
     OUT_OF_VIEW = -7  # outside the field of view
+    FOOT = -8  # low, part of a proposal or a structure beside it
 
 
 OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE
@@ -117,6 +118,7 @@ class Proposals:
     ground_z_m: Float64 | None = None  # (P,) z of the ground beneath each [m, sensor frame], None where not known
     reflectance: Float64 | None = None  # (P, 5)
     kind: Int8 | None = None  # (N,) PointKind of each point of the frame, None where not known
+    feet: Int | None = None  # (2, F) points of kind FOOT, and of each a point of what it belongs to
 
     def lock(self) -> Self:
         """These proposals, whose columns nobody can write to from here on.
@@ -163,6 +165,26 @@ class Proposals:
             ground_z_m=None if self.ground_z_m is None else self.ground_z_m.take(source),
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
             kind=self.kind,
+            feet=self.feet,
+        )
+
+    def followed_by(self, other: Proposals, feet: Int) -> Proposals:
+        """These proposals, then others of the same frame, with the (2, F) feet of both."""
+        if not len(other):
+            return replace(self, feet=feet)
+        if not len(self):
+            return replace(other, feet=feet)
+        return Proposals(
+            members=np.concatenate([self.members, other.members]),
+            offsets=np.concatenate([self.offsets, self.offsets[-1] + other.offsets[1:]]),
+            coordinates=np.concatenate([self.coordinates, other.coordinates], axis=1),
+            centroid=np.concatenate([self.centroid, other.centroid]),
+            box=np.concatenate([self.box, other.box]),
+            cut=np.concatenate([self.cut, other.cut]),
+            ground_z_m=_joined(self.ground_z_m, other.ground_z_m),
+            reflectance=_joined(self.reflectance, other.reflectance),
+            kind=self.kind,
+            feet=feet,
         )
 
     @classmethod
@@ -177,6 +199,11 @@ class Proposals:
             cut=np.zeros(0, np.int64),
             kind=kind,
         )
+
+
+def _joined(first: Float64 | None, second: Float64 | None) -> Float64 | None:
+    """Rows of both, None unless both have them."""
+    return None if first is None or second is None else np.concatenate([first, second])
 
 
 def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:
@@ -414,6 +441,9 @@ class FrameResult:
         labels = kind.astype(np.int64)
         row_of_proposal = self.tracks.row_of_proposal(len(self.proposals))
         labels[self.proposals.members] = self.tracks.id[row_of_proposal].repeat(self.proposals.count)
+        if self.proposals.feet is not None:
+            foot, beside = self.proposals.feet
+            labels[foot] = labels[beside]
         return labels
 
     def obstacles(self) -> Int:

@@ -55,6 +55,9 @@ def test_every_point_has_one_kind(fov, seed, n, scene, hostile):
     with np.errstate(all="ignore"):
         proposals = Segmenter(SegmentationConfig(), SENSOR, fov or FieldOfView()).segment(points)
     is_member = proposals.label(n) != NONE
+    foot, beside = proposals.feet if proposals.feet is not None else np.zeros((2, 0), np.int64)
+    assert sorted(foot.tolist()) == np.flatnonzero(proposals.kind == PointKind.FOOT).tolist()
+    assert np.isin(proposals.kind[beside], (PointKind.MEMBER, PointKind.STRUCTURE)).all()
     assert proposals.kind.shape == (n,)
     assert ((proposals.kind == PointKind.MEMBER) == is_member).all()
     assert set(proposals.kind.tolist()) <= {kind.value for kind in PointKind}
@@ -65,7 +68,7 @@ def test_kinds_of_a_scene_with_one_thing_each():
     """A person, a kerb, a pole of three returns, a long wall, a plate above, and points too near and too far."""
     boxes = [
         (8.0, 0.0, *PERSON),
-        (8.0, 4.0, 0.6, 0.2, 0.0, 0.33),
+        (9.0, 6.0, 0.3, 6.0, 0.0, 0.33),
         (14.0, 0.0, 0.2, 30.0, 0.0, 2.4),
         (6.0, -3.0, 1.0, 1.0, 2.7, 3.0),
     ]

@@ -6,7 +6,9 @@
  *   3. trace           which cells are ground, ring by ring from the sensor outwards, all rays at once
  *   4. interpolate     surface of the ground, ring by ring inwards
  *   5. smooth          medians across the rays: the ground under a vehicle is that beside it
- *   6. keep_points     points within bounds, with their heights, and the histogram of those heights
+ *   6. keep_points     points within bounds, with their heights, and low points that may belong to something
+ *   7. append_low      those after the others
+ * Before 3, measure_roughness tells how far above the ground a return is clear of it.
  * Passes 1, 2 and 6 go by blocks of points that stay in the first-level cache. A value a cell stands at
  * ring * sectors + sector; the cell after the last stands for the points out of bounds of range.
  */
@@ -21,11 +23,15 @@ typedef struct {
     float max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
     float above_m, bin_m;                                            /* begin and width of the bins of heights */
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
+    const i32 *low_sectors; /* (near_rings,) sectors to the left and right that a low thing does not reach */
+    i32 near_rings, quarters;
+    float low_m, clear_m, foot_share, min_foot_m;
 } Ground;
 
 /* Scratch: a value a cell, a value a ray, and a value a point. */
 typedef struct {
     float *lowest, *surface, *range_before; /* (cells,) range_before: of the ground cell before each cell [m] */
+    float *highest, *clear;                 /* (cells,) highest return; height from which one is clear of the ground */
     float (*ends)[2];                       /* (cells,) lowest return, and the highest, negated, side by side */
     uint8_t *kind;                          /* (cells,) flags of Kind */
     float *rays;                            /* (4 * sectors,) */
@@ -41,6 +47,8 @@ static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
     TAKE(&end, s->lowest, cells);
     TAKE(&end, s->surface, cells);
     TAKE(&end, s->range_before, cells);
+    TAKE(&end, s->highest, cells);
+    TAKE(&end, s->clear, cells);
     TAKE(&end, s->ends, cells);
     TAKE(&end, s->kind, cells);
     TAKE(&end, s->rays, 4 * g->sectors);
@@ -59,8 +67,10 @@ EXPORT i64 modt_ground_scratch(const Ground *g, i64 n)
 typedef struct {
     i64 *rows;      /* (room,) of the points kept; room for one more than there are points */
     float *kept[5]; /* (room,) x, y, z, square root of range, and height above ground */
-    i64 *histogram; /* (bins,) of the heights */
-    int8_t *kind;   /* (room,) PointKind of all points */
+    i64 *low_rows;     /* (room,) scratch: rows of the low points */
+    uint8_t *is_clear; /* (room,) low points that are clear of the roughness of the ground */
+    i64 *histogram;    /* (bins,) of the heights, without the low ones */
+    int8_t *kind;      /* (room,) PointKind of all points */
 } AboveGround;
 
 /* PointKind of types.py, as far as it is known here. */
@@ -138,6 +148,37 @@ static void find_ends(const Ground *g, float height_m, i64 n, const float *z, co
     for (i64 i = 0; i < n; i++) {
         int used = (sqrt_range[i] > g->min_sqrt_range) & (sqrt_range[i] < g->max_sqrt_range);
         cell[i] = used ? cell[i] : outside;
+    }
+}
+
+/* Lower median of n numbers, which it sorts; infinite of none. */
+static float median_of(float *numbers, i32 n)
+{
+    for (i32 i = 1; i < n; i++) {
+        float number = numbers[i];
+        i32 k = i;
+        for (; k > 0 && numbers[k - 1] > number; k--)
+            numbers[k] = numbers[k - 1];
+        numbers[k] = number;
+    }
+    return n ? numbers[(n - 1) / 2] : INFINITY;
+}
+
+/* GroundEstimator.clear_m. Keeps the highest returns, too. `rays` is scratch. */
+static void measure_roughness(const Ground *g, const GroundScratch *s)
+{
+    i32 in_quarter = g->sectors / g->quarters, cells = g->rings * g->sectors;
+    float *ranges = s->rays;
+    for (i32 first = 0; first < cells; first += in_quarter) {
+        i32 n = 0;
+        for (i32 k = first; k < first + in_quarter; k++) {
+            s->highest[k] = -s->ends[k][1];
+            ranges[n] = s->highest[k] - s->ends[k][0]; /* overwritten by the next, unless there is a lowest return */
+            n += s->ends[k][0] < INFINITY;
+        }
+        float clear_m = g->clear_m + median_of(ranges, n);
+        for (i32 k = first; k < first + in_quarter; k++)
+            s->clear[k] = clear_m;
     }
 }
 
@@ -250,7 +291,7 @@ static void median_across(i32 sectors, i32 step, const float *row, float *restri
     }
 }
 
-/* The end of GroundEstimator.height_above: medians across the rays, and the ground beside what stands on it. */
+/* The end of GroundEstimator.heights: medians across the rays, and the ground beside what stands or lies on it. */
 static void smooth(const Ground *g, const GroundScratch *s)
 {
     i32 sectors = g->sectors, cells = g->rings * sectors;
@@ -264,18 +305,28 @@ static void smooth(const Ground *g, const GroundScratch *s)
             int hidden = on_ramp ? median[k] < beside[k] : median[k] - beside[k] > g->flank_m;
             surface[k] = hidden ? beside[k] : median[k];
         }
+        if (row < g->near_rings * sectors) {
+            median_across(sectors, g->low_sectors[row / sectors], surface, round, beside);
+            for (i32 k = 0; k < sectors; k++) {
+                int raised = surface[k] - beside[k] > g->low_m && !(s->kind[row + k] & RAMP);
+                surface[k] = raised ? beside[k] : surface[k];
+            }
+        }
+        for (i32 k = row; k < row + sectors; k++)
+            s->clear[k] = s->highest[k] - s->surface[k] <= s->clear[k] ? INFINITY : s->clear[k];
     }
 }
 
 /* Kernels.above_ground, of up to BLOCK points from `start` on: those within bounds of height are written from
- * `count` on, where there is room for one more. Returns how many there are then. */
+ * `count` on, where there is room for one more. Returns how many there are then. Rows of low ones go to `low_rows`
+ * from `n_low` on. */
 static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points, i64 start, i64 n, i64 count,
-                       const AboveGround *out)
+                       i64 *n_low, const AboveGround *out)
 {
     const uint64_t all = 0x0101010101010101;
     float height[BLOCK], low = g->min_height_m, high = g->max_height_m;
     float *const *kept = out->kept;
-    uint8_t is_kept[BLOCK + GROUP] = {0};
+    uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}, is_clear[BLOCK];
     for (i64 i = 0; i < n; i++)
         height[i] = s->z[start + i] - s->surface[s->cell[start + i]];
     for (i64 i = 0; i < n; i++)
@@ -283,6 +334,21 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
     for (i64 i = 0; i < n; i++) { /* one that is out of range lies infinitely low */
         int8_t other = height[i] >= high ? OVERHEAD_KIND : height[i] > -INFINITY ? GROUND_KIND : OUT_OF_RANGE_KIND;
         out->kind[start + i] = is_kept[i] ? MEMBER_KIND : other;
+    }
+    for (i64 i = 0; i < n; i++) {
+        float clear = s->clear[s->cell[start + i]];
+        float foot = maxf(g->foot_share * clear, g->min_foot_m);
+        is_low[i] = (height[i] <= low) & (height[i] > foot) & (clear < INFINITY);
+        is_clear[i] = height[i] > clear;
+    }
+    for (i64 first = 0; first < n; first += GROUP) {
+        uint64_t group;
+        __builtin_memcpy(&group, is_low + first, GROUP);
+        for (i64 i = first; group && i < first + GROUP && i < n; i++) {
+            out->low_rows[*n_low] = start + i; /* overwritten by the next, unless it is low */
+            out->is_clear[*n_low] = is_clear[i];
+            *n_low += is_low[i];
+        }
     }
     for (i64 first = 0; first < n; first += GROUP) {
         i64 row = start + first;
@@ -308,12 +374,27 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
     return count;
 }
 
-/* Kernels.above_ground: of n points, x, y, z and reflectance of each, those within bounds, and the histogram of their
- * heights, which is 0 before. Returns how many points there are. `height_m` is that of the sensor above ground. */
-EXPORT i64 modt_above_ground(const Ground *g, const u4 *points, i64 n, float height_m, void *memory,
-                             const AboveGround *out)
+/* The low points, after the `count` others. */
+static void append_low(const GroundScratch *s, const u4 *points, i64 count, i64 n_low, const AboveGround *out)
 {
-    i64 cells = g->rings * g->sectors, count = 0;
+    float *const *kept = out->kept;
+    for (i64 k = 0; k < n_low; k++) {
+        i64 row = out->low_rows[k], at = count + k;
+        out->rows[at] = row;
+        for (int v = 0; v < 3; v++)
+            kept[v][at] = points[row][v];
+        kept[3][at] = s->sqrt_range[row];
+        kept[4][at] = s->z[row] - s->surface[s->cell[row]];
+    }
+}
+
+/* Kernels.above_ground: of n points, x, y, z and reflectance of each, those within bounds, and the histogram of their
+ * heights, which is 0 before. Counts those within bounds, and the low ones after them. `height_m` is that of the
+ * sensor above ground. */
+EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float height_m, void *memory,
+                              const AboveGround *out, i64 counts[2])
+{
+    i64 cells = g->rings * g->sectors, count = 0, n_low = 0;
     GroundScratch scratch, *s = &scratch;
     place_scratch(g, n, memory, s);
     for (i64 k = 0; k < cells; k++)
@@ -323,17 +404,21 @@ EXPORT i64 modt_above_ground(const Ground *g, const u4 *points, i64 n, float hei
         place_points(g, points + i, m, s->z + i, s->sqrt_range + i, s->cell + i);
         find_ends(g, height_m, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
     }
+    measure_roughness(g, s);
     for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* far away, right behind it */
         s->ends[k][1] = minf(s->ends[k][1], s->ends[k + g->sectors][1]);
     trace(g, height_m, s);
     interpolate(g, s);
     smooth(g, s);
     s->surface[cells] = INFINITY; /* above all points out of bounds of range */
+    s->clear[cells] = INFINITY;
     for (i64 i = 0; i < n; i += BLOCK)
-        count = keep_points(g, s, points, i, n - i < BLOCK ? n - i : BLOCK, count, out);
+        count = keep_points(g, s, points, i, n - i < BLOCK ? n - i : BLOCK, count, &n_low, out);
     const float *height = out->kept[4];
     for (i64 k = 0; k < count; k++)
         if (height[k] > g->above_m)
             out->histogram[(i32)((height[k] - g->above_m) / g->bin_m)]++;
-    return count;
+    append_low(s, points, count, n_low, out);
+    counts[0] = count;
+    counts[1] = n_low;
 }

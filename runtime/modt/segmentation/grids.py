@@ -39,6 +39,11 @@ class PointColumns:
         """Rows by index."""
         return type(self)(self.x.take(rows), self.y.take(rows), self.z.take(rows), self.sqrt_range.take(rows))
 
+    def part(self, first: int, end: int) -> Self:
+        """Rows from `first` to before `end`."""
+        rows = slice(first, end)
+        return type(self)(self.x[rows], self.y[rows], self.z[rows], self.sqrt_range[rows])
+
     def xyz(self) -> Float32:
         """(N, 3) positions [m]."""
         return np.stack([self.x, self.y, self.z], axis=1)

@@ -13,6 +13,9 @@ from modt.segmentation.groups import label_max, label_min
 from modt.segmentation.tuning import GroundTuning, PolarGridTuning, SensorHeightTuning
 from modt.types import Bool, Float32, Int
 
+QUARTERS = 4
+"""Parts of a ring over which the roughness of the ground is measured."""
+
 
 class HeightEstimator:
     """Mode of the depths of flat cells around the sensor, median over the first sweeps.
@@ -96,21 +99,55 @@ class GroundEstimator:
         self.flat_m: Float32 = self.grid.flat_m.astype(np.float32)
         self.bonnet_ring = int(np.searchsorted(self.grid.range_m, tuning.bonnet_range_m))
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
+        # (near rings,) sectors to the left and right of a cell that a low thing does not reach.
+        near_m = self.grid.range_m[self.grid.range_m < tuning.low_range_m]
+        sectors = np.rint(tuning.low_half_width_m / (2 * np.pi / SECTORS * near_m))
+        self.low_sectors = np.clip(sectors, tuning.flank_sectors, SECTORS // 4).astype(np.int32)
+        self.near_rings = len(near_m)
         steepest_rad = np.deg2rad(max_slope_deg)
         self.max_slope, self.ramp_slope = np.tan([steepest_rad, tuning.ramp_share * steepest_rad]).tolist()
 
     def height_above(self, points: PointColumns, sensor_height_m: float) -> Float32:
         """(N,) height of each point above the ground [m]."""
+        return self.heights(points, sensor_height_m)[0]
+
+    def heights(self, points: PointColumns, sensor_height_m: float) -> tuple[Float32, Float32]:
+        """(N,) height of each point above the ground, and (N,) height there from which it is clear of it [m].
+
+        The latter is infinite in a cell in which no return is.
+        """
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
+        highest = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS)
+        clear_m = self.clear_m(lowest, highest)
         is_ground, is_ramp, slope = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
         surface = _median_across(self._interpolate(lowest, is_ground, slope, sensor_height_m))
         # The ground under a vehicle, and under what stands on a ramp, is that of the rays beside it.
         beside = _median_across(surface, self.tuning.flank_sectors)
         flank = surface - beside > self.tuning.flank_m
         np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))
+        # So is the ground under low things, which seem a rise of it.
+        for ring, sectors in enumerate(self.low_sectors):
+            beside = _median_across(surface[[ring]], sectors)[0]
+            raised = (surface[ring] - beside > self.tuning.low_m) & ~is_ramp[ring]
+            np.copyto(surface[ring], beside, where=raised)
+        clear_m[highest - surface <= clear_m] = np.inf
         height: Float32 = points.z - surface.ravel().take(cell)
-        return height
+        return height, clear_m.ravel().take(cell)
+
+    def clear_m(self, lowest: Float32, highest: Float32) -> Float32:
+        """(rings, SECTORS) height above the ground from which returns are clear of it [m].
+
+        It follows the measured roughness: the height range of the returns of a cell, in the median of the cells of
+        the same ring and quarter of the circle. Where things stand in most of these, that is much.
+        """
+        shape = len(lowest), QUARTERS, SECTORS // QUARTERS
+        ranges = np.where(np.isfinite(lowest), highest - lowest, np.inf).reshape(shape)
+        ranges.sort(axis=2)  # cells without returns come last
+        last = np.maximum(np.isfinite(ranges).sum(axis=2, keepdims=True) - 1, 0)
+        median = np.take_along_axis(ranges, last // 2, axis=2)
+        clear_m = np.float32(self.tuning.clear_m) + median
+        return np.broadcast_to(clear_m, shape).reshape(lowest.shape).copy()
 
     def _lowest(self, points: PointColumns, cell: Int, sensor_height_m: float) -> Float32:
         """(rings, SECTORS) lowest return of each cell that can be ground [m], infinite without any."""

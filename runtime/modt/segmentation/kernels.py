@@ -13,7 +13,7 @@ from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
 from modt.segmentation.strips import merge_strips, view_bounds
-from modt.types import Float32, Int, Int8, PointKind
+from modt.types import Bool, Float32, Int, Int8, PointKind
 
 
 class Bounds(NamedTuple):
@@ -26,13 +26,22 @@ class Bounds(NamedTuple):
 
 
 class Above(NamedTuple):
-    """K of the N points of a sweep: those above the ground, within bounds of height and range."""
+    """K of the N points of a sweep: those above the ground, within bounds of height and range.
 
-    rows: Int  # (K,) rows of the sweep
-    points: PointColumns  # (K,)
-    height_m: Float32  # (K,) above the ground
-    histogram: Int  # (bins,) of the heights, in which a ceiling shows
-    kind: Int8  # (N,) PointKind of all points; MEMBER of the K
+    Then come L low ones, which lie below the least height but may belong to something.
+    """
+
+    rows: Int  # (K + L,) rows of the sweep
+    points: PointColumns  # (K + L,)
+    height_m: Float32  # (K + L,) above the ground
+    is_clear: Bool  # (L,) low points that are clear of the roughness of the ground
+    histogram: Int  # (bins,) of the heights of the K, in which a ceiling shows
+    kind: Int8  # (N,) PointKind of all points; MEMBER of the K, GROUND of the L
+
+    @property
+    def n_tall(self) -> int:
+        """K."""
+        return len(self.rows) - len(self.is_clear)
 
 
 class Kernels(GeometryKernels):
@@ -53,15 +62,19 @@ class Kernels(GeometryKernels):
     ) -> Above:
         """Those of (N, 4) or wider points within bounds."""
         sweep = PointColumns.from_array(points)
-        height = ground.height_above(sweep, sensor_height_m)
+        height, clear_m = ground.heights(sweep, sensor_height_m)
         in_range = (sweep.sqrt_range > bounds.min_sqrt_range) & (sweep.sqrt_range < bounds.max_sqrt_range)
         kind = np.full(len(points), PointKind.OUT_OF_RANGE, np.int8)
         kind[in_range] = PointKind.GROUND
         kind[in_range & (height > bounds.min_height_m)] = PointKind.MEMBER
         kind[in_range & (height >= bounds.max_height_m)] = PointKind.OVERHEAD
         rows = np.flatnonzero(kind == PointKind.MEMBER)
-        height = height.take(rows)
-        return Above(rows, sweep.take(rows), height, ceiling.histogram(height), kind)
+        histogram = ceiling.histogram(height.take(rows))
+        foot_m = np.maximum(np.float32(ground.tuning.foot_share) * clear_m, np.float32(ground.tuning.min_foot_m))
+        low = np.flatnonzero((kind == PointKind.GROUND) & (height > foot_m) & np.isfinite(clear_m))
+        is_clear = height.take(low) > clear_m.take(low)
+        rows = np.concatenate([rows, low])
+        return Above(rows, sweep.take(rows), height.take(rows), is_clear, histogram, kind)
 
 
 NUMPY = Kernels()

@@ -30,7 +30,7 @@ from modt.native.library import (
 from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, Members
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
-from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.ground import QUARTERS, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Above, Bounds, Kernels
 from modt.segmentation.strips import DIRECTION, ViewBounds
@@ -52,11 +52,16 @@ GROUND = Layout(
     **_members(Number(_i32), "rings", "sectors", "flank_sectors", "bonnet_ring"),
     **_members(Number(_f32), "far_m", "rings_per_unit", "max_slope", "ramp_slope", "near_m", "slope_gain", "noise_m"),
     **_members(Number(_f32), "max_gap_m", "flank_m", "above_m", "bin_m", *Bounds._fields),
+    low_sectors=Array(_i32, "near_rings"),
+    **_members(Number(_i32), "near_rings", "quarters"),
+    **_members(Number(_f32), "low_m", "clear_m", "foot_share", "min_foot_m"),
 )
 ABOVE_GROUND = Layout(
     "AboveGround",
     rows=Array(_i64, "room"),
     kept=Rows(_f32, 5, "room"),
+    low_rows=Array(_i64, "room"),
+    is_clear=Array(np.bool_, "room"),
     histogram=Array(_i64, "bins"),
     kind=Array(_i8, "room"),
 )
@@ -96,7 +101,7 @@ MEMBERS = Layout("Members", offsets=Array(_i64, "ends"), index=Array(_i64, "room
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
 _SIGNATURES: Signatures = {
     "modt_ground_scratch": (_L, (GROUND, _L)),
-    "modt_above_ground": (_L, (GROUND, FLOAT32, _L, _F, OutputArgument, ABOVE_GROUND)),
+    "modt_above_ground": (None, (GROUND, FLOAT32, _L, _F, OutputArgument, ABOVE_GROUND, OutputArgument)),
     "modt_occupied_cells": (
         _L,
         (POINT_COLUMNS, FLOAT32, _L, GRID, OutputArgument, POINT_COLUMNS, OutputArgument, CELLS),
@@ -143,7 +148,7 @@ def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
 
 def _ground(ground: GroundEstimator, ceiling: CeilingFinder, bounds: Bounds) -> Filled:
     sources = bounds, ground, ground.tuning, ground.grid, ceiling.tuning
-    return _filled(GROUND, *sources, sectors=SECTORS, far_m=FAR_M)
+    return _filled(GROUND, *sources, sectors=SECTORS, quarters=QUARTERS, far_m=FAR_M, clear_m=ground.tuning.clear_m)
 
 
 def _grid(grid: SqrtRangeGrid) -> Filled:
@@ -181,14 +186,17 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         n = len(points)
         structure = self._structure(_ground, ground, ceiling, bounds)
         scratch = self._memory(self.library.modt_ground_scratch(structure, n))
-        rows = np.empty(n + 1, np.int64)
+        rows, low_rows = np.empty((2, n + 1), np.int64)
         kept = np.empty((5, n + 1), np.float32)
+        is_clear = np.empty(n + 1, np.bool_)
         histogram = np.zeros(ceiling.bins, np.int64)
         kind = np.empty(n + 1, np.int8)
-        out = ABOVE_GROUND(rows=rows, kept=kept, histogram=histogram, kind=kind)
-        k = self.library.modt_above_ground(structure, points, n, sensor_height_m, scratch, out)
-        *columns, height = kept[:, :k]
-        return Above(rows[:k], PointColumns(*columns), height, histogram, kind[:n])
+        out = ABOVE_GROUND(rows=rows, kept=kept, low_rows=low_rows, is_clear=is_clear, histogram=histogram, kind=kind)
+        counts = np.empty(2, np.int64)
+        self.library.modt_above_ground(structure, points, n, sensor_height_m, scratch, out, counts)
+        n_tall, n_low = counts.tolist()
+        *columns, height = kept[:, : n_tall + n_low]
+        return Above(rows[: n_tall + n_low], PointColumns(*columns), height, is_clear[:n_low], histogram, kind[:n])
 
     def occupied_cells(
         self, grid: SqrtRangeGrid, points: PointColumns, height: Float32

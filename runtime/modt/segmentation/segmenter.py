@@ -15,9 +15,10 @@ from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, Groups, has_reflectance
 from modt.segmentation.kernels import NUMPY, Above, Bounds, Kernels
+from modt.segmentation.low import LowFinder
 from modt.segmentation.tuning import SegmentationTuning
 from modt.segmentation.view_ends import ViewEnds
-from modt.types import NONE, Bool, Cut, Float32, Float64, PointKind, Proposals
+from modt.types import NONE, Bool, Cut, Float32, Float64, Int, Int8, PointKind, Proposals
 
 
 class Segmenter:
@@ -49,6 +50,7 @@ class Segmenter:
         self.ground = GroundEstimator(sensor, config.max_slope_deg, tuning.ground, tuning.polar)
         self.ceiling = CeilingFinder(config.max_height_m, tuning.ceiling)
         self.clusterer = Clusterer(sensor, config, kernels, tuning)
+        self.low = LowFinder(sensor, config, kernels, tuning.low)
         self.ends = ViewEnds(sensor, tuning.split.person.max_top_m, tuning.view_ends)
 
     def facts(self) -> dict[str, str]:
@@ -60,17 +62,23 @@ class Segmenter:
         above = self._above_ground_in_view(points)
         if not len(above.rows):
             return Proposals.empty(above.kind)
-        clusters = self.clusterer.cluster(above.points, above.height_m)
-        depth = None if self.fov.full else self.fov.depth(clusters.sampled.xyz())
-        if depth is not None:
-            clusters = clusters.select(self._in_view(clusters, depth), PointKind.OUT_OF_VIEW)
-        members = self.kernels.members_of(clusters, above.rows, above.kind)
+        n_tall = above.n_tall
+        tall = self._seen(self.clusterer.cluster(above.points.part(0, n_tall), above.height_m[:n_tall]))
+        low = self.low.find(above, tall)
+        proposals = self._proposals(points, tall, above.rows[:n_tall], above.kind)
+        low_proposals = self._proposals(points, self._seen(low.clusters), above.rows.take(low.places), above.kind)
+        return proposals.followed_by(low_proposals, above.rows.take(low.feet)).lock()
+
+    def _proposals(self, points: Float32, clusters: Clusters, rows: Int, kind: Int8) -> Proposals:
+        """Proposals of clusters of the points at (P,) rows of the sweep; their kinds go into (N,) its kinds."""
+        members = self.kernels.members_of(clusters, rows, kind)
         if not clusters.n:
-            return Proposals.empty(above.kind)
+            return Proposals.empty(kind)
         cells_of_cluster = self.kernels.group(clusters.cluster_of_cell, clusters.n)
         box = self._boxes(clusters.sampled, cells_of_cluster, members)
         cut = self.ends.cut(members.columns[:3], members.offsets, box)
-        if depth is not None:
+        if not self.fov.full:
+            depth = self.fov.depth(clusters.sampled.xyz())
             cut |= Cut.SIDE * self._reaches_end_of_margin(cells_of_cluster, depth)
         mean = self.kernels.group_sums(members.columns, members.offsets) / np.diff(members.offsets)
         return Proposals(
@@ -82,8 +90,8 @@ class Segmenter:
             cut=cut,
             ground_z_m=mean[3],
             reflectance=self._reflectance(points, members),
-            kind=above.kind,
-        ).lock()
+            kind=kind,
+        )
 
     def sensor_height_m(self, points: Float32) -> float:
         """Height of the sensor [m]: of the profile, or estimated where the profile has none."""
@@ -101,7 +109,7 @@ class Segmenter:
         above.kind[above.rows[~below]] = PointKind.OVERHEAD
         kept = np.flatnonzero(below)
         rows = above.rows.take(kept)
-        return Above(rows, above.points.take(kept), above.height_m.take(kept), above.histogram, above.kind)
+        return above._replace(rows=rows, points=above.points.take(kept), height_m=above.height_m.take(kept))
 
     def _above_ground_in_view(self, points: Float32) -> Above:
         """`above_ground`, restricted to the view and its margin."""
@@ -113,10 +121,14 @@ class Segmenter:
         kind[region] = above.kind
         return above._replace(rows=region[above.rows], kind=kind)
 
-    def _in_view(self, clusters: Clusters, depth: Float32) -> Bool:
-        """(n,) clusters in the field of view or close to it, given the (C,) depth of each cell in it [m]."""
-        seen = (depth > -self.tuning.view.in_view_m) & (clusters.cluster_of_cell != NONE)
-        return np.bincount(clusters.cluster_of_cell[seen], minlength=clusters.n) > 0
+    def _seen(self, clusters: Clusters) -> Clusters:
+        """The clusters in the field of view or close to it."""
+        if self.fov.full:
+            return clusters
+        seen = self.fov.depth(clusters.sampled.xyz()) > -self.tuning.view.in_view_m
+        seen &= clusters.cluster_of_cell != NONE
+        is_seen = np.bincount(clusters.cluster_of_cell[seen], minlength=clusters.n) > 0
+        return clusters.select(is_seen, PointKind.OUT_OF_VIEW)
 
     def _boxes(self, cells: PointColumns, cells_of_cluster: Groups, members: Members) -> Float64:
         """(n, 7) boxes about the members of the clusters, at the heading that suits their (C,) cells."""

@@ -70,6 +70,22 @@ class GroundTuning:
     """Sectors to the left and right of a ray whose median bounds its surface. Chosen on: KITTI scans."""
     flank_m: float = 0.25
     """Height above that median from which a surface is the side of a vehicle [m]. Chosen on: KITTI scans."""
+    low_m: float = 0.08
+    """Height above the median of the surface beside it from which a surface is the top of a low thing [m].
+    More takes people who lie for ground. Chosen on: simulated halls."""
+    low_half_width_m: float = 1.2
+    """Distance to the left and right of a ray at which that median is taken [m]. Less takes people who lie for
+    ground. Chosen on: simulated halls."""
+    low_range_m: float = 12.0
+    """Range up to which it is taken [m]. Chosen on: simulated halls."""
+    clear_m: float = 0.06
+    """Height above the roughness of the ground from which a return is clear of it [m]. Less finds things in rough
+    ground that are not there. Chosen on: simulated lawns, hills and halls."""
+    foot_share: float = 0.5
+    """Share of that height from which returns near something that is clear of the ground belong to it. Less takes
+    ground for feet. Chosen on: simulated people."""
+    min_foot_m: float = 0.03
+    """Least height of such a return [m]. Chosen on: the range noise of common sensors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +160,23 @@ class ClusterTuning:
     min_part_top_m: float = 0.9
     """Height of the top of such a part above the ground [m]; lower ones are pieces of hedges.
     Chosen on: KITTI scans."""
+
+
+@dataclass(frozen=True, slots=True)
+class LowTuning:
+    """Things lower than `clearance_m`, and feet of what is higher."""
+
+    max_range_m: float = 15.0
+    """Range up to which a low thing is a proposal [m]. Farther away few beams meet it. Chosen on: simulated halls."""
+    max_extent_m: float = 3.0
+    """Greatest extent of a low thing that is a proposal [m]; longer ones are kerbs. Chosen on: judgement."""
+    max_foot_m: float = 0.6
+    """Extent up to which all of a low group beside something tall is its foot [m]. Chosen on: judgement."""
+    sparse_top_m: float = 0.25
+    """Height from which a group of few points is above the ground [m]; lower ones are rough ground.
+    Chosen on: judgement."""
+    sparse_range_m: float = 3.0
+    """Range up to which the smallest low group is above the ground [m]. Chosen on: judgement."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,6 +257,7 @@ class SegmentationTuning:
     cells: CellTuning = CellTuning()
     split: SplitTuning = SplitTuning()
     clusters: ClusterTuning = ClusterTuning()
+    low: LowTuning = LowTuning()
     strips: StripTuning = StripTuning()
     view: ViewTuning = ViewTuning()
     heading: HeadingTuning = HeadingTuning()
