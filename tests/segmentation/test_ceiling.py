@@ -9,37 +9,56 @@ from modt.config import SegmentationConfig
 from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.segmentation.ceiling import CeilingFinder
+from modt.segmentation.grids import SECTORS
+from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.segmenter import Segmenter
+from modt.types import PointKind
 from modt_simulation.synthetic_stream import SyntheticStream
+from tests.segmentation import scans
 
 RNG = np.random.default_rng(0)
-CEILING = CeilingFinder(2.6)
-WALLS = RNG.uniform(0.3, 2.6, 2000)
+GROUND = GroundEstimator(load("vlp-16").sensor, 16.0)
+CEILING = CeilingFinder(GROUND, 2.6)
+RINGS = GROUND.grid.rings
+
+
+def tops(height_m):
+    """(RINGS, SECTORS) tops of cells [m], by their (SECTORS, rings) heights; NaN where there is no return."""
+    return np.where(np.isnan(height_m), -np.inf, height_m).astype(np.float32).T
+
+
+def seen_from(first, last, height_m):
+    """Heights in every other ring of a range of rings, as beams meet a ceiling."""
+    height = np.full((SECTORS, RINGS), np.nan)
+    height[:, first:last:2] = height_m
+    return height
+
+
+@pytest.mark.parametrize("ceiling_m", [1.95, 2.0, 2.3, 2.6, 2.9])
+def test_a_ceiling_is_as_high_in_one_cell_of_a_ray_as_in_the_next(ceiling_m):
+    uneven = seen_from(14, 26, ceiling_m) + RNG.normal(0, 0.02, (SECTORS, RINGS))
+    assert CEILING.height_m(tops(uneven), 0.0) == pytest.approx(ceiling_m, abs=0.02)
+
+
+def test_a_slope_of_five_percent_is_a_ceiling():
+    slope = seen_from(14, 24, 2.3) + 0.05 * GROUND.grid.range_m
+    assert 2.4 < CEILING.height_m(tops(slope), 0.0) < 3.0
 
 
 @pytest.mark.parametrize(
-    ("ceiling_m", "n", "cut_m"),
+    "height_m",
     [
-        *((ceiling_m, 4000, (ceiling_m - 0.35, ceiling_m - 0.14)) for ceiling_m in (2.3, 2.4, 2.5, 2.62)),
-        *((ceiling_m, n, None) for ceiling_m, n in ((2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000))),
+        np.full((SECTORS, RINGS), np.nan),
+        np.where(np.arange(SECTORS)[:, None] < 8, seen_from(14, 20, 2.3), np.nan),
+        seen_from(20, 21, 2.2),
+        seen_from(14, 26, RNG.uniform(1.9, 6.0, (SECTORS, 6))),
+        seen_from(14, 26, 1.75),
+        seen_from(14, 26, 3.2),
     ],
+    ids=["nothing", "a lintel", "a wall", "trees", "cars", "a hall"],
 )
-def test_a_ceiling_is_cut_just_below_but_few_returns_doors_and_what_is_higher_are_none(ceiling_m, n, cut_m):
-    """Some returns of a ceiling lie 0.1 m below it."""
-    height = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.02, n)]).astype(np.float32)
-    limit_m = CEILING.within_m(CEILING.histogram(height[height < 2.6]))
-    assert (limit_m is None) if cut_m is None else (cut_m[0] < limit_m < cut_m[1])
-    assert CEILING.within_m(CEILING.histogram(np.zeros(0, np.float32))) is None
-
-
-@pytest.mark.parametrize(
-    ("ceiling_m", "n", "is_cut"),
-    [*((2.55 + 0.1 * k, 4000, True) for k in range(4)), (3.2, 4000, False), (2.65, 100, False), (2.65, 0, False)],
-)
-def test_a_ceiling_about_the_greatest_height_used_is_cut_well_below(ceiling_m, n, is_cut):
-    level = np.concatenate([WALLS, RNG.normal(ceiling_m, 0.05, n)]).astype(np.float32)
-    limit_m = CEILING.limit_m(np.zeros(CEILING.bins, np.int64), level, 0.0)
-    assert (2.3 < limit_m < 2.5) if is_cut else (limit_m is None)
+def test_what_is_small_met_once_uneven_low_or_high_is_no_ceiling(height_m):
+    assert CEILING.height_m(tops(height_m), 0.0) is None
 
 
 def stage_of(sensor, height_m):
@@ -52,6 +71,36 @@ def test_the_lowest_returns_of_a_ceiling_above_the_greatest_height_used_join_nob
     stage = stage_of("mid-360", 0.3)
     for frame in SyntheticStream("hall", "mid-360", 4.0, 2101, height_m=0.3).between(8, 10):
         assert stage.above_ground(frame.points).height_m.max() < 2.5
+
+
+PERSON = (5.0, 0.0, 0.4, 0.5, 0.0, 1.75)
+
+
+@pytest.mark.parametrize(
+    ("overhead", "height_m"),
+    [
+        ([(0, 0, 40, 40, 2.0, 2.2)], 0.8),
+        ([(0, 0, 40, 40, 2.1, 2.3), (0, 2, 40, 0.3, 1.95, 2.1)], 0.8),
+        ([(0, 0, 40, 40, 2.3, 2.5), (5, 0, 0.3, 10, 2.1, 2.3), (0, 0.2, 40, 0.1, 2.15, 2.25)], 0.8),
+        ([(x, 0, 2, 40, 2.4 + 0.05 * x, 2.6 + 0.05 * x) for x in range(-9, 20, 2)], 0.8),
+        ([(0, 0, 40, 40, 2.1, 2.3)], 1.7),
+    ],
+    ids=["low", "beam", "beam and pipe", "slope", "high sensor"],
+)
+def test_a_person_stands_apart_from_the_ceiling_and_what_hangs_from_it(overhead, height_m):
+    points, on = scans.scan([PERSON, *overhead], height_m, elevation=scans.VLP_16)
+    proposals = stage_of("vlp-16", height_m).segment(points)
+    (own,) = set(proposals.label(len(points))[(on == 1) & (points[:, 2] > 0.4 - height_m)].tolist())
+    members = proposals.members[proposals.offsets[own] : proposals.offsets[own + 1]]
+    assert (on[members] == 1).all()
+    assert (proposals.kind[(on > 1) & (points[:, 2] > 2.0 - height_m)] == PointKind.OVERHEAD).mean() > 0.99
+
+
+def test_the_roofs_of_vans_below_a_high_sensor_are_no_ceiling():
+    vans = [(x, y, 5.0, 2.0, 0.3, 2.0) for x in (-12, -6, 6, 12) for y in (-9, -6, -3, 3, 6, 9)]
+    points, on = scans.scan(vans, 2.8, elevation=np.deg2rad(np.linspace(-25, 15, 64)))
+    kind = stage_of("os1-64", 2.8).segment(points).kind
+    assert not (kind[on > 0] == PointKind.OVERHEAD).any()
 
 
 @pytest.mark.slow
@@ -75,5 +124,5 @@ def test_a_street_has_no_ceiling():
     config = SegmentationConfig()
     stage = Segmenter(config, load("os1-64").sensor, FieldOfView())
     for frame in SyntheticStream("street", "os1-64", 0.3, 901):
-        bounded = stage.kernels.above_ground(stage.ground, stage.ceiling, frame.points, 1.0, stage.bounds)
+        bounded = stage.kernels.above_ground(stage.ground, frame.points, 1.0, stage.bounds)
         assert stage.above_ground(frame.points).rows.tolist() == bounded.rows.tolist()

@@ -30,9 +30,10 @@ from modt.tracking.extent import extent_update_of
 from modt.tracking.kalman import filter_of
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
-from modt.types import NONE, UNRECORDED
+from modt.types import NONE, UNRECORDED, PointKind
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs
+from tests.segmentation import scans
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_cells import cloud
 from tests.tracking.tracking_scenes import frame_of, tracks_at
@@ -121,6 +122,16 @@ def test_rows_of_any_width_and_order(kernels):
     assert same(both(kernels, points), both(kernels, wide[:, :4]))
     with pytest.raises(ValueError, match="x, y, z and reflectance"):
         both(kernels, np.ascontiguousarray(points[:, :3]))
+
+
+def test_the_points_of_a_ceiling(kernels):
+    points, _ = scans.scan([(5, 0, 0.4, 0.5, 0, 1.75), (0, 0, 40, 40, 2.0, 2.2)], 0.8, elevation=scans.VLP_16)
+    kinds = both(kernels, points, SensorConfig(height_m=0.8)).kind
+    assert (kinds == PointKind.OVERHEAD).sum() > 1000
+    numpy, native = (
+        Segmenter(SegmentationConfig(), SensorConfig(height_m=0.8), FULL, each) for each in (NUMPY, kernels)
+    )
+    assert same(numpy.above_ground(points), native.above_ground(points))
 
 
 def test_every_value_of_the_tuning_reaches_both_kernels_alike(kernels):

@@ -1,4 +1,4 @@
-/* Points above the ground: GroundEstimator, CeilingFinder.histogram and Kernels.above_ground in one go.
+/* Points above the ground: GroundEstimator and Kernels.above_ground in one go.
  *
  * Order of the passes of a sweep of n points:
  *   1. place_points    columns of the points, and the cell of each on the polar grid
@@ -14,14 +14,13 @@
  */
 #include "kernels.h"
 
-/* GroundEstimator, GroundTuning, PolarGrid, CeilingTuning and Bounds: values by the names that they have there. */
+/* GroundEstimator, GroundTuning, PolarGrid and Bounds: values by the names that they have there. */
 typedef struct {
     const float *range_m, *flat_m; /* (rings,) middle; height range of a cell above which something stands in it */
     i32 rings, sectors, flank_sectors, bonnet_ring; /* sectors are a power of two */
     float far_m;                                    /* points as far away have no position */
     float rings_per_unit;                           /* of the square root of range */
     float max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
-    float above_m, bin_m;                                            /* begin and width of the bins of heights */
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
     const i32 *low_sectors; /* (near_rings,) sectors to the left and right that a low thing does not reach */
     i32 near_rings, quarters;
@@ -31,7 +30,7 @@ typedef struct {
 /* Scratch: a value a cell, a value a ray, and a value a point. */
 typedef struct {
     float *lowest, *surface, *range_before; /* (cells,) range_before: of the ground cell before each cell [m] */
-    float *highest, *clear;                 /* (cells,) highest return; height from which one is clear of the ground */
+    float *clear;                           /* (cells,) height from which a return is clear of the ground */
     float (*ends)[2];                       /* (cells,) lowest return, and the highest, negated, side by side */
     uint8_t *kind;                          /* (cells,) flags of Kind */
     float *rays;                            /* (4 * sectors,) */
@@ -47,7 +46,6 @@ static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
     TAKE(&end, s->lowest, cells);
     TAKE(&end, s->surface, cells);
     TAKE(&end, s->range_before, cells);
-    TAKE(&end, s->highest, cells);
     TAKE(&end, s->clear, cells);
     TAKE(&end, s->ends, cells);
     TAKE(&end, s->kind, cells);
@@ -69,7 +67,7 @@ typedef struct {
     float *kept[5]; /* (room,) x, y, z, square root of range, and height above ground */
     i64 *low_rows;     /* (room,) scratch: rows of the low points */
     uint8_t *is_clear; /* (room,) low points that are clear of the roughness of the ground */
-    i64 *histogram;    /* (bins,) of the heights, without the low ones */
+    float *top;        /* (rings, sectors) highest return of each polar cell */
     int8_t *kind;      /* (room,) PointKind of all points */
 } AboveGround;
 
@@ -164,16 +162,16 @@ static float median_of(float *numbers, i32 n)
     return n ? numbers[(n - 1) / 2] : INFINITY;
 }
 
-/* GroundEstimator.clear_m. Keeps the highest returns, too. `rays` is scratch. */
-static void measure_roughness(const Ground *g, const GroundScratch *s)
+/* GroundEstimator.clear_m, and the highest return of each cell. `rays` is scratch. */
+static void measure_roughness(const Ground *g, const GroundScratch *s, float *top)
 {
     i32 in_quarter = g->sectors / g->quarters, cells = g->rings * g->sectors;
     float *ranges = s->rays;
     for (i32 first = 0; first < cells; first += in_quarter) {
         i32 n = 0;
         for (i32 k = first; k < first + in_quarter; k++) {
-            s->highest[k] = -s->ends[k][1];
-            ranges[n] = s->highest[k] - s->ends[k][0]; /* overwritten by the next, unless there is a lowest return */
+            top[k] = -s->ends[k][1];
+            ranges[n] = top[k] - s->ends[k][0]; /* overwritten by the next, unless there is a lowest return */
             n += s->ends[k][0] < INFINITY;
         }
         float clear_m = g->clear_m + median_of(ranges, n);
@@ -292,7 +290,7 @@ static void median_across(i32 sectors, i32 step, const float *row, float *restri
 }
 
 /* The end of GroundEstimator.heights: medians across the rays, and the ground beside what stands or lies on it. */
-static void smooth(const Ground *g, const GroundScratch *s)
+static void smooth(const Ground *g, const GroundScratch *s, const float *top)
 {
     i32 sectors = g->sectors, cells = g->rings * sectors;
     float *median = s->rays, *beside = median + sectors, *round = beside + sectors; /* the last has two rows */
@@ -313,7 +311,7 @@ static void smooth(const Ground *g, const GroundScratch *s)
             }
         }
         for (i32 k = row; k < row + sectors; k++)
-            s->clear[k] = s->highest[k] - s->surface[k] <= s->clear[k] ? INFINITY : s->clear[k];
+            s->clear[k] = top[k] - s->surface[k] <= s->clear[k] ? INFINITY : s->clear[k];
     }
 }
 
@@ -388,8 +386,8 @@ static void append_low(const GroundScratch *s, const u4 *points, i64 count, i64 
     }
 }
 
-/* Kernels.above_ground: of n points, x, y, z and reflectance of each, those within bounds, and the histogram of their
- * heights, which is 0 before. Counts those within bounds, and the low ones after them. `height_m` is that of the
+/* Kernels.above_ground: of n points, x, y, z and reflectance of each, those within bounds, and the tops of the
+ * cells. Counts those within bounds, and the low ones after them. `height_m` is that of the
  * sensor above ground. */
 EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float height_m, void *memory,
                               const AboveGround *out, i64 counts[2])
@@ -404,20 +402,16 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
         place_points(g, points + i, m, s->z + i, s->sqrt_range + i, s->cell + i);
         find_ends(g, height_m, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
     }
-    measure_roughness(g, s);
+    measure_roughness(g, s, out->top);
     for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* far away, right behind it */
         s->ends[k][1] = minf(s->ends[k][1], s->ends[k + g->sectors][1]);
     trace(g, height_m, s);
     interpolate(g, s);
-    smooth(g, s);
+    smooth(g, s, out->top);
     s->surface[cells] = INFINITY; /* above all points out of bounds of range */
     s->clear[cells] = INFINITY;
     for (i64 i = 0; i < n; i += BLOCK)
         count = keep_points(g, s, points, i, n - i < BLOCK ? n - i : BLOCK, count, &n_low, out);
-    const float *height = out->kept[4];
-    for (i64 k = 0; k < count; k++)
-        if (height[k] > g->above_m)
-            out->histogram[(i32)((height[k] - g->above_m) / g->bin_m)]++;
     append_low(s, points, count, n_low, out);
     counts[0] = count;
     counts[1] = n_low;

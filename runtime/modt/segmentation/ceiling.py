@@ -4,70 +4,75 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.kernels import NUMPY, Above, Bounds, Kernels
 from modt.segmentation.tuning import CeilingTuning
-from modt.types import Float32, Int
+from modt.types import Bool, Float32
 
 
 class CeilingFinder:
-    """Height up to which objects reach under a ceiling, by the heights of the returns above people's heads.
+    """Returns of the ceiling and of what is fixed to it.
+
+    Turned over, a ceiling is ground: it is traced outwards from above the sensor, so it may slope.
 
     Args:
+        ground: tracing of ground.
         max_height_m: greatest height above ground at which returns are used.
-        tuning: bounds on the heights and the number of returns of a ceiling.
+        kernels: passes over points.
+        tuning: when there is a ceiling, and how far objects reach below it.
     """
 
-    def __init__(self, max_height_m: float, tuning: CeilingTuning = CeilingTuning()) -> None:
-        self.max_height_m = max_height_m
+    def __init__(
+        self,
+        ground: GroundEstimator,
+        max_height_m: float,
+        kernels: Kernels = NUMPY,
+        tuning: CeilingTuning = CeilingTuning(),
+    ) -> None:
+        self.ground = ground
+        self.kernels = kernels
         self.tuning = tuning
-        self.bins = max(0, int((max_height_m - tuning.above_m) / tuning.bin_m)) + 2
+        self.highest_m = max_height_m + tuning.grazed_m
+        self.below = Bounds(tuning.clearance_m, np.inf, 0.0, np.inf)
 
-    def histogram(self, height: Float32) -> Int:
-        """(bins,) returns in each bin of height from `above_m` on, by (K,) heights of returns above ground [m]."""
-        above = np.float32(self.tuning.above_m)
-        upper = height[height > above]
-        bin_ = ((upper - above) / np.float32(self.tuning.bin_m)).astype(np.int64)
-        return np.bincount(bin_, minlength=self.bins)
-
-    def limit_m(self, histogram: Int, z: Float32, sensor_height_m: float) -> float | None:
-        """Greatest height of objects above ground [m], None without a ceiling.
+    def overhead(self, points: Float32, above: Above, sensor_height_m: float) -> Bool | None:
+        """(K + L,) points above the ground that belong to a ceiling, None without one.
 
         Args:
-            histogram: (bins,) returns used, by height.
-            z: (N,) coordinates of all returns [m, sensor frame], with those too high to be used.
+            points: (N, 4) or wider sweep [m, sensor frame].
+            above: its points above the ground.
             sensor_height_m: height of the sensor above ground.
         """
-        limit_m = self.within_m(histogram)
-        if limit_m is None:
-            limit_m = self.grazing_m(z[:: self.tuning.stride], sensor_height_m)
-        return limit_m
+        ceiling_m = self.height_m(above.top, sensor_height_m)
+        if ceiling_m is None:
+            return None
+        overhead = above.height_m > self.tuning.lowest_m
+        upper = overhead.nonzero()[0]
+        turned = points[above.rows[upper], :4] * np.array([1, 1, -1, 1], np.float32)
+        below = self.kernels.above_ground(self.ground, turned, ceiling_m - sensor_height_m, self.below)
+        n_below = below.n_tall
+        upper = upper[below.rows[:n_below]]
+        is_fixture = below.height_m[:n_below] < self.tuning.fixture_m
+        overhead[upper] = (above.height_m[upper] > self.tuning.head_m) & is_fixture
+        return overhead
 
-    def within_m(self, histogram: Int) -> float | None:
-        """Limit under a ceiling that lies wholly within the heights used; None without one.
+    def height_m(self, top: Float32, sensor_height_m: float) -> float | None:
+        """Height of the ceiling above the ground at the sensor [m], None without one.
 
-        Most of the returns above people's heads are at one height there; on walls, trees and houses they spread.
+        Along a ray, the next top is about as high under a ceiling. A wall is met once, the tops of trees differ.
+
+        Args:
+            top: (rings, SECTORS) highest return of each polar cell [m, sensor frame].
+            sensor_height_m: height of the sensor above ground.
         """
         tuning = self.tuning
-        counted = int(histogram.sum())
-        if counted < tuning.min_returns:
+        top = np.ascontiguousarray(top.T)  # ray by ray
+        cell = np.flatnonzero(top > max(tuning.lowest_m - sensor_height_m, 0.0))  # a roof is seen from above
+        if len(cell) < tuning.min_cells:
             return None
-        in_two_bins = histogram[:-1] + histogram[1:]
-        in_two_bins[: round((tuning.lowest_m - tuning.above_m) / tuning.bin_m)] = 0
-        first = int(in_two_bins.argmax())
-        if in_two_bins[first] < tuning.min_share * counted:
+        upper = top.ravel().take(cell) + np.float32(sensor_height_m)
+        ray = cell // top.shape[1]
+        goes_on = (ray[1:] == ray[:-1]) & (np.abs(np.diff(upper)) < tuning.step_m) & (upper[1:] < self.highest_m)
+        if np.count_nonzero(goes_on) < tuning.min_share * len(cell):
             return None
-        if first and histogram[first - 1] > tuning.edge_share * in_two_bins[first]:
-            first -= 1
-        return tuning.above_m + tuning.bin_m * first - tuning.clearance_m
-
-    def grazing_m(self, z: Float32, sensor_height_m: float) -> float | None:
-        """Limit under a ceiling at about `max_height_m`, so only its lower returns are used; None without one."""
-        tuning = self.tuning
-        z = np.ascontiguousarray(z)
-        upper = z.compress(z > np.float32(tuning.above_m - sensor_height_m)) + np.float32(sensor_height_m)
-        on_ceiling = upper > self.max_height_m - tuning.grazed_below_m
-        on_ceiling &= upper < self.max_height_m + tuning.grazed_above_m
-        if tuning.stride * len(upper) < tuning.min_returns:
-            return None
-        if np.count_nonzero(on_ceiling) < tuning.min_share * len(upper):
-            return None
-        return self.max_height_m - tuning.grazed_clearance_m
+        return float(np.median(upper[1:][goes_on]))

@@ -111,10 +111,11 @@ class GroundEstimator:
         """(N,) height of each point above the ground [m]."""
         return self.heights(points, sensor_height_m)[0]
 
-    def heights(self, points: PointColumns, sensor_height_m: float) -> tuple[Float32, Float32]:
+    def heights(self, points: PointColumns, sensor_height_m: float) -> tuple[Float32, Float32, Float32]:
         """(N,) height of each point above the ground, and (N,) height there from which it is clear of it [m].
 
-        The latter is infinite in a cell in which no return is.
+        The latter is infinite in a cell in which no return is. With them comes the (rings, SECTORS) highest return of
+        each cell [m, sensor frame], minus infinity without any.
         """
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
@@ -133,7 +134,7 @@ class GroundEstimator:
             np.copyto(surface[ring], beside, where=raised)
         clear_m[highest - surface <= clear_m] = np.inf
         height: Float32 = points.z - surface.ravel().take(cell)
-        return height, clear_m.ravel().take(cell)
+        return height, clear_m.ravel().take(cell), highest
 
     def clear_m(self, lowest: Float32, highest: Float32) -> Float32:
         """(rings, SECTORS) height above the ground from which returns are clear of it [m].

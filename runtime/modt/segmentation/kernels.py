@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from modt.geometry.kernels import GeometryKernels
-from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.cells import CellClusterer, members_of, occupied_cells
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
@@ -35,7 +34,7 @@ class Above(NamedTuple):
     points: PointColumns  # (K + L,)
     height_m: Float32  # (K + L,) above the ground
     is_clear: Bool  # (L,) low points that are clear of the roughness of the ground
-    histogram: Int  # (bins,) of the heights of the K, in which a ceiling shows
+    top: Float32  # (rings, SECTORS) highest return of each polar cell [m, sensor frame], -inf without any
     kind: Int8  # (N,) PointKind of all points; MEMBER of the K, GROUND of the L
 
     @property
@@ -57,24 +56,21 @@ class Kernels(GeometryKernels):
     best_headings = staticmethod(best_headings)
     reflectance_statistics = staticmethod(reflectance_statistics)
 
-    def above_ground(
-        self, ground: GroundEstimator, ceiling: CeilingFinder, points: Float32, sensor_height_m: float, bounds: Bounds
-    ) -> Above:
+    def above_ground(self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Bounds) -> Above:
         """Those of (N, 4) or wider points within bounds."""
         sweep = PointColumns.from_array(points)
-        height, clear_m = ground.heights(sweep, sensor_height_m)
+        height, clear_m, top = ground.heights(sweep, sensor_height_m)
         in_range = (sweep.sqrt_range > bounds.min_sqrt_range) & (sweep.sqrt_range < bounds.max_sqrt_range)
         kind = np.full(len(points), PointKind.OUT_OF_RANGE, np.int8)
         kind[in_range] = PointKind.GROUND
         kind[in_range & (height > bounds.min_height_m)] = PointKind.MEMBER
         kind[in_range & (height >= bounds.max_height_m)] = PointKind.OVERHEAD
         rows = np.flatnonzero(kind == PointKind.MEMBER)
-        histogram = ceiling.histogram(height.take(rows))
         foot_m = np.maximum(np.float32(ground.tuning.foot_share) * clear_m, np.float32(ground.tuning.min_foot_m))
         low = np.flatnonzero((kind == PointKind.GROUND) & (height > foot_m) & np.isfinite(clear_m))
         is_clear = height.take(low) > clear_m.take(low)
         rows = np.concatenate([rows, low])
-        return Above(rows, sweep.take(rows), height.take(rows), is_clear, histogram, kind)
+        return Above(rows, sweep.take(rows), height.take(rows), is_clear, top, kind)
 
 
 NUMPY = Kernels()

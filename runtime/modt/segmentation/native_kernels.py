@@ -27,7 +27,6 @@ from modt.native.library import (
     Signatures,
     declare,
 )
-from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, Members
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import QUARTERS, GroundEstimator
@@ -51,7 +50,7 @@ GROUND = Layout(
     **_members(Array(_f32, "rings"), "range_m", "flat_m"),
     **_members(Number(_i32), "rings", "sectors", "flank_sectors", "bonnet_ring"),
     **_members(Number(_f32), "far_m", "rings_per_unit", "max_slope", "ramp_slope", "near_m", "slope_gain", "noise_m"),
-    **_members(Number(_f32), "max_gap_m", "flank_m", "above_m", "bin_m", *Bounds._fields),
+    **_members(Number(_f32), "max_gap_m", "flank_m", *Bounds._fields),
     low_sectors=Array(_i32, "near_rings"),
     **_members(Number(_i32), "near_rings", "quarters"),
     **_members(Number(_f32), "low_m", "clear_m", "foot_share", "min_foot_m"),
@@ -62,7 +61,7 @@ ABOVE_GROUND = Layout(
     kept=Rows(_f32, 5, "room"),
     low_rows=Array(_i64, "room"),
     is_clear=Array(np.bool_, "room"),
-    histogram=Array(_i64, "bins"),
+    top=Array(_f32, "rings", "sectors"),
     kind=Array(_i8, "room"),
 )
 POINT_COLUMNS = Layout("PointColumns", **_members(Array(_f32, "n"), "x", "y", "z", "sqrt_range"))
@@ -146,8 +145,8 @@ def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
     return layout(**others)
 
 
-def _ground(ground: GroundEstimator, ceiling: CeilingFinder, bounds: Bounds) -> Filled:
-    sources = bounds, ground, ground.tuning, ground.grid, ceiling.tuning
+def _ground(ground: GroundEstimator, bounds: Bounds) -> Filled:
+    sources = bounds, ground, ground.tuning, ground.grid
     return _filled(GROUND, *sources, sectors=SECTORS, quarters=QUARTERS, far_m=FAR_M, clear_m=ground.tuning.clear_m)
 
 
@@ -176,27 +175,25 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         self._structures: dict[Hashable, Filled] = {}
         self._scratch = np.empty(0, np.uint8)
 
-    def above_ground(
-        self, ground: GroundEstimator, ceiling: CeilingFinder, points: Float32, sensor_height_m: float, bounds: Bounds
-    ) -> Above:
+    def above_ground(self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Bounds) -> Above:
         """Those of (N, 4) or wider points within bounds."""
         if points.shape[1] < 4:
             raise ValueError(f"rows of x, y, z and reflectance are needed, not of shape {points.shape}")
         points = np.ascontiguousarray(points[:, :4], np.float32)
         n = len(points)
-        structure = self._structure(_ground, ground, ceiling, bounds)
+        structure = self._structure(_ground, ground, bounds)
         scratch = self._memory(self.library.modt_ground_scratch(structure, n))
         rows, low_rows = np.empty((2, n + 1), np.int64)
         kept = np.empty((5, n + 1), np.float32)
         is_clear = np.empty(n + 1, np.bool_)
-        histogram = np.zeros(ceiling.bins, np.int64)
+        top = np.empty((ground.grid.rings, SECTORS), np.float32)
         kind = np.empty(n + 1, np.int8)
-        out = ABOVE_GROUND(rows=rows, kept=kept, low_rows=low_rows, is_clear=is_clear, histogram=histogram, kind=kind)
+        out = ABOVE_GROUND(rows=rows, kept=kept, low_rows=low_rows, is_clear=is_clear, top=top, kind=kind)
         counts = np.empty(2, np.int64)
         self.library.modt_above_ground(structure, points, n, sensor_height_m, scratch, out, counts)
         n_tall, n_low = counts.tolist()
         *columns, height = kept[:, : n_tall + n_low]
-        return Above(rows[: n_tall + n_low], PointColumns(*columns), height, is_clear[:n_low], histogram, kind[:n])
+        return Above(rows[: n_tall + n_low], PointColumns(*columns), height, is_clear[:n_low], top, kind[:n])
 
     def occupied_cells(
         self, grid: SqrtRangeGrid, points: PointColumns, height: Float32

@@ -48,7 +48,7 @@ class Segmenter:
         self.bounds = Bounds(config.clearance_m, config.max_height_m, *map(math.sqrt, range_m))
         self.height_estimator = HeightEstimator(sensor, tuning.sensor_height, tuning.polar)
         self.ground = GroundEstimator(sensor, config.max_slope_deg, tuning.ground, tuning.polar)
-        self.ceiling = CeilingFinder(config.max_height_m, tuning.ceiling)
+        self.ceiling = CeilingFinder(self.ground, config.max_height_m, kernels, tuning.ceiling)
         self.clusterer = Clusterer(sensor, config, kernels, tuning)
         self.low = LowFinder(sensor, config, kernels, tuning.low)
         self.ends = ViewEnds(sensor, tuning.split.person.max_top_m, tuning.view_ends)
@@ -101,13 +101,12 @@ class Segmenter:
     def above_ground(self, points: Float32) -> Above:
         """Those of (N, 4) points within range, and `clearance_m` to `max_height_m` or the ceiling above ground."""
         sensor_height_m = self.sensor_height_m(points)
-        above = self.kernels.above_ground(self.ground, self.ceiling, points, sensor_height_m, self.bounds)
-        limit_m = self.ceiling.limit_m(above.histogram, points[:, 2], sensor_height_m)
-        if limit_m is None:
+        above = self.kernels.above_ground(self.ground, points, sensor_height_m, self.bounds)
+        overhead = self.ceiling.overhead(points, above, sensor_height_m)
+        if overhead is None:
             return above
-        below = above.height_m < np.float32(limit_m)
-        above.kind[above.rows[~below]] = PointKind.OVERHEAD
-        kept = np.flatnonzero(below)
+        above.kind[above.rows[overhead]] = PointKind.OVERHEAD
+        kept = np.flatnonzero(~overhead)
         rows = above.rows.take(kept)
         return above._replace(rows=rows, points=above.points.take(kept), height_m=above.height_m.take(kept))
 

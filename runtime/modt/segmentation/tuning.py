@@ -92,30 +92,27 @@ class GroundTuning:
 class CeilingTuning:
     """The ceiling of a room, below which objects end. Heights are above the ground."""
 
-    above_m: float = 1.95
-    """Height from which returns are counted [m]: above most people's heads. Chosen on: simulated halls."""
-    lowest_m: float = 2.15
-    """Least height of a ceiling [m]; a lower surface is the lintel of a door. Chosen on: simulated halls."""
-    bin_m: float = 0.05
-    """Width of a bin of heights [m]; two neighbouring bins hold a ceiling. Chosen on: simulated halls."""
-    min_returns: int = 50
-    """Counted returns below which there is no ceiling. Chosen on: judgement."""
-    min_share: float = 0.5
-    """Share of the counted returns at one height that makes it a ceiling. Less cuts trees and houses.
-    Chosen on: simulated halls and streets."""
-    edge_share: float = 0.05
-    """Share of a ceiling's returns from which the bin below it belongs to it too. Chosen on: simulated halls."""
-    clearance_m: float = 0.15
-    """Distance below a ceiling up to which objects reach [m]. Chosen on: simulated halls."""
-    stride: int = 8
-    """One return of so many is looked at for a ceiling near `max_height_m`. More costs less and misses small rooms.
-    Chosen on: judgement."""
-    grazed_below_m: float = 0.1
-    """Distance below `max_height_m` from which such a ceiling begins [m]. Chosen on: simulated halls."""
-    grazed_above_m: float = 0.3
-    """Distance above `max_height_m` up to which such a ceiling is looked for [m]. Chosen on: simulated halls."""
-    grazed_clearance_m: float = 0.2
-    """Distance below `max_height_m` up to which objects reach under it [m]. Chosen on: simulated halls."""
+    lowest_m: float = 1.85
+    """Least height of a ceiling [m]. Less cuts heads, more misses the ceilings of car parks.
+    Chosen on: simulated car parks."""
+    min_cells: int = 50
+    """Polar cells with returns above `lowest_m` below which there is no ceiling. Chosen on: judgement."""
+    min_share: float = 0.45
+    """Share of those cells whose top continues that of the cell before on its ray, from which they are a ceiling.
+    Less cuts shelves, hedges and lorries. Chosen on: simulated rooms, streets and forests."""
+    step_m: float = 0.1
+    """Difference in height below which a top continues the one before [m]. More takes trees for a ceiling.
+    Chosen on: simulated rooms, streets and forests."""
+    grazed_m: float = 0.4
+    """Distance above `max_height_m` up to which a ceiling is looked for [m]: lower returns of it are used.
+    Chosen on: simulated halls."""
+    clearance_m: float = 0.1
+    """Distance below a ceiling up to which objects reach [m]. Chosen on: simulated car parks."""
+    fixture_m: float = 0.5
+    """Distance below a ceiling up to which pipes, lamps and beams above `head_m` belong to it [m].
+    More cuts vans. Chosen on: simulated car parks."""
+    head_m: float = 1.9
+    """Height that hardly anybody exceeds [m]. Less cuts heads, more leaves beams. Chosen on: simulated car parks."""
 
 
 @dataclass(frozen=True, slots=True)
