@@ -171,8 +171,8 @@ static void measure_roughness(const Ground *g, const GroundScratch *s, float *to
         i32 n = 0;
         for (i32 k = first; k < first + in_quarter; k++) {
             top[k] = -s->ends[k][1];
-            ranges[n] = top[k] - s->ends[k][0]; /* overwritten by the next, unless there is a lowest return */
-            n += s->ends[k][0] < INFINITY;
+            ranges[n] = top[k] - s->ends[k][0]; /* overwritten by the next, unless there are returns and all lie flat */
+            n += ranges[n] <= g->flat_m[first / g->sectors] && s->ends[k][0] < INFINITY;
         }
         float clear_m = g->clear_m + median_of(ranges, n);
         for (i32 k = first; k < first + in_quarter; k++)

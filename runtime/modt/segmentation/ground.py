@@ -139,12 +139,15 @@ class GroundEstimator:
     def clear_m(self, lowest: Float32, highest: Float32) -> Float32:
         """(rings, SECTORS) height above the ground from which returns are clear of it [m].
 
-        It follows the measured roughness: the height range of the returns of a cell, in the median of the cells of
-        the same ring and quarter of the circle. Where things stand in most of these, that is much.
+        It follows the measured roughness: the height range of the returns of a cell in which nothing stands, in the
+        median of the cells of the same ring and quarter of the circle. It is infinite where there is none.
         """
         shape = len(lowest), QUARTERS, SECTORS // QUARTERS
-        ranges = np.where(np.isfinite(lowest), highest - lowest, np.inf).reshape(shape)
-        ranges.sort(axis=2)  # cells without returns come last
+        ranges = highest - lowest
+        is_flat = np.isfinite(lowest) & (ranges <= self.flat_m[:, None])
+        ranges[~is_flat] = np.inf
+        ranges = ranges.reshape(shape)
+        ranges.sort(axis=2)  # cells without returns, and where something stands, come last
         last = np.maximum(np.isfinite(ranges).sum(axis=2, keepdims=True) - 1, 0)
         median = np.take_along_axis(ranges, last // 2, axis=2)
         clear_m = np.float32(self.tuning.clear_m) + median

@@ -81,7 +81,7 @@ class GroundTuning:
     clear_m: float = 0.06
     """Height above the roughness of the ground from which a return is clear of it [m]. Less finds things in rough
     ground that are not there. Chosen on: simulated lawns, hills and halls."""
-    foot_share: float = 0.5
+    foot_share: float = 0.6
     """Share of that height from which returns near something that is clear of the ground belong to it. Less takes
     ground for feet. Chosen on: simulated people."""
     min_foot_m: float = 0.03
