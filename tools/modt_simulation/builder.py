@@ -31,15 +31,16 @@ MARGIN_M = 0.1
 """Margin around each body."""
 
 
-def without_collisions(paths: Sequence[Path], footprint: Float64, seconds: float) -> Bool:
+def without_collisions(paths: Sequence[Path], footprint: Float64, seconds: float, margin_m: float = MARGIN_M) -> Bool:
     """(n,) whether each body stays, by its path and its footprint (n, 2) [m].
 
     Of two that collide, the first one stays. Bodies of zero footprint do not collide. Pairs at rest are tested once.
+    A negative margin lets bodies touch.
     """
     solid = footprint.min(axis=1) > 0
     kept = solid.copy()
     boxes = np.zeros((len(paths), 7))
-    boxes[:, 3:5] = footprint + 2 * MARGIN_M
+    boxes[:, 3:5] = footprint + 2 * margin_m
     boxes[:, [0, 1, 6]] = [path.at(0.0) for path in paths]
     moving = np.array([not path.at_rest for path in paths])
     for step in range(int(seconds / STEP_S) + 2):
@@ -83,6 +84,15 @@ NONE_M = 1e-3
 """Size of the coat or backpack of a person without one."""
 POSTURES = {kinds.SITTER: Posture.SIT, kinds.CYCLIST: Posture.RIDE}
 """Postures of others than pedestrians."""
+LOW_M = {
+    Posture.FLOOR: (1.3, 0.65, 0.98),
+    Posture.CROUCH: (0.8, 0.65, 1.1),
+    Posture.KNEEL: (0.95, 0.65, 1.35),
+    Posture.LIE: (1.9, 0.75, 0.32),
+}
+"""Postures near the ground, and the length, width and height of a person in each."""
+RIDER_M = 1.74
+"""Standing height of a rider."""
 STRIP_M = 0.07
 """Height of a retroreflective strip."""
 STRIP_SHARE = 0.04
@@ -103,9 +113,12 @@ class SceneBuilder:
         self._people: list[Person] = []
         (self._strip_rng,) = rng.spawn(1)
 
-    def scenery(self, solids: Solids, x: float, y: float, heading_rad: float = 0.0) -> None:
-        """Add a body at rest without annotation."""
-        self.bodies.append(Body(kinds.SCENERY, _extent(solids), Path.standing(x, y, heading_rad), solids))
+    def scenery(
+        self, solids: Solids, x: float, y: float, heading_rad: float = 0.0, *, overhead: bool = False
+    ) -> None:
+        """Add a body at rest without annotation; what is overhead collides with nothing."""
+        size = (0.0, 0.0, 0.0) if overhead else _extent(solids)
+        self.bodies.append(Body(kinds.SCENERY, size, Path.standing(x, y, heading_rad), solids))
 
     def vehicle(self, kind: Kind, path: Path, size: Triple | None = None) -> None:
         """Add a car, a van or a truck, of random proportions and, where none is given, random size."""
@@ -122,7 +135,7 @@ class SceneBuilder:
         path = Path.standing(x, y, heading_rad)
         self.bodies.append(Body(kinds.BICYCLE, (1.75, 0.55, 1.05), path, vehicles.bicycle(self.rng)))
 
-    def pedestrian(self, path: Path, speed_mps: float = 0.0, height: float | None = None) -> None:
+    def pedestrian(self, path: Path, speed_mps: float = 0.0, height: float | None = None, role: str = "") -> None:
         """Add a pedestrian, standing at speed zero."""
         height = height or clipped_normal(self.rng, 1.74, 0.09, 1.15, 2.0)
         length = 0.5
@@ -132,21 +145,30 @@ class SceneBuilder:
             rate = np.pi * speed_mps / (2 * stride)
             length = 0.45 + 1.4 * stride
         size = (length, self.rng.uniform(0.55, 0.7), height)
-        self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride)
+        self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride, role=role)
 
     def bystander(self, x: float, y: float) -> None:
         """Add a pedestrian who stands and looks anywhere."""
         self.pedestrian(Path.standing(x, y, self.rng.uniform(-np.pi, np.pi)))
 
-    def walker(self, line: ArrayLike, speed_mps: float, start_m: float = 0.0) -> None:
+    def walker(self, line: ArrayLike, speed_mps: float, start_m: float = 0.0, role: str = "") -> None:
         """Add a pedestrian who walks along a line of way points (n, 2) [m, world], from start_m along it."""
-        self.pedestrian(Path.steady(line, start_m, speed_mps, self.seconds), speed_mps)
+        self.pedestrian(Path.steady(line, start_m, speed_mps, self.seconds), speed_mps, role=role)
 
     def sitter(self, path: Path) -> None:
         """Add a seated person."""
         height = clipped_normal(self.rng, 1.72, 0.08, 1.5, 1.95)
         seat = box((-0.02, 0.0, 0.22), (0.42, 0.42, 0.44), Material.WOOD)
         self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, height, seat)
+
+    def person_in(self, posture: Posture, path: Path, role: str) -> None:
+        """Add a person in a posture near the ground."""
+        height = clipped_normal(self.rng, 1.74, 0.08, 1.5, 1.95)
+        self._person(kinds.PEDESTRIAN, LOW_M[posture], path, height, Solids.none(), posture=posture, role=role)
+
+    def rider(self, kind: Kind, size: Triple, path: Path, vehicle: Solids, posture: Posture, role: str) -> None:
+        """Add a person on a vehicle, both as one body."""
+        self._person(kind, size, path, RIDER_M, vehicle, posture=posture, role=role)
 
     def cyclist(self, path: Path, speed_mps: float, height: float | None = None) -> None:
         """Add a cyclist."""
@@ -162,6 +184,7 @@ class SceneBuilder:
         height_m: float,
         sway_rad: float = 0.003,
         ego_m: Pair = EGO_M,
+        margin_m: float = MARGIN_M,
     ) -> World:
         """The world of the bodies that collide neither with the ego vehicle nor with one another.
 
@@ -170,7 +193,7 @@ class SceneBuilder:
         order = sorted(range(len(self.bodies)), key=lambda i: self.bodies[i].path.at_rest)
         paths = [ego, *(self.bodies[i].path for i in order)]
         footprint = np.array([ego_m, *(self.bodies[i].size[:2] for i in order)])
-        kept = without_collisions(paths, footprint, self.seconds)[1:]
+        kept = without_collisions(paths, footprint, self.seconds, margin_m)[1:]
         remaining = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(remaining)}
         people = [p._replace(body=number[p.body]) for p in self._people if p.body in number]
@@ -179,18 +202,30 @@ class SceneBuilder:
         return World(terrain, bodies, np.array(people, PERSON), ego, height_m, sway_rad, mount)
 
     def _person(
-        self, kind: Kind, size: Triple, path: Path, height: float, rigid: Solids, rate: float = 0, stride: float = 0
+        self,
+        kind: Kind,
+        size: Triple,
+        path: Path,
+        height: float,
+        rigid: Solids,
+        rate: float = 0,
+        stride: float = 0,
+        posture: Posture | None = None,
+        role: str = "",
     ) -> None:
-        posture = POSTURES.get(kind, Posture.WALK if rate else Posture.STAND)
+        if posture is None:
+            posture = POSTURES.get(kind, Posture.WALK if rate else Posture.STAND)
         girth = clipped_normal(self.rng, 1.0, 0.12, 0.75, 1.35)
         phase = self.rng.uniform(0, 2 * np.pi)
         coat = self.rng.uniform(0.16, 0.24) if self.rng.random() < 0.35 else NONE_M
         pack = self.rng.uniform(0.08, 0.16) if self.rng.random() < 0.3 else NONE_M
+        if posture in LOW_M:
+            coat = pack = NONE_M
         share = STRIP_SHARE_CYCLISTS if posture == Posture.RIDE else STRIP_SHARE
         strip = STRIP_M * (self._strip_rng.random() < share)
         body = len(self.bodies)
         self._people.append(Person(body, posture, height, girth, phase, rate, stride, coat, pack, strip))
-        self.bodies.append(Body(kind, size, path, rigid))
+        self.bodies.append(Body(kind, size, path, rigid, role))
 
 
 def _extent(solids: Solids) -> Triple:

@@ -1,20 +1,22 @@
-"""Rooms under a ceiling: a hall, a corridor, a lobby, the cabin of a lift and a warehouse."""
+"""Rooms under a ceiling: a hall, a corridor, a lobby, the cabin of a lift, a warehouse and a car park."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.random import Generator
 
-from modt_simulation import scenery
+from modt_simulation import kinds, scenery
 from modt_simulation.builder import SceneBuilder
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
-from modt_simulation.solids import Pair, block, box
+from modt_simulation.solids import Pair, block, box, rod
 from modt_simulation.world import World
 from modt_simulation.yard import ROBOT_M, enclose, floor, round_trip, walkers
 
 OVER_SENSOR_M = 0.8
 """Least distance between a sensor and the ceiling."""
+OVER_BEAMS_M = 0.25
+"""Least distance between a sensor and the ceiling of a car park."""
 SWAY_RAD = 0.003
 
 
@@ -111,6 +113,27 @@ def warehouse(rng: Generator, seconds: float, height_m: float) -> World:
     return _under(builder, half, rng.uniform(5.0, 8.0), ego, height_m)
 
 
+def carpark(rng: Generator, seconds: float, height_m: float) -> World:
+    """A low car park: parked cars between pillars, people, and beams and pipes under the ceiling."""
+    half = (18.0, 9.5)
+    ceiling = max(rng.uniform(2.0, 2.3), height_m + OVER_BEAMS_M)
+    builder = SceneBuilder(rng, seconds)
+    walkers(builder, (12.0, 3.0), 5)
+    for side in (-1, 1):
+        for x in np.arange(-15.0, 16.0, 5.0):
+            builder.scenery(block((0.4, 0.4, ceiling), Material.WALL), x, 3.7 * side)
+        for x in np.arange(-16.25, 17.0, 2.5):
+            if rng.random() < 0.6:
+                builder.vehicle(kinds.CAR, Path.standing(x, 6.6 * side, side * np.pi / 2 + rng.normal(0, 0.03)))
+        beam = box((0.0, 0.0, ceiling - 0.15), (2 * half[0], 0.3, 0.3), Material.WALL)
+        builder.scenery(beam, 0.0, 3.7 * side, overhead=True)
+        under_ceiling = ceiling - rng.uniform(0.08, 0.2)
+        pipe = rod((-half[0], 0.0, under_ceiling), (half[0], 0.0, under_ceiling), 0.06, Material.METAL)
+        builder.scenery(pipe, 0.0, rng.uniform(0.5, 3.0) * side, overhead=True)
+    ego = Path.steady([(-4.0, 0.0), (10.0, 0.0)], 0.0, 0.6, seconds)
+    return _under(builder, half, ceiling, ego, height_m)
+
+
 def _furnish(builder: SceneBuilder, half: Pair, n: int) -> None:
     rng = builder.rng
     makers = (scenery.table, scenery.chair, scenery.shelf, scenery.pallets)
@@ -125,6 +148,6 @@ def _under(builder: SceneBuilder, half: Pair, ceiling_m: float, ego: Path, heigh
     """The world of a room with four walls, a floor and a ceiling."""
     enclose(builder, half, ceiling_m)
     roof = box((0, 0, ceiling_m + 0.1), (2 * half[0] + 0.8, 2 * half[1] + 0.8, 0.2), Material.WALL)
-    builder.scenery(roof, 0.0, 0.0)
+    builder.scenery(roof, 0.0, 0.0, overhead=True)
     ground = floor(builder.rng, half, Material.FLOOR, 0.002)
     return builder.world(ground, ego, height_m, sway_rad=SWAY_RAD, ego_m=ROBOT_M)

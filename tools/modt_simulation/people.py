@@ -1,4 +1,4 @@
-"""Articulated people: walking, standing, sitting and cycling."""
+"""Articulated people: walking, standing, cycling, sitting, crouching, kneeling and lying."""
 
 from __future__ import annotations
 
@@ -20,8 +20,16 @@ class Posture(IntEnum):
     WALK = 1
     RIDE = 2
     SIT = 3
+    FLOOR = 4
+    """Sits on the floor with straight legs."""
+    CROUCH = 5
+    KNEEL = 6
+    LIE = 7
+    """Lies on the back."""
 
 
+LEAN_RAD = np.array([0.02, 0.06, 0.55, 0.02, -0.1, 0.5, 0.1, -1.55])
+"""Lean of the trunk in each posture."""
 SADDLE_M = 0.93
 """Height of the saddle of a bicycle."""
 CRANK_M = np.array([0.08, 0.0, 0.3])
@@ -32,7 +40,7 @@ class Person(NamedTuple):
     """Properties of a person that stay the same over a scene."""
 
     body: int  # index of the body
-    posture: Posture  # standing, walking, cycling or sitting
+    posture: Posture
     height: float  # standing height [m]
     girth: float  # breadth relative to the mean
     phase: float  # phase of the gait at time 0 [rad]
@@ -96,12 +104,23 @@ class _Figures:
         ride = self.posture == Posture.RIDE
         sit = self.posture == Posture.SIT
         self.seated = ride | sit
-        hip_z = np.where(ride, SADDLE_M, np.where(sit, 0.47, 0.52 * self.height))
-        lean = np.where(ride, 0.55, np.where(self.posture == Posture.WALK, 0.06, 0.02))
+        lean = LEAN_RAD[self.posture]
         self.spine = 0.30 * self.height
-        self.hips = _points(np.where(ride, -0.22, 0.0), 0.0, hip_z)
+        upright = _points(0.0, 0.0, 0.52 * self.height)
+        self.hips = self._of_posture(
+            stand=upright,
+            walk=upright,
+            ride=_points(-0.22, 0.0, SADDLE_M),
+            sit=_points(0.0, 0.0, 0.47),
+            floor=_points(-0.4, 0.0, 0.12),
+            crouch=_points(-0.1, 0.0, 0.32),
+            kneel=_points(0.0, 0.0, 0.48),
+            lie=_points(-0.1, 0.0, 0.13),
+        )
         self.neck = self.hips + _points(self.spine * np.sin(lean), 0.0, self.spine * np.cos(lean))
-        self.head = self.neck + _points(0.02 + 0.3 * lean * 0.2, 0.0, 0.115 * self.height)
+        raised = _points(0.02 + 0.3 * lean * 0.2, 0.0, 0.115 * self.height)
+        in_line = 0.4 * (self.neck - self.hips)
+        self.head = self.neck + np.where((self.posture == Posture.LIE)[:, None], in_line, raised)
 
     def leg(self, side: float, turn: Float64) -> list[_Bar]:
         """Thigh, shank and foot of the left (1) or right (-1) leg, at (n,) phases of the gait [rad]."""
@@ -111,6 +130,10 @@ class _Figures:
             walk=_points(self.people["stride"] * np.sin(turn), 0.0, 0.05 + 0.10 * np.maximum(np.cos(turn), 0)),
             ride=CRANK_M + 0.17 * _points(np.cos(turn), 0.0, -np.sin(turn)),
             sit=_points(0.42, 0.0, 0.06),
+            floor=_points(0.45, 0.0, 0.06),
+            crouch=_points(0.05, 0.0, 0.06),
+            kneel=_points(-0.42, 0.0, 0.06),
+            lie=_points(0.75, 0.0, 0.1),
         )
         foot[:, 1] = side * 0.09 * self.girth
         knee, foot = _bend(hip, foot, 0.245 * self.height, 0.245 * self.height, +1.0)
@@ -133,6 +156,10 @@ class _Figures:
             walk=_points(0.10 - 0.75 * self.people["stride"] * np.sin(turn), 0.0, hang),
             ride=_points(0.46, 0.0, 1.02),
             sit=_points(0.3, 0.0, 0.62),
+            floor=_points(-0.5, 0.0, 0.1),
+            crouch=_points(0.35, 0.0, 0.45),
+            kneel=_points(0.3, 0.0, 0.7),
+            lie=_points(-0.2, 0.0, 0.08),
         )
         hand[:, 1] = side * np.where(self.seated, 0.24, 0.25 * self.girth)
         elbow, hand = _bend(shoulder, hand, 0.175 * self.height, 0.16 * self.height, -1.0)
@@ -170,7 +197,8 @@ class _Figures:
 
     def _of_posture(self, **options: Float64) -> Float64:
         """(n, 3) point of the posture of each person, by the points of all postures, (n, 3) or (1, 3)."""
-        full = np.stack([np.broadcast_to(options[p.name.lower()], self.hips.shape) for p in Posture])
+        shape = (len(self.posture), 3)
+        full = np.stack([np.broadcast_to(options[p.name.lower()], shape) for p in Posture])
         return full[self.posture, np.arange(len(self.posture))]
 
 

@@ -12,7 +12,8 @@ from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Frame, Self
-from modt_simulation.indoors import corridor, hall, lift, lobby, warehouse
+from modt_simulation.indoors import carpark, corridor, hall, lift, lobby, warehouse
+from modt_simulation.obstacles import grass, heaps, hedges, hills, lying, movers, stairs, wall
 from modt_simulation.sensors import sensor as sensor_model
 from modt_simulation.simulator import Simulator, Truth
 from modt_simulation.street import crossing, street
@@ -25,7 +26,10 @@ CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
 
 SCENES = {
     scene.__name__: scene
-    for scene in (street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse)
+    for scene in (
+        *(street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse, carpark),
+        *(wall, grass, hedges, hills, heaps, stairs, movers, lying),
+    )
 }
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""
 

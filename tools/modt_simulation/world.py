@@ -26,6 +26,7 @@ class Body:
     size: Triple  # length, width, height of its box [m]
     path: Path  # motion of the body
     solids: Solids  # its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre)
+    role: str = ""  # what it does in its scene; empty if its kind says it all
 
 
 @dataclass
