@@ -2,11 +2,15 @@
 
     python -m tools.sequences --n 10000 --seed 1
     python -m tools.sequences --live hesai livox --seconds 1800
+    python -m tools.sequences --sweeps 100000
 
 Frames are empty, huge, repeated, late or not finite; poses leap, clocks are set, sensors change in mid-run. With
 --live the input is packets of a maker or clouds, and poses, thousands in a sequence. They are lost, forged or late on
 their way to the loop of a robot, whose process is stopped at times. The first broken promise is printed with the
 shortest sequence that breaks it; then the exit status is 1.
+
+With --sweeps the frames are small sweeps of any shape: fog, rooms, one beam, equal points, tilted, thinned, huge or
+not finite. Every twentieth is segmented by both kernels.
 """
 
 from __future__ import annotations
@@ -30,7 +34,11 @@ def main() -> None:
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--seconds", type=float, default=math.inf, help="CPU time after which no block begins")
     options.add_argument("--live", nargs="*", metavar="SOURCE", help="live inputs instead of frames; default: all")
+    options.add_argument("--sweeps", type=int, metavar="N", help="sweeps of any shape instead of sequences")
     given = options.parse_args()
+    if given.sweeps:
+        _feed_sweeps(given.sweeps, given.seed)
+        return
     from hypothesis import HealthCheck, Phase, seed, settings
     from hypothesis.stateful import run_state_machine_as_test
 
@@ -68,6 +76,21 @@ def main() -> None:
             sys.exit(1)
         print(f"{done + chosen.max_examples} sequences, {time.monotonic() - began_s:.0f} s", flush=True)
     print("every promise was kept")
+
+
+def _feed_sweeps(n: int, seed: int) -> None:
+    """Feed random sweeps, RUN_SWEEPS to a pipeline.
+
+    Raises:
+        AssertionError: a promise was broken.
+    """
+    from tests.sequences.sweeps import RUN_SWEEPS, feed
+
+    logging.disable(logging.CRITICAL)
+    for done in range(0, n, RUN_SWEEPS):
+        feed(1_000_000 * seed + done, min(RUN_SWEEPS, n - done))
+        print(f"{min(done + RUN_SWEEPS, n)} sweeps, {time.process_time():.0f} s", end="\r", flush=True)
+    print("\nevery promise was kept")
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from modt.model_file import ModelFile
 from modt.sinks.records import line
 from modt.sinks.tracks import frame_line
 from modt.tracking.background_map import CAPACITY
-from modt.types import NONE, Budget, Frame, FrameResult
+from modt.types import NONE, Budget, Frame, FrameResult, PointKind
 
 LONGEST_UNSEEN = 10
 """A track is kept unseen for at most this many times `max_missed` frames, however small their steps in time."""
@@ -118,6 +118,7 @@ class Run:
         self._proposals_are_of_the_frame(result)
         self._bounded(result)
         self._tracks(result)
+        self._labels(result)
         self._posteriors(result)
         self._placed(result)
         self._parts_are_the_whole(book)
@@ -147,6 +148,24 @@ class Run:
         assert set(result.classified.tolist()) <= set(tracks.id[tracks.proposal != NONE].tolist())
         for name, column in tracks.columns().items():
             assert np.isfinite(column).all(), name
+
+    def _labels(self, result: FrameResult) -> None:
+        """Every point has one label: its kind, or a track that is seen; members have the track of their proposal."""
+        labels = result.labels
+        kind = result.proposals.kind
+        assert kind is not None
+        proposal_of_point = result.proposals.label(len(result.frame.points))
+        assert labels.shape == kind.shape == proposal_of_point.shape
+        member = proposal_of_point != NONE
+        assert ((kind == PointKind.MEMBER) == member).all()
+        row_of_proposal = result.tracks.row_of_proposal(len(result.proposals))
+        seen = result.tracks.id[row_of_proposal]
+        assert (labels[member] == seen[proposal_of_point[member]]).all()
+        reasons = [reason.value for reason in PointKind if reason != PointKind.MEMBER]
+        assert np.isin(labels[~member], [*reasons, *seen]).all()
+        foot = kind == PointKind.FOOT  # labelled as what it is part of
+        assert (labels == kind)[~member & ~foot].all()
+        assert sum(result.left_out().values()) + len(result.proposals.members) == len(labels)
 
     def _posteriors(self, result: FrameResult) -> None:
         tracks = result.tracks
