@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from modt.energy.ledger import LedgerLine, StageWork
 from modt.energy.meters.meter import Kind
 from modt.energy.windows import EnergyWindow
 from modt.sinks.tracks import frame_line
-from modt.types import NONE, Frame, FrameResult, Proposals, Tracks
+from modt.types import LEFT_OUT, NONE, Frame, FrameResult, PointKind, Proposals, Tracks
 
 STATES = ("unmatched", "tracked", "lost")
 
@@ -51,6 +52,13 @@ def result(
     frame = Frame(index, index / 10, points)
     T = np.eye(4) if T_world_sensor is None else T_world_sensor
     return FrameResult(frame, T, proposals(counts), tracks, STATES, 0, np.arange(classified))
+
+
+def with_kinds(r: FrameResult) -> FrameResult:
+    """The same result; its points without a proposal are of each kind in turn, ground first."""
+    kind = np.resize(np.array(LEFT_OUT, np.int8), len(r.frame.points))
+    kind[r.proposals.members] = PointKind.MEMBER
+    return replace(r, proposals=replace(r.proposals, kind=kind))
 
 
 def frame_record(r: FrameResult) -> dict[str, Any]:

@@ -98,8 +98,8 @@ class _Sensors(Mapping[str, Scheme]):
 
 
 SENSORS = _Sensors()
-_POINTS = frozenset({"points"})
-_DETECTIONS = frozenset({"domain", "frame_id", "world_frame_id", "tracks"})
+_POINTS = frozenset({"points", "obstacles"})
+_DETECTIONS = frozenset({"domain", "frame_id", "world_frame_id", "tracks", "obstacles"})
 SINKS = {
     "stdout": Scheme("stdout://", _opener("sinks.frame_lines", "open_stdout")),
     "file": Scheme("file:///PATH", _opener("sinks.frame_lines", "open_file")),

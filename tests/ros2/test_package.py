@@ -88,7 +88,7 @@ def launch_file(monkeypatch):
         {},
         {"points": "/os/points", "odometry": "/odom", "base_to_sensor": "0.1,0,0.5,0,0,0"},
         {"source": "velodyne://", "profile": "vlp-16", "mode": "efficient", "core": "none", "out": "/tmp/x"},
-        {"prefix": "robot", "frame_id": "velodyne", "world_frame_id": "odom", "tracks": "all"},
+        {"prefix": "robot", "frame_id": "velodyne", "world_frame_id": "odom", "tracks": "all", "obstacles": "all"},
     ],
 )
 def test_launch_arguments_become_options_of_modt_run(launched, given):
@@ -100,10 +100,10 @@ def test_launch_arguments_become_options_of_modt_run(launched, given):
     source = parse_address(options.source, SENSORS)
     assert source.text == given.get("source", f"ros2:///{given.get('points', '/points')[1:]}")
     (sink,) = options.sink
-    wanted = {k: given[k] for k in ("frame_id", "world_frame_id", "tracks") if k in given}
+    wanted = {k: given[k] for k in ("frame_id", "world_frame_id", "tracks", "obstacles") if k in given}
     address = parse_address(sink, SINKS)
     assert address.path == f"/{given.get('prefix', 'modt')}"
-    assert dict(address.options) == {"tracks": "objects", **wanted}
+    assert dict(address.options) == {"tracks": "objects", "obstacles": "none", **wanted}
     if "odometry" in given:
         assert parse_address(options.odometry, POSES).option("base_to_sensor") == given["base_to_sensor"]
     else:

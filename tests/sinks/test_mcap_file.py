@@ -16,7 +16,7 @@ from modt.schemes import open_sink
 from modt.sinks.foxglove_sinks import McapRecorder
 from modt.sinks.messages import topics
 from modt.sources.recognise import open_stream
-from tests.results import CAR, PEDESTRIAN, energy_window, ledger_line, result
+from tests.results import CAR, PEDESTRIAN, energy_window, ledger_line, result, with_kinds
 from tests.sinks.recordings import files_of_at_most
 
 
@@ -74,6 +74,25 @@ def test_another_reader_of_ros_2_finds_what_the_topics_hold(tmp_path):
         "/modt/cpu_ms/total": 3.0,
         "/modt/cpu_ms/tracking": 2.0,
     }
+
+
+def test_obstacles_and_ground_are_recorded_by_request(tmp_path):
+    made = with_kinds(moving(3))
+    for option, extra in (("", set()), ("&obstacles=all", {"/modt/obstacles", "/modt/ground"})):
+        path = tmp_path / f"{len(extra)}.mcap"
+        sink = open_sink(f"mcap://{path}?points=none{option}")
+        sink.write(made)
+        sink.close()
+        assert {topic for topic, *_ in read(path)} == {
+            "/modt/detections",
+            "/modt/markers",
+            "/modt/odometry",
+            "/tf",
+            *extra,
+        }
+    encoded = {topic.name: topic.encode(made) for topic in topics(obstacles=True)}
+    for topic in extra:
+        assert [data for *_, data in read(path, topic)] == [encoded[topic]]
 
 
 def test_modt_itself_replays_the_points_and_the_poses(tmp_path):

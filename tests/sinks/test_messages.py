@@ -9,13 +9,16 @@ from modt.geometry import rotation_zyx, se3, transform
 from modt.placement import Mount
 from modt.ros2.odometry import StaticTransforms, read_odometry
 from modt.ros2.point_cloud2 import read_cloud
+from modt.schemes import SINKS
 from modt.sinks import messages as encoded
-from tests.results import CAR, PEDESTRIAN, result
+from modt.types import OBSTACLES, PointKind
+from tests.results import CAR, PEDESTRIAN, result, with_kinds
 from tests.ros2 import messages
 
 PLACED = se3(rotation_zyx(0.1, -0.2, 2.0), np.array([10.0, -20.0, 0.5]))
 EMPTY = result(0, [], {})
 FRAME = result(3, [5, 4, 7], {0: 1, 1: 12, 2: 1234567}, {1: CAR, 12: PEDESTRIAN}, lost=(99,), T_world_sensor=PLACED)
+LABELLED = with_kinds(FRAME)
 
 
 def published(frame, **options):
@@ -33,8 +36,8 @@ def detections(frame, **options):
 def test_topics_are_named_by_the_prefix_and_tf_and_points_are_asked_for():
     always = {"/robot/detections", "/robot/markers", "/robot/odometry"}
     assert {topic.name for topic in encoded.topics("robot")} == always
-    more = encoded.topics("robot", world_frame_id="map", points=True)
-    assert {topic.name for topic in more} == {*always, "/tf", "/robot/points"}
+    more = encoded.topics("robot", world_frame_id="map", points=True, obstacles=True)
+    assert {topic.name for topic in more} == {*always, "/tf", "/robot/points", "/robot/obstacles", "/robot/ground"}
 
 
 @pytest.mark.parametrize(
@@ -42,11 +45,12 @@ def test_topics_are_named_by_the_prefix_and_tf_and_points_are_asked_for():
     [("", "os_sensor", "os_sensor"), ("", "", "lidar"), ("velodyne", "os_sensor", "velodyne")],
 )
 def test_results_are_in_the_frame_of_the_input_unless_another_is_named(option, received, expected):
-    frame = dataclasses.replace(FRAME, frame=dataclasses.replace(FRAME.frame, frame_id=received))
-    shown = published(frame, frame_id=option, world_frame_id="map", points=True)
+    frame = dataclasses.replace(LABELLED, frame=dataclasses.replace(FRAME.frame, frame_id=received))
+    shown = published(frame, frame_id=option, world_frame_id="map", points=True, obstacles=True)
     odometry = shown["/modt/odometry"]
     (tf,) = shown["/tf"].transforms
-    stamped = [shown["/modt/detections"], shown["/modt/points"], *shown["/modt/markers"].markers]
+    clouds = [shown[f"/modt/{name}"] for name in ("points", "obstacles", "ground")]
+    stamped = [shown["/modt/detections"], *clouds, *shown["/modt/markers"].markers]
     assert {message.header.frame_id for message in stamped} == {expected}
     assert {odometry.child_frame_id, tf.child_frame_id} == {expected}
     assert {odometry.header.frame_id, tf.header.frame_id} == {"map"}
@@ -112,3 +116,53 @@ def test_points_of_a_tilted_sensor_are_as_it_sent_them_and_in_their_place_in_the
     inside = points[:, :3].astype(np.float64)
     placed = tilted.points[:, :3].astype(np.float64)
     np.testing.assert_allclose(transform(T, inside), transform(tilted.T_world_sensor, placed), atol=1e-3)
+
+
+def rows_of(message):
+    """Points of a PointCloud2, by the fields that the message states."""
+    formats = {2: "u1", 5: "<i4", 7: "<f4"}  # by sensor_msgs/PointField
+    layout = np.dtype(
+        {
+            "names": [field.name for field in message.fields],
+            "formats": [formats[field.datatype] for field in message.fields],
+            "offsets": [field.offset for field in message.fields],
+            "itemsize": message.point_step,
+        }
+    )
+    assert message.row_step == message.width * message.point_step == len(message.data)
+    assert (message.height, message.is_bigendian, message.is_dense) == (1, False, True)
+    return np.frombuffer(message.data.tobytes(), layout)
+
+
+def test_obstacles_and_ground_are_points_with_the_track_or_the_kind_and_the_class():
+    shown = published(LABELLED, obstacles=True)
+    found = rows_of(shown["/modt/obstacles"])
+    ground = rows_of(shown["/modt/ground"])
+    labels = LABELLED.labels
+    assert found.dtype.names == ("x", "y", "z", "track", "class")
+    for points, rows in ((found, LABELLED.obstacles()), (ground, np.flatnonzero(labels == PointKind.GROUND))):
+        xyz = np.column_stack([points[axis] for axis in "xyz"])
+        np.testing.assert_array_equal(xyz, LABELLED.frame.points[rows, :3])
+        assert points["track"].tolist() == labels[rows].tolist()
+    classes = dict(zip(found["track"].tolist(), found["class"].tolist(), strict=True))
+    assert classes == {1: 1, 12: 2, 1234567: 0, **dict.fromkeys(OBSTACLES, 0)}
+    assert set(ground["class"].tolist()) == {0}
+    assert len(found) + len(ground) < len(labels), "points out of range and overhead are neither"
+
+
+def test_a_frame_without_points_has_clouds_without_points():
+    shown = published(with_kinds(result(0, [], {}, n_points=0)), obstacles=True, points=True)
+    assert [len(rows_of(shown[f"/modt/{name}"])) for name in ("points", "obstacles", "ground")] == [0, 0, 0]
+
+
+def test_obstacles_of_a_tilted_sensor_are_as_it_sent_them():
+    sent = LABELLED.frame
+    frame = dataclasses.replace(LABELLED, frame=Mount.of(10.0, -5.0).level(sent))
+    found = rows_of(published(frame, obstacles=True)["/modt/obstacles"])
+    xyz = np.column_stack([found[axis] for axis in "xyz"])
+    np.testing.assert_allclose(xyz, sent.points[frame.obstacles(), :3], atol=1e-4)
+
+
+@pytest.mark.parametrize("scheme", ["ros2", "mcap", "foxglove"])
+def test_obstacles_are_an_option_of_each_sink_of_topics(scheme):
+    assert "obstacles" in SINKS[scheme].options

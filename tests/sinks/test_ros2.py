@@ -4,21 +4,28 @@ import pytest
 
 from modt.address import parse_address
 from modt.schemes import SINKS
-from tests.results import CAR, result
+from tests.results import CAR, result, with_kinds
 from tests.ros2.network import FAR, NEAR, has_sender, until
 
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds
 from modt.sinks.ros2 import open_ros2
 
-FRAME = result(3, [5, 4], {0: 1, 1: 12}, {1: CAR})
+FRAME = with_kinds(result(3, [5, 4], {0: 1, 1: 12}, {1: CAR}))
 
 
 def test_a_frame_is_published_to_its_subscribers(loopback):
-    address = f"ros2:///robot?domain={NEAR}&frame_id=velodyne&world_frame_id=map&tracks=all"
+    address = f"ros2:///robot?domain={NEAR}&frame_id=velodyne&world_frame_id=map&tracks=all&obstacles=all"
     sink = open_ros2(parse_address(address, SINKS))
     names = [topic.name for topic, _ in sink.topics]
-    assert names == ["/robot/detections", "/robot/markers", "/robot/odometry", "/tf"]
+    assert names == [
+        "/robot/detections",
+        "/robot/markers",
+        "/robot/odometry",
+        "/tf",
+        "/robot/obstacles",
+        "/robot/ground",
+    ]
     joined = dds.participant(FAR)
     heard = {t.name: dds.Subscription(joined, t.name, t.type, depth=1, reliable=True) for t, _ in sink.topics}
     until(lambda: all(publication.receivers for _, publication in sink.topics))

@@ -28,6 +28,7 @@ ARGUMENTS = {
     "frame_id": ("", "frame of the results (default: that of the input)"),
     "world_frame_id": ("", "frame of the poses; publishes /tf from it to frame_id"),
     "tracks": ("objects", "tracks among the detections: objects, or all"),
+    "obstacles": ("none", "point clouds of obstacles and ground: none, or all"),
     "rviz": ("false", "start RViz"),
 }
 """Default and meaning of each launch argument."""
@@ -40,7 +41,8 @@ def command(given: dict[str, str]) -> list[str]:
     if odometry.startswith("/"):
         mount = given["base_to_sensor"]
         odometry = f"ros2:///{odometry.strip('/')}" + (f"?base_to_sensor={mount}" if mount else "")
-    options = "&".join(f"{name}={given[name]}" for name in ("frame_id", "world_frame_id", "tracks") if given[name])
+    names = ("frame_id", "world_frame_id", "tracks", "obstacles")
+    options = "&".join(f"{name}={given[name]}" for name in names if given[name])
     words += ["--odometry", odometry, "--sink", f"ros2:///{given['prefix'].strip('/')}?{options}"]
     for name in ("profile", "mode", "core", "out"):
         words += [f"--{name}", given[name]] if given[name] else []

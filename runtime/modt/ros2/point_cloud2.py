@@ -17,7 +17,8 @@ from modt.types import UNRECORDED, Float32
 TYPE = "sensor_msgs/PointCloud2"
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """NumPy's name of each sensor_msgs/PointField datatype."""
-FLOAT32 = 7
+DATATYPES = {name: number for number, name in NUMBERS.items()}
+XYZI = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
 REFLECTANCES = ("reflectivity", "reflectance", "remission", "remissions", "intensity", "i")
 """Names of the field, by preference: a calibrated reflectance goes before a raw intensity."""
 _PREFIX = re.compile(r"^(?:(?:scalar|field|vertex|lidar)[_ .])+")
@@ -79,14 +80,21 @@ def read_cloud(message: bytes) -> PointCloud:
 
 def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
     """A message of (N, 4) points: x, y, z and intensity in float32."""
+    return write_table(stamp_s, frame_id, np.ascontiguousarray(points, "<f4").reshape(-1).view(XYZI))
+
+
+def write_table(stamp_s: float, frame_id: str, points: NDArray[np.void]) -> bytes:
+    """A message of an (N,) structured array in little-endian order, whose fields become those of the message."""
+    fields: Mapping[str, Any] = points.dtype.fields or {}
+    step = points.dtype.itemsize
     cdr = CdrWriter()
     cdr.header(stamp_s, frame_id)
-    cdr.record(("3I",), 1, len(points), 4)
-    for k, name in enumerate(("x", "y", "z", "intensity")):
+    cdr.record(("3I",), 1, len(points), len(fields))
+    for name, (kind, offset) in fields.items():
         cdr.text(name)
-        cdr.record(("I", "B", "I"), 4 * k, FLOAT32, 1)
-    cdr.record(("B", "2I"), 0, 16, 16 * len(points))
-    cdr.octets(np.ascontiguousarray(points, "<f4").reshape(-1).view(np.uint8).data)
+        cdr.record(("I", "B", "I"), offset, DATATYPES[kind.str[1:]], 1)
+    cdr.record(("B", "2I"), 0, step, step * len(points))
+    cdr.octets(points.view(np.uint8).data)
     cdr.record(("B",), 1)
     return cdr.message()
 

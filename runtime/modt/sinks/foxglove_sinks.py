@@ -49,13 +49,13 @@ class FoxgloveChannels:
     Messages have the stamps of the frames. They are encoded only while a client or file takes them.
     """
 
-    def __init__(self, context: foxglove.Context, *, points: bool) -> None:
+    def __init__(self, context: foxglove.Context, *, points: bool, obstacles: bool) -> None:
         def channel(name: str, kind: str) -> foxglove.Channel:
             package, _, short = kind.partition("/")
             form = foxglove.Schema(name=f"{package}/msg/{short}", encoding="ros2msg", data=schema(kind).encode())
             return foxglove.Channel(name, schema=form, message_encoding="cdr", context=context)
 
-        made = topics(world_frame_id=WORLD_FRAME_ID, points=points)
+        made = topics(world_frame_id=WORLD_FRAME_ID, points=points, obstacles=obstacles)
         self._topics = [(channel(topic.name, topic.type), topic.encode) for topic in made]
         self._figures = {name: channel(f"/{PREFIX}/{name}", kind) for name, kind in FIGURES.items()}
         self._stamp_ns = 0
@@ -95,9 +95,9 @@ def figures(line: LedgerLine | EnergyWindow) -> dict[str, float | str]:
 class FoxgloveServer(FoxgloveChannels):
     """Publishes to the connected clients. `port` is the one that is bound."""
 
-    def __init__(self, host: str, port: int, *, points: bool) -> None:
+    def __init__(self, host: str, port: int, *, points: bool, obstacles: bool = False) -> None:
         self._context = foxglove.Context()  # the server does not keep it alive
-        super().__init__(self._context, points=points)
+        super().__init__(self._context, points=points, obstacles=obstacles)
         self._server = foxglove.start_server(
             name="modt", host=host, port=port, context=self._context, message_backlog_size=BACKLOG
         )
@@ -117,7 +117,8 @@ def open_foxglove(address: Address) -> FoxgloveServer:
     try:
         port = PORT if address.port is None else address.port
         points = address.choice("points", "all", "none") == "all"
-        return FoxgloveServer(address.host or "127.0.0.1", port, points=points)
+        obstacles = address.choice("obstacles", "none", "all") == "all"
+        return FoxgloveServer(address.host or "127.0.0.1", port, points=points, obstacles=obstacles)
     except RuntimeError as error:
         remedy = "give a host of this machine and a free port"
         raise MisuseError(address.text, f"cannot be bound ({error})", remedy) from None
@@ -158,6 +159,7 @@ class McapRecorder:
     Args:
         path: file of the first part.
         points: whether the points are recorded.
+        obstacles: whether those of obstacles and of the ground are recorded, with their labels.
         max_bytes: limit for all parts, including those of earlier runs. The oldest are deleted.
         clock: [s].
 
@@ -166,13 +168,19 @@ class McapRecorder:
     """
 
     def __init__(
-        self, path: Path, *, points: bool, max_bytes: float = math.inf, clock: Callable[[], float] = time.monotonic
+        self,
+        path: Path,
+        *,
+        points: bool,
+        obstacles: bool = False,
+        max_bytes: float = math.inf,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._path = path
         self._max_bytes = max_bytes
         self._clock = clock
         self._context = foxglove.Context()
-        self._channels = FoxgloveChannels(self._context, points=points)
+        self._channels = FoxgloveChannels(self._context, points=points, obstacles=obstacles)
         self._output, self._writer = self._begin_part()
         self._flushed_s = clock()
 
@@ -235,7 +243,7 @@ class McapRecorder:
 
 
 def open_mcap(address: Address) -> McapRecorder:
-    """A recording. `points=none` leaves the points out, `max_mb` limits its size.
+    """A recording. `points=none` leaves the sweep out, `obstacles=all` adds obstacles and ground, `max_mb` limits it.
 
     Raises:
         MisuseError: no file name, or an invalid option.
@@ -250,4 +258,5 @@ def open_mcap(address: Address) -> McapRecorder:
     if not max_bytes > 0:
         raise MisuseError(address.text, "max_mb is not a size", "write max_mb=MEGABYTES")
     points = address.choice("points", "all", "none") == "all"
-    return McapRecorder(Path(address.path), points=points, max_bytes=max_bytes)
+    obstacles = address.choice("obstacles", "none", "all") == "all"
+    return McapRecorder(Path(address.path), points=points, obstacles=obstacles, max_bytes=max_bytes)

@@ -13,7 +13,7 @@ from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.geometry import quaternion_of, se3, yaw_of
 from modt.ros2 import odometry, point_cloud2
 from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
-from modt.types import NONE, Float64, FrameResult, Int
+from modt.types import NONE, Float32, Float64, FrameResult, Int, PointKind
 
 # Names used if neither the address nor the input gives one
 PREFIX = "modt"
@@ -46,6 +46,15 @@ WHITE = (1.0, 1.0, 1.0, 1.0)
 COLOURS = tuple((*(int(c.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.6) for c in CLASSES.values())
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """Pose and scale of the marker that deletes all others."""
+LABELLED = np.dtype(
+    {
+        "names": ["x", "y", "z", "track", "class"],
+        "formats": ["<f4", "<f4", "<f4", "<i4", "u1"],
+        "offsets": [0, 4, 8, 12, 16],
+        "itemsize": 20,
+    }
+)
+"""A point of an obstacle or of the ground. `track` is its label, `class` the reported class of its track."""
 NO_TEXT = text_fields("")
 NO_HEADER = header_fields(0.0, "")
 
@@ -77,6 +86,7 @@ def topics(
     world_frame_id: str = "",
     background: bool = False,
     points: bool = False,
+    obstacles: bool = False,
 ) -> list[Topic]:
     """Topics of the results.
 
@@ -86,6 +96,7 @@ def topics(
         world_frame_id: frame of the poses; "" takes WORLD_FRAME_ID, without the topic /tf.
         background: whether detections hold the background too.
         points: whether the sweep is published.
+        obstacles: whether the points of obstacles and those of the ground are published.
     """
 
     def topic(name: str, kind: str, encode: Callable[..., bytes], *more: object) -> Topic:
@@ -100,6 +111,9 @@ def topics(
         made.append(topic("/tf", TF, transform, world_frame_id))
     if points:
         made.append(topic(f"/{prefix}/points", point_cloud2.TYPE, cloud))
+    if obstacles:
+        made.append(topic(f"/{prefix}/obstacles", point_cloud2.TYPE, obstacle_cloud))
+        made.append(topic(f"/{prefix}/ground", point_cloud2.TYPE, ground_cloud))
     return made
 
 
@@ -198,10 +212,40 @@ def transform(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:
 def cloud(result: FrameResult, frame_id: str) -> bytes:
     """sensor_msgs/PointCloud2: the sweep."""
     points = result.frame.points
-    R_level_sensor = result.frame.R_level_sensor
-    if R_level_sensor is not None:
-        points = np.column_stack([points[:, :3] @ R_level_sensor.astype(np.float32), points[:, 3]])
+    if result.frame.R_level_sensor is not None:
+        points = np.column_stack([_turned_back(points[:, :3], result), points[:, 3]])
     return point_cloud2.write_cloud(result.frame.stamp_s, frame_id, points)
+
+
+def obstacle_cloud(result: FrameResult, frame_id: str) -> bytes:
+    """sensor_msgs/PointCloud2: the points that stand above the ground, as LABELLED."""
+    return _labelled_cloud(result, frame_id, result.obstacles())
+
+
+def ground_cloud(result: FrameResult, frame_id: str) -> bytes:
+    """sensor_msgs/PointCloud2: the points of the ground, as LABELLED."""
+    return _labelled_cloud(result, frame_id, np.flatnonzero(result.labels == PointKind.GROUND))
+
+
+def _labelled_cloud(result: FrameResult, frame_id: str, rows: Int) -> bytes:
+    """Message of the points of (K,) rows of the sweep with their labels. A point without a track is background."""
+    xyz = _turned_back(result.frame.points[rows, :3], result)
+    label = result.labels[rows]
+    points = np.zeros(len(rows), LABELLED)
+    for k, axis in enumerate("xyz"):
+        points[axis] = xyz[:, k]
+    points["track"] = label
+    has_track = label >= 0
+    by_id = np.argsort(result.tracks.id)
+    track = by_id[np.searchsorted(result.tracks.id, label[has_track], sorter=by_id)]
+    points["class"][has_track] = result.tracks.object_class[track]
+    return point_cloud2.write_table(result.frame.stamp_s, frame_id, points)
+
+
+def _turned_back(xyz: Float32, result: FrameResult) -> Float32:
+    """(K, 3) points turned from the level frame into that of the sensor, as mounted on the robot."""
+    R_level_sensor = result.frame.R_level_sensor
+    return xyz if R_level_sensor is None else xyz @ R_level_sensor.astype(np.float32)
 
 
 def box_poses(boxes: Float64) -> Float64:

@@ -33,7 +33,7 @@ class Ros2Sink:
 
 
 def open_ros2(address: Address) -> Ros2Sink:
-    """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME&tracks=objects|all.
+    """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME&tracks=objects|all&obstacles=none|all.
 
     Raises:
         MisuseError: Cyclone DDS is not installed, or an option is invalid.
@@ -44,6 +44,7 @@ def open_ros2(address: Address) -> Ros2Sink:
         frame_id=address.option("frame_id") or "",
         world_frame_id=address.option("world_frame_id") or "",
         background=address.choice("tracks", "objects", "all") == "all",
+        obstacles=address.choice("obstacles", "none", "all") == "all",
     )
     joined = participant(domain_of(address))
     return Ros2Sink([(topic, Publication(joined, topic.name, topic.type)) for topic in made])
