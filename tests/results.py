@@ -123,7 +123,13 @@ def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
         "source": "a\x1b[2Jb",
         "mode": "accurate",
         "profile": "vlp-16",
-        "counts": {**totals, "rate_hz": rate_hz, "tracks": 7, "visible": {"background": 3, "car": 2}},
+        "counts": {
+            **totals,
+            "rate_hz": rate_hz,
+            "tracks": 7,
+            "visible": {"background": 3, "car": 2},
+            "left_out": {"ground": 900.5, "structure": 60.2, "out_of_range": 0.0},
+        },
         "loop": {
             "frames": 20,
             "missed_deadlines": 1,

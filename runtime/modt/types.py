@@ -99,7 +99,7 @@ class PointKind(IntEnum):
 
 OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE
 """Kinds, besides members of proposals, of what stands above the ground and below the ceiling."""
-LEFT_OUT = tuple(kind for kind in PointKind if kind != PointKind.MEMBER)
+LEFT_OUT: tuple[PointKind, ...] = tuple(kind for kind in PointKind if kind != PointKind.MEMBER)
 """Kinds of the points that belong to no proposal."""
 
 
@@ -458,4 +458,5 @@ class FrameResult:
         kind = self.proposals.kind
         if kind is None:
             return dict.fromkeys(LEFT_OUT, 0)
-        return {each: np.count_nonzero(kind == each) for each in LEFT_OUT}  # a third of the time of `bincount`
+        # Seven comparisons of bytes take a third of the time of `bincount`, which widens them.
+        return {each: int(np.count_nonzero(kind == each)) for each in LEFT_OUT}

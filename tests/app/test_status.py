@@ -18,6 +18,7 @@ def test_metrics_are_valid_lines_with_one_type_each():
     assert len([line for line in lines if line.startswith("# TYPE modt_loop_lateness_ms ")]) == 1
     assert 'modt_loop_lateness_ms{quantile="p99"} 0.9' in lines
     assert {'modt_counts_visible{class="car"} 2', "modt_loop_step 2"} <= {*lines}
+    assert 'modt_counts_left_out{kind="ground"} 900.5' in lines
     assert 'modt_power_stages_J{stage="segmentation"} 0.25' in lines
     assert 'modt_sink_written_total{sink="udp://x"} 5' in lines
     assert 'modt_sensor_refused_messages_total{reason="too short"} 3' in lines
@@ -42,6 +43,7 @@ def test_counts_are_of_what_is_seen_and_the_rate_of_the_time_since_the_last_repo
     counts = counter.report(12.0)
     assert (counts.frames, counts.rate_hz, counts.tracks) == (20, 10.0, 3)
     assert counts.visible["car"] == 1
+    assert set(counts.left_out.values()) == {0}, "made-up proposals do not tell the kinds of the points"
     assert counts.classifications == 20
     assert counter.report(13.0).rate_hz == 0.0
 

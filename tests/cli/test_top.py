@@ -35,6 +35,7 @@ def test_in_a_terminal_the_page_follows_the_status_until_ctrl_c(write, tmp_path,
     first, *pages = capsys.readouterr().out.split(CLEAR)[1:]
     assert "10.0 Hz, 7 tracks (2 car)" in first
     assert "udp://x" in first
+    assert "left out    ground 900, structure 60 points a frame" in first
     assert "a?[2Jb" in first, "escape sequences are replaced"
     assert [words in page for words, page in zip(("5.0 Hz", "no status", "7.0 Hz"), pages, strict=True)] == [True] * 3
 

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from modt.energy.ledger import StageWork
-from modt.reporting.summary import Summary, around, summary_text
-from tests.results import CAR, ledger_line, result
+from modt.reporting.summary import COUNTED, Summary, around, summary_text
+from tests.results import CAR, ledger_line, result, with_kinds
 
 FRAMES = [
     result(0, [5, 5], {0: 1, 1: 2}, {1: CAR}, classified=2),
@@ -54,6 +54,24 @@ def test_the_nearest_return_of_each_class_is_of_the_last_frame():
         "background": {"count": 1, "nearest_m": 0.0},
     }
     assert whole()["around"] == {"car": {"count": 1, "nearest_m": 7.5}}
+
+
+def test_points_without_a_proposal_are_counted_by_kind():
+    summary = Summary()
+    for k in range(2 * COUNTED):
+        summary.add_result(with_kinds(result(k, [5, 1], {0: 1, 1: 2}, n_points=20 + k // COUNTED)))
+    figures = summary.result()
+    assert figures["left_out"] == {
+        "ground": 2,
+        "structure": 2,
+        "low": 2,
+        "sparse": 2,
+        "overhead": 2,
+        "out_of_range": 2,
+        "out_of_view": 2.5,
+    }
+    assert re.search(r"out of view +2\.5", summary_text(figures))
+    assert "belong to no segment" not in summary_text(Summary().result())
 
 
 def test_the_text_names_objects_and_costs_and_sums_the_stages_alone():

@@ -19,6 +19,7 @@ COUNTERS = re.compile(
 """Names of counters, which never decrease."""
 LABELS = {
     "visible": "class",
+    "left_out": "kind",
     "steps_entered": "step",
     "failures": "kind",
     "refused_messages": "reason",

@@ -40,6 +40,7 @@ class FrameCounts:
     proposals: int
     classifications: int
     deferred: int
+    left_out: Mapping[str, float]  # mean number of points of a frame without a proposal, by kind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,6 +156,7 @@ class FrameCounter:
             proposals=totals.proposals,
             classifications=totals.classified,
             deferred=totals.deferred,
+            left_out=totals.left_out,
         )
 
 
@@ -180,6 +182,7 @@ def status_text(status: Status, now_s: float) -> str:
     state = running if age_s < STALE_S else f"NOT running: last heard of {age_s:.0f} s ago"
     entered = ", ".join(f"{step} {n} times" for step, n in loop.steps_entered.items())
     energy = "unavailable" if power.frame_J is None else f"{1e3 * power.frame_J:.0f} mJ a frame, {power.kind}"
+    left_out = ", ".join(f"{kind} {mean:.0f}" for kind, mean in status.counts.left_out.items() if mean)
     stages = ", ".join(f"{stage} {1e3 * joules:.1f}" for stage, joules in power.stages_J.items() if joules)
     lines = [
         f"{status.source}: {state}, mode {status.mode}, profile {status.profile}",
@@ -192,6 +195,7 @@ def status_text(status: Status, now_s: float) -> str:
         f"  load        {loop.step}" + (f" ({entered})" if entered else ""),
         f"  energy      {energy}",
         *([f"  by stage    {stages} mJ a frame, estimated"] if stages else []),
+        *([f"  left out    {left_out.replace('_', ' ')} points a frame"] if left_out else []),
         f"  sensor      {_counts(status.sensor)}",
         f"  recording   {recording.failing or 'on'}, {recording.lines} lines, {recording.lost_lines} lost",
         *(f"  sink        {name}: {_counts(health)}" for name, health in status.sinks.items()),

@@ -11,9 +11,11 @@ from modt.classes import CLASS_NAMES, OBJECTS, ObjectClass
 from modt.energy.ledger import LedgerLine, StageWork
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE
 from modt.reporting.histogram import Histogram
-from modt.types import NONE, Bool, FrameResult, Int, Proposals, Tracks
+from modt.types import LEFT_OUT, NONE, Bool, FrameResult, Int, Proposals, Tracks
 
 _SCHEMA = "modt.summary/1"
+COUNTED = 10
+"""The points of one frame in so many are counted by kind. Of each frame it would take 2 % of the CPU time."""
 
 
 class Summary:
@@ -24,6 +26,7 @@ class Summary:
         self.proposals = 0
         self.classified = 0
         self.deferred = 0
+        self._left_out = dict.fromkeys(LEFT_OUT, 0)  # points without a proposal, in the frames that are counted
         self.tracks = Tracks.blank()  # of the last frame
         self._last_proposals = Proposals.empty()
         self._ended = np.zeros((2, 2), np.int64)  # lengths of the tracks that are gone, as _lengths
@@ -38,10 +41,19 @@ class Summary:
         # The sweep is left out, because it would stay in memory.
         self.tracks = tracks
         self._last_proposals = result.proposals
+        if self.frames % COUNTED == 0:
+            for kind, count in result.left_out().items():
+                self._left_out[kind] += count
         self.frames += 1
         self.proposals += len(result.proposals)
         self.classified += len(result.classified)
         self.deferred += result.n_deferred
+
+    @property
+    def left_out(self) -> dict[str, float]:
+        """Mean number of points of a frame without a proposal, by kind."""
+        counted = max(-(-self.frames // COUNTED), 1)
+        return {kind.name.lower(): round(count / counted, 1) for kind, count in self._left_out.items()}
 
     def add_ledger(self, line: LedgerLine) -> None:
         """Add the ledger line of a frame."""
@@ -66,6 +78,7 @@ class Summary:
             "classifications": self.classified,
             "classifications_by_tracking_by_detection": self.proposals,
             "deferred": self.deferred,
+            "left_out": self.left_out,
             "beta": _ratio(self.classified, self.proposals),
             "around": around(self.tracks, self._last_proposals),
             "tracks": all_tracks,
@@ -116,7 +129,8 @@ def summary_text(summary: dict[str, Any]) -> str:
         f"{run.get('stream', 'run')}: {summary['frames']} frames, mode {run.get('mode', '?')}, "
         f"field of view {run.get('fov', '?')}, profile {run.get('profile', '?')}"
     )
-    lines = [title, *_around_lines(summary), *_count_lines(summary), *_time_lines(summary["stages"])]
+    lines = [title, *_around_lines(summary), *_count_lines(summary), *_left_out_lines(summary)]
+    lines += _time_lines(summary["stages"])
     if "frames_per_s" in run:
         lines.append(
             f"  {run['frames_per_s']:.1f} frames/s with all of it, {run['real_time_factor']:.1f} x real time"
@@ -152,6 +166,15 @@ def _count_lines(summary: dict[str, Any]) -> list[str]:
         f"{objects['count']} of objects, in {_number(objects['N_go'])}",
         "",
     ]
+
+
+def _left_out_lines(summary: dict[str, Any]) -> list[str]:
+    """Points without a proposal by kind, if there are any."""
+    means = {kind: mean for kind, mean in summary["left_out"].items() if mean}
+    if not means:
+        return []
+    lines = [f"  {kind.replace('_', ' '):<16}{mean:>8.1f}" for kind, mean in means.items()]
+    return ["  Points of a frame that belong to no segment, by kind (docs/segmentation.md)", *lines, ""]
 
 
 def _time_lines(stages: dict[str, Any]) -> list[str]:

@@ -70,6 +70,7 @@ def run_tree(run: Path) -> dict[str, Any]:
         "fov": facts["fov"],
         "frames": sums.series.count,
         "ended": (run / SUMMARY).is_file(),
+        "left_out": _summary(run).get("left_out", {}),
         "board": board.board,
         "conditions": {**used.conditions, "core": facts.get("core")},
         "test": (
@@ -223,6 +224,9 @@ def run_document(tree: dict[str, Any]) -> Document:
         f"meter: {meter['name']} ({meter['kind']}), {meter['windows']} windows, {tree['dropped_windows']} dropped",
         energy_plots.conditions_text(tree["conditions"]),
     ]
+    if any(tree["left_out"].values()):
+        means = (f"{kind} {mean:.0f}" for kind, mean in tree["left_out"].items() if mean)
+        about.append(f"points of a frame without a proposal: {', '.join(means).replace('_', ' ')}")
     if not tree["ended"]:
         about.append("still running or cut short")
     if tree["marks"]:
@@ -270,10 +274,16 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
     ]
 
 
+def _summary(run: Path) -> dict[str, Any]:
+    """Summary of a run that has ended, else nothing."""
+    path = run / SUMMARY
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    return found
+
+
 def lateness_plots(run: Path) -> list[Plot]:
     """A plot from the summary of a service that has ended, none of another run."""
-    path = run / SUMMARY
-    late = json.loads(path.read_text(encoding="utf-8")).get("lateness", {}) if path.is_file() else {}
+    late = _summary(run).get("lateness", {})
     if not late.get("frames"):
         return []
     ms = np.array(late["ms"], float)
