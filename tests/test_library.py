@@ -49,6 +49,8 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
         np.testing.assert_array_equal(found.box_sensor[found.visible], boxes)
         assert np.isnan(found.box_sensor[~found.visible]).all()
         np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
+        np.testing.assert_array_equal(found.labels, result.labels)
+        np.testing.assert_array_equal(found.obstacles(), result.obstacles())
     assert len(found.objects()) > 0
     assert not (found.objects().object_class == 0).any()
 

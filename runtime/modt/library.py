@@ -26,8 +26,9 @@ from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
 from modt.sources.stream import Stream, no_seconds, unit_of
-from modt.types import UNRECORDED, Bool, Float32, Float64, Frame, Int, Self
+from modt.types import UNRECORDED, Bool, Float32, Float64, Frame, FrameResult, Int, PointKind, Self
 
+__all__ = ["Pipeline", "PointKind", "TrackedObjects", "open"]
 log = logging.getLogger(__name__)
 
 
@@ -65,6 +66,7 @@ class TrackedObjects:
         points: (n,) number of points of the last proposal.
         age, missed: (n,) frames since birth, and since the last proposal.
         T_world_sensor: (4, 4) pose of the sensor frame at the stamp, as given or as registered.
+        result: the frame as the stages exchange it, with its points.
     """
 
     id: Int
@@ -82,6 +84,16 @@ class TrackedObjects:
     age: Int
     missed: Int
     T_world_sensor: Float64
+    result: FrameResult
+
+    @property
+    def labels(self) -> Int:
+        """(N,) track of each point of the sweep, else its negative modt.PointKind. Each call computes them."""
+        return self.result.labels
+
+    def obstacles(self) -> Int:
+        """(K,) rows of the points of the sweep that stand above the ground and below the ceiling."""
+        return self.result.obstacles()
 
     def __len__(self) -> int:
         return len(self.id)
@@ -126,7 +138,8 @@ class TrackedObjects:
 
     def _columns(self) -> dict[str, Any]:
         """Fields that have a row a track."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "T_world_sensor"}
+        of_frame = ("T_world_sensor", "result")
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in of_frame}
 
 
 class Pipeline:
@@ -252,6 +265,7 @@ class Pipeline:
             age=tracks.age,
             missed=tracks.missed,
             T_world_sensor=result.T_world_sensor,
+            result=result,
         )
 
 
