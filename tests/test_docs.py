@@ -5,10 +5,13 @@ import pkgutil
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+import yaml
 
 from modt.classes import CLASS_NAMES
 from modt.reporting.summary import Summary
+from modt.sinks.messages import topics
 from modt_evaluation.class_score import ClassScore
 from modt_evaluation.evaluation import Evaluation, RangeScore, SegmentationScore
 from modt_evaluation.track_score import TrackScore
@@ -56,16 +59,36 @@ def test_every_page_is_linked_from_the_readme_or_another_page():
     assert [page.name for page in (*DOCS.glob("*.md"), ROOT / "CONTRIBUTING.md") if page not in linked] == []
 
 
-def test_the_example_of_the_library_runs(capsys, tmp_path, monkeypatch):
-    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "library.md").read_text(), re.DOTALL)
+def test_the_examples_of_the_library_run(capsys, tmp_path, monkeypatch):
+    tracks, costmap = re.findall(r"```python\n(.*?)```", (DOCS / "library.md").read_text(), re.DOTALL)
     frames = list(SyntheticStream("street", "vlp-16", 0.5, seed=3))
     scans = tmp_path / "DRIVE" / "velodyne_points" / "data"
     scans.mkdir(parents=True)
     for number, frame in enumerate(frames):
         frame.points.tofile(scans / f"{number:010}.bin")
     monkeypatch.chdir(tmp_path)
-    exec(code, {})
+    exec(tracks, {})
     assert {line.split()[1] for line in capsys.readouterr().out.splitlines()} & set(CLASS_NAMES)
+    variables = {}
+    exec(costmap, variables)
+    counts = dict(zip(*np.unique(variables["costmap"], return_counts=True), strict=True))
+    assert min(counts[cost] for cost in (-1, 0, 100)) > 100
+
+
+def test_the_costmap_of_nav2_reads_topics_of_modt_and_drops_no_point_by_its_default_heights():
+    (text,) = re.findall(r"```yaml\n(.*?)```", (DOCS / "nav2.md").read_text(), re.DOTALL)
+    costmap = yaml.safe_load(text)["local_costmap"]["local_costmap"]["ros__parameters"]
+    assert all(costmap[name]["plugin"].startswith("nav2_costmap_2d::") for name in costmap["plugins"])
+    layer = costmap["voxel_layer"]
+    sources = {name: layer[name] for name in layer["observation_sources"].split()}
+    assert {source["topic"] for source in sources.values()} == {"/modt/obstacles", "/modt/ground"}
+    published = {topic.name: topic.type for topic in topics(obstacles=True)}
+    for source in sources.values():
+        assert published[source["topic"]].endswith(f"/{source['data_type']}")
+        assert source["min_obstacle_height"] < 0 < source["max_obstacle_height"]
+    assert [source["marking"] for source in sources.values()] == [True, False]
+    assert layer["z_voxels"] <= 16
+    assert layer["origin_z"] + layer["z_voxels"] * layer["z_resolution"] >= layer["max_obstacle_height"] - 1e-9
 
 
 def test_the_formats_name_every_field():
