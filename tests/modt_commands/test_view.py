@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from modt.classes import CLASS_NAMES
+from modt.viewer import theme
 from modt_profiling.reporting.run_report import run_tree
 from modt_viewer.recorded_run import RecordedRun
 from tests.cli.commands import environment, here, modt, refusal
@@ -153,6 +154,32 @@ def test_a_frame_as_a_picture(run, records):
     with image.open(BytesIO(b64decode(encoded.partition(",")[2]))) as pixels:
         drawn = sorted(n for n, _ in pixels.getcolors(1 << 20))
     assert drawn[-3] > 1000, "paper, ground, and points above it"
+
+
+def test_what_is_left_out_can_be_coloured(run, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("matplotlib")
+    coloured = []
+    structure = [int(theme.kinds()[-1]["colour"][k : k + 2], 16) for k in (1, 3, 5)]
+    for more in ([], ["--left-out"]):
+        assert here("view", run, "--frame", 9, *more, "--out", tmp_path / "frame.png") == 0
+        with image.open(tmp_path / "frame.png") as picture:
+            pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
+        coloured.append(np.count_nonzero((pixels == structure).all(axis=1)))
+        assert here("view", run, *more, "--out", tmp_path / "view.html") == 0
+        page = Page(tmp_path / "view.html")
+        assert page.run["left_out"] == bool(more)
+        assert page.run["kinds"] == theme.kinds()
+    assert coloured[1] > coloured[0] + 300
+
+
+def test_the_key_k_colours_what_is_left_out(run, chromium):
+    """The numbers of colours on the canvas."""
+    with chromium.tab((run / "view.html").as_uri()) as tab:
+        count = "new Set(new Uint32Array(context.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size"
+        before = tab.value(count)
+        tab.value("state.kinds = true; draw()")
+        assert tab.value(count) > before
 
 
 def test_a_doubtful_class_has_a_question_mark_in_pages_and_pictures(run, records, tmp_path, chromium):

@@ -7,7 +7,8 @@ from modt.classes import CLASS_NAMES
 from modt.geometry import rotation_zyx, se3
 from modt.profile import load
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.viewer.packed import SIDE
+from modt.viewer import theme
+from modt.viewer.packed import PLAIN, SIDE
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_evaluation.recorded_result import recorded_result
@@ -102,6 +103,17 @@ def test_a_cell_shows_its_highest_point_and_ground_as_such():
     assert 0.2 < ground.mean() < 0.9
     x = ((without.cell % SIDE) + 0.5 - SIDE / 2) * grid.step_cm / 100
     assert np.abs(x).max() < config.sensor.max_range_m
+
+
+def test_what_is_left_out_is_drawn_as_what_it_is():
+    """A street whose walls are longer than an object."""
+    config = load("os1-64")
+    points = next(iter(SyntheticStream("street", "os1-64", 0.1, seed=2))).points
+    cells = Grid(config).cells(points)
+    structure = [entry["name"] for entry in theme.kinds()].index("structure")
+    assert np.count_nonzero(cells.group == structure) > 50
+    assert np.count_nonzero((cells.group == PLAIN) & (cells.level > 0)) > 500
+    assert (cells.group[cells.level == 0] != structure).all()
 
 
 def test_an_object_is_drawn_where_the_sensor_sees_it():

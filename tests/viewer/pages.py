@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.viewer.packed import CELL_BYTES, NUMBER_BYTES
+from modt.viewer.packed import CELL_BYTES, LEVELS, NUMBER_BYTES
 
 
 def unpacked(text: str) -> np.ndarray:
@@ -25,9 +25,16 @@ def sums(data: np.ndarray, n_bytes: int) -> np.ndarray:
 
 def cells(text: str) -> tuple[np.ndarray, np.ndarray]:
     """Numbers and levels of the cells of a sweep."""
+    number, level, _ = looks(text)
+    return number, level
+
+
+def looks(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Numbers, levels and groups of the cells of a sweep."""
     data = unpacked(text)
     n = len(data) // (CELL_BYTES + 1)
-    return sums(data[: CELL_BYTES * n], CELL_BYTES), data[CELL_BYTES * n :].astype(np.int64)
+    group, level = np.divmod(data[CELL_BYTES * n :].astype(np.int64), LEVELS)
+    return sums(data[: CELL_BYTES * n], CELL_BYTES), level, group
 
 
 def table(text: str, n_columns: int) -> np.ndarray:

@@ -30,11 +30,14 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add(p, "capture")
     truth = "labels to compare with, as for modt evaluate (default: those that lie with its source)"
     p.add_argument("--truth", type=Path, metavar="TRUTH", help=truth)
+    left_out = "colour the points of no proposal by their kind: structure, low or sparse, overhead (in a page: key K)"
+    p.add_argument("--left-out", action="store_true", help=left_out)
     p.add_argument("--out", type=Path, metavar="FILE", help=out)
     options.add_examples(
         p,
         "modt view RUN                                      a page that plays the run",
         "modt view RUN --frame 20 --out frame.png           one frame",
+        "modt view RUN --frame 20 --left-out                what belongs to no proposal, and why",
         "modt view RUN --track 40                           how the class of a track was decided",
     )
     p.set_defaults(run=run)
@@ -57,6 +60,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(out)
         return 0
     out = arguments.out or directory / default_name(arguments.frame, arguments.animate)
-    save_view(directory, arguments.frame, arguments.truth, capture, out)
+    save_view(directory, arguments.frame, arguments.truth, capture, out, left_out=arguments.left_out)
     print(f"{out} ({out.stat().st_size / 1e3:,.0f} kB)")
     return 0

@@ -61,7 +61,9 @@ def new_figure(width: int) -> Figure:
     return figure
 
 
-def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells | None) -> None:
+def draw(
+    figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells | None, left_out: bool = False
+) -> None:
     """Draw points, tracks, truth, and the cost of the frame, in place of the former content of the figure.
 
     Args:
@@ -70,6 +72,7 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
         at: index of the frame.
         step_cm: width of a cell.
         cells: cells of the sweep, None without points.
+        left_out: whether the cells of points of no proposal are coloured by their kind.
     """
     figure.clear()
     axes = figure.add_axes((0, 0, 1, 1))
@@ -78,23 +81,29 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
     side = reach * SIZE_IN[1] / SIZE_IN[0]  # a metre is as long as along x
     axes.set(xlim=(-reach, reach), ylim=(-side, side))
     if cells is not None:
-        _points(axes, cells, step_cm)
+        _points(axes, cells, step_cm, theme.kinds() if left_out else [])
     rings = np.arange(RINGS_M[reach], math.hypot(*axes.viewLim.max), RINGS_M[reach]).tolist()
     for radius in rings:
         axes.add_patch(Circle((0, 0), radius, fill=False, edgecolor=LINE, zorder=0))
     (sensor,) = axes.plot(0, 0, ">", color=INK, markersize=12)
     labels = _tracks(axes, run, at) + _truth(axes, run, at)
-    taken = [thing.get_window_extent() for thing in (_caption(axes, run, at), _legend(axes, run, at), sensor)]
+    taken = [
+        thing.get_window_extent() for thing in (_caption(axes, run, at), _legend(axes, run, at, left_out), sensor)
+    ]
     labels += [(0.0, radius, f"{radius:g} m", SOFT) for radius in rings]
     _write(axes, reversed(labels), [box.transformed(axes.transData.inverted()) for box in taken])
 
 
-def _points(axes: Axes, cells: Cells, step_cm: int) -> None:
+def _points(axes: Axes, cells: Cells, step_cm: int, kinds: list[theme.Entry]) -> None:
+    """Draw the cells, those of each kind in its colour."""
     x, y = ((v + 0.5 - SIDE / 2) * step_cm / 100 for v in (cells.cell % SIDE, cells.cell // SIDE))
     size = max(_LEAST_PT, 72 * SIZE_IN[0] / axes.viewLim.width * step_cm / 100)
     style = {"markersize": size, "markeredgewidth": 0, "rasterized": True, "zorder": 0.5}
-    for colour, group in ((LINE, cells.level == 0), (SOFT, cells.level > 0)):
-        axes.plot(x[group], y[group], "s", color=colour, **style)
+    is_ground = cells.level == 0
+    layers = [(LINE, is_ground), (SOFT, ~is_ground & (cells.group >= len(kinds)))]
+    layers += [(entry["colour"], ~is_ground & (cells.group == group)) for group, entry in enumerate(kinds)]
+    for colour, shown in layers:
+        axes.plot(x[shown], y[shown], "s", color=colour, **style)
 
 
 class ShownTracks:
@@ -216,10 +225,11 @@ def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
     return axes.text(0.01, 0.985, "\n".join(facts), transform=axes.transAxes, **style)
 
 
-def _legend(axes: Axes, run: RecordedRun, at: int) -> Legend:
-    """Colours of the classes and the states, and of the outcomes where the frame has truth."""
+def _legend(axes: Axes, run: RecordedRun, at: int, left_out: bool) -> Legend:
+    """Colours of the classes and the states, of kinds of points, and of outcomes where the frame has truth."""
     outlines = theme.states(run.states) + (list(LEGEND.values()) if "truth" in run.frames[at] else [])
-    entries = [(entry, True) for entry in theme.classes()] + [(entry, False) for entry in outlines]
+    filled = theme.classes() + (theme.kinds() if left_out else [])
+    entries = [(entry, True) for entry in filled] + [(entry, False) for entry in outlines]
     patches = [Patch(fill=f, color=e["colour"], linewidth=2, label=e["name"].replace("_", " ")) for e, f in entries]
     style = {"facecolor": PAPER, "edgecolor": "none", "labelcolor": SOFT, "fontsize": _TEXT_PT}
     return axes.legend(handles=patches, loc="lower left", handlelength=1, handleheight=1, **style)

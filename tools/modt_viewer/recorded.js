@@ -8,6 +8,7 @@ costOf = (rows) => {
   return `; ${spent.toFixed(1)} mJ of classification (estimated)`;
 };
 
+state.kinds = run.left_out;
 state.truth = Boolean(run.truth);
 if (run.truth) {
   element("states").insertAdjacentHTML("afterend", '<h2>Truth (dotted, key G)</h2><div class="legend" id="truth"></div>');

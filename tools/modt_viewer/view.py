@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from modt.app import assembly, inputs
 from modt.config import ProfileConfig
 from modt.errors import MisuseError, ModtError
 from modt.geometry import FieldOfView
@@ -20,10 +21,10 @@ from modt.segmentation.grids import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.sinks.output import writing
 from modt.sources.stream import Stream
-from modt.types import Float32
+from modt.types import Float32, Int8, PointKind
 from modt.viewer import theme
 from modt.viewer.html_page import content, page
-from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, occupied, packed_cells, packed_table
+from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, group_of, occupied, packed_cells, packed_table
 from modt_evaluation.run_record import FramesByNumber
 from modt_evaluation.truth import by_stamp
 from modt_evaluation.truth_files import labels_beside, open_truth
@@ -32,16 +33,17 @@ from modt_viewer.recorded_run import RecordedRun, reach_m
 from modt_viewer.track_page import rows_of, track_page, views
 from modt_viewer.truth_marks import LEGEND, truth_marks
 
-NO_CELLS = Cells(np.zeros(0, np.int64), np.zeros(0, np.int64))
+NO_CELLS = Cells(*np.zeros((3, 0), np.int64))
 STEP_CM = 4
 """Least width of a cell [cm]."""
 
 
 class Grid:
-    """Converts sweeps to cells; the segmenter of a profile finds the ground."""
+    """Converts sweeps to cells. A record does not hold the kinds of the points, so each sweep is segmented anew."""
 
-    def __init__(self, config: ProfileConfig) -> None:
-        self._segmenter = Segmenter(config.segmentation, config.sensor, FieldOfView())
+    def __init__(self, config: ProfileConfig, fov: FieldOfView = FieldOfView()) -> None:
+        self._segmenter = Segmenter(config.segmentation, config.sensor, FieldOfView())  # for the height of the points
+        self._stage = assembly.segmenter(config, fov, assembly.chosen_kernels(config.segmentation.kernels))
         self._clearance_m = config.segmentation.clearance_m
         self._range_m = config.sensor.max_range_m
         self.step_cm = max(STEP_CM, math.ceil(200 * self._range_m / SIDE))
@@ -52,9 +54,18 @@ class Grid:
         height = self._segmenter.ground.height_above(sweep, self._segmenter.sensor_height_m(points))
         sweep_range = sweep.sqrt_range**2
         used = (sweep_range > 0) & (sweep_range < self._range_m)
-        level = np.clip(np.rint(height[used] / LEVEL_M), 1, LEVELS - 1).astype(np.int64)
-        level[height[used] <= self._clearance_m] = 0
-        return occupied(sweep.x[used], sweep.y[used], level, self.step_cm)
+        kind = self._kinds(points)[used]
+        height = height[used]
+        level = np.clip(np.rint(height / LEVEL_M), 1, LEVELS - 1).astype(np.int64)
+        is_outside = (kind == PointKind.OUT_OF_RANGE) | (kind == PointKind.OUT_OF_VIEW)
+        level[(kind == PointKind.GROUND) | (is_outside & (height <= self._clearance_m))] = 0
+        return occupied(sweep.x[used], sweep.y[used], level, group_of(kind), self.step_cm)
+
+    def _kinds(self, points: Float32) -> Int8:
+        """(N,) kinds of the points."""
+        kind = self._stage.segment(points).kind
+        assert kind is not None
+        return kind
 
 
 SCRIPT = Path(__file__).parent / "recorded.js"
@@ -96,6 +107,7 @@ class View:
     at: int  # index of the frame, or of the first
     stream: Stream | None
     grid: Grid
+    left_out: bool  # whether the points of no proposal are coloured by their kind
     out: Path
 
     def cells(self, numbers: Sequence[int], most: int = sys.maxsize) -> Iterator[Cells] | None:
@@ -120,7 +132,8 @@ class View:
         numbers = self.run.numbers[self.at :][:n]
         cells = self.cells(numbers)
         for at in range(self.at, self.at + len(numbers)):
-            draw(figure, self.run, at, self.grid.step_cm, None if cells is None else next(cells))
+            shown = None if cells is None else next(cells)
+            draw(figure, self.run, at, self.grid.step_cm, shown, self.left_out)
             yield figure
 
     @property
@@ -143,6 +156,7 @@ def _player(view: View) -> None:
         "truth": LEGEND if any("truth" in frame for frame in run.frames) else None,
         "reach_m": reach_m(run.tracks),
         "start": view.at,
+        "left_out": view.left_out,
     }
     head, tail = page(run.facts["stream"]["name"], about, known, SCRIPT)
     with writing(view.out), view.out.open("w", encoding="utf-8") as file:
@@ -171,8 +185,12 @@ def _film(view: View) -> None:
 FORMS = {PLAYER: _player, PICTURE: _picture, PIXELS: _picture, GIF: _film, MP4: _film}
 
 
-def save_view(directory: Path, frame: int | None, labels: Path | None, capture: Capture, out: Path) -> None:
+def save_view(
+    directory: Path, frame: int | None, labels: Path | None, capture: Capture, out: Path, *, left_out: bool = False
+) -> None:
     """Write the page, the picture or the film of a run, by the ending of the file's name.
+
+    With `left_out` the points of no proposal are coloured by their kind; a page has a key for it.
 
     Raises:
         MisuseError: no run, a frame that is not recorded, a file of another kind, or a missing extra.
@@ -186,7 +204,10 @@ def save_view(directory: Path, frame: int | None, labels: Path | None, capture: 
     stream = mark_truth(recorded, labels, source(recorded, capture))
     if stream is None and recorded.record.live:
         print("modt: without points: a live source cannot be read again; --truth may have scans", file=sys.stderr)
-    FORMS[out.suffix](View(recorded, at, stream, Grid(recorded.config), out))
+    fov = FieldOfView()
+    if stream is not None and stream.info.camera is not None:
+        fov = inputs.field_of_view(inputs.Request(fov=recorded.facts.get("fov", "full")), stream.info)
+    FORMS[out.suffix](View(recorded, at, stream, Grid(recorded.config, fov), left_out, out))
 
 
 def save_track_page(directory: Path, track: int, capture: Capture, out: Path) -> None:

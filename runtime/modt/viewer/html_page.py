@@ -24,6 +24,7 @@ def content(states: list[theme.Entry], budget: str | None, step_cm: int | None) 
         "classes": theme.classes(),
         "states": states,
         "stages": theme.stages(),
+        "kinds": theme.kinds(),
         "budget": budget,
         "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},
         "reach_m": REACH_M,

@@ -12,11 +12,11 @@ from modt.energy.ledger import LedgerLine
 from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.sinks.records import line
-from modt.types import FrameResult
+from modt.types import FrameResult, PointKind
 from modt.viewer import theme
 from modt.viewer.html_page import LIVE, content, page
 from modt.viewer.live_server import LiveServer
-from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, occupied, packed_cells, packed_table
+from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, group_of, occupied, packed_cells, packed_table
 from modt.viewer.track_rows import planar, result_rows, scaled
 
 log = logging.getLogger(__name__)
@@ -96,14 +96,16 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
 
 
 def live_cells(result: FrameResult) -> Cells:
-    """Cells of the sweep. Points without a proposal count as ground."""
+    """Cells of the sweep. The ground is taken as level."""
     x, y, z = (result.frame.points[:, k] for k in range(3))
     reach_m = (SIDE // 2 - 1) * STEP_CM / 100
     used = (np.abs(x) < reach_m) & (np.abs(y) < reach_m) & ((x != 0) | (y != 0))
-    level = np.zeros(len(x), np.int64)
-    members = result.proposals.members
-    ground = used.copy()
-    ground[members] = False
-    floor_m = float(np.median(z[ground])) if ground.any() else 0.0
-    level[members] = np.clip(np.rint((z[members] - floor_m) / LEVEL_M), 1, LEVELS - 1)
-    return occupied(x[used], y[used], level[used], STEP_CM)
+    kind = result.proposals.kind
+    if kind is None:
+        kind = np.full(len(x), PointKind.GROUND, np.int8)
+        kind[result.proposals.members] = PointKind.MEMBER
+    is_ground = kind == PointKind.GROUND
+    floor_m = float(np.median(z[used & is_ground])) if (used & is_ground).any() else 0.0
+    level = np.clip(np.rint((z - floor_m) / LEVEL_M), 1, LEVELS - 1).astype(np.int64)
+    level[is_ground] = 0
+    return occupied(x[used], y[used], level[used], group_of(kind[used]), STEP_CM)

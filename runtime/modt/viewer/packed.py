@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.types import Float32, Int
+from modt.types import Float32, Int, Int8, PointKind
 
 LEVEL = 6
 """Level of the compression. Higher ones take longer and gain little."""
@@ -30,8 +30,9 @@ def planes(numbers: Int, n_bytes: int) -> bytes:
 
 
 def packed_cells(cells: Cells, level: int = LEVEL) -> str:
-    """Cells of a sweep: differences of the cells in CELL_BYTES planes, then the levels."""
-    return packed(planes(np.diff(cells.cell, prepend=0), CELL_BYTES) + planes(cells.level, 1), level)
+    """Cells of a sweep: differences of the cells in CELL_BYTES planes, then a byte each, LEVELS * group + level."""
+    look = LEVELS * cells.group + cells.level
+    return packed(planes(np.diff(cells.cell, prepend=0), CELL_BYTES) + planes(look, 1), level)
 
 
 def packed_table(table: Int, level: int = LEVEL) -> str:
@@ -45,6 +46,28 @@ LEVEL_M = 0.1
 """Height above ground of one level [m]. Level 0 is ground."""
 LEVELS = 64
 """Number of levels; the highest one holds all greater heights."""
+LOOKS = 256
+"""Number of pairs of a group and a level."""
+PLAIN = 3
+"""Group of the points that are drawn by their height alone."""
+_GROUPS = {
+    PointKind.MEMBER: PLAIN,
+    PointKind.GROUND: 0,
+    PointKind.STRUCTURE: 2,
+    PointKind.LOW: 1,
+    PointKind.SPARSE: 1,
+    PointKind.OVERHEAD: 0,
+    PointKind.OUT_OF_RANGE: PLAIN,
+    PointKind.OUT_OF_VIEW: PLAIN,
+}
+"""Points that are drawn alike, as in `theme.kinds`. Of the points in a cell the greatest group is shown."""
+
+
+def group_of(kind: Int8) -> Int:
+    """(N,) group of points by their PointKind."""
+    by_kind = np.zeros(len(_GROUPS), np.int64)
+    by_kind[[-each for each in _GROUPS]] = [*_GROUPS.values()]
+    return by_kind.take(-kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +76,7 @@ class Cells:
 
     cell: Int  # (n,) SIDE * row + column, ascending; column and row count from -x and -y, the sensor at SIDE / 2
     level: Int  # (n,) height above ground [LEVEL_M], 0 for ground
+    group: Int  # (n,) as of group_of
 
     def thinned(self, most: int) -> Cells:
         """Cells, `most` of them at most. Cells of the ground are left out first."""
@@ -62,14 +86,14 @@ class Cells:
             if len(rows) > room:
                 kept[group] = rows[np.linspace(0, len(rows), room, endpoint=False).astype(np.int64)]
         rows = np.sort(np.concatenate(kept))
-        return Cells(self.cell[rows], self.level[rows])
+        return Cells(self.cell[rows], self.level[rows], self.group[rows])
 
 
-def occupied(x: Float32, y: Float32, level: Int, step_cm: int) -> Cells:
-    """The cells of points x, y [m] within the grid, each with the highest level of its points."""
+def occupied(x: Float32, y: Float32, level: Int, group: Int, step_cm: int) -> Cells:
+    """Cells of points x, y [m] within the grid, each with the highest level of its points of the greatest group."""
     column, row = (np.floor(v * (100 / step_cm)).astype(np.int64) + SIDE // 2 for v in (x, y))
-    # Sorted by cell, then by height: the last of each cell is its highest.
-    cell_and_level = np.sort((SIDE * row + column) * LEVELS + level)
-    cell, level = np.divmod(cell_and_level, LEVELS)
-    highest = np.append(np.diff(cell) > 0, True)[: len(cell)]
-    return Cells(cell[highest], level[highest])
+    # Sorted by cell, then by group and height: the last of each cell is shown.
+    cell, look = np.divmod(np.sort((SIDE * row + column) * LOOKS + LEVELS * group + level), LOOKS)
+    shown = np.append(np.diff(cell) > 0, True)[: len(cell)]
+    group, level = np.divmod(look[shown], LEVELS)
+    return Cells(cell[shown], level, group)

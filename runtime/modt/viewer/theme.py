@@ -50,6 +50,12 @@ def states(names: Iterable[str]) -> list[Entry]:
     return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
 
 
+def kinds() -> list[Entry]:
+    """Legend of the points of no proposal, by their groups (`packed.group_of`)."""
+    named = {"overhead": COLOURS[7], "low or sparse": COLOURS[4], "structure": COLOURS[3]}
+    return [{"name": name, "colour": colour} for name, colour in named.items()]
+
+
 def stages() -> list[Entry]:
     """Legend of the stages of a frame."""
     return [{"name": name, "colour": colour} for name, colour in zip(STAGES, COLOURS, strict=True)]

@@ -9,7 +9,7 @@ let first = 0, last = frames.length - 1;
 
 const state = {
   at: 0, playing: false, hovered: null, kept: null,
-  points: true, trails: true, background: true, labels: true,
+  points: true, kinds: false, trails: true, background: true, labels: true,
   up: true, metre: 10, x: 0, y: 0, // pixels a metre, and where the sensor is on the canvas
 };
 
@@ -61,5 +61,5 @@ async function decodeSweep(packed) {
     x[k] = ((cell[k] % side) + 0.5 - side / 2) * step_cm / 100;
     y[k] = (Math.floor(cell[k] / side) + 0.5 - side / 2) * step_cm / 100;
   }
-  return { x, y, level: bytes.subarray(3 * n) };
+  return { x, y, look: bytes.subarray(3 * n) };
 }

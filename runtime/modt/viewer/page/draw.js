@@ -2,7 +2,7 @@
 
 const canvas = element("view"), context = canvas.getContext("2d", { alpha: false });
 const TRAIL = 30; // frames
-let sweep = null, pixels = null, palette = null, colours = {}, dot = 1, taken = [];
+let sweep = null, pixels = null, palettes = {}, colours = {}, dot = 1, taken = [];
 // A page may replace these: { text, colour } that marks a track, and drawing between the boxes and their labels.
 let markOf = (row) => null, drawMore = (frame) => {};
 
@@ -11,11 +11,14 @@ function theme() {
   for (const name of ["ink", "soft", "line", "paper"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
   const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
   const paper = rgb(colours.paper), ink = rgb(colours.ink);
-  const mixed = (part) => {
-    const [r, g, b] = paper.map((value, k) => Math.round(value + part * (ink[k] - value)));
+  const mixed = (part, colour = ink) => {
+    const [r, g, b] = paper.map((value, k) => Math.round(value + part * (colour[k] - value)));
     return (255 << 24) | (b << 16) | (g << 8) | r;
   };
-  palette = Int32Array.from({ length: 64 }, (_, level) => mixed(level ? 0.35 + 0.5 * Math.min(level / 25, 1) : 0.15));
+  const byHeight = (look) => mixed(look & 63 ? 0.35 + 0.5 * Math.min((look & 63) / 25, 1) : 0.15);
+  const byKind = (look) => (look & 63 && run.kinds[look >> 6] ? mixed(1, rgb(run.kinds[look >> 6].colour)) : byHeight(look));
+  const shades = (shade) => Int32Array.from({ length: 256 }, (_, look) => shade(look));
+  palettes = { false: shades(byHeight), true: shades(byKind) };
   colours.paperPixel = mixed(0);
 }
 
@@ -35,16 +38,16 @@ function drawPoints() {
   const out = new Int32Array(pixels.data.buffer);
   out.fill(colours.paperPixel);
   if (sweep && state.points) {
-    const { x, y, level } = sweep, { metre, up } = state;
+    const { x, y, look } = sweep, { metre, up } = state, palette = palettes[state.kinds];
     const size = Math.max(1, Math.min(4, Math.round((metre * run.points.step_cm) / 100)));
     const [xx, xy] = up ? [0, -metre] : [metre, 0], [yx, yy] = up ? [-metre, 0] : [0, -metre];
     for (const ground of [true, false]) // what stands lies above the ground
       for (let k = 0; k < x.length; k++) {
-        if ((level[k] === 0) !== ground) continue;
+        if (((look[k] & 63) === 0) !== ground) continue;
         const px = (state.x + xx * x[k] + xy * y[k]) | 0, py = (state.y + yx * x[k] + yy * y[k]) | 0;
         if (px < 0 || py < 0 || px + size > width || py + size > height) continue;
         for (let dy = 0; dy < size; dy++)
-          for (let dx = 0; dx < size; dx++) out[(py + dy) * width + px + dx] = palette[level[k]];
+          for (let dx = 0; dx < size; dx++) out[(py + dy) * width + px + dx] = palette[look[k]];
       }
   }
   context.putImageData(pixels, 0, 0);

@@ -92,7 +92,7 @@ const KEYS = {
   "+": () => zoom(1.25),
   "-": () => zoom(0.8),
   0: reset,
-  r: toggle("up"), p: toggle("points"), t: toggle("trails"), b: toggle("background"), l: toggle("labels"),
+  r: toggle("up"), p: toggle("points"), k: toggle("kinds"), t: toggle("trails"), b: toggle("background"), l: toggle("labels"),
   Escape: () => (state.kept = state.hovered = null),
 };
 document.onkeydown = (event) => {

@@ -89,4 +89,5 @@ function legends() {
   legend("classes", run.classes, false);
   legend("states", run.states, true);
   legend("stage-legend", run.stages, false);
+  legend("kinds", run.points ? run.kinds : [], false);
 }
