@@ -1,5 +1,6 @@
 """The library, as a program with its own loop uses it."""
 
+import dataclasses
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -11,8 +12,9 @@ import modt
 from modt.app import assembly
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, se3
+from modt.placement import Mount
 from modt.profile import load
-from modt.types import NONE
+from modt.types import NONE, OBSTACLES, PointKind
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
@@ -53,6 +55,24 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
         np.testing.assert_array_equal(found.obstacles(), result.obstacles())
     assert len(found.objects()) > 0
     assert not (found.objects().object_class == 0).any()
+
+
+def test_labels_have_the_order_of_the_given_points_though_the_sensor_hangs_tilted(frames):
+    config = load("vlp-16")
+    turned = dataclasses.replace(config, sensor=dataclasses.replace(config.sensor, roll_deg=180.0, pitch_deg=15.0))
+    R_level_sensor = Mount.of(180.0, 15.0).R_level_sensor
+    level, tilted = (modt.Pipeline(each) for each in (config, turned))
+    for frame in frames[:3]:
+        points = frame.points.copy()
+        points[:, :3] = frame.points[:, :3] @ R_level_sensor
+        expected = level.step(frame.points, frame.stamp_s)
+        found = tilted.step(points, frame.stamp_s)
+        assert found.labels.shape == (len(points),)
+        kinds = np.minimum(found.labels, PointKind.MEMBER)
+        assert (kinds == np.minimum(expected.labels, PointKind.MEMBER)).mean() > 0.99
+        rows = found.obstacles()
+        assert len(rows) > 500
+        np.testing.assert_array_equal(rows, np.flatnonzero(np.isin(found.labels, OBSTACLES) | (found.labels >= 0)))
 
 
 def test_frames_of_a_recording_are_stepped_with_their_poses_and_times(tmp_path):

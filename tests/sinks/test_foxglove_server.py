@@ -14,10 +14,12 @@ from modt.errors import MisuseError
 from modt.schemes import open_sink
 from modt.sinks.foxglove_sinks import FoxgloveServer
 from modt.sinks.messages import topics
+from tests.results import with_kinds
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
 
-SHOWN = topics(world_frame_id="world", points=True)
+SHOWN = topics(world_frame_id="world", points=True, obstacles=True)
 """Topics of a frame; those of energy and CPU time are beside them."""
+FRAME = with_kinds(moving(3))
 
 
 class Client:
@@ -75,7 +77,7 @@ def by_schema(channel, data):
 
 @pytest.fixture
 def server():
-    made = FoxgloveServer("127.0.0.1", 0, points=True)
+    made = FoxgloveServer("127.0.0.1", 0, points=True, obstacles=True)
     yield made
     made.close()
 
@@ -89,7 +91,7 @@ def test_a_client_sees_objects_points_and_energy(server):
     client.subscribe(channels)
     seen = {}
     for _ in range(1000):  # the subscription takes its time
-        server.write(moving(3))
+        server.write(FRAME)
         server.ledger(WINDOW)
         server.ledger(LEDGER)
         while select.select([client.socket], [], [], 0.01)[0] and not seen.keys() >= wanted:
@@ -99,10 +101,11 @@ def test_a_client_sees_objects_points_and_energy(server):
             break
     client.close()
     for topic in SHOWN:
-        assert seen[topic.name] == topic.encode(moving(3))
+        assert seen[topic.name] == topic.encode(FRAME)
     decoded = {c["topic"]: by_schema(c, seen[c["topic"]]) for c in channels.values() if c["topic"] in wanted}
     assert [found.id for found in decoded["/modt/detections"].detections] == ["11", "12"]
-    assert decoded["/modt/points"].width == len(moving(3).frame.points)
+    assert decoded["/modt/points"].width == len(FRAME.frame.points)
+    assert decoded["/modt/obstacles"].width == len(FRAME.obstacles()) > 0
     assert decoded["/modt/energy/watts"].data == 0.5
     assert seen["/modt/energy/watts"][4:] == struct.pack("<d", 0.5)
     assert seen["/modt/cpu_ms/tracking"][4:] == struct.pack("<d", 2.0)

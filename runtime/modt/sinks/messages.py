@@ -224,13 +224,13 @@ def obstacle_cloud(result: FrameResult, frame_id: str) -> bytes:
 
 def ground_cloud(result: FrameResult, frame_id: str) -> bytes:
     """sensor_msgs/PointCloud2: the points of the ground, as LABELLED."""
-    return _labelled_cloud(result, frame_id, np.flatnonzero(result.labels == PointKind.GROUND))
+    return _labelled_cloud(result, frame_id, np.flatnonzero(result.labels == PointKind.GROUND.value))
 
 
 def _labelled_cloud(result: FrameResult, frame_id: str, rows: Int) -> bytes:
     """Message of the points of (K,) rows of the sweep with their labels. A point without a track is background."""
-    xyz = _turned_back(result.frame.points[rows, :3], result)
-    label = result.labels[rows]
+    xyz = _turned_back(result.frame.points.take(rows, axis=0)[:, :3], result)
+    label = result.labels.take(rows)
     points = np.zeros(len(rows), LABELLED)
     for k, axis in enumerate("xyz"):
         points[axis] = xyz[:, k]
