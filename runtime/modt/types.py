@@ -99,7 +99,7 @@ class PointKind(IntEnum):
 
 OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE
 """Kinds, besides members of proposals, of what stands above the ground and below the ceiling."""
-LEFT_OUT: tuple[PointKind, ...] = tuple(kind for kind in PointKind if kind != PointKind.MEMBER)
+LEFT_OUT: tuple[PointKind, ...] = tuple(kind for kind in PointKind if kind not in (PointKind.MEMBER, PointKind.FOOT))
 """Kinds of the points that belong to no proposal."""
 
 
@@ -454,7 +454,7 @@ class FrameResult:
         return np.flatnonzero((labels >= 0) | np.isin(labels, OBSTACLES))
 
     def left_out(self) -> dict[PointKind, int]:
-        """Number of points of each kind that belong to no proposal."""
+        """Number of points of each kind in LEFT_OUT."""
         kind = self.proposals.kind
         if kind is None:
             return dict.fromkeys(LEFT_OUT, 0)

@@ -99,7 +99,8 @@ def test_labels_name_the_track_of_each_point_else_its_kind():
     assert result.obstacles().tolist() == np.flatnonzero(result.labels == of_person).tolist()
     left_out = result.left_out()
     assert left_out[PointKind.GROUND] == (result.labels == PointKind.GROUND).sum() > 1000
-    assert sum(left_out.values()) + len(result.proposals.members) == len(points)
+    n_feet = np.count_nonzero(result.proposals.kind == PointKind.FOOT)
+    assert sum(left_out.values()) + len(result.proposals.members) + n_feet == len(points)
 
 
 def test_proposals_of_a_record_have_no_labels():

@@ -39,6 +39,7 @@ def test_every_kind_has_its_look_and_ground_is_below_everything():
         PointKind.OVERHEAD: "overhead",
         PointKind.OUT_OF_RANGE: "plain",
         PointKind.OUT_OF_VIEW: "plain",
+        PointKind.FOOT: "plain",
     }
 
 

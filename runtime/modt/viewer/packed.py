@@ -51,21 +51,18 @@ LOOKS = 256
 PLAIN = 3
 """Group of the points that are drawn by their height alone."""
 _GROUPS = {
-    PointKind.MEMBER: PLAIN,
     PointKind.GROUND: 0,
-    PointKind.STRUCTURE: 2,
+    PointKind.OVERHEAD: 0,
     PointKind.LOW: 1,
     PointKind.SPARSE: 1,
-    PointKind.OVERHEAD: 0,
-    PointKind.OUT_OF_RANGE: PLAIN,
-    PointKind.OUT_OF_VIEW: PLAIN,
+    PointKind.STRUCTURE: 2,
 }
-"""Points that are drawn alike, as in `theme.kinds`. Of the points in a cell the greatest group is shown."""
+"""Kinds that are drawn alike, as in `theme.kinds`; others are PLAIN. In a cell the greatest group is shown."""
 
 
 def group_of(kind: Int8) -> Int:
     """(N,) group of points by their PointKind."""
-    by_kind = np.zeros(len(_GROUPS), np.int64)
+    by_kind = np.full(len(PointKind), PLAIN)
     by_kind[[-each for each in _GROUPS]] = [*_GROUPS.values()]
     return by_kind.take(-kind)
 
