@@ -86,3 +86,25 @@ def test_a_fitted_profile_has_the_mount_and_the_height_of_a_level_sensor():
     assert config.sensor.roll_deg == pytest.approx(10.0, abs=1.0)
     assert config.sensor.pitch_deg == pytest.approx(12.5, abs=1.0)
     assert config.sensor.height_m == pytest.approx(0.8, abs=0.05)
+
+
+def surface(height_m, ahead_m, behind_m):
+    """(n, 4) points of a strip along x; its height above the sensor is a function of x [m]."""
+    rng = np.random.default_rng(5)
+    x = rng.uniform(-behind_m, ahead_m, 6000)
+    y = rng.uniform(-3.0, 3.0, len(x))
+    z = height_m(x) + rng.normal(0.0, 0.01, len(x))
+    return np.stack([x, y, z, np.zeros(len(x))], axis=1).astype(np.float32)
+
+
+def test_level_beams_in_tall_grass_are_no_floor():
+    assert find_floor(surface(lambda x: 0.02 + 0.0 * x, 10.0, 10.0)) is None
+
+
+def test_the_side_of_a_hill_behind_is_no_tilt_of_the_mount():
+    def height_m(x):
+        return -0.8 + np.sin(2 * np.pi * (x - 2.0) / 20.0) + np.sin(0.2 * np.pi)
+
+    hill = surface(height_m, 3.0, 12.0)
+    assert find_floor(hill).tilt_deg() > MIN_TILT_DEG
+    assert find_floor(hill, 0.8) is None

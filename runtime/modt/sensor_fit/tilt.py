@@ -30,10 +30,16 @@ NEAR_M = (0.25, 0.12, 0.08, 0.06)
 """Distance from the plane within which a cube counts in each round of the fit [m]."""
 MIN_CUBES = 30
 """Fewest cubes on a floor."""
+SIDE_M = 6.0
+"""Range within which a floor goes on both ahead of the sensor and behind it [m]. The side of a hill does not."""
+MIN_SIDE_SHARE = 0.1
+"""Least share of the cubes ahead, and of those behind, that lie on such a floor; the others are objects."""
 MIN_TILT_DEG = 2.0
 """Least tilt that is corrected [deg]: streets slope to their sides, and cars lean on their springs."""
 OTHER_SHARE = 0.25
 """A plane whose depth differs from the height of the mount by this share of the height is no floor."""
+HEIGHTS_M = (0.05, 5.0)
+"""Heights that a profile can state."""
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 LEVEL_UP = np.array([0.0, 0.0, 1.0])
 
@@ -46,17 +52,23 @@ class Floor:
         up: (3,) normal, sensor frame.
         depth_m: distance of the plane.
         cubes: number of cubes on the plane.
+        around: whether the plane goes on both ahead of the sensor and behind it.
     """
 
     up: Float64
     depth_m: float
     cubes: int
+    around: bool
 
     @property
     def roll_pitch_deg(self) -> tuple[float, float]:
         """Roll and pitch of the sensor, to a tenth."""
         x, y, z = self.up.tolist()
         return round(float(np.rad2deg(np.arctan2(y, z))), 1), round(float(np.rad2deg(-np.arcsin(x))), 1)
+
+    def lies_at(self, height_m: float) -> bool:
+        """Whether its depth is the height of a mount [m]."""
+        return abs(self.depth_m - height_m) < OTHER_SHARE * height_m
 
     def tilt_deg(self, up: Float64 = LEVEL_UP) -> float:
         """Angle between the normal and the vertical (3,) of a mount, by default a level one."""
@@ -67,7 +79,8 @@ def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
     """The floor in (N, 3) or wider points; None if no floor is in view.
 
     A ceiling looks like the floor of a sensor that hangs upside down. The floor is the plane whose depth is the
-    height of the mount, else the one below the sensor, unless the one above is nearer and larger.
+    height of the mount, else the one below the sensor, unless the one above is nearer and larger. A plane of another
+    depth on one side of the sensor is the side of a hill.
     """
     near = points[np.hypot(points[:, 0], points[:, 1]) < REACH_M, :3]
     near = near[(near != 0).any(axis=1)]
@@ -75,13 +88,15 @@ def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
     cubes = near[np.unique(key, return_index=True)[1]].astype(np.float64).T
     upright = _floor(cubes, np.eye(3))
     hanging = _floor(cubes, UPSIDE_DOWN)
-    if upright is None or hanging is None:
-        return upright or hanging
-    if height_m is not None:
-        stands, hangs = (abs(f.depth_m - height_m) < OTHER_SHARE * height_m for f in (upright, hanging))
-        if stands != hangs:
-            return upright if stands else hanging
-    return hanging if hanging.depth_m < upright.depth_m and hanging.cubes > upright.cubes else upright
+    floor = upright or hanging
+    if upright and hanging:
+        if hanging.depth_m < upright.depth_m and hanging.cubes > upright.cubes:
+            floor = hanging
+        if height_m is not None and upright.lies_at(height_m) != hanging.lies_at(height_m):
+            floor = upright if upright.lies_at(height_m) else hanging
+    if floor is None or floor.around or height_m is None or floor.lies_at(height_m):
+        return floor
+    return None
 
 
 def _floor(cubes: Float64, R: Float64) -> Floor | None:
@@ -110,8 +125,9 @@ def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
     """Plane by least squares, from a first guess at a depth that is level after R (3, 3)."""
     x, y, z = _turned(R, cubes)
     way = np.abs(y) < WAY_M
+    x = x[way]
     z = z[way]
-    rows = np.stack([np.ones(len(z)), x[way], y[way]], axis=1)  # z = rows @ plane on the plane
+    rows = np.stack([np.ones(len(z)), x, y[way]], axis=1)  # z = rows @ plane on the plane
     plane = np.array([-depth_m, 0.0, 0.0])
     n = 0
     for near_m in NEAR_M:
@@ -124,17 +140,17 @@ def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
         right = (used * z[near, None]).sum(axis=0)
         plane = np.linalg.solve(normal, right)
     steep = np.array([-plane[1], -plane[2], 1.0])
-    up = R.T @ (steep / np.linalg.norm(steep))
-    return Floor(up, -float(plane[0]) / float(np.linalg.norm(steep)), n)
+    depth_m = -float(plane[0]) / float(np.linalg.norm(steep))
+    if depth_m < HEIGHTS_M[0]:  # the level beams of a sensor in tall grass are a plane too, through the sensor
+        return None
+    sides = (side & (np.abs(x) < SIDE_M) for side in (x > 0.0, x < 0.0))
+    around = all((side & near).sum() >= MIN_SIDE_SHARE * side.sum() for side in sides)
+    return Floor(R.T @ (steep / np.linalg.norm(steep)), depth_m, n, around)
 
 
 def _turned(R: Float64, columns: Float64) -> Float64:
     """(3, C) columns after a rotation (3, 3)."""
     return np.asarray((R[:, :, None] * columns[None]).sum(axis=1))
-
-
-HEIGHTS_M = (0.05, 5.0)
-"""Heights that a profile can state."""
 
 
 def ground_height_m(sweeps: Sequence[Float32], sensor: SensorConfig) -> float | None:
