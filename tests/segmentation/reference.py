@@ -6,6 +6,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from modt.segmentation.grids import SECTORS
+from modt.segmentation.ground import POSITIONS
 from modt.segmentation.groups import HEADINGS
 from modt.segmentation.tuning import SegmentationTuning
 
@@ -41,26 +42,30 @@ def flood_fill(cells, beam_m):
     return component
 
 
-def trace(lowest, stands, range_m, height_m, max_slope_deg):
+def trace(lowest, spread, estimator, height_m, max_slope_deg):
     """(rings, SECTORS) ground cells, cells on and beside a ramp, and (SECTORS,) slope of the ramp at a ray's end."""
     ground = SegmentationTuning().ground
-    max_slope, ramp_slope = (np.tan(np.deg2rad(v * max_slope_deg)) for v in (1.0, ground.ramp_share))
+    max_slope, hill_slope, ramp_slope = np.tan(np.deg2rad([v * max_slope_deg for v in (1.0, 2.0, ground.ramp_share)]))
+    position = (lowest.view(np.int32) & (POSITIONS - 1)) / POSITIONS
+    range_m = ((np.arange(len(lowest))[:, None] + position) * estimator.grid.ring_step) ** 2
     is_ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
     last = [(-height_m, 0.0, 0.0)] * SECTORS
     for ring in range(len(range_m)):
         for ray in range(SECTORS):
             here, (height, at, slope) = lowest[ring, ray], last[ray]
             if np.isfinite(here):
-                gap = range_m[ring] - at
+                gap = range_m[ring, ray] - at
                 reach = min(gap, ground.max_gap_m)
                 off = here - height - slope * reach
                 near = ground.max_gap_m if ring and ramp[ring - 1, ray] else ground.near_m
-                bound = 0.0 if stands[ring, ray] else min(gap, near) * max_slope
+                flat_m = estimator.flat_m[ring] + max(slope, 0.0) * estimator.depth_m[ring]
+                bound = 0.0 if spread[ring, ray] > flat_m else min(gap, near) * max_slope
                 if -gap * max_slope - ground.noise_m < off < bound + ground.noise_m:
                     is_ground[ring, ray] = True
-                    slope = slope + ground.slope_gain * ((here - height) / gap - slope)
-                    slope = float(np.clip(slope, -max_slope, max_slope))
-                    last[ray] = here, range_m[ring], slope
+                    gain = ground.slope_gain / max(gap, ground.slope_gap_m)
+                    slope += gain * (here - height - slope * gap)
+                    slope = float(np.clip(slope, -hill_slope, hill_slope))
+                    last[ray] = here, range_m[ring, ray], slope
             steep[ring, ray] = abs(slope) > ramp_slope
         for ray in range(SECTORS):
             ramp[ring, ray] = steep[ring, [(ray + k * ground.flank_sectors) % SECTORS for k in (-1, 0, 1)]].any()

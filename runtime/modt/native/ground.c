@@ -16,11 +16,12 @@
 
 /* GroundEstimator, GroundTuning, PolarGrid and Bounds: values by the names that they have there. */
 typedef struct {
-    const float *range_m, *flat_m; /* (rings,) middle; height range of a cell above which something stands in it */
+    const float *edge_m;           /* (rings + 1,) range of the edges of the rings */
+    const float *flat_m, *depth_m; /* (rings,) height range above which something stands in a cell; way looked at */
     i32 rings, sectors, flank_sectors, bonnet_ring; /* sectors are a power of two */
     float far_m;                                    /* points as far away have no position */
-    float rings_per_unit;                           /* of the square root of range */
-    float max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
+    float rings_per_unit, ring_step;                /* of the square root of range */
+    float max_slope, hill_slope, ramp_slope, near_m, slope_gain, slope_gap_m, noise_m, max_gap_m, flank_m;
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
     const i32 *low_sectors; /* (near_rings,) sectors to the left and right that a low thing does not reach */
     i32 near_rings, quarters;
@@ -44,7 +45,7 @@ static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
     uintptr_t end = (uintptr_t)memory;
     i64 cells = (i64)g->rings * g->sectors + 1;
     TAKE(&end, s->lowest, cells);
-    TAKE(&end, s->surface, cells);
+    TAKE(&end, s->surface, cells + g->sectors);
     TAKE(&end, s->range_before, cells);
     TAKE(&end, s->clear, cells);
     TAKE(&end, s->ends, cells);
@@ -74,6 +75,7 @@ typedef struct {
 /* PointKind of types.py, as far as it is known here. */
 enum { MEMBER_KIND = 0, GROUND_KIND = -1, OVERHEAD_KIND = -5, OUT_OF_RANGE_KIND = -6 };
 enum { BLOCK = 512, GROUP = 8 }; /* points in the first-level cache; points kept or left out together */
+enum { POSITIONS = 1024 }; /* of a lowest return in its ring, in the last bits of its height */
 /* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */
 typedef enum { GROUND = 1, STEEP = 2, RAMP = 4 } Kind;
 
@@ -122,18 +124,21 @@ static void place_points(const Ground *g, const u4 *points, i64 n, float *restri
     }
 }
 
-/* GroundEstimator._lowest and the maxima of _stands, of up to BLOCK points. Afterwards the cell of points out of
+/* GroundEstimator._lowest and the maxima of _spread, of up to BLOCK points. Afterwards the cell of points out of
  * bounds of range is the one after the last. */
 static void find_ends(const Ground *g, float height_m, i64 n, const float *z, const float *sqrt_range, i32 *cell,
                       float (*ends)[2])
 {
     enum { APART = BLOCK / 8 };
     float candidate[BLOCK][2];
+    float positions_per_unit = g->rings_per_unit * POSITIONS;
     i32 outside = g->rings * g->sectors;
     for (i64 i = 0; i < n; i++) {
-        float reach = sqrt_range[i] * sqrt_range[i] * g->max_slope + g->noise_m;
+        float reach = sqrt_range[i] * sqrt_range[i] * g->hill_slope + g->noise_m;
         int plausible = (magnitude(z[i] + height_m) < reach) & (sqrt_range[i] > g->min_sqrt_range);
-        candidate[i][0] = plausible ? z[i] : INFINITY;
+        i32 position = (i32)(sqrt_range[i] * positions_per_unit) & (POSITIONS - 1);
+        float placed = float_of((bits_of(z[i]) & ~(POSITIONS - 1)) | position);
+        candidate[i][0] = plausible ? placed : INFINITY;
         candidate[i][1] = -z[i];
     }
     for (i64 k = 0; k < APART; k++) /* neighbours share cells: those far apart do not wait for one another */
@@ -180,27 +185,38 @@ static void measure_roughness(const Ground *g, const GroundScratch *s, float *to
     }
 }
 
-/* _Rays.advance for one ring, with the cells of the ring and the last ground cell of each ray. Height and range of
- * that cell are left in `surface` and `range_before`. Something stands in a cell if its highest return lies flat_m
- * above the lowest. */
-static void trace_ring(const Ground *g, float range_m, float flat_m, float (*restrict ends)[2],
-                       float *restrict lowest, uint8_t *restrict kind, float *restrict height, float *restrict range,
-                       float *restrict slope, const float *restrict rise_range_m, float *restrict surface,
-                       float *restrict range_before)
+/* GroundEstimator.range_m: range of the lowest return of a cell of a ring. */
+static ALWAYS_INLINE float range_of(float lowest, float ring, float ring_step)
+{
+    float position = (float)(bits_of(lowest) & (POSITIONS - 1)) * (1.0f / POSITIONS);
+    float sqrt_range = (ring + position) * ring_step;
+    return sqrt_range * sqrt_range;
+}
+
+/* GroundEstimator.trace and _Rays.advance for one ring, with the cells of the ring and the last ground cell of each
+ * ray. Height and range of the ground cell before the ring are left in `surface` and `range_before`. Something stands
+ * in a cell if its highest return lies flat_m above the lowest, and more on ground that rises. */
+static void trace_ring(const Ground *g, i32 ring, float (*restrict ends)[2], float *restrict lowest,
+                       uint8_t *restrict kind, float *restrict height, float *restrict range, float *restrict slope,
+                       const float *restrict rise_range_m, float *restrict surface, float *restrict range_before)
 {
     const Ground c = *g; /* a copy, which no store through a pointer can change */
+    float flat_m = c.flat_m[ring], depth_m = c.depth_m[ring];
     for (i32 k = 0; k < c.sectors; k++) {
         lowest[k] = ends[k][0];
+        float range_m = range_of(lowest[k], (float)ring, c.ring_step);
         float gap = range_m - range[k];
         float rise = lowest[k] - height[k];
         float residual = rise - slope[k] * minf(gap, c.max_gap_m);
-        float flat = -ends[k][1] > lowest[k] + flat_m ? 0.0f : 1.0f;
+        float flat = -ends[k][1] - lowest[k] <= flat_m + maxf(slope[k], 0.0f) * depth_m ? 1.0f : 0.0f;
         float bound = minf(gap, rise_range_m[k]) * c.max_slope * flat + c.noise_m;
         int found = (residual < bound) & (residual > -(gap * c.max_slope + c.noise_m));
-        float newest = slope[k] + c.slope_gain * (rise / gap - slope[k]);
-        newest = minf(maxf(newest, -c.max_slope), c.max_slope);
-        surface[k] = height[k] = found ? lowest[k] : height[k];
-        range_before[k] = range[k] = found ? range_m : range[k];
+        float newest = slope[k] + c.slope_gain / maxf(gap, c.slope_gap_m) * (rise - slope[k] * gap);
+        newest = minf(maxf(newest, -c.hill_slope), c.hill_slope);
+        surface[k] = height[k];
+        range_before[k] = range[k];
+        height[k] = found ? lowest[k] : height[k];
+        range[k] = found ? range_m : range[k];
         slope[k] = found ? newest : slope[k];
         kind[k] = (uint8_t)(found | (magnitude(slope[k]) > c.ramp_slope) << 1); /* GROUND, STEEP */
     }
@@ -231,8 +247,8 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
         i32 row = ring * sectors;
         uint8_t *kind = s->kind + row;
         uint8_t *round = (uint8_t *)(s->ends + row); /* the ends of this ring are needed no more */
-        trace_ring(g, g->range_m[ring], g->flat_m[ring], s->ends + row, s->lowest + row, kind, height, range, slope,
-                   rise_range_m, s->surface + row, s->range_before + row);
+        trace_ring(g, ring, s->ends + row, s->lowest + row, kind, height, range, slope, rise_range_m,
+                   s->surface + row, s->range_before + row);
         close_round(kind, flank, sectors, round);
         for (i32 k = 0; k < sectors; k++) {
             i32 steep = (round[k] | round[k + flank] | round[k + 2 * flank]) & STEEP;
@@ -242,36 +258,37 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
     }
 }
 
-/* A ring of GroundEstimator._interpolate. The ground cell before each cell is in `surface` and `range_before`; the
- * one after it, in `height` and `range`, is updated with the cells of this ring. NONE as its range means that
- * there is none, and the ray goes on with `slope`. */
+/* The inner edge of a ring of GroundEstimator._interpolate. The ground cell before it is in `surface` and
+ * `range_before`; the one after it, in `height` and `range`, is updated with the cells of this ring. NONE as its
+ * range means that there is none, and the ray goes on with `slope`. */
 static void blend(const Ground *g, i32 ring, const uint8_t *restrict kind, float *restrict height,
                   float *restrict range, const float *restrict slope, const float *restrict lowest,
                   float *restrict surface, const float *restrict range_before)
 {
     const Ground c = *g; /* a copy, which no store through a pointer can change */
-    float range_m = c.range_m[ring], first_m = c.range_m[0];
+    float edge_m = c.edge_m[ring];
     for (i32 k = 0; k < c.sectors; k++) {
-        float from = surface[k], from_range = maxf(range_before[k], first_m);
-        float to = height[k], to_range = range[k];
-        height[k] = to = kind[k] & GROUND ? from : to;
-        range[k] = to_range = kind[k] & GROUND ? range_m : to_range;
-        float since = range_m - from_range;
-        float between = from + (to - from) * (since / maxf(to_range - from_range, 1e-3f));
+        float range_m = range_of(lowest[k], (float)ring, c.ring_step);
+        float to = kind[k] & GROUND ? lowest[k] : height[k];
+        float to_range = kind[k] & GROUND ? range_m : range[k];
+        float from = surface[k];
+        float since = edge_m - range_before[k];
+        float between = from + (to - from) * (since / maxf(to_range - range_before[k], 1e-3f));
         float ramp = from + slope[k] * minf(since, c.max_gap_m);
         float beyond = minf(ramp, maxf(lowest[k], from)); /* a ramp rises above no return */
+        height[k] = to;
+        range[k] = to_range;
         surface[k] = to_range < 0.0f ? beyond : between;
     }
 }
 
-/* GroundEstimator._interpolate, from the last ring inwards: linear from the ground cell before each cell to the
+/* GroundEstimator._interpolate, from the last ring inwards: linear from the ground cell before each edge to the
  * one after it, or on with the slope of its ramp. `rays` comes from trace. */
 static void interpolate(const Ground *g, const GroundScratch *s)
 {
     i32 sectors = g->sectors;
     float *height = s->rays, *range = height + sectors, *slope = range + sectors;
     for (i32 k = 0; k < sectors; k++) {
-        s->kind[k] |= GROUND; /* the foot of the sensor */
         range[k] = NONE;
         slope[k] = magnitude(slope[k]) > g->ramp_slope ? slope[k] : 0.0f;
     }
@@ -315,6 +332,15 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
     }
 }
 
+/* Height of the surface below a point, linear between the edges of its ring; not a number out of bounds of range. */
+static ALWAYS_INLINE float surface_at(const Ground *g, const GroundScratch *s, i64 row)
+{
+    i32 cell = s->cell[row], bits = __builtin_ctz((unsigned)g->sectors);
+    float inner = s->surface[cell], outer = s->surface[cell + g->sectors];
+    float share = s->sqrt_range[row] * g->rings_per_unit - (float)(cell >> bits);
+    return inner + (outer - inner) * share;
+}
+
 /* Kernels.above_ground, of up to BLOCK points from `start` on: those within bounds of height are written from
  * `count` on, where there is room for one more. Returns how many there are then. Rows of low ones go to `low_rows`
  * from `n_low` on. */
@@ -326,10 +352,10 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
     float *const *kept = out->kept;
     uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}, is_clear[BLOCK];
     for (i64 i = 0; i < n; i++)
-        height[i] = s->z[start + i] - s->surface[s->cell[start + i]];
+        height[i] = s->z[start + i] - surface_at(g, s, start + i);
     for (i64 i = 0; i < n; i++)
         is_kept[i] = (height[i] > low) & (height[i] < high);
-    for (i64 i = 0; i < n; i++) { /* one that is out of range lies infinitely low */
+    for (i64 i = 0; i < n; i++) { /* one that is out of range has no height */
         int8_t other = height[i] >= high ? OVERHEAD_KIND : height[i] > -INFINITY ? GROUND_KIND : OUT_OF_RANGE_KIND;
         out->kind[start + i] = is_kept[i] ? MEMBER_KIND : other;
     }
@@ -373,7 +399,8 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
 }
 
 /* The low points, after the `count` others. */
-static void append_low(const GroundScratch *s, const u4 *points, i64 count, i64 n_low, const AboveGround *out)
+static void append_low(const Ground *g, const GroundScratch *s, const u4 *points, i64 count, i64 n_low,
+                       const AboveGround *out)
 {
     float *const *kept = out->kept;
     for (i64 k = 0; k < n_low; k++) {
@@ -382,7 +409,7 @@ static void append_low(const GroundScratch *s, const u4 *points, i64 count, i64 
         for (int v = 0; v < 3; v++)
             kept[v][at] = points[row][v];
         kept[3][at] = s->sqrt_range[row];
-        kept[4][at] = s->z[row] - s->surface[s->cell[row]];
+        kept[4][at] = s->z[row] - surface_at(g, s, row);
     }
 }
 
@@ -408,11 +435,11 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
     trace(g, height_m, s);
     interpolate(g, s);
     smooth(g, s, out->top);
-    s->surface[cells] = INFINITY; /* above all points out of bounds of range */
+    s->surface[cells] = s->surface[cells + g->sectors] = INFINITY; /* points out of bounds of range have no height */
     s->clear[cells] = INFINITY;
     for (i64 i = 0; i < n; i += BLOCK)
         count = keep_points(g, s, points, i, n - i < BLOCK ? n - i : BLOCK, count, &n_low, out);
-    append_low(s, points, count, n_low, out);
+    append_low(g, s, points, count, n_low, out);
     counts[0] = count;
     counts[1] = n_low;
 }

@@ -42,6 +42,8 @@ static inline double maxd(double a, double b) { return a > b ? a : b; }
 static inline f4 min4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
 static inline f4 max4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
 static inline f4 spread(float a) { return (f4){a, a, a, a}; }
+static inline i32 bits_of(float a) { i32 bits; __builtin_memcpy(&bits, &a, sizeof bits); return bits; }
+static inline float float_of(i32 bits) { float a; __builtin_memcpy(&a, &bits, sizeof a); return a; }
 static inline float magnitude(float a) { return __builtin_fabsf(a); }
 
 /* PointColumns of grids.py: n points [m, sensor frame], and square roots of their ranges. */

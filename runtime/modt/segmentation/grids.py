@@ -75,10 +75,13 @@ class PolarGrid:
     """
 
     def __init__(self, max_range_m: float, tuning: PolarGridTuning = PolarGridTuning()) -> None:
+        self.ring_step = tuning.ring_step
         self.rings_per_unit = 1 / tuning.ring_step  # [1/sqrt(m)]
         self.rings = int(np.sqrt(max_range_m) / tuning.ring_step) + 2
         self.size = self.rings * SECTORS
         edge_m = (np.arange(self.rings + 1) * tuning.ring_step) ** 2
+        # (rings + 1,) range of the edges of the rings [m].
+        self.edge_m: Float32 = edge_m.astype(np.float32)
         # (rings,) range of the middle of each ring [m].
         self.range_m: Float32 = ((edge_m[1:] + edge_m[:-1]) / 2).astype(np.float32)
         # (rings,) height range of the returns of a cell above which something stands in it [m].

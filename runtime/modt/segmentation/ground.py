@@ -15,6 +15,9 @@ from modt.types import Bool, Float32, Int
 
 QUARTERS = 4
 """Parts of a ring over which the roughness of the ground is measured."""
+POSITIONS = 1024
+"""Positions of a return in its ring that are told apart, a power of two."""
+POSITION_MASK = np.int32(POSITIONS - 1)
 
 
 class HeightEstimator:
@@ -74,15 +77,15 @@ class HeightEstimator:
 class GroundEstimator:
     """Height of each point above the ground below it.
 
-    The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` over a
-    short way, on and beside a ramp over a longer one. It may not rise at all where something stands in the cell or,
-    far away, right behind it, since it may be a flank. It may fall by `max_slope_deg` over any gap, since only ground
-    lies lower. Cells without ground are interpolated along the ray; beyond its last one, the ground is level, but a
-    ramp goes on for `max_gap_m`.
+    The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` more
+    than the running slope of the ray over a short way, on and beside a ramp over a longer one. It may not rise more
+    where something stands in the cell or, far away, right behind it, since it may be a flank. It may fall by
+    `max_slope_deg` more over any gap, since only ground lies lower. The surface is linear between the ground returns
+    of a ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
 
     Args:
         sensor: range.
-        max_slope_deg: steepest ground.
+        max_slope_deg: greatest change of the slope of the ground.
         tuning: bounds on ground that continues that of a ray.
         polar: cells of the polar grid.
     """
@@ -98,6 +101,9 @@ class GroundEstimator:
         self.grid = PolarGrid(sensor.max_range_m, polar)
         self.flat_m: Float32 = self.grid.flat_m.astype(np.float32)
         self.bonnet_ring = int(np.searchsorted(self.grid.range_m, tuning.bonnet_range_m))
+        # (rings,) way over which the returns of a cell are looked at for what stands [m].
+        self.depth_m: Float32 = np.diff(self.grid.edge_m)
+        self.depth_m[self.bonnet_ring :] *= 2
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
         # (near rings,) sectors to the left and right of a cell that a low thing does not reach.
         near_m = self.grid.range_m[self.grid.range_m < tuning.low_range_m]
@@ -106,6 +112,7 @@ class GroundEstimator:
         self.near_rings = len(near_m)
         steepest_rad = np.deg2rad(max_slope_deg)
         self.max_slope, self.ramp_slope = np.tan([steepest_rad, tuning.ramp_share * steepest_rad]).tolist()
+        self.hill_slope = float(np.tan(2 * steepest_rad))  # of a hill, seen from the slope of the hill opposite
 
     def height_above(self, points: PointColumns, sensor_height_m: float) -> Float32:
         """(N,) height of each point above the ground [m]."""
@@ -121,7 +128,7 @@ class GroundEstimator:
         lowest = self._lowest(points, cell, sensor_height_m)
         highest = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS)
         clear_m = self.clear_m(lowest, highest)
-        is_ground, is_ramp, slope = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
+        is_ground, is_ramp, slope = self.trace(lowest, self._spread(highest, lowest), sensor_height_m)
         surface = _median_across(self._interpolate(lowest, is_ground, slope, sensor_height_m))
         # The ground under a vehicle, and under what stands on a ramp, is that of the rays beside it.
         beside = _median_across(surface, self.tuning.flank_sectors)
@@ -133,7 +140,11 @@ class GroundEstimator:
             raised = (surface[ring] - beside > self.tuning.low_m) & ~is_ramp[ring]
             np.copyto(surface[ring], beside, where=raised)
         clear_m[highest - surface <= clear_m] = np.inf
-        height: Float32 = points.z - surface.ravel().take(cell)
+        inner = surface.ravel().take(cell)
+        outer = np.concatenate([surface[1:], surface[-1:]]).ravel().take(cell)
+        ring_of_point = (cell // SECTORS).astype(np.float32)
+        share = points.sqrt_range * np.float32(self.grid.rings_per_unit) - ring_of_point
+        height: Float32 = points.z - (inner + (outer - inner) * share)
         return height, clear_m.ravel().take(cell), highest
 
     def clear_m(self, lowest: Float32, highest: Float32) -> Float32:
@@ -154,24 +165,36 @@ class GroundEstimator:
         return np.broadcast_to(clear_m, shape).reshape(lowest.shape).copy()
 
     def _lowest(self, points: PointColumns, cell: Int, sensor_height_m: float) -> Float32:
-        """(rings, SECTORS) lowest return of each cell that can be ground [m], infinite without any."""
+        """(rings, SECTORS) lowest return of each cell that can be ground [m], infinite without any.
+
+        The last bits of each height are replaced by the position of the return in its ring, so that both are found
+        at once: see `range_m`.
+        """
         reach = points.sqrt_range * points.sqrt_range
-        reach *= self.max_slope
+        reach *= self.hill_slope
         reach += self.tuning.noise_m
         plausible = np.abs(points.z + np.float32(sensor_height_m)) < reach
         plausible &= points.sqrt_range > self.min_sqrt_range
-        z = np.where(plausible, points.z, np.inf)
+        position = (points.sqrt_range * np.float32(self.grid.rings_per_unit * POSITIONS)).astype(np.int32)
+        bits = (points.z.view(np.int32) & ~POSITION_MASK) | (position & POSITION_MASK)
+        z = np.where(plausible, bits.view(np.float32), np.inf)
         return label_min(z, cell, self.grid.size).reshape(-1, SECTORS)
 
-    def _stands(self, points: PointColumns, cell: Int, lowest: Float32) -> Bool:
-        """(rings, SECTORS) cells in which, or right behind which, something stands: returns far above the lowest."""
-        highest = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS)
+    def range_m(self, lowest: Float32, ring: Int) -> Float32:
+        """(...) range of the lowest returns of cells of rings [m]."""
+        position = (lowest.view(np.int32) & POSITION_MASK).astype(np.float32) * np.float32(1 / POSITIONS)
+        sqrt_range = (ring.astype(np.float32) + position) * np.float32(self.grid.ring_step)
+        range_m: Float32 = sqrt_range * sqrt_range
+        return range_m
+
+    def _spread(self, highest: Float32, lowest: Float32) -> Float32:
+        """(rings, SECTORS) height of the highest return in each cell, or right behind it, above its lowest [m]."""
+        highest = highest.copy()
         far = self.bonnet_ring
         highest[far:-1] = np.maximum(highest[far:-1], highest[far + 1 :])
-        stands: Bool = highest > lowest + self.flat_m[:, None]
-        return stands
+        return highest - lowest
 
-    def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> tuple[Bool, Bool, Float32]:
+    def trace(self, lowest: Float32, spread: Float32, sensor_height_m: float) -> tuple[Bool, Bool, Float32]:
         """(rings, SECTORS) ground cells, and cells on and beside a ramp, where no surface is a vehicle's side.
 
         With them comes the (SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0.
@@ -180,31 +203,35 @@ class GroundEstimator:
         rays = _Rays(self, sensor_height_m)
         is_ground = np.zeros(lowest.shape, np.bool_)
         is_ramp = np.zeros(lowest.shape, np.bool_)
-        for ring, range_m in enumerate(self.grid.range_m):
-            is_ground[ring] = rays.advance(range_m, lowest[ring], stands[ring])
+        range_m = self.range_m(lowest, np.arange(self.grid.rings)[:, None])
+        for ring in range(self.grid.rings):
+            flat = spread[ring] <= self.flat_m[ring] + np.maximum(rays.slope, 0) * self.depth_m[ring]
+            is_ground[ring] = rays.advance(range_m[ring], lowest[ring], flat)
             is_ramp[ring] = rays.beside_ramp
         return is_ground, is_ramp, rays.slope * rays.on_ramp
 
     def _interpolate(self, lowest: Float32, is_ground: Bool, slope: Float32, sensor_height_m: float) -> Float32:
-        """(rings, SECTORS) surface, linear between the ground cells of a ray.
+        """(rings, SECTORS) surface at the inner edges of the rings, linear between the ground returns of a ray.
 
         Beyond the last one it goes on with the (SECTORS,) slope for `max_gap_m`, but rises above no return.
         """
-        ground = np.where(is_ground, lowest, np.float32(-sensor_height_m))
-        is_ground = is_ground.copy()
-        is_ground[0] = True  # the foot of the sensor
-        cell = np.arange(is_ground.size).reshape(is_ground.shape)
-        before = np.maximum.accumulate(np.where(is_ground, cell, 0), axis=0)
-        after = np.minimum.accumulate(np.where(is_ground, cell, cell.size)[::-1], axis=0)[::-1]
-        beyond = after == cell.size
+        foot = np.full((1, SECTORS), -sensor_height_m, np.float32)
+        height = np.concatenate([foot, np.where(is_ground, lowest, np.inf)])  # of a cell: one row on
+        ring = np.arange(-1, self.grid.rings)
+        range_m = self.range_m(height, np.maximum(ring, 0)[:, None])
+        is_node = np.concatenate([np.ones_like(is_ground[:1]), is_ground])
+        node = np.arange(is_node.size).reshape(is_node.shape)
+        before = np.maximum.accumulate(np.where(is_node, node, 0), axis=0)[:-1]
+        after = np.minimum.accumulate(np.where(is_node, node, node.size)[::-1], axis=0)[::-1][1:]
+        beyond = after == node.size
         after = np.where(beyond, before, after)
-        range_m = np.repeat(self.grid.range_m, SECTORS)
+        range_m[0] = 0.0
         range_before = range_m.take(before)
-        height_before = ground.take(before)
-        since = self.grid.range_m[:, None] - range_before
+        height_before = height.take(before)
+        since = self.grid.edge_m[:-1, None] - range_before
         ramp = height_before + slope * np.minimum(since, self.tuning.max_gap_m)
-        share = since / np.maximum(range_m.take(after) - range_before, 1e-3)
-        between = height_before + (ground.take(after) - height_before) * share
+        share = since / np.maximum(range_m.take(after) - range_before, np.float32(1e-3))
+        between = height_before + (height.take(after) - height_before) * share
         surface: Float32 = np.where(beyond, np.minimum(ramp, np.maximum(lowest, height_before)), between)
         return surface
 
@@ -220,13 +247,13 @@ class _Rays:
         self.on_ramp = np.zeros(SECTORS, np.bool_)
         self.beside_ramp = self.on_ramp  # or on it
 
-    def advance(self, range_m: np.float32, lowest: Float32, stands: Bool) -> Bool:
+    def advance(self, range_m: Float32, lowest: Float32, flat: Bool) -> Bool:
         """(SECTORS,) rays that find ground in the next ring.
 
         Args:
-            range_m: range of the ring.
+            range_m: (SECTORS,) range of the lowest returns [m].
             lowest: (SECTORS,) lowest return of each cell of the ring [m], infinite without any.
-            stands: (SECTORS,) cells in which something stands: the ground does not rise there.
+            flat: (SECTORS,) cells in which nothing stands: the ground does not rise in the others.
         """
         tuning = self.ground.tuning
         max_slope = self.ground.max_slope
@@ -234,10 +261,12 @@ class _Rays:
         rise = lowest - self.height_m
         residual = rise - self.slope * np.minimum(gap, tuning.max_gap_m)
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
-        found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * ~stands + tuning.noise_m
+        found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * flat + tuning.noise_m
         found &= residual > -(gap * max_slope + tuning.noise_m)
-        slope = self.slope + tuning.slope_gain * (rise / gap - self.slope)
-        np.copyto(self.slope, np.minimum(np.maximum(slope, -max_slope), max_slope), where=found)
+        gain = tuning.slope_gain / np.maximum(gap, tuning.slope_gap_m)
+        slope = self.slope + gain * (rise - self.slope * gap)
+        steepest = self.ground.hill_slope
+        np.copyto(self.slope, np.minimum(np.maximum(slope, -steepest), steepest), where=found)
         np.copyto(self.height_m, lowest, where=found)
         np.copyto(self.range_m, range_m, where=found)
         self.on_ramp = np.abs(self.slope) > self.ground.ramp_slope

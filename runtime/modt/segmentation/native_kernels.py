@@ -47,10 +47,12 @@ def _members(kind: Member, *names: str) -> dict[str, Member]:
 
 GROUND = Layout(
     "Ground",
-    **_members(Array(_f32, "rings"), "range_m", "flat_m"),
+    edge_m=Array(_f32, "edges"),
+    **_members(Array(_f32, "rings"), "flat_m", "depth_m"),
     **_members(Number(_i32), "rings", "sectors", "flank_sectors", "bonnet_ring"),
-    **_members(Number(_f32), "far_m", "rings_per_unit", "max_slope", "ramp_slope", "near_m", "slope_gain", "noise_m"),
-    **_members(Number(_f32), "max_gap_m", "flank_m", *Bounds._fields),
+    **_members(Number(_f32), "far_m", "rings_per_unit", "ring_step", "max_slope", "hill_slope", "ramp_slope"),
+    **_members(Number(_f32), "near_m", "slope_gain", "slope_gap_m", "noise_m", "max_gap_m", "flank_m"),
+    **_members(Number(_f32), *Bounds._fields),
     low_sectors=Array(_i32, "near_rings"),
     **_members(Number(_i32), "near_rings", "quarters"),
     **_members(Number(_f32), "low_m", "clear_m", "foot_share", "min_foot_m"),

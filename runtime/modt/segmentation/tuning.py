@@ -59,10 +59,13 @@ class GroundTuning:
     max_gap_m: float = 6.0
     """`near_m` on and beside a ramp, and the distance over which the slope of a ray is extrapolated [m].
     Chosen on: simulated ramps."""
-    ramp_share: float = 0.3
+    ramp_share: float = 0.27
     """Share of `max_slope_deg` above which the running slope of a ray is a ramp. Chosen on: simulated ramps."""
     slope_gain: float = 0.2
     """Weight of the newest slope in the running slope of a ray. Chosen on: KITTI scans."""
+    slope_gap_m: float = 0.5
+    """Distance between two ground cells below which that weight shrinks in proportion [m]. Less lets the noise of
+    close returns into the slope. Chosen on: KITTI scans and simulated hills."""
     bonnet_range_m: float = 11.0
     """Range from which the next ring is looked at for what stands behind a low return [m]: cells are as deep as a
     bonnet, 1 m, there. Chosen on: sensor study (far cars of a VLP-16)."""
