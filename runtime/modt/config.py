@@ -223,7 +223,7 @@ class SegmentationConfig(StageConfig):
         0.105, 0.01, 2.0, "m", "Side of a cell at 10 m. It grows with the square root of the range."
     )
     min_points: int = number(5, 1, 1000, "", "Least number of points of a proposal.")
-    max_extent_m: float = number(9.0, 0.5, 50.0, "m", "Greatest length of a proposal.")
+    max_extent_m: float = number(20.0, 0.5, 50.0, "m", "Greatest length of a proposal.")
     min_height_m: float = number(0.2, 0.0, 3.0, "m", "Least height of a proposal.")
     kernels: str = choice(
         "auto",

@@ -1,6 +1,8 @@
 /* Cells of a grid: which are occupied, which are connected, and which clusters of them are one car. */
 #include "kernels.h"
 
+#define FAR_M 1e6f /* of grids.py */
+
 /* Cells of cells.py: n occupied cells of a square grid. */
 typedef struct {
     i32 *row, *column;  /* (n,) */
@@ -134,6 +136,15 @@ typedef struct {
     i32 *span_of_cell;              /* (n,) */
     i32 *span_in_order;             /* (n + 1,) spans in the order of their last cells */
     i32 *component_of_root;         /* (n + 1,) number of the component of a span that is its own parent */
+    i32 *next_of_cluster;           /* (2 n,) where the next cell of a cluster goes that may have surfaces, or NONE */
+    i32 *cell_of_row;               /* (n,) cells of those clusters, in their order */
+    i32 *row_cells;                 /* (n,) cells of one cluster that surfaces are looked for in */
+    double *x, *y, *width_m;        /* (n,) these cells, as find_surfaces takes them */
+    uint8_t *on_surface;            /* (n,) its results */
+    double *distance_m;             /* (n,) */
+    float *before_m;                /* (n,) distance of each cell before surfaces, infinite without */
+    float *front_m, *back_m;        /* (n,) greatest and least of those of each part */
+    SurfaceScratch surface;
 } ClusterScratch;
 
 /* Places the scratch at `memory`; returns its size in bytes. */
@@ -158,6 +169,18 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->span_of_cell, n);
     TAKE(&end, s->span_in_order, n + 1);
     TAKE(&end, s->component_of_root, n + 1);
+    TAKE(&end, s->next_of_cluster, 2 * n);
+    TAKE(&end, s->cell_of_row, n);
+    TAKE(&end, s->row_cells, n);
+    TAKE(&end, s->x, n);
+    TAKE(&end, s->y, n);
+    TAKE(&end, s->width_m, n);
+    TAKE(&end, s->on_surface, n);
+    TAKE(&end, s->distance_m, n);
+    TAKE(&end, s->before_m, n);
+    TAKE(&end, s->front_m, n);
+    TAKE(&end, s->back_m, n);
+    place_surface_scratch(n, &end, &s->surface);
     return (i64)(end - (uintptr_t)memory);
 }
 
@@ -376,17 +399,23 @@ static void measure(const Cells *cells, const PointColumns *sampled, const float
 typedef struct {
     i32 coarse_side, fine_side;
     float max_gap_m, max_gap_beams;            /* vertical gap between connected cells */
-    float max_extent_m;                        /* of an object; a larger cluster is oversized */
+    float max_extent_m;                        /* of an object */
     float min_extent_m, max_split_sqrt_range;  /* of a cluster that may hold a person and more */
     i64 min_points;                            /* of a part that is split off */
+    double step;                               /* side of a fine cell [sqrt(m)] */
 } ClusterRules;
 
-/* Oversized, or CellClusterer._may_hold_person */
-static int is_divided(const ClusterRules *r, const PersonSize *person, const ClusterSizes *s, i64 g)
+/* CellClusterer._may_hold_person */
+static int may_hold_person(const ClusterRules *r, const PersonSize *person, const ClusterSizes *s, i64 g)
 {
-    return s->extent_m[g] >= r->max_extent_m ||
-           (s->extent_m[g] > r->min_extent_m && s->top_m[g] > person->min_top_m &&
-            s->points[g] >= 2 * r->min_points && s->sqrt_range[g] < r->max_split_sqrt_range);
+    return s->extent_m[g] > r->min_extent_m && s->top_m[g] > person->min_top_m && s->points[g] >= 2 * r->min_points &&
+           s->sqrt_range[g] < r->max_split_sqrt_range;
+}
+
+/* CellClusterer._may_be_person */
+static int may_be_person_part(const ClusterRules *r, const PersonSize *person, const ClusterSizes *s, i64 p)
+{
+    return s->points[p] >= r->min_points && fits_person(person, s->extent_m[p], s->bottom_m[p], s->top_m[p]);
 }
 
 /* Sizes from cluster n on */
@@ -402,12 +431,111 @@ static ClusterSizes sizes_from(const ClusterSizes *s, i64 n)
                           .of_oversized = s->of_oversized + n};
 }
 
+/* _moved: the parts whose `cluster_of_part` is not NONE leave their clusters. A part that stays keeps its number, with
+ * no points. Of a cluster that parts leave, the number of points alone is corrected. `cluster` is read for all parts
+ * before their cells are moved. */
+static void move_parts(const ClusterScratch *s, i64 n_cells, i64 n_parts, i64 *cluster, const ClusterSizes *sizes,
+                       const ClusterSizes *parts)
+{
+    for (i64 p = 0; p < n_parts; p++) {
+        parts->points[p] = s->cluster_of_part[p] == NONE ? 0 : parts->points[p];
+        sizes->points[cluster[parts->cell[p]]] -= parts->points[p];
+    }
+    for (i64 i = 0; i < n_cells; i++)
+        if (s->part[i] != NONE && s->cluster_of_part[s->part[i]] != NONE)
+            cluster[i] = s->cluster_of_part[s->part[i]];
+}
+
+/* CellClusterer._before_surfaces, of n clusters: sets `use` of the cells that are free, and `before_m`. */
+static void find_free_cells(const ClusterRules *rules, const StructureRules *r, const PersonSize *person,
+                            const Cells *cells, const PointColumns *sampled, i64 n_cells, const i64 *cluster,
+                            const ClusterSizes *sizes, i64 n, const ClusterScratch *s)
+{
+    i32 *const next = s->next_of_cluster, rows = 0;
+    for (i64 g = 0; g < n; g++) {
+        int tried = sizes->points[g] >= 2 * rules->min_points && sizes->top_m[g] > person->min_top_m &&
+                    sizes->extent_m[g] >= r->min_extent_m;
+        next[g] = tried ? 0 : NONE;
+    }
+    for (i64 i = 0; i < n_cells; i++) {
+        s->use[i] = 0;
+        s->before_m[i] = INFINITY;
+        next[cluster[i]] += next[cluster[i]] != NONE;
+    }
+    for (i64 g = 0; g < n; g++)
+        if (next[g] != NONE) {
+            i32 of_cluster = next[g];
+            next[g] = rows;
+            rows += of_cluster;
+        }
+    for (i64 i = 0; i < n_cells; i++)
+        if (next[cluster[i]] != NONE)
+            s->cell_of_row[next[cluster[i]]++] = (i32)i;
+    i32 start = 0;
+    for (i64 g = 0; g < n; g++) {
+        if (next[g] == NONE)
+            continue;
+        i32 end = next[g], hanging = 0, m = 0;
+        for (i32 k = start; k < end; k++)
+            hanging += cells->low[s->cell_of_row[k]] > r->hanging_m;
+        int canopy = hanging >= r->min_hanging * (end - start);
+        for (i32 k = start; k < end; k++) {
+            i32 i = s->cell_of_row[k];
+            if (canopy && cells->low[i] > r->hanging_m)
+                continue;
+            s->row_cells[m] = i;
+            s->x[m] = sampled->x[i];
+            s->y[m] = sampled->y[i];
+            s->width_m[m++] = rules->step * sampled->sqrt_range[i];
+        }
+        start = end;
+        i64 found = find_surfaces(r, s->x, s->y, s->width_m, m, &s->surface, s->on_surface, s->distance_m);
+        if (!found && !canopy)
+            continue;
+        for (i32 k = 0; k < m; k++) {
+            s->use[s->row_cells[k]] = !s->on_surface[k];
+            s->before_m[s->row_cells[k]] = found ? (float)s->distance_m[k] : FAR_M;
+        }
+    }
+}
+
+/* CellClusterer._leaves_surface: sets `cluster_of_part` of those that leave, which are numbered from n on. */
+static void find_leaving(const ClusterRules *rules, const StructureRules *r, const PersonSize *person, i64 n_cells,
+                         const i64 *cluster, const ClusterSizes *sizes, i64 n, const ClusterSizes *parts, i64 n_parts,
+                         const ClusterScratch *s)
+{
+    for (i64 p = 0; p < n_parts; p++) {
+        s->front_m[p] = -INFINITY;
+        s->back_m[p] = INFINITY;
+    }
+    for (i64 i = 0; i < n_cells; i++) {
+        i64 p = s->part[i];
+        if (p == NONE || !(s->before_m[i] < INFINITY))
+            continue;
+        s->front_m[p] = maxf(s->before_m[i], s->front_m[p]);
+        s->back_m[p] = minf(s->before_m[i], s->back_m[p]);
+    }
+    const float thickness_m = (float)r->thickness_m;
+    for (i64 p = 0; p < n_parts; p++) {
+        float front_m = s->front_m[p], back_m = s->back_m[p];
+        float extent_m = sizes->extent_m[cluster[parts->cell[p]]];
+        int across = back_m < -thickness_m && front_m > -thickness_m && front_m - back_m > r->min_across_m;
+        int before = (front_m > r->min_before_m || across) && back_m > -r->max_behind_m;
+        int possible = may_be_person_part(rules, person, parts, p) && parts->bottom_m[p] < r->max_bottom_m;
+        int stands_out = parts->points[p] >= r->min_part_points && parts->top_m[p] >= r->min_part_top_m &&
+                         parts->extent_m[p] >= r->min_part_extent_m;
+        int leaves = (before && (possible || (extent_m >= r->oversized_m && stands_out))) ||
+                     (extent_m >= rules->max_extent_m && stands_out);
+        s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
+    }
+}
+
 /* CellClusterer.cluster: cluster of each cell, given one point of each and the distance of beams there. Returns
- * how many clusters there are, the tried parts after those of the coarse grid; there is room for the sizes of
- * 2 n_cells. */
-EXPORT i64 modt_cluster(const ClusterRules *rules, const PersonSize *person, const Cells *cells,
-                        const PointColumns *sampled, const float *beam_m, i64 n_cells, void *memory, i64 *cluster,
-                        const ClusterSizes *sizes)
+ * how many clusters there are: those of the coarse grid, the parts tried, and the parts tried before surfaces. There
+ * is room for the sizes of 3 n_cells. */
+EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structure, const PersonSize *person,
+                        const Cells *cells, const PointColumns *sampled, const float *beam_m, i64 n_cells,
+                        void *memory, i64 *cluster, const ClusterSizes *sizes)
 {
     ClusterScratch scratch, *s = &scratch;
     PROVEN(rules->coarse_side <= rules->fine_side);
@@ -421,31 +549,30 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const PersonSize *person, con
     i64 n = connect(cells, n_cells, 1, rules->coarse_side, s, cluster);
     measure(cells, sampled, beam_m, cluster, n_cells, n, s->ends, sizes);
 
-    /* 2. Parts, on the fine grid, of those that are oversized or may hold a person and more. */
+    /* 2. Parts, on the fine grid, of those that are oversized or may hold a person and more. Parts of oversized
+     * clusters, and those of a person's size, leave their clusters. */
     for (i64 g = 0; g < n; g++)
-        s->divided[g] = (uint8_t)is_divided(rules, person, sizes, g);
+        s->divided[g] = sizes->extent_m[g] >= structure->oversized_m || may_hold_person(rules, person, sizes, g);
     for (i64 i = 0; i < n_cells; i++)
         s->use[i] = s->divided[cluster[i]];
     i64 n_parts = connect(cells, n_cells, 0, rules->fine_side, s, s->part);
     ClusterSizes parts = sizes_from(sizes, n);
     measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
-
-    /* 3. Parts of oversized clusters, and those of a person's size, leave their clusters. A part that does not leave
-     * keeps its number, with no points. Of a cluster that parts leave, the number of points alone is corrected.
-     * Points of a part that stays become zero before they are subtracted from those of its cluster, and `cluster` is
-     * read for all parts before their cells are moved. */
     for (i64 p = 0; p < n_parts; p++) {
-        i64 whole = cluster[parts.cell[p]];
-        parts.of_oversized[p] = sizes->extent_m[whole] >= rules->max_extent_m;
-        int fits = fits_person(person, parts.extent_m[p], parts.bottom_m[p], parts.top_m[p]);
-        int leaves = parts.of_oversized[p] || (fits && parts.points[p] >= rules->min_points);
+        parts.of_oversized[p] = sizes->extent_m[cluster[parts.cell[p]]] >= structure->oversized_m;
+        int leaves = parts.of_oversized[p] || may_be_person_part(rules, person, &parts, p);
         s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
-        parts.points[p] = leaves ? parts.points[p] : 0;
-        sizes->points[whole] -= parts.points[p];
     }
-    for (i64 i = 0; i < n_cells; i++)
-        if (s->part[i] != NONE && s->cluster_of_part[s->part[i]] != NONE)
-            cluster[i] = s->cluster_of_part[s->part[i]];
+    move_parts(s, n_cells, n_parts, cluster, sizes, &parts);
+    n += n_parts;
+
+    /* 3. Parts before surfaces. */
+    find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s);
+    n_parts = connect(cells, n_cells, 0, rules->fine_side, s, s->part);
+    parts = sizes_from(sizes, n);
+    measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
+    find_leaving(rules, structure, person, n_cells, cluster, sizes, n, &parts, n_parts, s);
+    move_parts(s, n_cells, n_parts, cluster, sizes, &parts);
     return n + n_parts;
 }
 

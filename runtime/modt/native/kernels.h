@@ -87,4 +87,26 @@ static inline int fits_person(const PersonSize *p, float extent, float bottom, f
            top - bottom > p->min_height_m;
 }
 
+/* StructureTuning and ClusterTuning: values by the names that they have there. */
+enum { MAX_SAMPLE = 256 }; /* room for max_cells */
+typedef struct {
+    double thickness_m, max_gap_m, min_length_m, min_filled, piece_gap, min_piece_m, beside_m, min_hanging;
+    float min_base_m, min_extent_m, oversized_m, min_before_m, max_behind_m, min_across_m;
+    float max_bottom_m, min_part_extent_m, min_part_top_m, hanging_m;
+    i64 min_part_points;
+    i32 max_lines, max_cells, min_cells, refinements;
+} StructureRules;
+
+/* Scratch of find_surfaces, for n cells. */
+typedef struct {
+    i32 *rest, *order;                  /* (n,) cells on no surface yet; those near a line */
+    double *off_m, *along_m, *length_m; /* (n,) distance from a line, position along it, length of a cell along it */
+} SurfaceScratch;
+
+void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *s);
+
+/* find_surfaces of structure.py, for n > 0 cells. Returns how many of them are on a surface. */
+i64 find_surfaces(const StructureRules *r, const double *x, const double *y, const double *width_m, i64 n,
+                  const SurfaceScratch *s, uint8_t *on_surface, double *before_m);
+
 #endif

@@ -11,9 +11,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.grids import Int32, PointColumns, SqrtRangeGrid
+from modt.segmentation.grids import FAR_M, Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
-from modt.segmentation.tuning import CellTuning, SplitTuning
+from modt.segmentation.structure import find_surfaces
+from modt.segmentation.tuning import CellTuning, ClusterTuning, SplitTuning, StructureTuning
 from modt.types import NONE, Bool, Float32, Int, Int8, PointKind, Self
 
 
@@ -183,6 +184,8 @@ class CellClusterer:
         config: clustering distance and sizes of objects.
         cells: gap between neighbouring cells of one cluster.
         split: parts that are a person.
+        structure: surfaces, and parts before them.
+        valid: points and height of a part that stands out.
     """
 
     def __init__(
@@ -191,9 +194,13 @@ class CellClusterer:
         config: SegmentationConfig,
         cells: CellTuning = CellTuning(),
         split: SplitTuning = SplitTuning(),
+        structure: StructureTuning = StructureTuning(),
+        valid: ClusterTuning = ClusterTuning(),
     ) -> None:
         self.gap = cells
         self.split = split
+        self.structure = structure
+        self.valid = valid
         self.max_extent_m = config.max_extent_m
         step = config.cell_m / np.sqrt(10.0)
         # Points are placed on the fine grid alone, and a coarse cell is two by two fine ones. So the centre of the
@@ -214,22 +221,82 @@ class CellClusterer:
         max_gap_m = np.float32(self.gap.max_gap_m) + np.float32(self.gap.max_gap_beams) * beam_m
         cluster = connect_coarse(self.coarse, cells, max_gap_m)
         sizes = ClusterSizes.of_cells(cells, sampled, beam_m, cluster)
-        oversized = sizes.extent_m >= self.max_extent_m
+        oversized = sizes.extent_m >= np.float32(self.structure.oversized_m)
         divided = oversized | self._may_hold_person(sizes)
 
         part = connect(self.fine, cells, max_gap_m, divided.take(cluster))
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
-        whole = cluster.take(parts.cell)  # (parts,) cluster that each part is of, before any cell leaves it
-        of_oversized = oversized.take(whole)
-        is_split = of_oversized | self._may_be_person(parts)
+        of_oversized = oversized.take(cluster.take(parts.cell))
+        parts = replace(parts, of_oversized=of_oversized)
+        cluster, sizes = _moved(cluster, sizes, part, parts, of_oversized | self._may_be_person(parts))
 
-        split_points = parts.points * is_split  # none of a part that stays, so that its cluster keeps them
-        points_left = sizes.points - np.bincount(whole, split_points, len(sizes)).astype(np.int64)
-        cell_in_part = np.flatnonzero(part != NONE)
-        split_cell = cell_in_part[is_split.take(part.take(cell_in_part))]
-        cluster[split_cell] = len(sizes) + part[split_cell]
-        parts = replace(parts, points=split_points, of_oversized=of_oversized)
-        return cluster, replace(sizes, points=points_left).followed_by(parts)
+        free, before_m = self._before_surfaces(cells, sampled, cluster, sizes)
+        part = connect(self.fine, cells, max_gap_m, free)
+        parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
+        extent_m = sizes.extent_m.take(cluster.take(parts.cell))
+        return _moved(cluster, sizes, part, parts, self._leaves_surface(parts, part, before_m, extent_m))
+
+    def _before_surfaces(
+        self, cells: Cells, sampled: PointColumns, cluster: Int, sizes: ClusterSizes
+    ) -> tuple[Bool, Float32]:
+        """(C,) cells of long clusters that are on no surface, and (C,) distance of each before surfaces [m].
+
+        The distance is infinite where no surface reaches. Cells of clusters without a surface are not free, except
+        those below a canopy, which count as far before it.
+        """
+        tuning = self.structure
+        tried = (sizes.points >= 2 * self.split.min_points) & (sizes.top_m > np.float32(self.split.person.min_top_m))
+        tried &= sizes.extent_m >= np.float32(tuning.min_extent_m)
+        n = np.count_nonzero(tried)
+        free = np.zeros(len(cells), np.bool_)
+        before_m = np.full(len(cells), np.inf, np.float32)
+        groups = Groups.from_labels(consecutive(tried).take(cluster), n)
+        width_m = self.fine.step * sampled.sqrt_range.astype(np.float64)
+        for rows in np.split(groups.rows, groups.offsets[1:-1]) if n else ():
+            hanging = cells.low[rows] > np.float32(tuning.hanging_m)
+            canopy = np.count_nonzero(hanging) >= tuning.min_hanging * len(rows)
+            if canopy:
+                rows = rows[~hanging]
+            x, y = (column[rows].astype(np.float64) for column in (sampled.x, sampled.y))
+            on_surface, distance_m = find_surfaces(x, y, width_m[rows], tuning)
+            if on_surface.any():
+                before_m[rows] = distance_m
+            elif canopy:
+                before_m[rows] = FAR_M
+            else:
+                continue
+            free[rows] = ~on_surface
+        return free, before_m
+
+    def _leaves_surface(self, parts: ClusterSizes, part: Int, before_m: Float32, extent_m: Float32) -> Bool:
+        """(parts,) parts that leave their clusters, which have these extents [m].
+
+        Before a surface, or across it, are possible people and, if the cluster is oversized, what stands out. From
+        one that is longer than any object all leaves that stands out.
+
+        Args:
+            parts: sizes of the parts.
+            part: (C,) part of each cell, or NONE.
+            before_m: (C,) distance of each cell before surfaces [m].
+            extent_m: (parts,) extent of the cluster of each part.
+        """
+        tuning = self.structure
+        cell = np.flatnonzero((part != NONE) & (before_m < np.inf))
+        front_m = label_max(before_m.take(cell), part.take(cell), len(parts))
+        back_m = label_min(before_m.take(cell), part.take(cell), len(parts))
+        thickness_m = np.float32(tuning.thickness_m)
+        across = (back_m < -thickness_m) & (front_m > -thickness_m)
+        across &= front_m - back_m > np.float32(tuning.min_across_m)
+        before = (front_m > np.float32(tuning.min_before_m)) | across
+        before &= back_m > -np.float32(tuning.max_behind_m)
+        person = self._may_be_person(parts) & (parts.bottom_m < np.float32(tuning.max_bottom_m))
+        stands_out = parts.points >= self.valid.min_part_points
+        stands_out &= parts.top_m >= np.float32(self.valid.min_part_top_m)
+        stands_out &= parts.extent_m >= np.float32(tuning.min_part_extent_m)
+        oversized = extent_m >= np.float32(tuning.oversized_m)
+        endless = extent_m >= np.float32(self.max_extent_m)
+        leaves: Bool = (before & (person | (oversized & stands_out))) | (endless & stands_out)
+        return leaves
 
     def _may_hold_person(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters that may hold a person and more, near enough for the fine grid to hold an object together."""
@@ -242,6 +309,24 @@ class CellClusterer:
         """(G,) parts of a person's size."""
         fits = self.split.person.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
         return (sizes.points >= self.split.min_points) & fits
+
+
+def _moved(
+    cluster: Int, sizes: ClusterSizes, part: Int, parts: ClusterSizes, leaves: Bool
+) -> tuple[Int, ClusterSizes]:
+    """(C,) cluster of each cell, and sizes, after some of the (C,) parts have left their clusters.
+
+    Parts are numbered after the clusters. One that stays keeps its number, with no points. Of a cluster that parts
+    leave, only the number of points is corrected.
+    """
+    whole = cluster.take(parts.cell)  # cluster that each part is of, before any cell leaves it
+    points = parts.points * leaves
+    points_left = sizes.points - np.bincount(whole, points, len(sizes)).astype(np.int64)
+    in_part = np.flatnonzero(part != NONE)
+    moving = in_part[leaves.take(part.take(in_part))]
+    moved = cluster.copy()
+    moved[moving] = len(sizes) + part[moving]
+    return moved, replace(sizes, points=points_left).followed_by(replace(parts, points=points))
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,10 @@ class Clusterer:
     """Clusters of points that can be objects.
 
     A coarse grid connects objects with sparse returns. Clusters that it may have joined wrongly are clustered once
-    more on a grid of half the spacing. An oversized cluster (a wall, a hedge) keeps only the parts that stand out of
-    it. Parts that may be a person are split off a cluster that may hold a person and more.
+    more on a grid of half the spacing. An oversized cluster falls into its parts there. Parts that may be a person are
+    split off a cluster that may hold a person and more. What stands before the long surface of a wall, a hedge or a
+    vehicle leaves it. Of the rest, what is longer than any object, or a low part of an oversized cluster, is
+    structure.
 
     Args:
         sensor: range and beam spacing.
@@ -40,7 +42,7 @@ class Clusterer:
         self.kernels = kernels
         self.config = config
         self.beams = sensor.beams
-        self.cells = CellClusterer(sensor, config, tuning.cells, tuning.split)
+        self.cells = CellClusterer(sensor, config, tuning.cells, tuning.split, tuning.structure, tuning.clusters)
         self.valid = tuning.clusters
         max_diagonal_m = min(tuning.strips.max_diagonal_m, config.max_extent_m)
         self.strips = replace(tuning.strips, max_diagonal_m=max_diagonal_m)

@@ -37,7 +37,8 @@ from modt.segmentation.tuning import StripTuning
 from modt.types import N_REFLECTANCE, Float32, Float64, Int, Int8
 
 T = TypeVar("T", Cells, PointColumns, ClusterSizes)
-_f32, _i8, _i32, _i64 = map(np.dtype, (np.float32, np.int8, np.int32, np.int64))
+_f32, _f64 = map(np.dtype, (np.float32, np.float64))
+_i8, _i32, _i64 = map(np.dtype, (np.int8, np.int32, np.int64))
 
 
 def _members(kind: Member, *names: str) -> dict[str, Member]:
@@ -82,6 +83,16 @@ CLUSTER_RULES = Layout(
     **_members(Number(_i32), "coarse_side", "fine_side"),
     **_members(Number(_f32), "max_gap_m", "max_gap_beams", "max_extent_m", "min_extent_m", "max_split_sqrt_range"),
     min_points=Number(_i64),
+    step=Number(_f64),
+)
+STRUCTURE_RULES = Layout(
+    "StructureRules",
+    **_members(Number(_f64), "thickness_m", "max_gap_m", "min_length_m", "min_filled", "piece_gap", "min_piece_m"),
+    **_members(Number(_f64), "beside_m", "min_hanging"),
+    **_members(Number(_f32), "min_base_m", "min_extent_m", "oversized_m", "min_before_m", "max_behind_m"),
+    **_members(Number(_f32), "min_across_m", "max_bottom_m", "min_part_extent_m", "min_part_top_m", "hanging_m"),
+    min_part_points=Number(_i64),
+    **_members(Number(_i32), "max_lines", "max_cells", "min_cells", "refinements"),
 )
 CLUSTER_SIZES = Layout(
     "ClusterSizes",
@@ -112,6 +123,7 @@ _SIGNATURES: Signatures = {
         _L,
         (
             CLUSTER_RULES,
+            STRUCTURE_RULES,
             PERSON_SIZE,
             CELLS,
             POINT_COLUMNS,
@@ -158,7 +170,11 @@ def _grid(grid: SqrtRangeGrid) -> Filled:
 
 def _cluster_rules(clusterer: CellClusterer) -> Filled:
     sides = {"coarse_side": clusterer.coarse.side, "fine_side": clusterer.fine.side}
-    return _filled(CLUSTER_RULES, clusterer, clusterer.gap, clusterer.split, **sides)
+    return _filled(CLUSTER_RULES, clusterer, clusterer.gap, clusterer.split, clusterer.fine, **sides)
+
+
+def _structure_rules(clusterer: CellClusterer) -> Filled:
+    return _filled(STRUCTURE_RULES, clusterer.structure, clusterer.valid)
 
 
 class NativeKernels(NativeGeometryKernels, Kernels):
@@ -226,12 +242,13 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         n = len(cells)
         scratch = self._memory(self.library.modt_cluster_scratch(n, clusterer.fine.side))
         cluster = np.empty(n, np.int64)
-        count, cell = np.empty((2, 2 * n), np.int64)
-        extent_m, bottom_m, top_m, sqrt_range, last_beam_m = np.empty((5, 2 * n), np.float32)
-        of_oversized = np.empty(2 * n, np.bool_)
+        count, cell = np.empty((2, 3 * n), np.int64)
+        extent_m, bottom_m, top_m, sqrt_range, last_beam_m = np.empty((5, 3 * n), np.float32)
+        of_oversized = np.empty(3 * n, np.bool_)
         sizes = ClusterSizes(count, cell, extent_m, bottom_m, top_m, sqrt_range, last_beam_m, of_oversized)
         g = self.library.modt_cluster(
             self._structure(_cluster_rules, clusterer),
+            self._structure(_structure_rules, clusterer),
             self._structure(PERSON_SIZE.of, clusterer.split.person),
             CELLS.of(cells),
             POINT_COLUMNS.of(sampled),

@@ -147,6 +147,58 @@ class SplitTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class StructureTuning:
+    """Long surfaces within clusters, and the parts before them that leave. Chosen on: simulated walls, doors, car
+    parks and hedges, with a check on simulated streets.
+    """
+
+    min_extent_m: float = 2.5
+    """Extent of a cluster from which surfaces are looked for [m]. Less costs time."""
+    oversized_m: float = 9.0
+    """Extent of a cluster from which it is divided into its parts on the fine grid, and loses all that stands out
+    before its surfaces [m]; smaller ones lose possible people only."""
+    max_lines: int = 6
+    """Greatest number of surfaces of a cluster."""
+    max_cells: int = 48
+    """Cells of a cluster that vote for a line. More costs time."""
+    min_cells: int = 12
+    """Cells without a surface below which no further one is looked for."""
+    min_base_m: float = 0.5
+    """Least distance of two cells whose line is tried [m]."""
+    refinements: int = 3
+    """Number of least-squares fits of a line to the cells near it."""
+    thickness_m: float = 0.1
+    """Distance from a line within which a cell is on it [m]. More swallows people who lean on a wall."""
+    max_gap_m: float = 1.5
+    """Greatest gap within a run of cells along a line [m]: people hide a part of the wall."""
+    min_length_m: float = 2.0
+    """Least length of such a run [m]. More keeps people joined to short walls."""
+    min_filled: float = 0.5
+    """Least share of a run that is not gaps. Less takes rows of poles for walls."""
+    piece_gap: float = 1.6
+    """Gap between two pieces of a run [lengths of a cell]. More keeps people in doorways joined to the wall."""
+    min_piece_m: float = 0.8
+    """Least length of a piece that is surface [m]; a person in a doorway is a shorter one."""
+    beside_m: float = 0.6
+    """Distance beyond the ends of a run up to which things are before or behind it [m]."""
+    min_before_m: float = 0.28
+    """Least distance that a part reaches before a surface [m]. Less takes bulges of hedges for people."""
+    max_behind_m: float = 0.4
+    """Greatest distance that it reaches behind [m]. More takes cars apart, whose seats lie behind their sides."""
+    min_across_m: float = 0.2
+    """Least distance that a part reaches across a surface, from front to back [m]: a person in a doorway."""
+    max_bottom_m: float = 0.8
+    """Greatest height of the bottom of a possible person before a surface [m]. More takes pillars of cars for
+    people."""
+    min_part_extent_m: float = 0.2
+    """Least extent of a part that stands out and is no possible person [m]. Less takes posts of fences."""
+    hanging_m: float = 1.6
+    """Least height of a cell that hangs above the ground [m]: a beam, a branch."""
+    min_hanging: float = 0.3
+    """Share of hanging cells from which a cluster is a canopy. Its hanging cells join nothing below."""
+
+
+@dataclass(frozen=True, slots=True)
 class ClusterTuning:
     """Clusters that are kept although they are low, or parts of an oversized one."""
 
@@ -258,6 +310,7 @@ class SegmentationTuning:
     split: SplitTuning = SplitTuning()
     clusters: ClusterTuning = ClusterTuning()
     low: LowTuning = LowTuning()
+    structure: StructureTuning = StructureTuning()
     strips: StripTuning = StripTuning()
     view: ViewTuning = ViewTuning()
     heading: HeadingTuning = HeadingTuning()

@@ -1,0 +1,192 @@
+/* Long surfaces within a cluster: lines that long runs of cells lie along. */
+#include "kernels.h"
+
+typedef struct {
+    double cosine, sine, distance_m; /* of the normal; distance of the sensor along it */
+} Line;
+
+void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *s)
+{
+    TAKE(end, s->rest, n);
+    TAKE(end, s->off_m, n);
+    TAKE(end, s->along_m, n);
+    TAKE(end, s->order, n);
+    TAKE(end, s->length_m, n);
+}
+
+/* Number of n points, a multiple of four, that are within `thickness_m` of a line */
+static i32 votes(const float *x, const float *y, i64 n, float cosine, float sine, float distance_m, float thickness_m)
+{
+    const f4 c = spread(cosine), s = spread(sine), d = spread(distance_m), limit = spread(thickness_m);
+    i4 count = {0, 0, 0, 0};
+    for (i64 i = 0; i < n; i += 4) {
+        f4 off = *(const u4 *)(x + i) * c + *(const u4 *)(y + i) * s - d;
+        count -= (off < limit) & (off > -limit);
+    }
+    return count[0] + count[1] + count[2] + count[3];
+}
+
+/* Least squares of the points near a line; 0 if they have no direction. `rest` are n rows. */
+static int refine(Line *line, const double *x, const double *y, const i32 *rest, i64 n, double thickness_m)
+{
+    double x_sum = 0.0, y_sum = 0.0, difference = 0.0, product = 0.0;
+    i64 count = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        double x_mean = x_sum / (double)count, y_mean = y_sum / (double)count;
+        for (i64 k = 0; k < n; k++) {
+            double u = x[rest[k]], v = y[rest[k]];
+            double off = u * line->cosine + v * line->sine - line->distance_m;
+            if (!(off < thickness_m && off > -thickness_m))
+                continue;
+            if (pass == 0) {
+                x_sum += u;
+                y_sum += v;
+                count++;
+            } else {
+                u -= x_mean;
+                v -= y_mean;
+                difference += u * u - v * v;
+                product += u * v;
+            }
+        }
+        if (count == 0)
+            return 0;
+    }
+    product *= 2;
+    double scatter = __builtin_sqrt(difference * difference + product * product);
+    if (!(scatter > 0))
+        return 0;
+    line->cosine = __builtin_sqrt((1 - difference / scatter) / 2);
+    line->sine = __builtin_copysign(__builtin_sqrt((1 + difference / scatter) / 2), -product);
+    line->distance_m = x_sum / (double)count * line->cosine + y_sum / (double)count * line->sine;
+    return 1;
+}
+
+/* _best_line of the n rows `rest`; 0 without one */
+static int best_line(const StructureRules *r, const double *x, const double *y, const i32 *rest, i64 n, Line *line)
+{
+    static const i64 paired[] = {16, 3}; /* PAIRED */
+    float sample_x[MAX_SAMPLE + 3], sample_y[MAX_SAMPLE + 3];
+    if (n < r->min_cells)
+        return 0;
+    i64 stride = (n + r->max_cells - 1) / r->max_cells, count = 0;
+    for (i64 k = 0; k < n; k += stride) {
+        sample_x[count] = (float)x[rest[k]];
+        sample_y[count++] = (float)y[rest[k]];
+    }
+    PROVEN(count <= MAX_SAMPLE);
+    i64 padded = (count + 3) / 4 * 4;
+    for (i64 k = count; k < padded; k++)
+        sample_x[k] = sample_y[k] = INFINITY; /* near no line: the product is infinite, or no number */
+    i32 most = 0;
+    for (int p = 0; p < 2; p++)
+        for (i64 k = 0; k < count; k++) {
+            i64 other = (k + count / paired[p] + 1) % count;
+            float dx = sample_x[other] - sample_x[k], dy = sample_y[other] - sample_y[k];
+            float base_m = __builtin_sqrtf(dx * dx + dy * dy);
+            if (!(base_m > r->min_base_m))
+                continue;
+            float cosine = -dy / base_m, sine = dx / base_m;
+            float distance_m = sample_x[k] * cosine + sample_y[k] * sine;
+            i32 near = votes(sample_x, sample_y, padded, cosine, sine, distance_m, (float)r->thickness_m);
+            if (near > most) {
+                most = near;
+                *line = (Line){cosine, sine, distance_m};
+            }
+        }
+    for (i32 k = 0; most && k < r->refinements; k++)
+        most = refine(line, x, y, rest, n, r->thickness_m);
+    return most > 0;
+}
+
+/* Sorts n rows by position, stably (Shell's method: they are nearly sorted). */
+static void sort_rows(const double *along_m, i32 *order, i64 n)
+{
+    for (i64 gap = n / 2; gap > 0; gap = gap == 2 ? 1 : gap * 5 / 11)
+        for (i64 i = gap; i < n; i++) {
+            i32 row = order[i];
+            i64 k = i;
+            for (; k >= gap; k -= gap) {
+                i32 before = order[k - gap];
+                if (along_m[before] < along_m[row] || (along_m[before] == along_m[row] && before < row))
+                    break;
+                order[k] = before;
+            }
+            order[k] = row;
+        }
+}
+
+/* _long_runs of n rows, sorted by position, whose lengths are at the rows too. Marks those kept; returns how many. */
+static i64 long_runs(const StructureRules *r, const double *along_m, const double *length_m, const i32 *order, i64 n,
+                     uint8_t *on_surface, double *first_m, double *last_m)
+{
+    i64 kept = 0;
+    for (i64 start = 0, end; start < n; start = end) {
+        double filled_m = 0.0;
+        for (end = start + 1; end < n; end++) {
+            double gap_m = along_m[order[end]] - along_m[order[end - 1]];
+            if (gap_m > r->max_gap_m)
+                break;
+            filled_m += mind(gap_m, 2 * length_m[order[end - 1]]);
+        }
+        double run_m = along_m[order[end - 1]] - along_m[order[start]];
+        if (!(run_m >= r->min_length_m && filled_m >= r->min_filled * run_m))
+            continue;
+        for (i64 piece = start, next; piece < end; piece = next) {
+            for (next = piece + 1; next < end; next++)
+                if (along_m[order[next]] - along_m[order[next - 1]] > r->piece_gap * length_m[order[next]])
+                    break;
+            if (!(along_m[order[next - 1]] - along_m[order[piece]] >= r->min_piece_m))
+                continue;
+            *first_m = kept ? *first_m : along_m[order[piece]];
+            *last_m = along_m[order[next - 1]];
+            kept += next - piece;
+            for (i64 k = piece; k < next; k++)
+                on_surface[order[k]] = 1;
+        }
+    }
+    return kept;
+}
+
+i64 find_surfaces(const StructureRules *r, const double *x, const double *y, const double *width_m, i64 n,
+                  const SurfaceScratch *s, uint8_t *on_surface, double *before_m)
+{
+    i64 found = 0;
+    for (i64 i = 0; i < n; i++) {
+        on_surface[i] = 0;
+        before_m[i] = INFINITY;
+    }
+    for (i32 lines = 0; lines < r->max_lines; lines++) {
+        i64 rest = 0, near = 0;
+        Line line;
+        for (i64 i = 0; i < n; i++) {
+            s->rest[rest] = (i32)i;
+            rest += !on_surface[i];
+        }
+        if (!best_line(r, x, y, s->rest, rest, &line))
+            break;
+        for (i64 i = 0; i < n; i++) {
+            s->off_m[i] = x[i] * line.cosine + y[i] * line.sine - line.distance_m;
+            s->along_m[i] = y[i] * line.cosine - x[i] * line.sine;
+        }
+        for (i64 k = 0; k < rest; k++) {
+            i32 i = s->rest[k];
+            s->order[near] = i;
+            near += s->off_m[i] < r->thickness_m && s->off_m[i] > -r->thickness_m;
+        }
+        for (i64 k = 0; k < near; k++) {
+            i32 i = s->order[k];
+            s->length_m[i] = width_m[i] * (1 + __builtin_fabs(s->along_m[i]) / __builtin_sqrt(x[i] * x[i] + y[i] * y[i]));
+        }
+        sort_rows(s->along_m, s->order, near);
+        double first_m = 0.0, last_m = 0.0;
+        i64 kept = long_runs(r, s->along_m, s->length_m, s->order, near, on_surface, &first_m, &last_m);
+        if (!kept)
+            break;
+        found += kept;
+        for (i64 i = 0; i < n; i++)
+            if (s->along_m[i] > first_m - r->beside_m && s->along_m[i] < last_m + r->beside_m)
+                before_m[i] = mind(before_m[i], line.distance_m > 0 ? -s->off_m[i] : s->off_m[i]);
+    }
+    return found;
+}
