@@ -454,7 +454,8 @@ static void find_free_cells(const ClusterRules *rules, const StructureRules *r, 
     i32 *const next = s->next_of_cluster, rows = 0;
     for (i64 g = 0; g < n; g++) {
         int tried = sizes->points[g] >= 2 * rules->min_points && sizes->top_m[g] > person->min_top_m &&
-                    sizes->extent_m[g] >= r->min_extent_m;
+                    sizes->extent_m[g] >= r->min_extent_m &&
+                    sizes->sqrt_range[g] * sizes->sqrt_range[g] < r->max_range_m;
         next[g] = tried ? 0 : NONE;
     }
     for (i64 i = 0; i < n_cells; i++) {

@@ -247,16 +247,16 @@ class CellClusterer:
         tuning = self.structure
         tried = (sizes.points >= 2 * self.split.min_points) & (sizes.top_m > np.float32(self.split.person.min_top_m))
         tried &= sizes.extent_m >= np.float32(tuning.min_extent_m)
-        n = np.count_nonzero(tried)
+        tried &= sizes.sqrt_range * sizes.sqrt_range < np.float32(tuning.max_range_m)
+        n = int(np.count_nonzero(tried))
         free = np.zeros(len(cells), np.bool_)
         before_m = np.full(len(cells), np.inf, np.float32)
         groups = Groups.from_labels(consecutive(tried).take(cluster), n)
         width_m = self.fine.step * sampled.sqrt_range.astype(np.float64)
-        for rows in np.split(groups.rows, groups.offsets[1:-1]) if n else ():
-            hanging = cells.low[rows] > np.float32(tuning.hanging_m)
-            canopy = np.count_nonzero(hanging) >= tuning.min_hanging * len(rows)
-            if canopy:
-                rows = rows[~hanging]
+        for members in np.split(groups.rows, groups.offsets[1:-1]) if n else ():
+            hanging = cells.low[members] > np.float32(tuning.hanging_m)
+            canopy = np.count_nonzero(hanging) >= tuning.min_hanging * len(members)
+            rows = members[~hanging] if canopy else members
             x, y = (column[rows].astype(np.float64) for column in (sampled.x, sampled.y))
             on_surface, distance_m = find_surfaces(x, y, width_m[rows], tuning)
             if on_surface.any():

@@ -20,9 +20,9 @@ class Clusterer:
     """Clusters of points that can be objects.
 
     A coarse grid connects objects with sparse returns. Clusters that it may have joined wrongly are clustered once
-    more on a grid of half the spacing. An oversized cluster falls into its parts there. Parts that may be a person are
-    split off a cluster that may hold a person and more. What stands before the long surface of a wall, a hedge or a
-    vehicle leaves it. Of the rest, what is longer than any object, or a low part of an oversized cluster, is
+    more on a grid of half the spacing. An oversized cluster falls into its parts there. Parts that may be a person
+    are split off a cluster that may hold a person and more. What stands before the long surface of a wall, a hedge or
+    a vehicle leaves it. Of the rest, what is longer than any object, or a low part of an oversized cluster, is
     structure.
 
     Args:

@@ -91,6 +91,7 @@ STRUCTURE_RULES = Layout(
     **_members(Number(_f64), "beside_m", "min_hanging"),
     **_members(Number(_f32), "min_base_m", "min_extent_m", "oversized_m", "min_before_m", "max_behind_m"),
     **_members(Number(_f32), "min_across_m", "max_bottom_m", "min_part_extent_m", "min_part_top_m", "hanging_m"),
+    max_range_m=Number(_f32),
     min_part_points=Number(_i64),
     **_members(Number(_i32), "max_lines", "max_cells", "min_cells", "refinements"),
 )

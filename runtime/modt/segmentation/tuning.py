@@ -148,18 +148,21 @@ class SplitTuning:
 
 @dataclass(frozen=True, slots=True)
 class StructureTuning:
-    """Long surfaces within clusters, and the parts before them that leave. Chosen on: simulated walls, doors, car
-    parks and hedges, with a check on simulated streets.
+    """Long surfaces within clusters, and the parts before them that leave.
+
+    Chosen on: simulated walls, doors, car parks and hedges, with a check on simulated streets.
     """
 
     min_extent_m: float = 2.5
     """Extent of a cluster from which surfaces are looked for [m]. Less costs time."""
+    max_range_m: float = 25.0
+    """Range of a cluster up to which surfaces are looked for [m]. More costs time."""
     oversized_m: float = 9.0
     """Extent of a cluster from which it is divided into its parts on the fine grid, and loses all that stands out
     before its surfaces [m]; smaller ones lose possible people only."""
     max_lines: int = 6
     """Greatest number of surfaces of a cluster."""
-    max_cells: int = 48
+    max_cells: int = 36
     """Cells of a cluster that vote for a line. More costs time."""
     min_cells: int = 12
     """Cells without a surface below which no further one is looked for."""
@@ -181,7 +184,7 @@ class StructureTuning:
     """Least length of a piece that is surface [m]; a person in a doorway is a shorter one."""
     beside_m: float = 0.6
     """Distance beyond the ends of a run up to which things are before or behind it [m]."""
-    min_before_m: float = 0.28
+    min_before_m: float = 0.35
     """Least distance that a part reaches before a surface [m]. Less takes bulges of hedges for people."""
     max_behind_m: float = 0.4
     """Greatest distance that it reaches behind [m]. More takes cars apart, whose seats lie behind their sides."""

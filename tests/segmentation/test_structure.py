@@ -1,0 +1,129 @@
+"""Long surfaces, and what stands before them."""
+
+import numpy as np
+import pytest
+
+from modt.config import SegmentationConfig, SensorConfig
+from modt.native import library
+from modt.segmentation.cells import CellClusterer
+from modt.segmentation.clustering import Clusterer
+from modt.segmentation.grids import PointColumns
+from modt.segmentation.kernels import NUMPY
+from modt.segmentation.native_kernels import NativeKernels
+from modt.segmentation.structure import find_surfaces
+from modt.segmentation.tuning import SegmentationTuning
+from modt.types import NONE, PointKind
+
+TUNING = SegmentationTuning().structure
+SENSOR = SensorConfig(max_range_m=60.0, azimuth_step_deg=0.2)
+
+
+def wall(x0, x1, y, height=2.5):
+    """Points of a wall along x."""
+    return grid(np.arange(x0, x1, 0.01), y, height)
+
+
+def grid(x, y, height):
+    """Points above those of a line, each 0.1 m."""
+    z = np.arange(0.3, height, 0.2)
+    x, z = np.meshgrid(x, z)
+    return np.stack([x.ravel(), np.full(x.size, y), z.ravel()], axis=1)
+
+
+def person(x, y):
+    """Points of an upright cylinder, half of which is seen."""
+    angle = np.linspace(-np.pi, 0, 16)
+    ring = np.stack([x + 0.25 * np.cos(angle), y + 0.2 * np.sin(angle)], axis=1)
+    return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in np.arange(0.3, 1.7, 0.1)])
+
+
+def clustered(points, kernels=NUMPY):
+    """Clusters of points whose heights above ground are their z."""
+    columns = PointColumns.from_array(points.astype(np.float32))
+    return Clusterer(SENSOR, SegmentationConfig(), kernels).cluster(columns, columns.z)
+
+
+def label(clusters):
+    """(K,) cluster of each point."""
+    return clusters.cluster_of_cell[clusters.cell_of_point]
+
+
+@pytest.mark.parametrize("angle", np.linspace(0, np.pi, 7))
+def test_a_wall_is_found_at_every_angle(angle):
+    t = np.arange(-4, 4, 0.1)
+    x, y = t, np.full_like(t, 3.0)
+    x, y = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
+    on_surface, before_m = find_surfaces(x, y, np.full_like(x, 0.1), TUNING)
+    assert on_surface.all()
+    assert np.abs(before_m).max() < 1e-9
+
+
+def test_what_is_nearer_to_the_sensor_is_before_a_surface():
+    x = np.append(np.arange(-4, 4, 0.1), [0.0, 0.0, 9.0])
+    y = np.append(np.full(80, 3.0), [2.4, 3.5, 3.0])
+    on_surface, before_m = find_surfaces(x, y, np.full_like(x, 0.1), TUNING)
+    assert on_surface.tolist() == [True] * 80 + [False] * 3
+    np.testing.assert_allclose(before_m[80:], [0.6, -0.5, np.inf], atol=1e-6)
+
+
+def test_few_cells_have_no_surface():
+    on_surface, before_m = find_surfaces(np.arange(5.0), np.ones(5), np.full(5, 0.1), TUNING)
+    assert not on_surface.any()
+    assert np.isinf(before_m).all()
+
+
+@pytest.mark.parametrize("gap_m", [0.05, 0.2, 0.5])
+def test_a_person_at_a_wall_is_a_proposal_and_an_endless_wall_is_structure(gap_m):
+    first = wall(-12, 12, 4.0)
+    clusters = clustered(np.concatenate([first, person(1.0, 4.0 - gap_m - 0.25)]))
+    of_wall, of_person = np.split(label(clusters), [len(first)])
+    assert clusters.n == 1
+    assert (of_person == 0).mean() > 0.9
+    assert (of_wall == NONE).mean() > 0.9
+    kind = clusters.kind_of_cell[clusters.cell_of_point[: len(first)]]
+    assert (kind == PointKind.STRUCTURE).mean() > 0.9
+
+
+def test_a_long_vehicle_is_one_proposal():
+    side = wall(-6, 6, 6.0)
+    assert set(label(clustered(side))) == {0}
+
+
+def test_a_person_in_a_doorway_is_a_proposal():
+    jambs = np.concatenate([wall(-3.0, -0.5, 5.0), wall(0.5, 3.0, 5.0)])
+    clusters = clustered(np.concatenate([jambs, person(0.0, 5.1)]))
+    of_person = label(clusters)[len(jambs) :]
+    assert np.unique(of_person).tolist() == [of_person[0]]
+    assert not np.isin(of_person[0], label(clusters)[: len(jambs)])
+
+
+def test_a_beam_above_does_not_join_people():
+    beam = np.concatenate([grid(np.arange(-6, 6, 0.05), y, 2.2) for y in (3.9, 4.0, 4.1)])
+    beam = beam[beam[:, 2] > 1.7]
+    clusters = clustered(np.concatenate([beam, person(-2.0, 4.0), person(2.0, 4.0)]))
+    people = label(clusters)[len(beam) :]
+    one, other = people.reshape(2, -1)
+    assert set(one).isdisjoint(other)
+    assert NONE not in people
+
+
+def test_compiled_kernels_find_the_same_parts():
+    try:
+        kernels = NativeKernels(*library.load())
+    except library.NotAvailableError as error:
+        pytest.skip(str(error))
+    rng = np.random.default_rng(5)
+    clusterer = CellClusterer(SENSOR, SegmentationConfig())
+    for _ in range(30):
+        parts = [wall(*np.sort(rng.uniform(-12, 12, 2)), rng.uniform(2, 8)) for _ in range(3)]
+        parts += [person(*rng.uniform(-8, 8, 2)) for _ in range(6)]
+        turn = rng.uniform(0, 2 * np.pi)
+        points = np.concatenate(parts) + rng.normal(0, 0.02, 3)
+        points[:, :2] = points[:, :2] @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        columns = PointColumns.from_array(points.astype(np.float32))
+        cells, _, sampled, _ = kernels.occupied_cells(clusterer.fine, columns, columns.z)
+        beam_m = np.full(len(cells), 0.1, np.float32)
+        expected, sizes = NUMPY.cluster(clusterer, cells, sampled, beam_m)
+        cluster, compiled_sizes = kernels.cluster(clusterer, cells, sampled, beam_m)
+        np.testing.assert_array_equal(cluster, expected)
+        np.testing.assert_array_equal(compiled_sizes.points, sizes.points)
