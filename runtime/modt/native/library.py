@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import platform
 import struct
-from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -72,17 +71,6 @@ def address(numbers: Any) -> int:
         return data
 
 
-def pointers(*arrays: NDArray[Any]) -> array[int]:
-    """A C structure of pointers to contiguous arrays, and to each row of those of two dimensions."""
-    addresses: list[int] = []
-    for numbers in arrays:
-        first = address(numbers)
-        rows = 1 if numbers.ndim == 1 else len(numbers)
-        step = numbers.strides[0] or 1  # of an empty one
-        addresses += range(first, first + rows * step, step)
-    return array("Q", addresses)
-
-
 @dataclass(frozen=True, slots=True)
 class Member:
     """A member of a C structure.
@@ -146,10 +134,8 @@ def _picker(places: list[int]) -> Callable[[tuple[int, ...]], tuple[int, ...]]:
     return itemgetter(*places)
 
 
-class Filled(bytearray):
+class Filled(bytes):
     """A filled structure. It keeps alive the arrays that it points to."""
-
-    __slots__ = ("arrays", "layout")
 
     layout: Layout
     arrays: list[NDArray[Any]]
@@ -175,20 +161,17 @@ class Layout:
     def __init__(self, name: str, **members: Member) -> None:
         self.name = name
         self.members = members
-        self._arrays = [name for name, member in members.items() if member.kind != "number"]
-        self._dtypes = [members[name].dtype for name in self._arrays]
+        arrays = {name: member.shape for name, member in members.items() if member.kind != "number"}
         # Each size is taken from one place: the number of its name, or the first axis that has it.
         self._places: dict[str, tuple[str, int | None]] = {}
-        for array_name in self._arrays:
-            for axis, size in enumerate(members[array_name].shape):
+        for array_name, shape in arrays.items():
+            for axis, size in enumerate(shape):
                 if isinstance(size, str):
                     self._places.setdefault(size, (size, None) if size in members else (array_name, axis))
-        self._where = list(self._places.values())
         # Shapes are picked from the sizes in the order of their places, followed by the sizes that are constant.
-        shapes = [members[name].shape for name in self._arrays]
-        self._constants = tuple([size for shape in shapes for size in shape if isinstance(size, int)])
+        self._constants = tuple([size for shape in arrays.values() for size in shape if isinstance(size, int)])
         known = [*self._places, *self._constants]
-        self._pick_shapes = [_picker([known.index(size) for size in shape]) for shape in shapes]
+        self._pick_shape = {name: _picker([known.index(size) for size in shape]) for name, shape in arrays.items()}
         alignment = "0q"
         self._pack = struct.Struct("".join(member.format for member in members.values()) + alignment).pack
 
@@ -199,55 +182,63 @@ class Layout:
             TypeError: a member is missing, unknown, of another type, or not contiguous.
             ValueError: an array has another shape, or members disagree about a size.
         """
-        # Lists are compared whole, since this runs several times a frame. _refusal finds what differs.
-        try:
-            arrays = [values[name] for name in self._arrays]
-            sizes = tuple([values[name] if axis is None else values[name].shape[axis] for name, axis in self._where])
-            if (
-                [numbers.shape for numbers in arrays] == self._shapes_of(sizes)
-                and [numbers.dtype for numbers in arrays] == self._dtypes
-                and len(values) == len(self.members)
-            ):
-                return self._filled(values, arrays)
-        except (AttributeError, IndexError, KeyError, TypeError, struct.error):
-            pass
-        raise self._refusal(values)
+        return self._filled(values)
 
     def of(self, source: object, **others: Any) -> Filled:
         """Fill a structure: members from `others`, the rest from attributes of `source` with the same names."""
-        return self(**{name: getattr(source, name) for name in self.members if name not in others}, **others)
+        for name in self.members:
+            if name not in others:
+                others[name] = getattr(source, name)
+        return self._filled(others)
 
     def allocate(self, **numbers: int) -> Filled:
         """Fill a structure with new arrays, whose contents are undefined. The numbers are the sizes of the arrays."""
-        shapes = self._shapes_of(tuple(numbers[size] for size in self._places))
-        arrays = list(map(np.empty, shapes, self._dtypes))
-        return self._filled(numbers | dict(zip(self._arrays, arrays, strict=True)), arrays)
+        known = (*map(numbers.get, self._places), *self._constants)
+        arrays = {name: np.empty(pick(known), self.members[name].dtype) for name, pick in self._pick_shape.items()}
+        return self._filled(arrays | numbers)
 
-    def from_param(self, filled: Filled) -> Any:
+    def from_param(self, filled: Filled) -> Filled:
         """The structure as ctypes passes it."""
         if filled.layout is not self:
             raise TypeError(f"a structure {self.name} is needed, not {filled.layout.name}")
-        return _start(filled)
+        return filled
 
-    def _shapes_of(self, sizes: tuple[int, ...]) -> list[tuple[int, ...]]:
-        """Shapes of the arrays, given the sizes in the order of their places."""
-        known = sizes + self._constants
-        return [pick(known) for pick in self._pick_shapes]
-
-    def _filled(self, values: dict[str, Any], arrays: list[NDArray[Any]]) -> Filled:
-        """Structure of values that fit."""
-        fields: list[Any] = []
-        for name, member in self.members.items():
-            if member.kind == "array":
-                fields.append(address(values[name]))
-            elif member.kind == "rows":
-                fields.extend(pointers(values[name]))
-            else:
-                fields.append(values[name])
-        filled = Filled(self._pack(*fields))
+    def _filled(self, values: dict[str, Any]) -> Filled:
+        """Structure of these values, checked in one pass, since many are filled in a frame."""
+        try:
+            known = self._sizes(values)
+            arrays = []
+            fields: list[Any] = []
+            for name, member in self.members.items():
+                value = values[name]
+                if member.kind == "number":
+                    fields.append(value)
+                    continue
+                if value.dtype != member.dtype or value.shape != self._pick_shape[name](known):
+                    raise TypeError
+                arrays.append(value)
+                first = address(value)
+                if member.kind == "array":
+                    fields.append(first)
+                else:
+                    step = value.strides[0] or 1  # of an empty array
+                    fields.extend(range(first, first + len(value) * step, step))
+            filled = Filled(self._pack(*fields))
+        except (AttributeError, IndexError, KeyError, TypeError, struct.error):
+            raise self._refusal(values) from None
+        if len(values) != len(self.members):
+            raise self._refusal(values)
         filled.layout = self
         filled.arrays = arrays
         return filled
+
+    def _sizes(self, values: dict[str, Any]) -> tuple[int, ...]:
+        """Sizes in the order of their places, and the constant ones."""
+        sizes = []
+        for name, axis in self._places.values():
+            value = values[name]
+            sizes.append(value if axis is None else value.shape[axis])
+        return (*sizes, *self._constants)
 
     def _refusal(self, values: dict[str, Any]) -> TypeError | ValueError:
         """Error that names the member which does not fit."""
@@ -256,13 +247,11 @@ class Layout:
         for name, member in self.members.items():
             if fault := member.fault(values[name]):
                 return TypeError(f"{self.name}.{name}, {member}, {fault}")
-        sizes = {
-            size: values[name] if axis is None else values[name].shape[axis]
-            for size, (name, axis) in self._places.items()
-        }
-        for name, shape in zip(self._arrays, self._shapes_of(tuple(sizes.values())), strict=True):
-            if values[name].shape != shape:
+        known = self._sizes(values)
+        for name, pick in self._pick_shape.items():
+            if values[name].shape != pick(known):
                 subject = f"{self.name}.{name}, {self.members[name]},"
+                sizes = dict(zip(self._places, known))
                 return ValueError(f"{subject} has the shape {values[name].shape}, where {sizes}")
         return TypeError(f"{self.name} cannot be filled")
 
