@@ -21,7 +21,6 @@ from modt.native.library import (
     Layout,
     Number,
     OutputArgument,
-    Rows,
     Signatures,
     declare,
 )
@@ -41,7 +40,6 @@ _SHAPES = Layout(
     log_points=Array(float64, "n"),
     n=Number(int64),
 )
-_MEMBERS = Layout("Rows", index=Array(int64, "k"), xyz=Rows(float32, 3, "k"))
 _ASSIGNMENT = Layout(
     "Assignment",
     cost=Array(float64, "rows", "columns"),
@@ -62,7 +60,10 @@ _SIGNATURES: Signatures = {
     ),
     "modt_kdop_ends": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT32, OutputArgument)),
     "modt_group_sums": (None, (FLOAT32, _L, _L, INT64, _L, OutputArgument)),
-    "modt_copy_runs": (None, (_MEMBERS, INT64, INT64, _L, _MEMBERS)),
+    "modt_copy_runs": (
+        None,
+        (INT64, FLOAT32, _L, INT64, INT64, _L, OutputArgument, OutputArgument, _L),
+    ),
     "modt_overlapping_pairs": (
         _L,
         (FLOAT64, _L, FLOAT64, _L, OutputArgument, _L, _L, OutputArgument, OutputArgument),
@@ -112,7 +113,7 @@ _SIGNATURES: Signatures = {
     ),
     "modt_sort_members": (
         None,
-        (_MEMBERS, INT64, _L, INT64, INT64, INT64, _L, _L, OutputArgument, OutputArgument, _MEMBERS),
+        (INT64, FLOAT32, _L, INT64, _L, INT64, INT64, INT64, _L, _L, *[OutputArgument] * 4),
     ),
 }
 _PAIRS_EACH = 8
@@ -161,9 +162,9 @@ class NativeGeometryKernels(GeometryKernels):
         n = int((end - begin).sum())
         copied_members = np.empty(n, int64)
         copied = np.empty((3, n), float32)
-        given = _MEMBERS(index=members, xyz=coordinates)
-        out = _MEMBERS(index=copied_members, xyz=copied)
-        self.library.modt_copy_runs(given, begin, end, len(begin), out)
+        self.library.modt_copy_runs(
+            members, coordinates, len(members), begin, end, len(begin), copied_members, copied, n
+        )  # fmt: skip
         return copied_members, copied
 
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
@@ -255,10 +256,8 @@ class NativeGeometryKernels(GeometryKernels):
         sorted_members = np.empty_like(members)
         sorted_coordinates = np.empty_like(coordinates)
         count = np.empty(n, int64)
-        given = _MEMBERS(index=members, xyz=coordinates)
-        out = _MEMBERS(index=sorted_members, xyz=sorted_coordinates)
         self.library.modt_sort_members(
-            given, offsets, len(label), label, member_rows, own_label, len(member_rows), n,
-            np.empty(n, int64), count, out,
+            members, coordinates, len(members), offsets, len(label), label, member_rows, own_label, len(member_rows), n,
+            np.empty(n, int64), count, sorted_members, sorted_coordinates,
         )  # fmt: skip
         return sorted_members, sorted_coordinates, count

@@ -24,29 +24,26 @@ EXPORT i64 modt_group(const i64 *labels, i64 n_rows, i64 n, i64 *rows, i64 *offs
     return offsets[n];
 }
 
-/* Members of proposals, with their coordinates. */
-typedef struct {
-    i64 *index;    /* (k,) row of the sweep */
-    float *xyz[3]; /* (k,) each [m] */
-} Rows;
-
-/* copy_runs: n runs of rows, from `begin` to before `end`, one after the other. */
-EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i64 n, Rows *copied)
+/* copy_runs: members of proposals with their coordinates (3, n_members), in n runs of rows from `begin` to before
+ * `end`, one after the other. */
+EXPORT void modt_copy_runs(const i64 *members, const float *xyz, i64 n_members, const i64 *begin, const i64 *end,
+                           i64 n, i64 *copied_members, float *copied_xyz, i64 n_copied)
 {
     i64 at = 0;
     for (i64 run = 0; run < n; at += end[run] - begin[run], run++)
         for (i64 i = begin[run], to = at; i < end[run]; i++, to++) {
-            copied->index[to] = rows->index[i];
+            copied_members[to] = members[i];
             for (int v = 0; v < 3; v++)
-                copied->xyz[v][to] = rows->xyz[v][i];
+                copied_xyz[v * n_copied + to] = xyz[v * n_members + i];
         }
 }
 
-/* sort_members: rows of n_groups groups by label, below n, in their order within it, and the count of each label. A
- * row has the label of its group, but for the n_moved rows `moved`, ascending, whose labels are `label_of_moved`.
- * Scratch: `next` of n, the place of the next row of each label. */
-EXPORT void modt_sort_members(const Rows *rows, const i64 *offsets, i64 n_groups, const i64 *label, const i64 *moved,
-                              const i64 *label_of_moved, i64 n_moved, i64 n, i64 *next, i64 *count, Rows *sorted)
+/* sort_members: members with their coordinates (3, n_members), in n_groups groups, by label, below n, in their order
+ * within it, and the count of each label. A member has the label of its group, but for the n_moved rows `moved`,
+ * ascending, whose labels are `label_of_moved`. Scratch: `next` of n, the place of the next member of each label. */
+EXPORT void modt_sort_members(const i64 *members, const float *xyz, i64 n_members, const i64 *offsets, i64 n_groups,
+                              const i64 *label, const i64 *moved, const i64 *label_of_moved, i64 n_moved, i64 n,
+                              i64 *next, i64 *count, i64 *sorted_members, float *sorted_xyz)
 {
     /* 1. Rows of each label: those of its groups, less those that moved away, and those that moved to it. */
     i64 total = 0;
@@ -74,10 +71,10 @@ EXPORT void modt_sort_members(const Rows *rows, const i64 *offsets, i64 n_groups
             end = moves ? i + 1 : m < n_moved && moved[m] < offsets[g + 1] ? moved[m] : offsets[g + 1];
             *place += end - i;
             for (i64 k = i; k < end; k++)
-                sorted->index[to + k - i] = rows->index[k];
+                sorted_members[to + k - i] = members[k];
             for (int v = 0; v < 3; v++)
                 for (i64 k = i; k < end; k++)
-                    sorted->xyz[v][to + k - i] = rows->xyz[v][k];
+                    sorted_xyz[v * n_members + to + k - i] = xyz[v * n_members + k];
         }
 }
 
