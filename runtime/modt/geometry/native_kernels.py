@@ -257,7 +257,7 @@ class NativeGeometryKernels(GeometryKernels):
         sorted_coordinates = np.empty_like(coordinates)
         count = np.empty(n, int64)
         self.library.modt_sort_members(
-            members, coordinates, len(members), offsets, len(label), label, member_rows, own_label, len(member_rows), n,
-            np.empty(n, int64), count, sorted_members, sorted_coordinates,
+            members, coordinates, len(members), offsets, len(label), label, member_rows, own_label, len(member_rows),
+            n, np.empty(n, int64), count, sorted_members, sorted_coordinates,
         )  # fmt: skip
         return sorted_members, sorted_coordinates, count

@@ -251,7 +251,7 @@ class Layout:
         for name, pick in self._pick_shape.items():
             if values[name].shape != pick(known):
                 subject = f"{self.name}.{name}, {self.members[name]},"
-                sizes = dict(zip(self._places, known))
+                sizes = dict(zip(self._places, known, strict=False))  # the constants follow
                 return ValueError(f"{subject} has the shape {values[name].shape}, where {sizes}")
         return TypeError(f"{self.name} cannot be filled")
 

@@ -92,36 +92,26 @@ def _expected_points(now: Situation, rows: Int, hosts: Int) -> _Points:
 
     A point where two are expected goes to the track of the lower row, which is the older one, not always the senior.
     """
-    proposals = now.proposals
+    offsets = now.proposals.offsets
     T_world_sensor = now.placement.T_world_sensor
-    margin_m = now.tuning.margin_m
-    piece, member_rows = _rows_of_groups(proposals.offsets, hosts)
     R = T_world_sensor[:3, :3].astype(np.float32)
-    xyz = R @ proposals.coordinates.take(member_rows, axis=1) + T_world_sensor[:3, 3:]
-    below = (xyz[2] < now.tracks.top[rows[piece]] + margin_m).nonzero()[0]
-    member_rows = member_rows[below]
-    piece = piece[below]
-    xyz = xyz.take(below, axis=1)
+    margin_m = now.tuning.margin_m
+    top_m = now.tracks.top[rows] + margin_m
+    ends_m = now.pairs.expected.take(rows, axis=1) + margin_m
     # Points are deskewed to the stamp as if seen where the track is expected.
     step = now.placement.deskew(now.tracks.x[rows, :2])
-    xy = xyz[:2] + step.T.take(piece, axis=1)
-    limit = now.pairs.expected.take(rows[piece], axis=1) + margin_m
-    within = (DIRECTIONS.T @ xy <= limit).all(axis=0).nonzero()[0]
-    once, first = np.unique(member_rows[within], return_index=True)
-    chosen = within[first]
-    return _Points(once, piece[chosen], xyz[2, chosen])
-
-
-def _rows_of_groups(offsets: Int, groups: Int) -> tuple[Int, Int]:
-    """All rows of the groups (R,), one group after the other, each with the index of its group among the R.
-
-    A group has the rows from offsets[i] to offsets[i + 1], and may be given several times.
-    """
-    begin = offsets[groups]
-    count = offsets[groups + 1] - begin
-    index = np.arange(len(groups)).repeat(count)
-    n_before = count.cumsum() - count
-    return index, np.arange(len(index)) + (begin - n_before).repeat(count)
+    member_rows = []
+    height_m = []
+    for piece, host in enumerate(hosts):
+        first = offsets[host]
+        xyz = R @ now.proposals.coordinates[:, first : offsets[host + 1]] + T_world_sensor[:3, 3:]
+        xy = xyz[:2] + step[piece, :, None]
+        within = (DIRECTIONS.T @ xy <= ends_m[:, piece, None]).all(axis=0) & (xyz[2] < top_m[piece])
+        member_rows.append(first + within.nonzero()[0])
+        height_m.append(xyz[2, within])
+    piece_of_point = np.arange(len(rows)).repeat(list(map(len, member_rows)))
+    once, chosen = np.unique(np.concatenate(member_rows), return_index=True)
+    return _Points(once, piece_of_point[chosen], np.concatenate(height_m)[chosen])
 
 
 def _worth_making(now: Situation, points: _Points, rows: Int, hosts: Int) -> Bool:
