@@ -11,40 +11,55 @@ typedef float f8 __attribute__((vector_size(32), aligned(4)));
 typedef i32 i8 __attribute__((vector_size(32)));
 typedef i64 l4 __attribute__((vector_size(32)));
 
+enum { LANES = 8 }; /* points, or k-DOPs, in a vector */
 enum { EAST, NORTH_EAST, NORTH, NORTH_WEST, AXES }; /* axes of k-DOPs; AXES more is the same axis backwards */
 
 static const double HALF_ROOT = 0x1.6a09e667f3bcdp-1;    /* component of the axes north-east and north-west */
 static const double QUARTER_TURN = 0x1.921fb54442d18p+0; /* radians */
 
-/* Least and greatest coordinates along four axes of the points from `begin` to before `end`, at least one. The x, y and z
- * of the axes are given. Two points are taken at a time, into two extents that do not wait for one another. */
-static ALWAYS_INLINE void extent_along(const float *x, const float *y, const float *z, i64 begin, i64 end,
-                                       const f4 axes[3], f4 *least, f4 *greatest)
+/* Least and greatest coordinates along axes of the points from `begin` to before `end`, at least one. Rows x, y and z
+ * of the points are given, and those of the axes. Eight points are taken at a time. The last eight hold some that were
+ * taken before, or, where there are fewer in all, the last point several times. */
+static ALWAYS_INLINE void extent_along(const float *const xyz[3], i64 begin, i64 end, const float axes[3][AXES],
+                                       int n_axes, float *least, float *greatest)
 {
-    f4 low[2] = {spread(INFINITY), spread(INFINITY)}, high[2] = {-low[0], -low[0]};
-    i64 i = begin;
-    if ((end - begin) & 1) {
-        low[0] = high[0] = axes[0] * spread(x[i]) + axes[1] * spread(y[i]) + axes[2] * spread(z[i]);
-        i++;
+    f8 low[AXES], high[AXES], eight[3];
+    for (int k = 0; k < n_axes; k++) {
+        low[k] = (f8){0} + INFINITY;
+        high[k] = -low[k];
     }
-    for (; i < end; i += 2)
-        for (int k = 0; k < 2; k++) {
-            f4 along = axes[0] * spread(x[i + k]) + axes[1] * spread(y[i + k]) + axes[2] * spread(z[i + k]);
-            low[k] = min4(along, low[k]);
-            high[k] = max4(along, high[k]);
+    for (i64 next = begin; next < end; next += LANES) {
+        i64 i = next + LANES > end && begin + LANES <= end ? end - LANES : next;
+        for (int v = 0; v < 3; v++)
+            if (i + LANES <= end)
+                eight[v] = *(const f8 *)(xyz[v] + i);
+            else
+                for (i64 lane = 0; lane < LANES; lane++)
+                    eight[v][lane] = xyz[v][i + lane < end ? i + lane : end - 1];
+        for (int k = 0; k < n_axes; k++) {
+            f8 along = axes[0][k] * eight[0] + axes[1][k] * eight[1] + axes[2][k] * eight[2];
+            i8 is_less = along < low[k], is_more = along > high[k];
+            low[k] = (f8)(((i8)along & is_less) | ((i8)low[k] & ~is_less));
+            high[k] = (f8)(((i8)along & is_more) | ((i8)high[k] & ~is_more));
         }
-    *least = min4(low[0], low[1]);
-    *greatest = max4(high[0], high[1]);
+    }
+    for (int k = 0; k < n_axes; k++) {
+        least[k] = low[k][0];
+        greatest[k] = high[k][0];
+        for (int lane = 1; lane < LANES; lane++) {
+            least[k] = minf(least[k], low[k][lane]);
+            greatest[k] = maxf(greatest[k], high[k][lane]);
+        }
+    }
 }
 
 /* kdop_ends: k-DOPs (8, n_groups) of groups of points, given the axes (3, 4). */
 EXPORT void modt_kdop_ends(const float *x, const float *y, const float *z, const i64 *offsets, i64 n_groups,
-                           const float *axes, float *kdop)
+                           const float axes[3][AXES], float *kdop)
 {
-    f4 axes_xyz[3], low, high;
-    __builtin_memcpy(axes_xyz, axes, sizeof axes_xyz);
+    float low[AXES], high[AXES];
     for (i64 g = 0; g < n_groups; g++) {
-        extent_along(x, y, z, offsets[g], offsets[g + 1], axes_xyz, &low, &high);
+        extent_along((const float *[]){x, y, z}, offsets[g], offsets[g + 1], axes, AXES, low, high);
         for (int k = 0; k < AXES; k++) {
             kdop[k * n_groups + g] = high[k];
             kdop[(k + AXES) * n_groups + g] = -low[k];
@@ -59,9 +74,9 @@ EXPORT void modt_upright_boxes(const float *x, const float *y, const float *z, c
 {
     for (i64 g = 0; g < n_groups; g++) {
         float c = (float)cosine[g], s = (float)sine[g];
-        f4 axes[3] = {{c, -s, 0.0f, 0.0f}, {s, c, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f, 0.0f}}, low, high;
+        float axes[3][AXES] = {{c, -s, 0.0f}, {s, c, 0.0f}, {0.0f, 0.0f, 1.0f}}, low[AXES], high[AXES];
         double middle[3], side[3]; /* along the heading, across it, and upwards */
-        extent_along(x, y, z, offsets[g], offsets[g + 1], axes, &low, &high);
+        extent_along((const float *[]){x, y, z}, offsets[g], offsets[g + 1], axes, 3, low, high);
         for (int k = 0; k < 3; k++) {
             middle[k] = ((double)low[k] + (double)high[k]) / 2;
             side[k] = (double)high[k] - (double)low[k];
@@ -77,7 +92,7 @@ EXPORT void modt_upright_boxes(const float *x, const float *y, const float *z, c
     }
 }
 
-enum { LANES = 8, HALVES = 2, BLOCK = LANES * HALVES, SIDES = 4 }; /* k-DOPs compared together, in two vectors */
+enum { HALVES = 2, BLOCK = LANES * HALVES, SIDES = 4 }; /* k-DOPs compared together, in two vectors */
 
 /* overlapping_pairs: pairs of k-DOPs a (8, n_a) and b (8, n_b) that overlap along x and along y, as indices among both.
  * Returns how many there are; no more than `limit` are written.
