@@ -193,7 +193,7 @@ class Layout:
 
     def allocate(self, **numbers: int) -> Filled:
         """Fill a structure with new arrays, whose contents are undefined. The numbers are the sizes of the arrays."""
-        known = (*map(numbers.get, self._places), *self._constants)
+        known = (*[numbers[size] for size in self._places], *self._constants)
         arrays = {name: np.empty(pick(known), self.members[name].dtype) for name, pick in self._pick_shape.items()}
         return self._filled(arrays | numbers)
 
