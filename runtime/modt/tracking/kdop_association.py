@@ -82,15 +82,16 @@ class KdopAssociation:
     def _reach(self, covariance: Float64) -> Float64:
         """(M,) search radius [m] of tracks whose positions have the covariance xx, xy, yy (3, M).
 
-        It is a margin of 0.5 m and three standard deviations of the position. The deviations are fewer where the
+        It is a margin and `reach_sigmas` standard deviations of the position. The deviations are fewer where the
         missing overlap and the uncertainty of the position leave less of `max_cost` for the displacement.
         """
         xx, xy, yy = covariance
         least = self._jump_variance
         uncertainty = np.log(((xx + least) * (yy + least) - xy * xy) / least**2)
-        # Greatest squared displacement in standard deviations: 9 stands for three of them.
-        left = np.minimum(2 * (self._tuning.max_cost - self._weights.overlap) - uncertainty, 9.0)
-        reach: Float64 = 0.5 + np.sqrt(np.maximum(left, 0.0) * np.maximum(xx, yy))
+        # Greatest squared displacement, in standard deviations of the position.
+        affordable = 2 * (self._tuning.max_cost - self._weights.overlap) - uncertainty
+        squared = np.minimum(affordable, self._tuning.reach_sigmas**2)
+        reach: Float64 = self._tuning.reach_margin_m + np.sqrt(np.maximum(squared, 0.0) * np.maximum(xx, yy))
         return reach
 
 

@@ -46,6 +46,16 @@ class KdopAssociationTuning:
     are matched.
     Chosen on: judgement."""
 
+    reach_margin_m: float = 0.5
+    """Margin around a track within which proposals are candidates for it, beside the uncertainty of its position [m].
+    Less: fewer pairs are compared, and a track whose shape changes is lost.
+    Chosen on: judgement."""
+
+    reach_sigmas: float = 3.0
+    """Most standard deviations of its position, beyond the margin, at which a proposal is a candidate for a track.
+    Less: fewer pairs are compared, and a track that turns is lost.
+    Chosen on: judgement."""
+
     position_sigma_m: float = 0.1
     """Standard deviation of a measured position along either axis [m]. Greater: the filter smooths more.
     Chosen on: judgement."""
