@@ -48,4 +48,6 @@ def test_the_tracker_follows_by_the_association_it_is_given():
     assert (tracks.hits >= 9).sum() > 0.5 * len(result.proposals)
     seen = tracks.proposal != NONE
     measured = transform(frame.T_world_sensor, result.proposals.centroid[tracks.proposal[seen]])[:, :2]
-    np.testing.assert_allclose(tracker.tracks.anchor[seen], measured, atol=1e-6)  # centroids, not centres of k-DOPs
+    np.testing.assert_allclose(
+        tracker.tracks.kdop_position[seen], measured, atol=1e-6
+    )  # centroids, not centres of k-DOPs

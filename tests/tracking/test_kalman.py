@@ -77,7 +77,7 @@ def test_covariances_stay_covariances(x, P, dt_s):
 @given(STATES, POSITIVE, arrays(np.float64, 3, elements=st.floats(-3, 3)))
 def test_turning_a_standing_track_moves_nothing(x, P, heading):
     x[3] = 0
-    turned, Q = kalman.face(x, P, heading)
+    turned, Q = kalman.with_heading(x, P, heading)
     np.testing.assert_allclose(motion(turned, 0.1), motion(x, 0.1) + (turned - x), atol=1e-12)
     np.testing.assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
     np.testing.assert_allclose(np.hypot(Q[0, 3], Q[1, 3]), np.hypot(P[0, 3], P[1, 3]))
@@ -85,7 +85,7 @@ def test_turning_a_standing_track_moves_nothing(x, P, heading):
 
 @given(STATES, POSITIVE)
 def test_turning_about_keeps_the_motion(x, P):
-    turned, Q = kalman.turn_about(x, P)
+    turned, Q = kalman.with_forward_speed(x, P)
     np.testing.assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
     assert (turned[3] >= 0).all()
     np.testing.assert_allclose(motion(turned, 1.0)[:2], motion(x, 1.0)[:2], atol=1e-12)

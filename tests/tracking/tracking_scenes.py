@@ -141,7 +141,7 @@ def tracks_at(boxes, *classes, points=60, **columns):
     t.age[:] = 10
     t.hits[:] = 10
     t.points[:] = points
-    t.x[:, :2] = t.anchor[:] = t.rest_position[:] = observations.position
+    t.x[:, :2] = t.kdop_position[:] = t.rest_position[:] = observations.position
     t.P[:] = 0.01 * np.eye(4)
     t.box[:] = observations.box
     t.kdop[:] = observations.kdop.T

@@ -148,7 +148,8 @@ EXPORT void modt_observe_speed(double (*states)[N_STATE], double (*covariances)[
 
 /* Columns of the track table, an entry a track; k-DOPs [m, world], envelope and mean about the position [m]. */
 typedef struct {
-    double (*kdop)[8], (*lagged_kdop)[8], (*envelope)[8], (*mean_kdop)[8], (*box)[7], (*size_m)[3], (*anchor)[2];
+    double (*kdop)[8], (*lagged_kdop)[8], (*envelope)[8], (*mean_kdop)[8], (*box)[7], (*size_m)[3];
+    double (*kdop_position)[2];
     double *moved_m, *observed_s, *bottom, *top;
     i64 *proposal, *points;
     const i64 *hits, *object_class;
@@ -225,7 +226,7 @@ EXPORT void modt_update_extent(const TrackColumns *tracks, const Observations *s
         for (int k = 0; k < 7; k++)
             tracks->box[row][k] = seen->box[proposal][k];
         for (int k = 0; k < 2; k++)
-            tracks->anchor[row][k] = position[m][k];
+            tracks->kdop_position[row][k] = position[m][k];
         tracks->moved_m[row] = moved;
         tracks->observed_s[row] += seen->dt_s;
         tracks->bottom[row] = seen->bottom[proposal];

@@ -63,7 +63,7 @@ class ExtentUpdate:
         self._displacement(tracks, rows, kdop, dt_s)
         self._size(tracks, rows, box[:, 3:6])
         tracks.observed_s[rows] += dt_s
-        tracks.anchor[rows] = position
+        tracks.kdop_position[rows] = position
         tracks.kdop[rows] = kdop
         tracks.box[rows] = box
         tracks.bottom[rows] = observations.bottom[proposals]
@@ -126,7 +126,7 @@ _COLUMNS = Layout(
     mean_kdop=Array(np.float64, "m", 8),
     box=Array(np.float64, "m", 7),
     size_m=Array(np.float64, "m", 3),
-    anchor=Array(np.float64, "m", 2),
+    kdop_position=Array(np.float64, "m", 2),
     moved_m=Array(np.float64, "m"),
     observed_s=Array(np.float64, "m"),
     bottom=Array(np.float64, "m"),

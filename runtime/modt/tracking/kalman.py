@@ -114,7 +114,7 @@ def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) ->
     return after, symmetric(P - K[:, None] * P[SPEED])
 
 
-def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64]:
+def with_heading(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64]:
     """Turn the heading of tracks that stand to where they seem to go.
 
     At speed zero all headings are the same state, but the linearisation sees motion along the chosen one alone. So
@@ -132,7 +132,7 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
     return facing, turned
 
 
-def turn_about(x: Float64, P: Float64) -> tuple[Float64, Float64]:
+def with_forward_speed(x: Float64, P: Float64) -> tuple[Float64, Float64]:
     """The same motion with a speed that is not negative."""
     sign = np.where(x[SPEED] < 0, -1.0, 1.0)
     forward = x.copy()
@@ -174,8 +174,8 @@ class Filter:
         """
         state, covariance = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
         position, noise = components_first(z, R)
-        turned = face(state, covariance, _heading(state, covariance[SPEED, SPEED], position))
-        x[rows], P[rows] = tracks_first(*turn_about(*update(*turned, position, noise)))
+        turned = with_heading(state, covariance, _heading(state, covariance[SPEED, SPEED], position))
+        x[rows], P[rows] = tracks_first(*with_forward_speed(*update(*turned, position, noise)))
 
     def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
         """The rows after an observed speed of deviation sigma."""

@@ -159,12 +159,12 @@ def locate_pieces(
     off = np.where(both, 0.0, np.where(touched, -off[OPPOSITE], off))
     before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
     shift, covariance, end_variance = now.kernels.measured(mean, mean + off, variance, before)
-    at = (matches.rows == rows[:, None]).argmax(axis=1)
+    match_of_piece = (matches.rows == rows[:, None]).argmax(axis=1)
     # The pieces are new to their tracks, so the matches hold the expected positions, from which the shift leads.
     measured = matches._replace(
-        position=with_rows(matches.position, at, matches.position[at] + shift),
-        covariance=with_rows(matches.covariance, at, covariance),
-        end_variance=with_rows(matches.end_variance, at, end_variance.T),
+        position=with_rows(matches.position, match_of_piece, matches.position[match_of_piece] + shift),
+        covariance=with_rows(matches.covariance, match_of_piece, covariance),
+        end_variance=with_rows(matches.end_variance, match_of_piece, end_variance.T),
     )
     kdop_there: Float64 = expected + DIRECTIONS.T @ shift.T
     return kdop_there, measured

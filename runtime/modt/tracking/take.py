@@ -45,7 +45,7 @@ def find_takes(now: Situation) -> Takes:
     rows = pairs.rows[larger]
     proposals = pairs.proposals[larger]
     known = tracks.box.take(rows, axis=0)  # where the filter expects it now
-    known[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.anchor.take(rows, axis=0)
+    known[:, :2] += tracks.x.take(rows, axis=0)[:, :2] - tracks.kdop_position.take(rows, axis=0)
     seen = now.observations.box.take(proposals, axis=0)
     fits = fit_together(known, seen, MAX_SIZE_M.take(tracks.object_class[rows], axis=0)).nonzero()[0]
     return _exchanges(rows[fits].tolist(), proposals[fits].tolist(), proposal_of_track, track_of_proposal)

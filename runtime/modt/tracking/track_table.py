@@ -34,14 +34,14 @@ class TrackTable(Tracks):
     end_variance: Float64 = column(float, 4)  # extra position variance along each axis, by ends that disagreed [m2]
     bottom: Float64 = column(float)  # lowest point last observed [m, world]
     top: Float64 = column(float)  # highest point last observed [m, world]
-    anchor: Float64 = column(float, 2)  # measured position when `kdop` was observed [m, world]
+    kdop_position: Float64 = column(float, 2)  # measured position when `kdop` was observed [m, world]
     rest_position: Float64 = column(float, 2)  # position at which the track was last known to rest [m, world]
     stationary: Bool = column(bool)  # the track is at rest
     unseen_s: Float64 = column(float)  # time since the last proposal; a stalled clock adds one period a frame [s]
 
     def predicted_kdops(self, rows: Int | slice = slice(None)) -> Float64:
         """(8, R) k-DOPs last observed of the rows, of all by default, where the filter expects them now."""
-        kdop: Float64 = (self.kdop[rows] + (self.x[rows, :2] - self.anchor[rows]) @ DIRECTIONS).T.copy()
+        kdop: Float64 = (self.kdop[rows] + (self.x[rows, :2] - self.kdop_position[rows]) @ DIRECTIONS).T.copy()
         return kdop
 
     def known_kdops(self, rows: Int) -> Float64:
