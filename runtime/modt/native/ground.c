@@ -31,7 +31,7 @@ typedef struct {
 /* Scratch: a value a cell, a value a ray, and a value a point. */
 typedef struct {
     float *lowest, *surface, *range_before; /* (cells,) range_before: of the ground cell before each cell [m] */
-    float *clear;                           /* (cells,) height from which a return is clear of the ground */
+    float *clear, *foot;                    /* (cells,) height from which a return is clear of the ground; a foot */
     float (*ends)[2];                       /* (cells,) lowest return, and the highest, negated, side by side */
     uint8_t *kind;                          /* (cells,) flags of Kind */
     float *rays;                            /* (4 * sectors,) */
@@ -48,6 +48,7 @@ static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
     TAKE(&end, s->surface, cells + g->sectors);
     TAKE(&end, s->range_before, cells);
     TAKE(&end, s->clear, cells);
+    TAKE(&end, s->foot, cells);
     TAKE(&end, s->ends, cells);
     TAKE(&end, s->kind, cells);
     TAKE(&end, s->rays, 4 * g->sectors);
@@ -328,7 +329,8 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
             }
         }
         for (i32 k = row; k < row + sectors; k++)
-            s->clear[k] = top[k] - s->surface[k] <= s->clear[k] ? INFINITY : s->clear[k];
+            s->foot[k] = top[k] - s->surface[k] <= s->clear[k] ? INFINITY
+                                                               : maxf(g->foot_share * s->clear[k], g->min_foot_m);
     }
 }
 
@@ -350,7 +352,7 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
     const uint64_t all = 0x0101010101010101;
     float height[BLOCK], low = g->min_height_m, high = g->max_height_m;
     float *const *kept = out->kept;
-    uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}, is_clear[BLOCK];
+    uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0};
     for (i64 i = 0; i < n; i++)
         height[i] = s->z[start + i] - surface_at(g, s, start + i);
     for (i64 i = 0; i < n; i++)
@@ -359,18 +361,14 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
         int8_t other = height[i] >= high ? OVERHEAD_KIND : height[i] > -INFINITY ? GROUND_KIND : OUT_OF_RANGE_KIND;
         out->kind[start + i] = is_kept[i] ? MEMBER_KIND : other;
     }
-    for (i64 i = 0; i < n; i++) {
-        float clear = s->clear[s->cell[start + i]];
-        float foot = maxf(g->foot_share * clear, g->min_foot_m);
-        is_low[i] = (height[i] <= low) & (height[i] > foot) & (clear < INFINITY);
-        is_clear[i] = height[i] > clear;
-    }
+    for (i64 i = 0; i < n; i++)
+        is_low[i] = (height[i] <= low) & (height[i] > s->foot[s->cell[start + i]]);
     for (i64 first = 0; first < n; first += GROUP) {
         uint64_t group;
         __builtin_memcpy(&group, is_low + first, GROUP);
         for (i64 i = first; group && i < first + GROUP && i < n; i++) {
             out->low_rows[*n_low] = start + i; /* overwritten by the next, unless it is low */
-            out->is_clear[*n_low] = is_clear[i];
+            out->is_clear[*n_low] = height[i] > s->clear[s->cell[start + i]];
             *n_low += is_low[i];
         }
     }
@@ -436,7 +434,7 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
     interpolate(g, s);
     smooth(g, s, out->top);
     s->surface[cells] = s->surface[cells + g->sectors] = INFINITY; /* points out of bounds of range have no height */
-    s->clear[cells] = INFINITY;
+    s->foot[cells] = s->clear[cells] = INFINITY;
     for (i64 i = 0; i < n; i += BLOCK)
         count = keep_points(g, s, points, i, n - i < BLOCK ? n - i : BLOCK, count, &n_low, out);
     append_low(g, s, points, count, n_low, out);

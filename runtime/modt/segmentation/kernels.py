@@ -67,7 +67,7 @@ class Kernels(GeometryKernels):
         kind[in_range & (height >= bounds.max_height_m)] = PointKind.OVERHEAD
         rows = np.flatnonzero(kind == PointKind.MEMBER)
         foot_m = np.maximum(np.float32(ground.tuning.foot_share) * clear_m, np.float32(ground.tuning.min_foot_m))
-        low = np.flatnonzero((kind == PointKind.GROUND) & (height > foot_m) & np.isfinite(clear_m))
+        low = np.flatnonzero((kind == PointKind.GROUND) & (height > foot_m))
         is_clear = height.take(low) > clear_m.take(low)
         rows = np.concatenate([rows, low])
         return Above(rows, sweep.take(rows), height.take(rows), is_clear, top, kind)

@@ -20,8 +20,6 @@ from modt.types import NONE, Int, Int8, PointKind
 
 ANY_GAP = CellTuning(max_gap_m=np.inf, max_gap_beams=0.0)
 NO_SPLIT = SplitTuning(min_extent_m=np.inf)
-LEFT_OVER = PointKind.LOW, PointKind.SPARSE
-STANDING = PointKind.MEMBER, PointKind.STRUCTURE
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +61,7 @@ class LowFinder:
         self.kernels = kernels
         self.tuning = tuning
         self.min_points = config.min_points
+        self.max_sqrt_range = np.float32(np.sqrt(tuning.max_range_m))
         self.clusterer = CellClusterer(sensor, config, ANY_GAP, NO_SPLIT)
         self.grid = self.clusterer.fine
         # Wide cells are two by two fine ones. What stands in each is NONE throughout between calls.
@@ -74,7 +73,8 @@ class LowFinder:
 
     def find(self, above: Above, tall: Clusters) -> LowThings:
         """Low things and feet, given the clusters of the K tall points."""
-        cells_standing = np.isin(tall.kind_of_cell, STANDING).nonzero()[0]
+        kind = tall.kind_of_cell
+        cells_standing = ((kind == PointKind.MEMBER.value) | (kind == PointKind.STRUCTURE.value)).nonzero()[0]
         wide_standing = self._wide(tall.cells.row[cells_standing], tall.cells.column[cells_standing])
         self.standing[wide_standing] = tall.sample[cells_standing]
         places = self._places(above, tall)
@@ -103,14 +103,21 @@ class LowFinder:
         return LowThings(clusters, places, feet)
 
     def _places(self, above: Above, tall: Clusters) -> Int:
-        """(P,) places of left-over tall points, clear low ones, and low ones that share a wide cell."""
+        """(P,) places of left-over tall points, clear low ones, and low ones that share a wide cell.
+
+        Farther away than low things are looked for, only those are used that share one with something tall.
+        """
         n_tall = above.n_tall
-        left_over = np.isin(tall.kind_of_cell, LEFT_OVER).take(tall.cell_of_point).nonzero()[0]
+        kind = tall.kind_of_cell
+        is_left_over = (kind == PointKind.LOW.value) | (kind == PointKind.SPARSE.value)
+        is_left_over &= tall.sampled.sqrt_range < self.max_sqrt_range
+        left_over = is_left_over.take(tall.cell_of_point).nonzero()[0]
         low = above.points.part(n_tall, len(above.rows))
+        is_near = low.sqrt_range < self.max_sqrt_range
         wide = self._wide(*self.grid.row_column(low))
-        wide_clear = wide[above.is_clear]
+        wide_clear = wide[above.is_clear & is_near]
         self.has_clear[wide_clear] = True
-        used = above.is_clear | self.has_clear.take(wide) | (self.standing.take(wide) != NONE)
+        used = self.has_clear.take(wide) | (self.standing.take(wide) != NONE)
         self.has_clear[wide_clear] = False
         return np.concatenate([left_over, n_tall + used.nonzero()[0]])
 
