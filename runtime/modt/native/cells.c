@@ -446,8 +446,9 @@ static void move_parts(const ClusterScratch *s, i64 n_cells, i64 n_parts, i64 *c
             cluster[i] = s->cluster_of_part[s->part[i]];
 }
 
-/* CellClusterer._before_surfaces, of n clusters: sets `use` of the cells that are free, and `before_m`. */
-static void find_free_cells(const ClusterRules *rules, const StructureRules *r, const PersonSize *person,
+/* CellClusterer._before_surfaces, of n clusters: sets `use` of the cells that are free, and `before_m`. Returns whether
+ * surfaces were looked for. */
+static int find_free_cells(const ClusterRules *rules, const StructureRules *r, const PersonSize *person,
                             const Cells *cells, const PointColumns *sampled, i64 n_cells, const i64 *cluster,
                             const ClusterSizes *sizes, i64 n, const ClusterScratch *s)
 {
@@ -473,7 +474,7 @@ static void find_free_cells(const ClusterRules *rules, const StructureRules *r, 
         if (next[cluster[i]] != NONE)
             s->cell_of_row[next[cluster[i]]++] = (i32)i;
     i32 start = 0;
-    for (i64 g = 0; g < n; g++) {
+    for (i64 g = 0; g < n && rows; g++) {
         if (next[g] == NONE)
             continue;
         i32 end = next[g], hanging = 0, m = 0;
@@ -498,6 +499,7 @@ static void find_free_cells(const ClusterRules *rules, const StructureRules *r, 
             s->before_m[s->row_cells[k]] = found ? (float)s->distance_m[k] : FAR_M;
         }
     }
+    return rows > 0;
 }
 
 /* CellClusterer._leaves_surface: sets `cluster_of_part` of those that leave, which are numbered from n on. */
@@ -568,7 +570,8 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structu
     n += n_parts;
 
     /* 3. Parts before surfaces. */
-    find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s);
+    if (!find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s))
+        return n;
     n_parts = connect(cells, n_cells, 0, rules->fine_side, s, s->part);
     parts = sizes_from(sizes, n);
     measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
