@@ -26,6 +26,7 @@ from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
 from modt_simulation.sensors import SENSORS
+from tools.train.bare_scans import bare_scans
 from tools.train.dataset import CLUSTERED, MAJORITY, PASTED, SHIPPED, SYNTHETIC, VARIANT_NAMES, Sensors
 from tools.train.labelled_scans import (
     THINNED,
@@ -255,6 +256,12 @@ def near_crops(path: Path, worlds: int, seed: int) -> None:
     """Write crops of simulated sweeps of low sensors among people at arm's length, one sweep of each world."""
     scans = near_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
     _save_simulated(path, scans, {"near": worlds, "seed": seed})
+
+
+def bare_crops(path: Path, worlds: int, seed: int) -> None:
+    """Write crops of simulated sweeps without an object, among heaps and plants, one sweep of each world."""
+    scans = bare_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
+    _save_simulated(path, scans, {"bare": worlds, "seed": seed})
 
 
 def _save_simulated(path: Path, scans: Iterable[Scan], provenance: dict[str, object]) -> None:

@@ -1,8 +1,9 @@
 """Build models from scratch: crops, training, export, cards (extra [train]).
 
-    python -m tools.train.build_models WORK_DIR [--kitti ROOT] [--scans FOLDER --profile PROFILE]
+    python -m tools.train.build_models WORK_DIR [--kitti ROOT] [--scans FOLDER --profile PROFILE] [--further]
 
-Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/pointnet-kitti. With --scans it builds
+Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/pointnet-kitti. With --further it trains
+the shipped ones on sweeps without objects alone (tools.train.train_bare), which takes minutes. With --scans it builds
 WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data. The scans
 have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the validation.
 Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z forward).
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from modt import profile
 from tools.options import parser
-from tools.train.build_crops import kitti_crops, near_crops, own_crops, synthetic_crops
+from tools.train.build_crops import bare_crops, kitti_crops, near_crops, own_crops, synthetic_crops
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
@@ -25,6 +26,10 @@ NEAR_WORLDS = {1: 3000, 2: 550}
 """Seed and number of the worlds near the sensor, first for training, then for the card."""
 NEAR_STEPS = 4000
 """Training steps of the network for near crops."""
+BARE_STEPS = 3000
+"""Training steps on sweeps without objects, at most."""
+BARE_WORLDS = {3: 880, 4: 110}
+"""Seed and number of the worlds without objects, first for training, then for the card."""
 KITTI_DATA = (
     "106 + 2 and 53 more object frames and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; SemanticKITTI "
     "labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 sweeps of Argoverse 2 (B. "
@@ -45,21 +50,29 @@ def run(name: str, *arguments: str | Path | int) -> None:
     subprocess.run(command, check=True)
 
 
-def build(crops: list[Path], near: list[Path], out: Path, steps: int, data: str, licence: str) -> None:
+def build(crops: list[Path], work: Path, out: Path, steps: int, data: str, licence: str) -> None:
     """Train a model and the network beside it for what the view cuts, with their cards.
 
     Args:
         crops: data sets.
-        near: two data sets of near_crops, one to train on and one for the card.
+        work: folder with the other data sets, of worlds without objects and of worlds near the sensor.
         out: the model.
         steps: training steps of each network.
         data: description of the data, for the card.
         licence: for the card.
     """
     run("train_pointnet", out, *crops, "--steps", steps, "--data", data, "--licence", licence)
+    train_further(crops, work, out, min(steps, BARE_STEPS))
     options = ["--steps", str(NEAR_STEPS), "--licence", licence]
     beside = out.with_stem(f"{out.stem}-near")
-    run("train_near", out, beside, *options, "--near", near[0], "--held", near[1], "--crops", *crops)
+    near, held = (work / f"near-{seed}.npz" for seed in NEAR_WORLDS)
+    run("train_near", out, beside, *options, "--near", near, "--held", held, "--crops", *crops)
+
+
+def train_further(crops: list[Path], work: Path, out: Path, steps: int) -> None:
+    """Train a model on worlds without objects. Its own data sets are `crops`."""
+    bare, held = (work / f"bare-{seed}.npz" for seed in BARE_WORLDS)
+    run("train_bare", out, "--bare", bare, "--held", held, "--steps", steps, "--crops", *crops)
 
 
 def main() -> None:
@@ -69,15 +82,18 @@ def main() -> None:
     options.add_argument("--kitti", type=Path, help="KITTI root, with argoverse2/ and pandaset/ beside object/")
     options.add_argument("--scans", type=Path, help="own scans: velodyne/, label_2/ and, for a camera's view, calib/")
     options.add_argument("--profile", default=profile.DEFAULT, help="of their sensor")
+    options.add_argument("--further", action="store_true", help="train the shipped models on, not from scratch")
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     free = args.work / "synthetic.npz"
     placed = args.work / "placed.npz"
     real = args.work / "kitti.npz"
     scans = args.work / "scans.npz"
-    near = [args.work / f"near-{seed}.npz" for seed in NEAR_WORLDS]
-    for path, (seed, worlds) in zip(near, NEAR_WORLDS.items(), strict=True):
-        near_crops(path, worlds, seed)
+    for seed, worlds in BARE_WORLDS.items():
+        bare_crops(args.work / f"bare-{seed}.npz", worlds, seed)
+    if not args.further:
+        for seed, worlds in NEAR_WORLDS.items():
+            near_crops(args.work / f"near-{seed}.npz", worlds, seed)
     if args.kitti:
         kitti_crops(real, args.kitti)
         synthetic_crops(placed, WORLDS, args.kitti / "object" / "training_all_labels")
@@ -89,12 +105,16 @@ def main() -> None:
         data = f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA
-        build(crops, near, args.work / "pointnet-scans.onnx", args.steps, data, licence)
+        build(crops, args.work, args.work / "pointnet-scans.onnx", args.steps, data, licence)
         return
-    licence = "Apache-2.0: free for any use"
-    build([free], near, MODELS / "pointnet-synthetic.onnx", args.steps, SYNTHETIC_DATA, licence)
+    shipped = [([free], MODELS / "pointnet-synthetic.onnx", SYNTHETIC_DATA, "Apache-2.0: free for any use")]
     if args.kitti:
-        build([real, placed], near, MODELS / "pointnet-kitti.onnx", args.steps, KITTI_DATA, KITTI_LICENCE)
+        shipped.append(([real, placed], MODELS / "pointnet-kitti.onnx", KITTI_DATA, KITTI_LICENCE))
+    for crops, out, data, licence in shipped:
+        if args.further:
+            train_further(crops, args.work, out, BARE_STEPS)
+        else:
+            build(crops, args.work, out, args.steps, data, licence)
 
 
 if __name__ == "__main__":
