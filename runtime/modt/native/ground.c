@@ -168,15 +168,16 @@ static float median_of(float *numbers, i32 n)
     return n ? numbers[(n - 1) / 2] : INFINITY;
 }
 
-/* GroundEstimator.clear_m, and the highest return of each cell. `rays` is scratch. */
+/* GroundEstimator.clear_m of the near rings, and the highest return of each cell. `rays` is scratch. */
 static void measure_roughness(const Ground *g, const GroundScratch *s, float *top)
 {
     i32 in_quarter = g->sectors / g->quarters, cells = g->rings * g->sectors;
     float *ranges = s->rays;
-    for (i32 first = 0; first < cells; first += in_quarter) {
+    for (i32 k = 0; k < cells; k++)
+        top[k] = -s->ends[k][1];
+    for (i32 first = 0; first < g->near_rings * g->sectors; first += in_quarter) {
         i32 n = 0;
         for (i32 k = first; k < first + in_quarter; k++) {
-            top[k] = -s->ends[k][1];
             ranges[n] = top[k] - s->ends[k][0]; /* overwritten by the next, unless there are returns and all lie flat */
             n += ranges[n] <= g->flat_m[first / g->sectors] && s->ends[k][0] < INFINITY;
         }
@@ -328,9 +329,10 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
                 surface[k] = raised ? beside[k] : surface[k];
             }
         }
-        for (i32 k = row; k < row + sectors; k++)
-            s->foot[k] = top[k] - s->surface[k] <= s->clear[k] ? INFINITY
-                                                               : maxf(g->foot_share * s->clear[k], g->min_foot_m);
+        for (i32 k = row; k < row + sectors; k++) {
+            int is_clear = row < g->near_rings * sectors && top[k] - s->surface[k] > s->clear[k];
+            s->foot[k] = is_clear ? maxf(g->foot_share * s->clear[k], g->min_foot_m) : INFINITY;
+        }
     }
 }
 

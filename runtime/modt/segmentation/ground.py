@@ -140,6 +140,7 @@ class GroundEstimator:
             raised = (surface[ring] - beside > self.tuning.low_m) & ~is_ramp[ring]
             np.copyto(surface[ring], beside, where=raised)
         clear_m[highest - surface <= clear_m] = np.inf
+        clear_m[self.near_rings :] = np.inf
         inner = surface.ravel().take(cell)
         outer = np.concatenate([surface[1:], surface[-1:]]).ravel().take(cell)
         ring_of_point = (cell // SECTORS).astype(np.float32)

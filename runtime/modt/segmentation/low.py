@@ -38,7 +38,7 @@ class LowThings:
 
 
 class LowFinder:
-    """Finds things that are lower than what is clustered, near the sensor, and feet at any distance.
+    """Finds things that are lower than what is clustered, and feet, near the sensor.
 
     Low points that are clear of the roughness of the ground, and tall ones whose clusters are too low or too sparse,
     are grouped by neighbouring cells. Cells beside something tall are its foot. A group that stands alone is a thing
@@ -74,9 +74,11 @@ class LowFinder:
     def find(self, above: Above, tall: Clusters) -> LowThings:
         """Low things and feet, given the clusters of the K tall points."""
         kind = tall.kind_of_cell
-        cells_standing = ((kind == PointKind.MEMBER.value) | (kind == PointKind.STRUCTURE.value)).nonzero()[0]
-        wide_standing = self._wide(tall.cells.row[cells_standing], tall.cells.column[cells_standing])
-        self.standing[wide_standing] = tall.sample[cells_standing]
+        is_standing = (kind == PointKind.MEMBER.value) | (kind == PointKind.STRUCTURE.value)
+        is_standing &= tall.sampled.sqrt_range < self.max_sqrt_range
+        cells_standing = is_standing.nonzero()[0]
+        wide_standing = self._wide(tall.cells.row.take(cells_standing), tall.cells.column.take(cells_standing))
+        self.standing[wide_standing] = tall.sample.take(cells_standing)
         places = self._places(above, tall)
         points = above.points.take(places)
         height = above.height_m.take(places)
@@ -103,19 +105,15 @@ class LowFinder:
         return LowThings(clusters, places, feet)
 
     def _places(self, above: Above, tall: Clusters) -> Int:
-        """(P,) places of left-over tall points, clear low ones, and low ones that share a wide cell.
-
-        Farther away than low things are looked for, only those are used that share one with something tall.
-        """
+        """(P,) places of left-over tall points, clear low ones, and low ones that share a wide cell."""
         n_tall = above.n_tall
         kind = tall.kind_of_cell
         is_left_over = (kind == PointKind.LOW.value) | (kind == PointKind.SPARSE.value)
         is_left_over &= tall.sampled.sqrt_range < self.max_sqrt_range
         left_over = is_left_over.take(tall.cell_of_point).nonzero()[0]
         low = above.points.part(n_tall, len(above.rows))
-        is_near = low.sqrt_range < self.max_sqrt_range
         wide = self._wide(*self.grid.row_column(low))
-        wide_clear = wide[above.is_clear & is_near]
+        wide_clear = wide[above.is_clear]
         self.has_clear[wide_clear] = True
         used = self.has_clear.take(wide) | (self.standing.take(wide) != NONE)
         self.has_clear[wide_clear] = False
@@ -130,7 +128,7 @@ class LowFinder:
         kind = np.full(len(sizes), PointKind.GROUND, np.int8)
         kind[(sizes.top_m > tuning.sparse_top_m) | (range_m < tuning.sparse_range_m)] = PointKind.SPARSE
         kind[enough] = PointKind.LOW
-        kind[enough & small & (range_m < tuning.max_range_m)] = PointKind.MEMBER
+        kind[enough & small] = PointKind.MEMBER
         return kind
 
     def _wide(self, row: Int32, column: Int32) -> Int:

@@ -79,8 +79,9 @@ class GroundTuning:
     low_half_width_m: float = 1.2
     """Distance to the left and right of a ray at which that median is taken [m]. Less takes people who lie for
     ground. Chosen on: simulated halls."""
-    low_range_m: float = 12.0
-    """Range up to which it is taken [m]. Chosen on: simulated halls."""
+    low_range_m: float = 15.0
+    """Range up to which it is taken, and low returns are looked for [m]. More finds more feet and costs time.
+    Chosen on: simulated halls."""
     clear_m: float = 0.06
     """Height above the roughness of the ground from which a return is clear of it [m]. Less finds things in rough
     ground that are not there. Chosen on: simulated lawns, hills and halls."""
@@ -222,7 +223,8 @@ class LowTuning:
     """Things lower than `clearance_m`, and feet of what is higher."""
 
     max_range_m: float = 15.0
-    """Range up to which a low thing is a proposal [m]. Farther away few beams meet it. Chosen on: simulated halls."""
+    """Range up to which tall points that are too few or too low belong to low things [m], that of the low points.
+    Chosen on: simulated halls."""
     max_extent_m: float = 3.0
     """Greatest extent of a low thing that is a proposal [m]; longer ones are kerbs. Chosen on: judgement."""
     max_foot_m: float = 0.6
