@@ -165,7 +165,8 @@ class Run:
         assert np.isin(labels[~member], [*reasons, *seen]).all()
         foot = kind == PointKind.FOOT  # labelled as what it is part of
         assert (labels == kind)[~member & ~foot].all()
-        assert sum(result.left_out().values()) + len(result.proposals.members) == len(labels)
+        left_out = sum(result.left_out().values())
+        assert left_out + len(result.proposals.members) + np.count_nonzero(foot) == len(labels)
 
     def _posteriors(self, result: FrameResult) -> None:
         tracks = result.tracks
