@@ -143,6 +143,9 @@ typedef struct {
     uint8_t *on_surface;            /* (n,) its results */
     double *distance_m;             /* (n,) */
     float *before_m;                /* (n,) distance of each cell before surfaces, infinite without */
+    Cells free;                     /* (n,) cells on no surface, without the number of points */
+    i32 *cell_of_free;              /* (n,) their numbers among all */
+    i64 *part_of_free;              /* (n,) */
     float *front_m, *back_m;        /* (n,) greatest and least of those of each part */
     SurfaceScratch surface;
 } ClusterScratch;
@@ -178,6 +181,12 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->on_surface, n);
     TAKE(&end, s->distance_m, n);
     TAKE(&end, s->before_m, n);
+    TAKE(&end, s->free.row, n);
+    TAKE(&end, s->free.column, n);
+    TAKE(&end, s->free.low, n);
+    TAKE(&end, s->free.high, n);
+    TAKE(&end, s->cell_of_free, n);
+    TAKE(&end, s->part_of_free, n);
     TAKE(&end, s->front_m, n);
     TAKE(&end, s->back_m, n);
     place_surface_scratch(n, &end, &s->surface);
@@ -431,6 +440,31 @@ static ClusterSizes sizes_from(const ClusterSizes *s, i64 n)
                           .of_oversized = s->of_oversized + n};
 }
 
+/* connect of the cells in use on the fine grid, where these are few: as `connect` gives for all cells. */
+static i64 connect_few(const Cells *cells, i64 n_cells, i32 side, const ClusterScratch *s, i64 *component)
+{
+    const Cells *few = &s->free;
+    i64 n = 0;
+    for (i64 i = 0; i < n_cells; i++) {
+        component[i] = NONE;
+        s->cell_of_free[n] = (i32)i; /* overwritten by the next, unless it is used */
+        n += s->use[i];
+    }
+    for (i64 k = 0; k < n; k++) {
+        i32 i = s->cell_of_free[k];
+        few->row[k] = cells->row[i];
+        few->column[k] = cells->column[i];
+        few->low[k] = cells->low[i];
+        few->high[k] = cells->high[i];
+        s->max_gap_m[k] = s->max_gap_m[i];
+        s->use[k] = 1;
+    }
+    i64 components = connect(few, n, 0, side, s, s->part_of_free);
+    for (i64 k = 0; k < n; k++)
+        component[s->cell_of_free[k]] = s->part_of_free[k];
+    return components;
+}
+
 /* _moved: the parts whose `cluster_of_part` is not NONE leave their clusters. A part that stays keeps its number, with
  * no points. Of a cluster that parts leave, the number of points alone is corrected. `cluster` is read for all parts
  * before their cells are moved. */
@@ -572,7 +606,7 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structu
     /* 3. Parts before surfaces. */
     if (!find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s))
         return n;
-    n_parts = connect(cells, n_cells, 0, rules->fine_side, s, s->part);
+    n_parts = connect_few(cells, n_cells, rules->fine_side, s, s->part);
     parts = sizes_from(sizes, n);
     measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
     find_leaving(rules, structure, person, n_cells, cluster, sizes, n, &parts, n_parts, s);

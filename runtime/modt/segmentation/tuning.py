@@ -156,20 +156,20 @@ class StructureTuning:
 
     min_extent_m: float = 2.5
     """Extent of a cluster from which surfaces are looked for [m]. Less costs time."""
-    max_range_m: float = 25.0
+    max_range_m: float = 20.0
     """Range of a cluster up to which surfaces are looked for [m]. More costs time."""
     oversized_m: float = 9.0
     """Extent of a cluster from which it is divided into its parts on the fine grid, and loses all that stands out
     before its surfaces [m]; smaller ones lose possible people only."""
     max_lines: int = 6
     """Greatest number of surfaces of a cluster."""
-    max_cells: int = 36
+    max_cells: int = 32
     """Cells of a cluster that vote for a line. More costs time."""
     min_cells: int = 12
     """Cells without a surface below which no further one is looked for."""
     min_base_m: float = 0.5
     """Least distance of two cells whose line is tried [m]."""
-    refinements: int = 3
+    refinements: int = 2
     """Number of least-squares fits of a line to the cells near it."""
     thickness_m: float = 0.1
     """Distance from a line within which a cell is on it [m]. More swallows people who lean on a wall."""
