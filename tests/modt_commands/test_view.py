@@ -170,7 +170,7 @@ def test_what_is_left_out_can_be_coloured(run, tmp_path):
         page = Page(tmp_path / "view.html")
         assert page.run["left_out"] == bool(more)
         assert page.run["kinds"] == theme.kinds()
-    assert coloured[1] > 3 * coloured[0]
+    assert coloured[1] > 2 * coloured[0]
 
 
 def test_the_key_k_colours_what_is_left_out(run, chromium):
