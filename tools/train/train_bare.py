@@ -256,7 +256,7 @@ def train_boxes(model: Model, data: Dataset, bare: Dataset, steps: int, seed: in
         schedule.step()
     weight = np.zeros(len(data))
     for rows, share in (pair for pool in pools for pair in pool):
-        weight[rows] += share
+        weight[rows] += 1 / len(rows) if share is None else share
     layers = net.layers()
     calibration = keep_posteriors(box_classifier.logits(layers, feature), wanted, weight / weight.sum())
     return replace(model, boxes=replace(model.boxes, layers=calibration.fold_into(layers)))

@@ -88,10 +88,7 @@ class LowFinder:
 
         any_beam_m = np.zeros(len(cells), np.float32)
         group_of_cell, sizes = self.kernels.cluster(self.clusterer, cells, sampled, any_beam_m)
-        standing_of_group = np.full(len(sizes), NONE)
-        np.maximum.at(standing_of_group, group_of_cell, beside)
-        standing_of_group[sizes.extent_m > self.tuning.max_foot_m] = NONE
-        standing_of_cell = np.maximum(beside, standing_of_group.take(group_of_cell))
+        standing_of_cell = self._standing_of_cell(beside, group_of_cell, sizes)
         is_foot = standing_of_cell != NONE
         kind_of_group = self._kind(sizes)
         kind_of_cell = np.where(is_foot, np.int8(PointKind.FOOT), kind_of_group.take(group_of_cell))
@@ -118,6 +115,16 @@ class LowFinder:
         used = self.has_clear.take(wide) | (self.standing.take(wide) != NONE)
         self.has_clear[wide_clear] = False
         return np.concatenate([left_over, n_tall + used.nonzero()[0]])
+
+    def _standing_of_cell(self, beside: Int, group_of_cell: Int, sizes: ClusterSizes) -> Int:
+        """(D,) place of a tall point that each cell is the foot of, NONE where there is none.
+
+        It is one beside the cell, given (D,) such places, or beside another cell of its group, if that is small.
+        """
+        standing_of_group = np.full(len(sizes), NONE)
+        np.maximum.at(standing_of_group, group_of_cell, beside)
+        standing_of_group[sizes.extent_m > self.tuning.max_foot_m] = NONE
+        return np.maximum(beside, standing_of_group.take(group_of_cell))
 
     def _kind(self, sizes: ClusterSizes) -> Int8:
         """(G,) PointKind of each group that stands alone."""
