@@ -124,7 +124,8 @@ class LowFinder:
         standing_of_group = np.full(len(sizes), NONE)
         np.maximum.at(standing_of_group, group_of_cell, beside)
         standing_of_group[sizes.extent_m > self.tuning.max_foot_m] = NONE
-        return np.maximum(beside, standing_of_group.take(group_of_cell))
+        standing: Int = np.maximum(beside, standing_of_group.take(group_of_cell))
+        return standing
 
     def _kind(self, sizes: ClusterSizes) -> Int8:
         """(G,) PointKind of each group that stands alone."""
