@@ -45,7 +45,7 @@ def test_the_tracker_follows_by_the_association_it_is_given():
     for frame in SyntheticStream("street", "vlp-16", 1.0, seed=0):
         result = pipeline.step(frame)
     tracks = result.tracks
-    assert (tracks.hits >= 9).sum() > 0.4 * len(result.proposals)
+    assert (tracks.hits >= 9).sum() > 0.5 * len(result.proposals)
     seen = tracks.proposal != NONE
     measured = transform(frame.T_world_sensor, result.proposals.centroid[tracks.proposal[seen]])[:, :2]
     np.testing.assert_allclose(

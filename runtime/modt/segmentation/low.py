@@ -46,7 +46,7 @@ class LowFinder:
 
     Args:
         sensor: range and spacing of points.
-        config: clustering distance, and least number of points.
+        config: clustering distance.
         kernels: passes over points and cells.
         tuning: bounds on low things.
     """
@@ -60,7 +60,6 @@ class LowFinder:
     ) -> None:
         self.kernels = kernels
         self.tuning = tuning
-        self.min_points = config.min_points
         self.max_sqrt_range = np.float32(np.sqrt(tuning.max_range_m))
         self.clusterer = CellClusterer(sensor, config, ANY_GAP, NO_SPLIT)
         self.grid = self.clusterer.fine
@@ -131,7 +130,7 @@ class LowFinder:
         """(G,) PointKind of each group that stands alone."""
         tuning = self.tuning
         range_m = np.square(sizes.sqrt_range)
-        enough = sizes.points >= self.min_points
+        enough = sizes.points >= tuning.min_points
         small = (sizes.extent_m < tuning.max_extent_m) & ~sizes.of_oversized
         kind = np.full(len(sizes), PointKind.GROUND, np.int8)
         kind[(sizes.top_m > tuning.sparse_top_m) | (range_m < tuning.sparse_range_m)] = PointKind.SPARSE

@@ -222,6 +222,8 @@ class ClusterTuning:
 class LowTuning:
     """Things lower than `clearance_m`, and feet of what is higher."""
 
+    min_points: int = 8
+    """Least number of points of a low thing. Less makes proposals that come and go. Chosen on: simulated halls."""
     max_range_m: float = 15.0
     """Range up to which tall points that are too few or too low belong to low things [m], that of the low points.
     Chosen on: simulated halls."""
