@@ -216,7 +216,13 @@ class OdometryConfig(StageConfig):
 class SegmentationConfig(StageConfig):
     """Ground, clusters, and the sizes that an object can have (section III-A)."""
 
-    max_slope_deg: float = number(16.0, 0.5, 45.0, "deg", "Greatest change of the slope of the ground along a ray; the ground is at most twice as steep.")
+    max_slope_deg: float = number(
+        16.0,
+        0.5,
+        45.0,
+        "deg",
+        "Greatest change of the slope of the ground along a ray; the ground is at most twice as steep.",
+    )
     clearance_m: float = number(0.25, 0.02, 1.0, "m", "Height above the ground from which points belong to objects.")
     max_height_m: float = number(2.6, 0.3, 20.0, "m", "Height above the ground up to which points belong to objects.")
     cell_m: float = number(
