@@ -1,5 +1,7 @@
 """Long surfaces, and what stands before them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -127,3 +129,23 @@ def test_compiled_kernels_find_the_same_parts():
         cluster, compiled_sizes = kernels.cluster(clusterer, cells, sampled, beam_m)
         np.testing.assert_array_equal(cluster, expected)
         np.testing.assert_array_equal(compiled_sizes.points, sizes.points)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_person_whose_hand_touches_a_wall_needs_its_surface_to_be_found(seed):
+    across = np.arange(3.5, 4.0, 0.02)
+    hand = np.concatenate(
+        [np.column_stack([np.full(25, 1.0 + off), across, np.ones(25)]) for off in (0.0, 0.05, 0.1)]
+    )
+    of_wall = wall(-12, 12, 4.0)
+    points = np.concatenate([of_wall, person(1.0, 3.65), hand])
+    points[:, 1] += np.random.default_rng(seed).normal(0, 0.02, len(points))
+    columns = PointColumns.from_array(points.astype(np.float32))
+    tuning = SegmentationTuning()
+    without = replace(tuning, structure=replace(tuning.structure, max_lines=0))
+    parted = []
+    for each in (tuning, without):
+        clusters = Clusterer(SENSOR, SegmentationConfig(), NUMPY, each).cluster(columns, columns.z)
+        on_wall, on_person = np.split(label(clusters) != NONE, [len(of_wall)])
+        parted.append(on_person.mean() > 0.5 and on_wall.mean() < 0.2)
+    assert parted == [True, False]

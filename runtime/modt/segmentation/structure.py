@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.segmentation.tuning import StructureTuning
-from modt.types import Bool, Float64, Int
+from modt.types import Bool, Float32, Float64, Int
 
 PAIRED = 16, 3
 """Each cell is paired with the one that follows after this share of the sample: a close one, and a far one."""
@@ -60,27 +60,32 @@ def _best_line(x: Float64, y: Float64, tuning: StructureTuning) -> Line | None:
     stride = -(-len(x) // tuning.max_cells)
     sample_x = x[::stride].astype(np.float32)
     sample_y = y[::stride].astype(np.float32)
-    n = len(sample_x)
     best: Line | None = None
     most = 0
     for share in PAIRED:
-        other = (np.arange(n) + (n // share + 1)) % n
-        dx = sample_x[other] - sample_x
-        dy = sample_y[other] - sample_y
-        base_m = np.sqrt(dx * dx + dy * dy)
-        usable = np.flatnonzero(base_m > np.float32(tuning.min_base_m))
-        cosine = -dy[usable] / base_m[usable]
-        sine = dx[usable] / base_m[usable]
-        distance_m = sample_x[usable] * cosine + sample_y[usable] * sine
-        off_m = sample_x * cosine[:, None] + sample_y * sine[:, None] - distance_m[:, None]
-        near = np.count_nonzero(np.abs(off_m) < np.float32(tuning.thickness_m), axis=1)
+        lines, near = _lines_through_pairs(sample_x, sample_y, len(sample_x) // share + 1, tuning)
         if near.max(initial=0) > most:
             most = int(near.max())
-            k = near.argmax()
-            best = float(cosine[k]), float(sine[k]), float(distance_m[k])
+            cosine, sine, distance_m = lines[:, near.argmax()].tolist()
+            best = cosine, sine, distance_m
     for _ in range(tuning.refinements):
         best = best and _refined(best, x, y, tuning.thickness_m)
     return best
+
+
+def _lines_through_pairs(x: Float32, y: Float32, step: int, tuning: StructureTuning) -> tuple[Float32, Int]:
+    """(3, k) lines through each of (n,) points and the one `step` after it, and (k,) points near each line."""
+    other = (np.arange(len(x)) + step) % len(x)
+    dx = x[other] - x
+    dy = y[other] - y
+    base_m = np.sqrt(dx * dx + dy * dy)
+    usable = np.flatnonzero(base_m > np.float32(tuning.min_base_m))
+    cosine = -dy[usable] / base_m[usable]
+    sine = dx[usable] / base_m[usable]
+    distance_m = x[usable] * cosine + y[usable] * sine
+    off_m = x * cosine[:, None] + y * sine[:, None] - distance_m[:, None]
+    near: Int = np.count_nonzero(np.abs(off_m) < np.float32(tuning.thickness_m), axis=1)
+    return np.stack([cosine, sine, distance_m]), near
 
 
 def _refined(line: Line, x: Float64, y: Float64, thickness_m: float) -> Line | None:
