@@ -161,3 +161,15 @@ def test_coefficients_split_the_reading_of_a_calibrated_board_but_not_the_model(
     assert parts == pytest.approx(expected)
     estimated = window_of(5.0, 2, 4, kind=Kind.ESTIMATED)
     assert attribute(estimated, CALIBRATED) == attribute(estimated, EnergyConfig())
+
+
+def test_a_process_that_stalls_between_the_readings_of_two_clocks_was_not_suspended():
+    now_ns = 0
+
+    def stalling_ns():
+        nonlocal now_ns
+        now_ns += 300_000_000
+        return now_ns
+
+    windows = Windows((), Clocks(stalling_ns, stalling_ns, lambda: 0), Conditions())
+    assert "suspended" not in windows.close().marks

@@ -105,8 +105,10 @@ class Windows:
 
     def close(self) -> EnergyWindow:
         """Close the open window, however short, return it, and begin the next one."""
+        # In the reverse order of _open: a process that stalls between the two readings does not look suspended.
+        boot_ns = self._clocks.boot_ns() - self._boot_begin_ns
         wall_ns = self._clocks.monotonic_ns() - self._begin_ns
-        suspended_ns = self._clocks.boot_ns() - self._boot_begin_ns - wall_ns
+        suspended_ns = boot_ns - wall_ns
         suspended = suspended_ns > 1e9 * SUSPEND_S
         if suspended:
             self._marks.add("suspended")
