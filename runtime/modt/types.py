@@ -97,6 +97,14 @@ class PointKind(IntEnum):
     FOOT = -8  # low, part of a proposal or a structure beside it
 
 
+class MotionState(IntEnum):
+    """Whether a track moves."""
+
+    UNKNOWN = 0
+    STILL = 1
+    MOVING = 2
+
+
 OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE
 """Kinds, besides members of proposals, of what stands above the ground and below the ceiling."""
 LEFT_OUT: tuple[PointKind, ...] = tuple(kind for kind in PointKind if kind not in (PointKind.MEMBER, PointKind.FOOT))
@@ -330,6 +338,10 @@ class Motion(Columns):
     observed_s: Float64 = column(float)  # sum of the steps that ended with a proposal, so a gap adds its last one [s]
     size_m: Float64 = column(float, 3)  # smoothed length, width and height of the boxes seen [m]
     hidden: Bool = column(bool)  # a person whose upper half the view cuts off
+    motion: Int = column(int)  # value of MotionState
+    moving_probability: Float64 = column(float)  # probability that it moves
+    velocity: Float64 = column(float, 2)  # velocity, 0 of what is still [m/s, world]
+    velocity_covariance: Float64 = column(float, 2, 2)  # its covariance [m2/s2]
 
     @property
     def observed(self) -> Bool:

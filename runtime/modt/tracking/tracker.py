@@ -14,14 +14,14 @@ from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
 from modt.tracking.extent import extent_update_of
-from modt.tracking.kalman import SPEED, filter_of
+from modt.tracking.kalman import HEADING, SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Regrouping
 from modt.tracking.states import StateEvent, StateMachine
 from modt.tracking.track_table import LiveTracks, TrackTable
 from modt.tracking.tuning import TrackingTuning
-from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks
+from modt.types import NONE, Bool, Cut, Float64, Int, MotionState, Proposals, TrackedFrame, Tracks
 
 MIN_STEP_SHARE = 0.1
 """A time step shorter than this share of the period means a stalled clock."""
@@ -127,6 +127,7 @@ class Tracker:
         kept = self._expire(settled)
         self._begin_tracks(kept, settled, frame.matches, frame.observations)
         t = self.tracks
+        self._write_motion(t)
         return self._live.tracked(proposals, self.machine.wants_class[t.state] & t.observed)
 
     def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
@@ -249,6 +250,14 @@ class Tracker:
         t.rest_position[rows] = position + (rest.gain * near)[:, None] * step
         if self._extended:
             self._filter.observe_speed(t.x, t.P, rows[near], 0.0, rest.speed_sigma_mps)
+
+    def _write_motion(self, t: TrackTable) -> None:
+        """Write whether tracks move, and their velocities."""
+        along = np.column_stack([np.cos(t.x[:, HEADING]), np.sin(t.x[:, HEADING])])
+        t.moving_probability[:] = np.where(t.stationary, 0.0, 0.5)
+        t.motion[:] = np.where(t.stationary, MotionState.STILL.value, MotionState.UNKNOWN.value)
+        t.velocity[:] = along * t.x[:, SPEED, None]
+        t.velocity_covariance[:] = along[:, :, None] * along[:, None] * t.P[:, SPEED, SPEED, None, None]
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
