@@ -12,6 +12,7 @@ import numpy as np
 from modt.energy.ledger import LedgerLine, StageWork
 from modt.energy.meters.meter import Kind
 from modt.energy.windows import EnergyWindow
+from modt.geometry import transform_boxes
 from modt.sinks.tracks import frame_line
 from modt.types import LEFT_OUT, NONE, Frame, FrameResult, PointKind, Proposals, Tracks
 
@@ -51,7 +52,9 @@ def result(
     points = np.arange(n_points * 4, dtype=np.float32).reshape(-1, 4)
     frame = Frame(index, index / 10, points)
     T = np.eye(4) if T_world_sensor is None else T_world_sensor
-    return FrameResult(frame, T, proposals(counts), tracks, STATES, 0, np.arange(classified))
+    made = proposals(counts)
+    tracks.whole_box[tracks.observed] = transform_boxes(T, made.box[tracks.proposal[tracks.observed]])
+    return FrameResult(frame, T, made, tracks, STATES, 0, np.arange(classified))
 
 
 def with_kinds(r: FrameResult) -> FrameResult:

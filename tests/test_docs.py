@@ -11,7 +11,7 @@ import yaml
 
 from modt.classes import CLASS_NAMES
 from modt.reporting.summary import Summary
-from modt.sinks.messages import topics
+from modt.sinks.topics import TopicOptions, topics
 from modt_evaluation.class_score import ClassScore
 from modt_evaluation.evaluation import Evaluation, RangeScore, SegmentationScore
 from modt_evaluation.track_score import TrackScore
@@ -82,7 +82,7 @@ def test_the_costmap_of_nav2_reads_topics_of_modt_and_drops_no_point_by_its_defa
     layer = costmap["voxel_layer"]
     sources = {name: layer[name] for name in layer["observation_sources"].split()}
     assert {source["topic"] for source in sources.values()} == {"/modt/obstacles", "/modt/ground"}
-    published = {topic.name: topic.type for topic in topics(obstacles=True)}
+    published = {topic.name: topic.type for topic in topics(TopicOptions(obstacles=True))}
     for source in sources.values():
         assert published[source["topic"]].endswith(f"/{source['data_type']}")
         assert source["min_obstacle_height"] < 0 < source["max_obstacle_height"]

@@ -48,8 +48,8 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
         np.testing.assert_array_equal(found.posterior, result.tracks.posterior)
         np.testing.assert_array_equal(found.visible, result.tracks.proposal != NONE)
         boxes = result.proposals.box[result.tracks.proposal[found.visible]]
-        np.testing.assert_array_equal(found.box_sensor[found.visible], boxes)
-        assert np.isnan(found.box_sensor[~found.visible]).all()
+        np.testing.assert_array_equal(found.seen[found.visible], boxes)
+        assert np.isnan(found.seen[~found.visible]).all()
         np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
         np.testing.assert_array_equal(found.labels, result.labels)
         np.testing.assert_array_equal(found.obstacles(), result.obstacles())
@@ -119,7 +119,7 @@ def test_rows_are_had_as_arrays_as_dictionaries_and_by_index(found):
     assert len(rows) == len(found)
     assert [row["id"] for row in rows] == found.id.tolist()
     assert {row["object_class"] for row in rows} <= set(modt.CLASS_NAMES)
-    assert rows[0]["box_sensor"] == found.box_sensor[0].tolist()
+    assert rows[0]["seen"] == found.seen[0].tolist()
     assert found.take(np.array([1])).as_dicts() == rows[1:2]
     np.testing.assert_array_equal(found.take(np.array([1])).T_world_sensor, np.eye(4))
     assert [str(row) for row in found] == list(map(str, rows))  # by text: NaN is not itself

@@ -7,7 +7,7 @@ from modt.app import assembly
 from modt.geometry import FieldOfView, inverse, quaternion_of, rotation_zyx, se3, transform
 from modt.placement import LEVEL, Mount
 from modt.profile import load, parse
-from modt.sinks.messages import box_poses, in_sensor_frame
+from modt.sinks.poses import box_poses, in_sensor_frame
 from modt.types import NONE, Frame
 from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from modt.classes import CLASS_NAMES
-    from modt.library import Pipeline, PointKind, TrackedObjects, open
+    from modt.library import MOTION_NAMES, Pipeline, PointKind, TrackedObjects, open
 
 __version__ = "0.1.0"
-__all__ = ["CLASS_NAMES", "Pipeline", "PointKind", "TrackedObjects", "__version__", "open"]
+__all__ = ["CLASS_NAMES", "MOTION_NAMES", "Pipeline", "PointKind", "TrackedObjects", "__version__", "open"]
 
 
 def __dir__() -> list[str]:

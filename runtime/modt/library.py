@@ -21,14 +21,26 @@ from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
-from modt.geometry import FieldOfView
+from modt.geometry import FieldOfView, inverse, transform_boxes
 from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
 from modt.sources.stream import Stream, no_seconds, unit_of
-from modt.types import UNRECORDED, Bool, Float32, Float64, Frame, FrameResult, Int, PointKind, Self
+from modt.types import (
+    MOTION_NAMES,
+    UNRECORDED,
+    Bool,
+    Float32,
+    Float64,
+    Frame,
+    FrameResult,
+    Int,
+    MotionState,
+    PointKind,
+    Self,
+)
 
-__all__ = ["Pipeline", "PointKind", "TrackedObjects", "open"]
+__all__ = ["MOTION_NAMES", "Pipeline", "PointKind", "TrackedObjects", "open"]
 log = logging.getLogger(__name__)
 
 
@@ -58,10 +70,18 @@ class TrackedObjects:
         final: (n,) whether the class is confirmed.
         visible: (n,) whether the track matches a proposal of this frame.
         unknown_near: (n,) whether the track is reported as background, but too near to rule out a person.
-        box_sensor: (n, 7) x, y, z of the centre, length, width, height [m], yaw [rad] in the sensor frame, for a
-            tilted sensor the level frame at its place; NaN if not visible.
-        box_world: (n, 7) last box in the world.
+        moving: (n,) whether the track moves; it may be unknown (`motion`).
+        motion: (n,) index in modt.MOTION_NAMES: unknown, still, moving.
+        moving_probability: (n,)
+        box: (n, 7) of the whole object, as estimated: x, y, z of the centre, length, width, height [m], yaw [rad] in
+            the sensor frame, for a tilted sensor the level frame at its place.
+        heading_known: (n,) whether the yaw of `box` is that of its front; else it may be turned round.
+        seen: (n, 7) box of what this sweep shows of it, in the same frame; NaN if not visible.
+        box_world: (n, 7) `box` in the world.
         position: (n, 2) filtered x, y [m, world].
+        position_covariance: (n, 2, 2) [m2].
+        velocity: (n, 2) [m/s, world], 0 of what is still.
+        velocity_covariance: (n, 2, 2) [m2/s2].
         heading_rad, speed_mps: (n,) heading and speed of the motion in the world.
         points: (n,) number of points of the last proposal.
         age, missed: (n,) frames since birth, and since the last proposal.
@@ -75,9 +95,17 @@ class TrackedObjects:
     final: Bool
     visible: Bool
     unknown_near: Bool
-    box_sensor: Float64
+    moving: Bool
+    motion: Int
+    moving_probability: Float64
+    box: Float64
+    heading_known: Bool
+    seen: Float64
     box_world: Float64
     position: Float64
+    position_covariance: Float64
+    velocity: Float64
+    velocity_covariance: Float64
     heading_rad: Float64
     speed_mps: Float64
     points: Int
@@ -119,13 +147,14 @@ class TrackedObjects:
         return replace(self, **{name: column[rows] for name, column in self._columns().items()})
 
     def objects(self) -> Self:
-        """Visible rows whose class is not background."""
-        return self.take((self.object_class != ObjectClass.BACKGROUND) & self.visible)
+        """Visible rows that are of a class or move."""
+        return self.take(((self.object_class != ObjectClass.BACKGROUND) | self.moving) & self.visible)
 
     def as_dicts(self) -> list[dict[str, Any]]:
-        """One dictionary a row, of plain numbers and lists. Its object_class is a name."""
+        """One dictionary a row, of plain numbers and lists. Its object_class and motion are names."""
         columns = {name: column.tolist() for name, column in self._columns().items()}
         columns["object_class"] = [CLASS_NAMES[c] for c in self.object_class.tolist()]
+        columns["motion"] = [MOTION_NAMES[m] for m in self.motion.tolist()]
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def to_pandas(self) -> Any:
@@ -149,7 +178,7 @@ class Pipeline:
         pipeline = modt.Pipeline.from_profile("vlp-16", mode="accurate")
         for frame in modt.open("DRIVE"):
             for found in pipeline.step(frame).objects().as_dicts():
-                print(found["id"], found["object_class"], found["box_sensor"])
+                print(found["id"], found["object_class"], found["box"])
 
     The mode is "conventional", "efficient" or "accurate".
 
@@ -247,8 +276,8 @@ class Pipeline:
         result = self._pipeline.step(frame, self._budget)
         tracks = result.tracks
         visible = tracks.observed
-        box_sensor = np.full((len(tracks), 7), np.nan)
-        box_sensor[visible] = result.proposals.box[tracks.proposal[visible]]
+        seen = np.full((len(tracks), 7), np.nan)
+        seen[visible] = result.proposals.box[tracks.proposal[visible]]
         return TrackedObjects(
             id=tracks.id,
             object_class=tracks.object_class,
@@ -256,9 +285,17 @@ class Pipeline:
             final=tracks.final,
             visible=visible,
             unknown_near=unknown_near(result),
-            box_sensor=box_sensor,
-            box_world=tracks.box,
+            moving=tracks.motion == MotionState.MOVING.value,
+            motion=tracks.motion,
+            moving_probability=tracks.moving_probability,
+            box=transform_boxes(inverse(result.T_world_sensor), tracks.whole_box),
+            heading_known=tracks.heading_known,
+            seen=seen,
+            box_world=tracks.whole_box,
             position=tracks.x[:, :2],
+            position_covariance=tracks.P[:, :2, :2],
+            velocity=tracks.velocity,
+            velocity_covariance=tracks.velocity_covariance,
             heading_rad=tracks.x[:, 2],
             speed_mps=tracks.x[:, 3],
             points=tracks.points,

@@ -98,21 +98,26 @@ class _Sensors(Mapping[str, Scheme]):
 
 
 SENSORS = _Sensors()
-_POINTS = frozenset({"points", "obstacles"})
-_DETECTIONS = frozenset({"domain", "frame_id", "world_frame_id", "tracks", "obstacles"})
+_TOPICS = frozenset({"messages", "tracks", "points", "obstacles", "frame_id", "world_frame_id"})
 SINKS = {
     "stdout": Scheme("stdout://", _opener("sinks.frame_lines", "open_stdout")),
     "file": Scheme("file:///PATH", _opener("sinks.frame_lines", "open_file")),
     "unix": Scheme("unix:///PATH", _opener("sinks.frame_lines", "open_unix")),
     "udp": Scheme("udp://HOST:PORT", _opener("sinks.frame_lines", "open_udp")),
     "mcap": Scheme(
-        "mcap:///PATH", _background("sinks.foxglove_sinks", "open_mcap", 4), _POINTS | {"max_mb"}, "foxglove"
+        "mcap:///PATH",
+        _background("sinks.foxglove_sinks", "open_mcap", 4),
+        _TOPICS | {"max_mb"},
+        "foxglove",
     ),
     "foxglove": Scheme(
-        "foxglove://[HOST][:PORT]", _background("sinks.foxglove_sinks", "open_foxglove", 4), _POINTS, "foxglove"
+        "foxglove://[HOST][:PORT]",
+        _background("sinks.foxglove_sinks", "open_foxglove", 4),
+        _TOPICS,
+        "foxglove",
     ),
     "view": Scheme("view://[HOST][:PORT]", _background("viewer.live_page", "open_view", 6)),
-    "ros2": Scheme("ros2:///PREFIX", _background("sinks.ros2", "open_ros2", 4), _DETECTIONS, "ros2"),
+    "ros2": Scheme("ros2:///PREFIX", _background("sinks.ros2", "open_ros2", 4), _TOPICS | {"domain"}, "ros2"),
 }
 POSES = {
     "udp": Scheme("udp://HOST:PORT", _pose_socket),

@@ -105,6 +105,8 @@ class MotionState(IntEnum):
     MOVING = 2
 
 
+MOTION_NAMES = tuple(state.name.lower() for state in MotionState)
+
 OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE
 """Kinds, besides members of proposals, of what stands above the ground and below the ceiling."""
 LEFT_OUT: tuple[PointKind, ...] = tuple(kind for kind in PointKind if kind not in (PointKind.MEMBER, PointKind.FOOT))
@@ -342,6 +344,8 @@ class Motion(Columns):
     moving_probability: Float64 = column(float)  # probability that it moves
     velocity: Float64 = column(float, 2)  # velocity, 0 of what is still [m/s, world]
     velocity_covariance: Float64 = column(float, 2, 2)  # its covariance [m2/s2]
+    whole_box: Float64 = column(float, 7)  # box of the whole object: x, y, z, l, w, h [m], yaw [rad], world frame
+    heading_known: Bool = column(bool)  # whether the yaw of `whole_box` is that of its front
 
     @property
     def observed(self) -> Bool:

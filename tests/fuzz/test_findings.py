@@ -51,9 +51,9 @@ FOUND = {
     "a run with a profile of text": ("run_description", "schema: modt.run/1\nprofile: {classification: {batch: x}}"),
     "a line without its stages": ("ledger", json.dumps({**ledger_line(0, 0), "stages": None}) + "\n"),
     "a number of 5,000 digits": ("ledger", "9" * 5000 + "\n"),
-    "a frame without its tracks": ("tracks", '{"schema": "modt.frame/3"}\n'),
+    "a frame without its tracks": ("tracks", '{"schema": "modt.frame/4"}\n'),
     "a status without its loop": ("service_status", '{"schema": "modt.status/1"}'),
-    "costs without a frame": ("viewed_run", '{"schema": "modt.ledger/1"}\n---\n{"schema": "modt.frame/3"}\n'),
+    "costs without a frame": ("viewed_run", '{"schema": "modt.ledger/1"}\n---\n{"schema": "modt.frame/4"}\n'),
 }
 
 
@@ -100,7 +100,7 @@ def test_a_message_of_a_channel_that_is_not_listed_is_refused(tmp_path):
 
 PIPES = {
     "poses": read_poses,
-    "records": lambda path: list(read_records(path, "modt.frame/3")),
+    "records": lambda path: list(read_records(path, "modt.frame/4")),
     "status": lambda path: read_status(path.parent),
     "calibration of a Velodyne": lambda path: VelodyneDecoder("sensor", calibration=path),
     "calibration of a Hesai": read_angles,

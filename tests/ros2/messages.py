@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-VISION_MSGS_4 = {
+FURTHER = {
     "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
     "vision_msgs/msg/ObjectHypothesisWithPose": (
         "vision_msgs/ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose\n"
@@ -17,15 +17,39 @@ VISION_MSGS_4 = {
     ),
     "vision_msgs/msg/Detection3DArray": "std_msgs/Header header\nvision_msgs/Detection3D[] detections\n",
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    "unique_identifier_msgs/msg/UUID": "uint8[16] uuid\n",
+    "autoware_perception_msgs/msg/ObjectClassification": "uint8 label\nfloat32 probability\n",
+    "autoware_perception_msgs/msg/TrackedObjectKinematics": (
+        "geometry_msgs/PoseWithCovariance pose_with_covariance\n"
+        "geometry_msgs/TwistWithCovariance twist_with_covariance\n"
+        "geometry_msgs/AccelWithCovariance acceleration_with_covariance\n"
+        "uint8 orientation_availability\nbool is_stationary\n"
+    ),
+    "autoware_perception_msgs/msg/Shape": (
+        "uint8 type\ngeometry_msgs/Polygon footprint\ngeometry_msgs/Vector3 dimensions\n"
+    ),
+    "autoware_perception_msgs/msg/TrackedObject": (
+        "unique_identifier_msgs/UUID object_id\nfloat32 existence_probability\n"
+        "autoware_perception_msgs/ObjectClassification[] classification\n"
+        "autoware_perception_msgs/TrackedObjectKinematics kinematics\nautoware_perception_msgs/Shape shape\n"
+    ),
+    "autoware_perception_msgs/msg/TrackedObjects": (
+        "std_msgs/Header header\nautoware_perception_msgs/TrackedObject[] objects\n"
+    ),
+    "nav2_dynamic_msgs/msg/Obstacle": (
+        "unique_identifier_msgs/UUID uuid\nfloat32 score\ngeometry_msgs/Point position\n"
+        "geometry_msgs/Vector3 velocity\ngeometry_msgs/Vector3 size\n"
+    ),
+    "nav2_dynamic_msgs/msg/ObstacleArray": "std_msgs/Header header\nnav2_dynamic_msgs/Obstacle[] obstacles\n",
 }
-"""Definitions of vision_msgs 4.1, without comments and constants."""
+"""Definitions of the packages' .msg files (vision_msgs 4.1, autoware_perception_msgs 1.7), without constants."""
 
 
 @cache
 def store():
-    """Types of ROS 2 Humble and of vision_msgs 4."""
+    """Types of ROS 2 Humble and of further packages."""
     found = get_typestore(Stores.ROS2_HUMBLE)
-    for name, definition in VISION_MSGS_4.items():
+    for name, definition in FURTHER.items():
         if name not in found.types:
             found.register(get_types_from_msg(definition, name))
     return found

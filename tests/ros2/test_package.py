@@ -23,14 +23,14 @@ from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.schemes import POSES, SENSORS, SINKS, open_poses, open_sensor, open_sink
 from modt.sinks.foxglove_sinks import FIGURES
-from modt.sinks.messages import PREFIX, topics
+from modt.sinks.topics import PREFIX, TopicOptions, topics
 from tests.results import CAR, result
 from tests.ros2 import fake_rclpy
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "ros2" / "modt_ros"
 FRAME = result(3, [5, 4], {0: 1, 1: 12}, {1: CAR})
-PUBLISHED = {topic.name: topic.type for topic in topics(PREFIX, world_frame_id="world", points=True)}
+PUBLISHED = {topic.name: topic.type for topic in topics(TopicOptions(world_frame_id="world", points=True))}
 
 
 def test_the_manifest_has_the_version_of_modt_and_the_setup_holds_every_file():

@@ -13,11 +13,12 @@ import pytest
 from modt.errors import MisuseError
 from modt.schemes import open_sink
 from modt.sinks.foxglove_sinks import FoxgloveServer
-from modt.sinks.messages import topics
+from modt.sinks.topics import TopicOptions, topics
 from tests.results import with_kinds
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
 
-SHOWN = topics(world_frame_id="world", points=True, obstacles=True)
+OPTIONS = TopicOptions(world_frame_id="world", points=True, obstacles=True)
+SHOWN = topics(OPTIONS)
 """Topics of a frame; those of energy and CPU time are beside them."""
 FRAME = with_kinds(moving(3))
 
@@ -77,7 +78,7 @@ def by_schema(channel, data):
 
 @pytest.fixture
 def server():
-    made = FoxgloveServer("127.0.0.1", 0, points=True, obstacles=True)
+    made = FoxgloveServer("127.0.0.1", 0, OPTIONS)
     yield made
     made.close()
 

@@ -14,10 +14,12 @@ from modt.errors import ModtError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import open_sink
 from modt.sinks.foxglove_sinks import McapRecorder
-from modt.sinks.messages import topics
+from modt.sinks.topics import TopicOptions, topics
 from modt.sources.recognise import open_stream
 from tests.results import CAR, PEDESTRIAN, energy_window, ledger_line, result, with_kinds
 from tests.sinks.recordings import files_of_at_most
+
+OPTIONS = TopicOptions(world_frame_id="world", points=True)
 
 
 def moving(index):
@@ -51,7 +53,7 @@ def n_frames(path):
 
 
 def record(path, *frames, records=()):
-    sink = McapRecorder(path, points=True)
+    sink = McapRecorder(path, OPTIONS)
     for frame in frames:
         sink.write(frame)
     for line in records:
@@ -65,7 +67,7 @@ def test_another_reader_of_ros_2_finds_what_the_topics_hold(tmp_path):
     with AnyReader([tmp_path / "a.mcap"]) as reader:
         found = {c.topic: (raw, reader.deserialize(raw, c.msgtype), stamp) for c, stamp, raw in reader.messages()}
     assert {stamp for *_, stamp in found.values()} == {300_000_000}
-    for topic in topics(world_frame_id="world", points=True):
+    for topic in topics(OPTIONS):
         assert found.pop(topic.name)[0] == topic.encode(moving(3))
     assert {name: message.data for name, (_, message, _) in found.items()} == {
         "/modt/energy/mJ_per_frame": 50.0,
@@ -90,7 +92,7 @@ def test_obstacles_and_ground_are_recorded_by_request(tmp_path):
             "/tf",
             *extra,
         }
-    encoded = {topic.name: topic.encode(made) for topic in topics(obstacles=True)}
+    encoded = {topic.name: topic.encode(made) for topic in topics(TopicOptions(obstacles=True))}
     for topic in extra:
         assert [data for *_, data in read(path, topic)] == [encoded[topic]]
 
@@ -117,7 +119,7 @@ def test_the_oldest_parts_make_room_and_nothing_else(tmp_path):
     (tmp_path / "a-note.mcap").write_bytes(bytes(100_000))
     sizes = []
     limit = 200_000
-    sink = McapRecorder(tmp_path / "a.mcap", points=True, max_bytes=limit)
+    sink = McapRecorder(tmp_path / "a.mcap", OPTIONS, max_bytes=limit)
     rng = np.random.default_rng(0)
     for k in range(200):
         frame = moving(k)
@@ -139,7 +141,7 @@ def parts(folder):
 
 def test_a_second_old_frame_survives_a_crash(tmp_path):
     now_s = iter(np.arange(0.0, 100.0, 0.3).tolist())
-    sink = McapRecorder(tmp_path / "a.mcap", points=False, clock=lambda: next(now_s))
+    sink = McapRecorder(tmp_path / "a.mcap", TopicOptions(), clock=lambda: next(now_s))
     for k in range(20):
         sink.write(moving(k))
     (tmp_path / "crashed.mcap").write_bytes((tmp_path / "a.mcap").read_bytes())
@@ -149,7 +151,7 @@ def test_a_second_old_frame_survives_a_crash(tmp_path):
 
 
 def test_a_full_disk_is_an_error_and_the_recording_goes_on_when_there_is_room(tmp_path):
-    sink = McapRecorder(tmp_path / "a.mcap", points=False, clock=iter(range(1000)).__next__)
+    sink = McapRecorder(tmp_path / "a.mcap", TopicOptions(), clock=iter(range(1000)).__next__)
     sink.write(moving(0))
     with files_of_at_most(0):
         for k in range(1, 4):

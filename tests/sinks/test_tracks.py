@@ -8,10 +8,10 @@ from hypothesis.extra.numpy import arrays
 
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES
-from modt.geometry import rotation_zyx, se3
+from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt.sinks.records import line
 from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
-from modt.types import NONE, Cut
+from modt.types import MOTION_NAMES, NONE, Cut
 from modt_evaluation.recorded_result import recorded_pose
 from tests.results import PEDESTRIAN, frame_record, result
 
@@ -66,10 +66,16 @@ def results(draw):
         (t.x, NUMBERS),
         (t.size_m, NUMBERS),
         (r.proposals.box, NUMBERS),
+        (t.whole_box, NUMBERS),
+        (t.velocity, NUMBERS),
+        (t.velocity_covariance, NUMBERS),
+        (t.moving_probability, LIKELIHOODS),
         (t.posterior, LIKELIHOODS),
     ):
         column[:] = draw(arrays(np.float64, column.shape, elements=elements))
     t.final[:] = draw(arrays(np.bool_, len(t)))
+    t.heading_known[:] = draw(arrays(np.bool_, len(t)))
+    t.motion[:] = draw(arrays(np.int64, len(t), elements=st.integers(0, 2)))
     t.object_class[:] = draw(arrays(np.int64, len(t), elements=st.integers(0, 3)))
     r.proposals.cut[:] = draw(arrays(np.int64, tracked, elements=st.sampled_from([0, Cut.TOP])))
     return r
@@ -86,7 +92,9 @@ def tracks_one_by_one(r):
     for k in range(len(r.tracks)):
         t = r.tracks
         proposal = int(r.tracks.proposal[k])
-        box = None if proposal == NONE else np.round(r.proposals.box[proposal], 3).tolist()
+        seen = None if proposal == NONE else np.round(r.proposals.box[proposal], 3).tolist()
+        box = np.round(transform_boxes(inverse(r.T_world_sensor), t.whole_box[k : k + 1])[0], 3).tolist()
+        (xx, xy), (_, yy) = np.round(t.velocity_covariance[k], 3).tolist()
         yield {
             "id": int(t.id[k]),
             "state": r.state_names[t.state[k]],
@@ -100,9 +108,15 @@ def tracks_one_by_one(r):
             "points": int(t.points[k]),
             "age": int(t.age[k]),
             "missed": int(t.missed[k]),
-            "box": box and dict(zip(BOX_KEYS, box, strict=True)),
+            "box": None if proposal == NONE else dict(zip(BOX_KEYS, box, strict=True)),
+            "heading_known": bool(t.heading_known[k]),
+            "seen": seen and dict(zip(BOX_KEYS, seen, strict=True)),
             "size": np.round(t.size_m[k], 3).tolist(),
             "world": dict(zip(WORLD_KEYS, np.round(t.x[k], 3).tolist(), strict=True)),
+            "motion": MOTION_NAMES[t.motion[k]],
+            "moving": round(float(t.moving_probability[k]), 3),
+            "velocity": np.round(t.velocity[k], 3).tolist(),
+            "velocity_covariance": [xx, xy, yy],
         }
 
 

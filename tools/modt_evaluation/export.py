@@ -134,11 +134,12 @@ def _mcap(export: Export, target: Path) -> None:
     """Write an MCAP file as the sink mcap:///FILE does."""
     try:
         from modt.sinks.foxglove_sinks import McapRecorder
+        from modt.sinks.topics import WORLD_FRAME_ID, TopicOptions
     except ModuleNotFoundError as error:
         raise MisuseError("--mcap", f"needs {error.name}", install("foxglove")) from None
     results = _with_points(export) if export.points else export.results()
     lines = export.run.ledger_lines()
-    with closing(McapRecorder(target, points=export.points)) as file:
+    with closing(McapRecorder(target, TopicOptions(world_frame_id=WORLD_FRAME_ID, points=export.points))) as file:
         for result in results:
             file.write(result)
             for line in lines.get(result.frame.index, ()):

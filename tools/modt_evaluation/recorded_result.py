@@ -11,7 +11,7 @@ from modt.classes import CLASS_NAMES, CLASSES
 from modt.geometry import transform_boxes
 from modt.sinks.kitti import MAX_INSTANCE
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.types import NONE, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
+from modt.types import MOTION_NAMES, NONE, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
 
 MOST_PROPOSALS = 100_000
 """Most proposals of a valid record; sweeps have some hundreds."""
@@ -46,18 +46,32 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
         tracks.motion_evidence.shape
     )
     tracks.size_m[:] = np.array([row.get("size", [0.0] * 3) for row in rows]).reshape(tracks.size_m.shape)
+    tracks.motion[:] = [MOTION_NAMES.index(row.get("motion", "unknown")) for row in rows]
+    tracks.moving_probability[:] = [row.get("moving", 0.5) for row in rows]
+    tracks.velocity[:] = np.array([row.get("velocity", [0.0] * 2) for row in rows]).reshape(-1, 2)
+    tracks.heading_known[:] = [row.get("heading_known", False) for row in rows]
+    covariance = np.array([row.get("velocity_covariance", [0.0] * 3) for row in rows]).reshape(-1, 3)
+    tracks.velocity_covariance[:] = covariance[:, [[0, 1], [1, 2]]]
     tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]
     if (tracks.proposal < NONE).any():
         raise ValueError("a track's proposal is none of the frame's")
     tracks.x[:] = _table([row["world"] for row in rows], WORLD_KEYS)
     seen = np.flatnonzero(tracks.proposal != NONE)
-    boxes = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
+    whole = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
+    tracks.whole_box[seen] = transform_boxes(T_world_sensor, whole)
+    boxes = _table([seen_box(row) for row in rows if row["proposal"] is not None], BOX_KEYS)
     tracks.box[seen] = transform_boxes(T_world_sensor, boxes)
     proposals = _proposals(int(record["proposals"]))
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
     classified = np.array(record.get("classified", []), np.int64)
     return FrameResult(frame, T_world_sensor, proposals, tracks, names, int(record["deferred"]), classified)
+
+
+def seen_box(row: dict[str, Any]) -> dict[str, float]:
+    """What the frame shows of a track in view; in runs of earlier versions that is `box`."""
+    seen: dict[str, float] = row.get("seen", row["box"])
+    return seen
 
 
 def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:

@@ -23,12 +23,12 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from PIL import Image
 
-from modt.classes import CLASS_NAMES
 from modt.errors import MisuseError, ModtError
 from modt.geometry import corners
+from modt.publication import KIND_NAMES
 from modt.sinks.output import writing
 from modt.sinks.tracks import BOX_KEYS
-from modt.types import Float64
+from modt.types import Float64, MotionState
 from modt.viewer import theme
 from modt.viewer.packed import SIDE, Cells
 from modt.viewer.theme import LIGHT, REACH_M
@@ -46,8 +46,6 @@ _TEXT_PT = 9.5
 _PANEL = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
 _LEAST_PT = 0.8
 """Least width of a point."""
-MIN_SPEED_MPS = 0.5
-"""Speed from which on an object has a line to where it goes."""
 FALSE_COLOUR = LEGEND["false"]["colour"]
 _DATES_S = 1e8
 """Stamps from here on count from 1970."""
@@ -112,8 +110,8 @@ class ShownTracks:
     Attributes:
         column: (M,) values by the names of COLUMNS.
         ids: (M,) numbers.
-        kind: (M,) classes.
-        is_object: (M,) of a class other than background.
+        kind: (M,) indices in modt.publication.KIND_NAMES.
+        is_object: (M,) of another kind than background.
         is_false: (M,) objects that are reported as a wrong class.
         outline: (M, 4, 2) corners of the boxes.
         xy: (M, 2) centres of the boxes.
@@ -165,7 +163,7 @@ def _rings(axes: Axes, tracks: ShownTracks) -> EllipseCollection:
 def _motions(run: RecordedRun, at: int, tracks: ShownTracks) -> LineCollection:
     """Trails of the objects, and their ways in the next second."""
     speed_mps = tracks.column["world_speed_mps"]
-    moves = tracks.is_object & (speed_mps > MIN_SPEED_MPS)
+    moves = tracks.is_object & (tracks.column["motion"] == MotionState.MOVING.value)
     heading = tracks.column["world_heading"] - run.poses[at, 2]
     ahead = tracks.xy + speed_mps[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
     trails = [_trail(run, at, id_) for id_ in tracks.ids[tracks.is_object].tolist()]
@@ -178,11 +176,12 @@ def _track_labels(tracks: ShownTracks) -> list[Label]:
     """Number, class and probability of each object, with a question mark below one half."""
     labels = []
     for k in np.flatnonzero(tracks.is_object).tolist():
-        name = CLASS_NAMES[tracks.kind[k]]
-        probability = tracks.column[f"p_{name}"][k]
-        doubt = "?" if probability < 0.5 else ""
+        name = KIND_NAMES[tracks.kind[k]]
+        probability = tracks.column.get(f"p_{name}")
         wrong = "false: " if tracks.is_false[k] else ""
-        text = f"{wrong}#{tracks.ids[k]} {name}{doubt} {100 * probability:.0f} %"
+        text = f"{wrong}#{tracks.ids[k]} {name}"
+        if probability is not None:
+            text += f"{'?' if probability[k] < 0.5 else ''} {100 * probability[k]:.0f} %"
         colour = FALSE_COLOUR if tracks.is_false[k] else INK
         labels.append((tracks.xy[k, 0], tracks.outline[k, :, 1].max(), text, colour))
     return labels

@@ -163,7 +163,7 @@ def frame_rows(at: int, result: FrameResult, states: list[str], boxes: dict[int,
     states += [name for name in result.state_names if name not in states]
     number = np.array([states.index(name) for name in result.state_names], np.int64)
     tracks = result.tracks
-    for id_, lost, box in zip(tracks.id.tolist(), (tracks.proposal == NONE).tolist(), tracks.box, strict=True):
+    for id_, lost, box in zip(tracks.id.tolist(), (tracks.proposal == NONE).tolist(), tracks.whole_box, strict=True):
         box[:] = boxes.get(id_, box) if lost else box
         boxes[id_] = box
     rows = result_rows(result)

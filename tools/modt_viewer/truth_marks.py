@@ -14,6 +14,7 @@ from modt.types import NONE, Float32, Int
 from modt.viewer.theme import COLOURS, Entry
 from modt_evaluation.matching import judge
 from modt_evaluation.overlap import inside
+from modt_evaluation.recorded_result import seen_box
 from modt_evaluation.rows import Rows
 from modt_evaluation.run_record import LABELS, RunRecord
 from modt_evaluation.truth import FrameTruth, Truth
@@ -72,7 +73,8 @@ def points_in_boxes(record: dict[str, Any], points: Float32) -> Int:
     found = np.full(len(points), NONE, np.int64)
     for track in record["tracks"]:
         if track["box"] is not None:
-            box = np.array([track["box"][key] for key in BOX_KEYS])
+            shown = seen_box(track)
+            box = np.array([shown[key] for key in BOX_KEYS])
             reach = np.hypot(box[3], box[4]) / 2 + MARGIN_M
             near = order[slice(*np.searchsorted(sorted_x, [box[0] - reach, box[0] + reach]))]
             found[near[inside(points[near], box, MARGIN_M, -MARGIN_M)]] = track["proposal"]

@@ -18,6 +18,10 @@ DEFINITIONS = {
     "geometry_msgs/Vector3": "float64 x, float64 y, float64 z",
     "geometry_msgs/Point": "float64 x, float64 y, float64 z",
     "geometry_msgs/Quaternion": "float64 x, float64 y, float64 z, float64 w",
+    "geometry_msgs/Point32": "float32 x, float32 y, float32 z",
+    "geometry_msgs/Polygon": "geometry_msgs/Point32[] points",
+    "geometry_msgs/Accel": "geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular",
+    "geometry_msgs/AccelWithCovariance": "geometry_msgs/Accel accel, float64[36] covariance",
     "geometry_msgs/Pose": "geometry_msgs/Point position, geometry_msgs/Quaternion orientation",
     "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose, float64[36] covariance",
     "geometry_msgs/Transform": "geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation",
@@ -41,6 +45,30 @@ DEFINITIONS = {
         "string id"
     ),
     "vision_msgs/Detection3DArray": "std_msgs/Header header, vision_msgs/Detection3D[] detections",
+    "unique_identifier_msgs/UUID": "uint8[16] uuid",
+    "autoware_perception_msgs/ObjectClassification": "uint8 label, float32 probability",
+    "autoware_perception_msgs/TrackedObjectKinematics": (
+        "geometry_msgs/PoseWithCovariance pose_with_covariance, "
+        "geometry_msgs/TwistWithCovariance twist_with_covariance, "
+        "geometry_msgs/AccelWithCovariance acceleration_with_covariance, uint8 orientation_availability, "
+        "bool is_stationary"
+    ),
+    "autoware_perception_msgs/Shape": (
+        "uint8 type, geometry_msgs/Polygon footprint, geometry_msgs/Vector3 dimensions"
+    ),
+    "autoware_perception_msgs/TrackedObject": (
+        "unique_identifier_msgs/UUID object_id, float32 existence_probability, "
+        "autoware_perception_msgs/ObjectClassification[] classification, "
+        "autoware_perception_msgs/TrackedObjectKinematics kinematics, autoware_perception_msgs/Shape shape"
+    ),
+    "autoware_perception_msgs/TrackedObjects": (
+        "std_msgs/Header header, autoware_perception_msgs/TrackedObject[] objects"
+    ),
+    "nav2_dynamic_msgs/Obstacle": (
+        "unique_identifier_msgs/UUID uuid, float32 score, geometry_msgs/Point position, "
+        "geometry_msgs/Vector3 velocity, geometry_msgs/Vector3 size"
+    ),
+    "nav2_dynamic_msgs/ObstacleArray": "std_msgs/Header header, nav2_dynamic_msgs/Obstacle[] obstacles",
     "visualization_msgs/UVCoordinate": "float32 u, float32 v",
     "visualization_msgs/MeshFile": "string filename, uint8[] data",
     "visualization_msgs/Marker": (
@@ -52,7 +80,7 @@ DEFINITIONS = {
     ),
     "visualization_msgs/MarkerArray": "visualization_msgs/Marker[] markers",
 }
-"""Fields of each message in ROS 2 Humble and later; vision_msgs 4."""
+"""Fields of each message in ROS 2 Humble and later; vision_msgs 4, autoware_perception_msgs 1."""
 
 
 def schema(name: str) -> str:

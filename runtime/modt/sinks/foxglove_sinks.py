@@ -22,8 +22,8 @@ from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.ros2.cdr import CdrWriter
 from modt.ros2.definitions import schema
-from modt.sinks.messages import PREFIX, WORLD_FRAME_ID, topics
 from modt.sinks.output import writing
+from modt.sinks.topics import PREFIX, WORLD_FRAME_ID, TopicOptions, topics
 from modt.types import FrameResult
 
 logging.getLogger("foxglove").setLevel(logging.ERROR)  # its warnings of each unwritten message are counted instead
@@ -44,19 +44,18 @@ FIGURES = {
 
 
 class FoxgloveChannels:
-    """The topics of `modt.sinks.messages`, and FIGURES below PREFIX, as ROS 2 messages.
+    """The topics of `modt.sinks.topics`, and FIGURES below PREFIX, as ROS 2 messages.
 
     Messages have the stamps of the frames. They are encoded only while a client or file takes them.
     """
 
-    def __init__(self, context: foxglove.Context, *, points: bool, obstacles: bool) -> None:
+    def __init__(self, context: foxglove.Context, options: TopicOptions) -> None:
         def channel(name: str, kind: str) -> foxglove.Channel:
             package, _, short = kind.partition("/")
             form = foxglove.Schema(name=f"{package}/msg/{short}", encoding="ros2msg", data=schema(kind).encode())
             return foxglove.Channel(name, schema=form, message_encoding="cdr", context=context)
 
-        made = topics(world_frame_id=WORLD_FRAME_ID, points=points, obstacles=obstacles)
-        self._topics = [(channel(topic.name, topic.type), topic.encode) for topic in made]
+        self._topics = [(channel(topic.name, topic.type), topic.encode) for topic in topics(options)]
         self._figures = {name: channel(f"/{PREFIX}/{name}", kind) for name, kind in FIGURES.items()}
         self._stamp_ns = 0
 
@@ -95,9 +94,9 @@ def figures(line: LedgerLine | EnergyWindow) -> dict[str, float | str]:
 class FoxgloveServer(FoxgloveChannels):
     """Publishes to the connected clients. `port` is the one that is bound."""
 
-    def __init__(self, host: str, port: int, *, points: bool, obstacles: bool = False) -> None:
+    def __init__(self, host: str, port: int, options: TopicOptions) -> None:
         self._context = foxglove.Context()  # the server does not keep it alive
-        super().__init__(self._context, points=points, obstacles=obstacles)
+        super().__init__(self._context, options)
         self._server = foxglove.start_server(
             name="modt", host=host, port=port, context=self._context, message_backlog_size=BACKLOG
         )
@@ -116,9 +115,7 @@ def open_foxglove(address: Address) -> FoxgloveServer:
     """
     try:
         port = PORT if address.port is None else address.port
-        points = address.choice("points", "all", "none") == "all"
-        obstacles = address.choice("obstacles", "none", "all") == "all"
-        return FoxgloveServer(address.host or "127.0.0.1", port, points=points, obstacles=obstacles)
+        return FoxgloveServer(address.host or "127.0.0.1", port, _options(address))
     except RuntimeError as error:
         remedy = "give a host of this machine and a free port"
         raise MisuseError(address.text, f"cannot be bound ({error})", remedy) from None
@@ -158,8 +155,7 @@ class McapRecorder:
 
     Args:
         path: file of the first part.
-        points: whether the points are recorded.
-        obstacles: whether those of obstacles and of the ground are recorded, with their labels.
+        options: what is recorded.
         max_bytes: limit for all parts, including those of earlier runs. The oldest are deleted.
         clock: [s].
 
@@ -170,9 +166,8 @@ class McapRecorder:
     def __init__(
         self,
         path: Path,
+        options: TopicOptions,
         *,
-        points: bool,
-        obstacles: bool = False,
         max_bytes: float = math.inf,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -180,7 +175,7 @@ class McapRecorder:
         self._max_bytes = max_bytes
         self._clock = clock
         self._context = foxglove.Context()
-        self._channels = FoxgloveChannels(self._context, points=points, obstacles=obstacles)
+        self._channels = FoxgloveChannels(self._context, options)
         self._output, self._writer = self._begin_part()
         self._flushed_s = clock()
 
@@ -243,7 +238,7 @@ class McapRecorder:
 
 
 def open_mcap(address: Address) -> McapRecorder:
-    """A recording. `points=none` leaves the sweep out, `obstacles=all` adds obstacles and ground, `max_mb` limits it.
+    """A recording with the options of TopicOptions.of; `points=none` leaves the sweep out, `max_mb` limits it.
 
     Raises:
         MisuseError: no file name, or an invalid option.
@@ -257,6 +252,9 @@ def open_mcap(address: Address) -> McapRecorder:
         max_bytes = 0.0
     if not max_bytes > 0:
         raise MisuseError(address.text, "max_mb is not a size", "write max_mb=MEGABYTES")
-    points = address.choice("points", "all", "none") == "all"
-    obstacles = address.choice("obstacles", "none", "all") == "all"
-    return McapRecorder(Path(address.path), points=points, obstacles=obstacles, max_bytes=max_bytes)
+    return McapRecorder(Path(address.path), _options(address), max_bytes=max_bytes)
+
+
+def _options(address: Address) -> TopicOptions:
+    """Options of an address, by default with the sweep."""
+    return TopicOptions.of(address, world_frame_id=WORLD_FRAME_ID, points=("all", "none"))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from modt.address import Address
 from modt.ros2.address import domain_of, name_of
 from modt.ros2.dds import Publication, participant
-from modt.sinks.messages import PREFIX, Topic, topics
 from modt.sinks.output import Health
+from modt.sinks.topics import PREFIX, Topic, TopicOptions, topics
 from modt.types import FrameResult
 
 
@@ -33,18 +33,12 @@ class Ros2Sink:
 
 
 def open_ros2(address: Address) -> Ros2Sink:
-    """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME&tracks=objects|all&obstacles=none|all.
+    """The sink of ros2:///PREFIX?domain=N and the options of TopicOptions.of.
 
     Raises:
         MisuseError: Cyclone DDS is not installed, or an option is invalid.
         ModtError: the domain cannot be joined.
     """
-    made = topics(
-        name_of(address) or PREFIX,
-        frame_id=address.option("frame_id") or "",
-        world_frame_id=address.option("world_frame_id") or "",
-        background=address.choice("tracks", "objects", "all") == "all",
-        obstacles=address.choice("obstacles", "none", "all") == "all",
-    )
+    made = topics(TopicOptions.of(address, prefix=name_of(address) or PREFIX))
     joined = participant(domain_of(address))
     return Ros2Sink([(topic, Publication(joined, topic.name, topic.type)) for topic in made])

@@ -9,11 +9,12 @@ import numpy as np
 
 from modt.class_sizes import doubtful, unknown_near
 from modt.classes import CLASS_NAMES
+from modt.geometry import inverse, transform_boxes
 from modt.sinks import json_columns as text
 from modt.sinks.records import line
-from modt.types import NONE, FrameResult, Int
+from modt.types import MOTION_NAMES, NONE, FrameResult, Int
 
-SCHEMA = "modt.frame/3"
+SCHEMA = "modt.frame/4"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 UNKNOWN_NEAR = "unknown, near"
@@ -109,12 +110,15 @@ def _rows(result: FrameResult) -> text.Text:
     lost = tracks.proposal == NONE
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
     id_, proposal, points, age, missed = text.integers(np.stack(counts))
-    boxes = np.zeros((len(tracks), len(BOX_KEYS)))
-    boxes[~lost] = result.proposals.box[tracks.proposal[~lost]]
+    boxes = transform_boxes(inverse(result.T_world_sensor), tracks.whole_box)
     box = _group(text.rounded_to_3(boxes), BOX_KEYS)
-    for value in (proposal, box):
+    boxes_seen = np.zeros((len(tracks), len(BOX_KEYS)))
+    boxes_seen[~lost] = result.proposals.box[tracks.proposal[~lost]]
+    seen = _group(text.rounded_to_3(boxes_seen), BOX_KEYS)
+    for value in (proposal, box, seen):
         value[lost] = 0
         value[lost, 0] = NULL
+    covariance = tracks.velocity_covariance.reshape(-1, 4)[:, [0, 1, 3]]  # xx, xy, yy
     columns = {
         "id": id_,
         "state": _words(result.state_names)[tracks.state],
@@ -129,8 +133,14 @@ def _rows(result: FrameResult) -> text.Text:
         "age": age,
         "missed": missed,
         "box": box,
+        "heading_known": _words(BOOLEANS)[tracks.heading_known.astype(np.int64)],
+        "seen": seen,
         "size": _group(text.rounded_to_3(tracks.size_m)),
         "world": _group(text.rounded_to_3(tracks.x), WORLD_KEYS),
+        "motion": _words(MOTION_NAMES)[tracks.motion],
+        "moving": text.rounded_to_3(tracks.moving_probability),
+        "velocity": _group(text.rounded_to_3(tracks.velocity)),
+        "velocity_covariance": _group(text.rounded_to_3(covariance)),
     }
     keyed = [part for key, column in columns.items() for part in (f',"{key}":', column)]
     keyed[0] = ',{"id":'

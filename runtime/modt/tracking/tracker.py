@@ -256,6 +256,7 @@ class Tracker:
         along = np.column_stack([np.cos(t.x[:, HEADING]), np.sin(t.x[:, HEADING])])
         t.moving_probability[:] = np.where(t.stationary, 0.0, 0.5)
         t.motion[:] = np.where(t.stationary, MotionState.STILL.value, MotionState.UNKNOWN.value)
+        t.whole_box[:] = t.box
         t.velocity[:] = along * t.x[:, SPEED, None]
         t.velocity_covariance[:] = along[:, :, None] * along[:, None] * t.P[:, SPEED, SPEED, None, None]
 

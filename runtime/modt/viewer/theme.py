@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from modt.classes import CLASS_NAMES, CLASSES
 from modt.energy.ledger import STAGES
+from modt.publication import KIND_COLOURS, KIND_NAMES
 
 Entry = dict[str, str]
 """`name` and `colour` of a line of a legend."""
@@ -41,8 +41,8 @@ _STATE_COLOURS = {
 
 
 def classes() -> list[Entry]:
-    """Legend of the classes, in their order."""
-    return [{"name": name, "colour": spec.colour} for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)]
+    """Legend of the classes, and of the further kinds that are published, in their order."""
+    return [{"name": name, "colour": colour} for name, colour in zip(KIND_NAMES, KIND_COLOURS, strict=True)]
 
 
 def states(names: Iterable[str]) -> list[Entry]:

@@ -110,7 +110,7 @@ def write_run(path, *, windows=True, mode="efficient", frames=20, energy=None):
         for k in range(frames):
             tracks = [track(id_, id_, named=id_ < 15) for id_ in range(20)]
             record = {"frame": k, "proposals": 20, "classifications": (k * 7) % 5, "deferred": 0, "tracks": tracks}
-            out.write(json.dumps({"schema": "modt.frame/3", **record}) + "\n")
+            out.write(json.dumps({"schema": "modt.frame/4", **record}) + "\n")
     (path / "summary.json").write_text("{}")
     return path
 

@@ -84,6 +84,7 @@ function trail(row) {
 // The reported class with its posterior; with a question mark below one half, as in `uncertain` of tracks.jsonl.
 const reported = (row, digits) => {
   const { name } = run.classes[row.class], p = row[`p_${name}`];
+  if (p === undefined) return name.replaceAll("_", " ");
   return `${name}${row.class && p < 0.5 ? "?" : ""} ${(100 * p).toFixed(digits)} %`;
 };
 const label = (row) => `#${row.id} ${reported(row, 0)}`;
@@ -110,6 +111,9 @@ function write(text, x, y, colour, needed) {
   }
 }
 
+// Value of a motion that is known to be one.
+const MOVING = 2;
+
 function drawTrack(row) {
   const chosen = row.id === (state.kept ?? state.hovered), object = row.class > 0;
   const box = outline(row), middle = screen(row.x, row.y), filled = run.classes[row.class].colour;
@@ -125,7 +129,7 @@ function drawTrack(row) {
   context.globalAlpha = object || chosen ? 1 : row.seen ? 0.5 : 0.3;
   const shown = chosen ? colours.ink : mark?.colour ?? edge;
   stroke(shown, chosen || mark ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
-  if (object && row.world_speed_mps > 0.5) {
+  if (object && row.motion === MOVING) {
     const heading = row.world_heading - frames[state.at].pose[2], reach = row.world_speed_mps;
     path([middle, screen(row.x + reach * Math.cos(heading), row.y + reach * Math.sin(heading))], false);
     stroke(edge, 2);

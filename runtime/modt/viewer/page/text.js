@@ -39,7 +39,8 @@ function showFrame() {
 }
 
 const percent = (row, { name }) => `${name} ${(100 * row[`p_${name}`]).toFixed(1)} %`;
-const motion = (row) => run.classes.slice(1).map(({ name }) => `${name} ${row[`motion_${name}`].toFixed(1)}`).join(", ");
+const trained = (row) => run.classes.filter(({ name }) => row[`p_${name}`] !== undefined);
+const motion = (row) => trained(row).slice(1).map(({ name }) => `${name} ${row[`motion_${name}`].toFixed(1)}`).join(", ");
 const stateOf = (row) => run.states[row.state].name.replaceAll("_", " ");
 
 // Every classification of a track, and every change of its state and of the class that is reported.
@@ -47,7 +48,7 @@ function events(rows) {
   const found = [];
   rows.forEach((row, k) => {
     if (row.classified) {
-      const posterior = run.classes.map((c) => percent(row, c)).join(", ");
+      const posterior = trained(row).map((c) => percent(row, c)).join(", ");
       const view = [row.l, row.w, row.h].map((side) => side.toFixed(1)).join(" × ");
       const range = Math.hypot(row.x, row.y).toFixed(0);
       found.push([row.at, `classified: ${row.points} points, ${view} m at ${range} m: ${posterior}`]);
@@ -66,7 +67,7 @@ function showStory() {
   box.replaceChildren();
   const row = rows.find((row) => row.at === state.at);
   add(box, "b", row ? label(row) : `#${id}, not in this frame`);
-  const pace = row && `${row.world_speed_mps.toFixed(1)} m/s, motion says ${motion(row)}`;
+  const pace = row && `${["motion unknown", "still", "moving"][row.motion]}, ${row.world_speed_mps.toFixed(1)} m/s, motion says ${motion(row)}`;
   const now = row ? `${stateOf(row)}, ${row.points} points, ${pace}; ` : "";
   const [begin, end] = [rows[0], rows[rows.length - 1]].map((row) => frames[row.at].frame);
   add(box, "div", `${now}frames ${begin} to ${end}${costOf(rows)}`);

@@ -10,8 +10,9 @@ from modt.placement import Mount
 from modt.ros2.odometry import StaticTransforms, read_odometry
 from modt.ros2.point_cloud2 import read_cloud
 from modt.schemes import SINKS
-from modt.sinks import messages as encoded
-from modt.types import OBSTACLES, PointKind
+from modt.sinks import markers
+from modt.sinks.topics import TopicOptions, topics
+from modt.types import OBSTACLES, MotionState, PointKind
 from tests.results import CAR, PEDESTRIAN, result, with_kinds
 from tests.ros2 import messages
 
@@ -25,7 +26,7 @@ def published(frame, **options):
     """The decoded message of each topic."""
     return {
         topic.name: messages.decode(topic.encode(frame), topic.type.replace("/", "/msg/"))
-        for topic in encoded.topics(**options)
+        for topic in topics(TopicOptions(**options))
     }
 
 
@@ -35,8 +36,8 @@ def detections(frame, **options):
 
 def test_topics_are_named_by_the_prefix_and_tf_and_points_are_asked_for():
     always = {"/robot/detections", "/robot/markers", "/robot/odometry"}
-    assert {topic.name for topic in encoded.topics("robot")} == always
-    more = encoded.topics("robot", world_frame_id="map", points=True, obstacles=True)
+    assert {topic.name for topic in topics(TopicOptions(prefix="robot"))} == always
+    more = topics(TopicOptions(prefix="robot", world_frame_id="map", points=True, obstacles=True))
     assert {topic.name for topic in more} == {*always, "/tf", "/robot/points", "/robot/obstacles", "/robot/ground"}
 
 
@@ -68,7 +69,7 @@ def test_objects_in_view_are_detections_and_the_background_where_it_is_asked_for
 def test_a_detection_has_its_box_and_the_reported_class_first_though_another_is_more_probable():
     frame = result(1, [5], {0: 7}, {7: [0.6, 0.1, 0.3, 0.0]})
     frame.tracks.object_class[:] = 2
-    frame.proposals.box[0] = [10.0, -2.0, -1.0, 4.0, 1.8, 1.5, 0.5]  # in the frame of the sensor
+    frame.tracks.whole_box[0] = [10.0, -2.0, -1.0, 4.0, 1.8, 1.5, 0.5]  # in the world, where the sensor is
     (found,) = detections(frame)
     hypotheses = [(r.hypothesis.class_id, r.hypothesis.score) for r in found.results]
     assert hypotheses == [("pedestrian", 0.3), ("background", 0.6), ("car", 0.1), ("cyclist", 0.0)]
@@ -82,15 +83,16 @@ def test_a_detection_has_its_box_and_the_reported_class_first_though_another_is_
 
 def test_objects_are_cubes_with_labels_and_an_arrow_along_their_motion():
     frame = result(3, [5, 4, 7], {0: 1, 1: 12, 2: 13}, {1: CAR, 12: PEDESTRIAN, 13: PEDESTRIAN})
-    frame.tracks.x[:, 3] = [2.0, 0.0, -1.5]
+    frame.tracks.velocity[:, 0] = [2.0, 0.0, -1.5]
+    frame.tracks.motion[[0, 2]] = MotionState.MOVING
     deletion, *rest = published(frame)["/modt/markers"].markers
-    assert deletion.action == encoded.DELETE_ALL
+    assert deletion.action == markers.DELETE_ALL
     shown = {(marker.ns, marker.id): marker for marker in rest}
     everybody = {(name, track) for name in ("objects", "labels") for track in (1, 12, 13)}
     assert shown.keys() == {*everybody, ("motion", 1), ("motion", 13)}
     cube = shown["objects", 1]
     label = shown["labels", 1]
-    assert (cube.type, cube.scale.x, cube.scale.y, cube.scale.z) == (encoded.CUBE, 4.0, 2.0, 1.5)
+    assert (cube.type, cube.scale.x, cube.scale.y, cube.scale.z) == (markers.CUBE, 4.0, 2.0, 1.5)
     assert label.text == "car 1, 2.0 m/s"
     assert label.pose.position.z > cube.pose.position.z + cube.scale.z / 2
     assert (shown["motion", 1].scale.x, shown["motion", 1].pose.orientation.w) == pytest.approx((2.0, 1.0))
@@ -98,10 +100,10 @@ def test_objects_are_cubes_with_labels_and_an_arrow_along_their_motion():
 
 
 def test_the_pose_of_the_sensor_is_an_odometry_and_a_transform():
-    topics = {topic.name: topic.encode(FRAME) for topic in encoded.topics(world_frame_id="map")}
+    encoded = {topic.name: topic.encode(FRAME) for topic in topics(TopicOptions(world_frame_id="map"))}
     tree = StaticTransforms()
-    tree.add(topics["/tf"])
-    for T in (tree.between("map", "lidar"), read_odometry(topics["/modt/odometry"]).T_odom_child):
+    tree.add(encoded["/tf"])
+    for T in (tree.between("map", "lidar"), read_odometry(encoded["/modt/odometry"]).T_odom_child):
         np.testing.assert_allclose(T, PLACED, atol=1e-12)
 
 
@@ -109,10 +111,10 @@ def test_points_of_a_tilted_sensor_are_as_it_sent_them_and_in_their_place_in_the
     level = dataclasses.replace(FRAME.frame, T_world_sensor=PLACED)
     tilted = Mount.of(10.0, -5.0).level(level)
     frame = dataclasses.replace(FRAME, frame=tilted, T_world_sensor=tilted.T_world_sensor)
-    topics = {topic.name: topic.encode(frame) for topic in encoded.topics(points=True)}
-    points = read_cloud(topics["/modt/points"]).points
+    encoded = {topic.name: topic.encode(frame) for topic in topics(TopicOptions(points=True))}
+    points = read_cloud(encoded["/modt/points"]).points
     np.testing.assert_allclose(points[:, :3], level.points[:, :3], atol=1e-4)
-    T = read_odometry(topics["/modt/odometry"]).T_odom_child
+    T = read_odometry(encoded["/modt/odometry"]).T_odom_child
     inside = points[:, :3].astype(np.float64)
     placed = tilted.points[:, :3].astype(np.float64)
     np.testing.assert_allclose(transform(T, inside), transform(tilted.T_world_sensor, placed), atol=1e-3)
