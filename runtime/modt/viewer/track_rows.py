@@ -16,9 +16,9 @@ WITNESS = tuple(f"motion_{name}" for name in CLASS_NAMES)
 WORLD = tuple(f"world_{key}" for key in WORLD_KEYS)
 SCALED = (*P, *WITNESS, *BOX_KEYS, *WORLD)
 COLUMNS = (*PLAIN, *SCALED)
-"""`at` is the index of the frame in the run, `class` the kind as in modt.publication, `motion` a value of MotionState, and
-`seen` whether it has a proposal. Probabilities are per mille, lengths
-[cm], angles [mrad], speeds [cm/s]; `motion_CLASS` the log-likelihood of the motion over that of background [1/100].
+"""`at` is the index of the frame in the run, `class` the kind as in modt.publication, `motion` a MotionState,
+`seen` whether it has a proposal. Probabilities are per mille, lengths [cm], angles [mrad], speeds [cm/s];
+`motion_CLASS` the log-likelihood of the motion over that of background [1/100].
 Boxes are of the whole object; that of a lost track is its last one, moved to where the filter predicts it."""
 SCALE = {name: 1000 if name in (*P, "yaw", "world_heading") else 100 for name in SCALED}
 
