@@ -10,6 +10,7 @@ from unittest.mock import Mock
 import pytest
 
 from modt import host
+from modt.errors import MisuseError
 
 
 @pytest.mark.parametrize(
@@ -112,3 +113,20 @@ def test_the_unit_starts_where_the_kernel_refuses_real_time():
     unit = (Path(__file__).parents[1] / "systemd" / "modt.service").read_text()
     assert "\nCPUSchedulingPolicy" not in unit
     assert "\nLimitRTPRIO=10" in unit
+
+
+def test_an_isolated_core_is_used_though_it_is_not_inherited(monkeypatch):
+    given = []
+    monkeypatch.setattr(host.os, "sched_getaffinity", lambda _: {0, 1, 2})  # as with isolcpus=3
+    monkeypatch.setattr(host.os, "sched_setaffinity", lambda _, cores: given.append(cores))
+    monkeypatch.setattr(host.os, "environ", {})
+    assert host.pin_to_core(3) == 3
+    assert given == [{3}]
+
+
+def test_a_core_that_the_kernel_refuses_is_a_misuse(monkeypatch):
+    monkeypatch.setattr(host.os, "sched_getaffinity", lambda _: {0, 1, 2})
+    monkeypatch.setattr(host.os, "sched_setaffinity", Mock(side_effect=OSError(22, "Invalid argument")))
+    monkeypatch.setattr(host.os, "environ", {})
+    with pytest.raises(MisuseError, match="core 3: not available to this process; use one of 0, 1, 2"):
+        host.pin_to_core(3)

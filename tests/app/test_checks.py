@@ -64,7 +64,8 @@ SWEEP = Sweep(1.0, np.full((10, 4), 0.5, np.float32))
     ("check", "level", "words"),
     [
         (lambda sys: core(sys, "1-3\n", 2), "ok", ""),
-        (lambda sys: core(sys, "\n", 2), "warn", ""),
+        (lambda sys: core(sys, "\n", 2), "warn", "isolcpus=2 to the kernel's command line, and give --core 2"),
+        (lambda sys: core(sys, "3\n", 2), "warn", "give --core 3, isolated by the kernel"),
         (lambda sys: core(sys, "1-3\n", None), "warn", ""),
         (lambda sys: governor(sys, "performance"), "ok", ""),
         (lambda sys: governor(sys, "powersave"), "warn", "powersave"),

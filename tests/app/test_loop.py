@@ -310,3 +310,21 @@ def test_a_signal_ends_a_long_sleep_of_naps_that_add_up_to_it():
         stop.sleep(100.0)
     assert len(naps) == 30
     assert max(naps) <= NAP_S
+
+
+@pytest.mark.parametrize("apart_s", [0.001, 0.9])
+def test_two_signals_within_a_second_are_one_request(apart_s):
+    time = Time()
+    with Stop(time.sleep, time).on_signals() as stop:
+        signal.raise_signal(signal.SIGTERM)
+        time.sleep(apart_s)
+        signal.raise_signal(signal.SIGINT)  # another one, as a launcher passes on a Ctrl-C as SIGTERM
+        assert stop.signal == "SIGTERM"
+
+
+def test_a_later_signal_ends_the_process_at_once():
+    time = Time()
+    with pytest.raises(KeyboardInterrupt), Stop(time.sleep, time).on_signals():
+        signal.raise_signal(signal.SIGINT)
+        time.sleep(1.1)
+        signal.raise_signal(signal.SIGINT)

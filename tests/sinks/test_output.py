@@ -1,9 +1,12 @@
 """Properties of all sinks of files."""
 
+import os
+import stat
 import threading
 
 import pytest
 
+from modt.sinks.frame_lines import RotatedFile
 from modt.sinks.output import close_together, replace_file
 
 
@@ -29,3 +32,27 @@ def test_a_file_is_replaced_whatever_was_left_in_its_place(tmp_path, left):
     assert (tmp_path / "run.yaml").read_text() == "new"
     assert not (tmp_path / "run.yaml").is_symlink()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.yaml", "victim"]
+
+
+@pytest.mark.parametrize(("public", "mode"), [(False, 0o640), (True, 0o644)])
+def test_a_public_file_is_readable_whatever_the_umask(tmp_path, public, mode):
+    before = os.umask(0o027)
+    try:
+        replace_file(tmp_path / "modt.prom", "1", public=public)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "modt.prom").stat().st_mode) == mode
+
+
+@pytest.mark.parametrize("rotated", [lambda path: path.rename(f"{path}.1"), lambda path: path.unlink()])
+def test_a_rotated_file_begins_anew_under_its_name(tmp_path, rotated):
+    path = tmp_path / "tracks.log"
+    lines = RotatedFile(path, mode="ab")
+    lines.write("a\n")
+    rotated(path)
+    lines.write("b\n")
+    assert path.read_text() == "b\n"
+    os.truncate(path, 0)  # copytruncate
+    lines.write("c\n")
+    assert path.read_text() == "c\n"
+    lines.close()

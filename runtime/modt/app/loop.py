@@ -102,16 +102,16 @@ class Loop:
             ModtError: a failure that is not contained, or another run that records into the same directory.
         """
         self._on_frame = on_frame or self._on_frame
-        with self.recording.directory.locked(), ExitStack() as at_end:
-            # At the end these are called last first: the signal handlers are restored, the last window is written,
-            # systemd is told of the end, the source, the poses and the sinks are closed, and the summary is written.
+        with self.recording.directory.locked(), self.stop.on_signals(), ExitStack() as at_end:
+            # At the end these are called last first: the last window is written, systemd is told of the end, the
+            # source, the poses and the sinks are closed, and the summary is written. Then the signal handlers are
+            # restored.
             self.recording.start()
             at_end.callback(self._finish)
             at_end.callback(close_together, self.sinks.values())
             for part in (self.stages.odometry, self.source, notifier):
                 at_end.callback(self.failures.contain, "end", part.close)
             at_end.callback(self.failures.contain, "records", lambda: self._write_costs(self._windows.close()))
-            at_end.enter_context(self.stop.on_signals())
             self.source.start()
             self.process_frames(notifier)
         return self.summary

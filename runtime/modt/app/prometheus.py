@@ -42,9 +42,9 @@ def metrics_text(status: Mapping[str, Any]) -> str:
 
 
 def write_metrics(path: Path, status: Mapping[str, Any]) -> None:
-    """Replace a file by the metrics of a status; one that cannot be written is left as it is."""
+    """Replace a file by the metrics of a status, for every user to read; one that cannot be written is left as it is."""
     with suppress(ModtError):
-        replace_file(path, metrics_text(status))
+        replace_file(path, metrics_text(status), public=True)
 
 
 Sample = tuple[str, dict[str, str], float]

@@ -12,6 +12,9 @@ STOPPING = (signal.SIGINT, signal.SIGTERM)
 """Signals that end a run."""
 NAP_S = 0.05
 """Longest sleep without a check of the signals [s]."""
+SAME_S = 1.0
+"""Signals within this time of the first one are the same request [s]: `timeout` signals its child and then its group,
+and a launcher passes on a Ctrl-C that the terminal has sent to its child too."""
 
 
 class Stop:
@@ -26,6 +29,7 @@ class Stop:
     ) -> None:
         """`reload`: whether SIGHUP is handled."""
         self.signal: str | None = None  # name of the one that ends the run
+        self._asked_s: float | None = None  # time of the first signal to stop
         self._reload = False
         self._sleep = sleep
         self._clock = clock
@@ -47,7 +51,7 @@ class Stop:
 
     @contextmanager
     def on_signals(self) -> Iterator[Stop]:
-        """Handle the signals within the context; a second one to stop ends the process."""
+        """Handle the signals within the context; a second one to stop, after SAME_S, ends the process."""
         if threading.current_thread() is not threading.main_thread():
             yield self
             return
@@ -59,9 +63,14 @@ class Stop:
                 signal.signal(number, handler)
 
     def _on_stop(self, number: int, _frame: object) -> None:
-        self.signal = signal.Signals(number).name
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        now_s = self._clock()
+        if self._asked_s is None:
+            self._asked_s = now_s
+            self.signal = signal.Signals(number).name
+        elif now_s - self._asked_s >= SAME_S:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            signal.raise_signal(number)
 
     def _on_reload(self, _number: int, _frame: object) -> None:
         self._reload = True

@@ -47,6 +47,16 @@ def open_stdout(address: Address) -> Background[str]:
     return Background(address.text, Descriptor(sys.stdout.fileno()), DEPTH, encode=frame_line)
 
 
+class RotatedFile(LineFile[str]):
+    """A file of lines that begins anew under its path when it has been renamed or removed, as by logrotate."""
+
+    def write(self, text: str, /) -> None:
+        """Append lines to the file that the path leads to."""
+        if not self.present():
+            self.renew()
+        super().write(text)
+
+
 def open_file(address: Address) -> Background[str]:
     """A file, which is continued after its last whole line.
 
@@ -59,7 +69,7 @@ def open_file(address: Address) -> Background[str]:
         raise MisuseError(address.text, "names no file", "write file:///PATH")
     if path.exists():
         _end_with_a_line(path)
-    return Background(address.text, LineFile[str](path, mode="ab"), DEPTH, encode=frame_line)
+    return Background(address.text, RotatedFile(path, mode="ab"), DEPTH, encode=frame_line)
 
 
 def _end_with_a_line(path: Path) -> None:

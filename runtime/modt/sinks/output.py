@@ -60,8 +60,10 @@ def writing(path: Path, remedy: str = WRITE_REMEDY) -> Iterator[None]:
         raise ModtError(path, f"cannot be written ({error.strerror or error})", remedy) from None
 
 
-def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
-    """Write a file atomically through .NAME.part, without following links. A lasting file survives a power cut whole.
+def replace_file(path: Path, text: str, *, lasting: bool = False, public: bool = False) -> None:
+    """Write a file atomically through .NAME.part, without following links.
+
+    A lasting file survives a power cut whole. A public one may be read by every user, whatever the umask.
 
     Raises:
         ModtError: the file cannot be written.
@@ -72,6 +74,8 @@ def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
         try:
             number = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
             with open(number, "w", encoding="utf-8") as file:
+                if public:
+                    os.fchmod(number, 0o644)
                 file.write(text)
                 file.flush()
                 if lasting:
@@ -115,6 +119,17 @@ class LineFile(Generic[T]):
                     self._file.truncate(self._file.seek(whole))  # the next line begins where this one did
                 raise
         self._written += 1
+
+    def renew(self) -> None:
+        """Go on in a file under its path, as the present one has been renamed or removed.
+
+        Raises:
+            ModtError: the new file cannot be opened; the present one stays in use.
+        """
+        with writing(self.path):
+            renamed = self._file
+            self._file = self.path.open("ab", buffering=0)
+            renamed.close()
 
     def sync(self) -> None:
         """Make all written lines survive a power cut, and wait for the disk.
