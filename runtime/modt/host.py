@@ -32,7 +32,8 @@ _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 def pin_to_core(core: int | None) -> int | None:
     """Pin this process and its future threads to a core, None for any, and disable thread pools; returns the core.
 
-    The kernel decides which cores are available: a process does not inherit the isolated ones, but may use them. Call it before NumPy, SciPy or ONNX Runtime is imported: they size their thread pools when imported.
+    The kernel decides which cores are available: a process does not inherit the isolated ones, but may use them. Call
+    it before NumPy, SciPy or ONNX Runtime is imported: they size their thread pools when imported.
 
     Raises:
         MisuseError: the core is not available to this process.
@@ -50,7 +51,9 @@ def pin_to_core(core: int | None) -> int | None:
         raise MisuseError(f"core {core}", "affinity may not be changed", "set CPUAffinity= in the unit") from None
     except (OSError, OverflowError):
         listed = ", ".join(map(str, sorted(inherited)))
-        raise MisuseError(f"core {core}", "not available to this process", f"use one of {listed}, or --core none") from None
+        raise MisuseError(
+            f"core {core}", "not available to this process", f"use one of {listed}, or --core none"
+        ) from None
     return core
 
 

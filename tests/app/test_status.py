@@ -9,6 +9,7 @@ from modt.app.status import FrameCounter, PowerStatus
 from modt.config import EnergyConfig
 from modt.energy.ledger import StageWork
 from modt.energy.meters.meter import Kind
+from modt.errors import ModtError
 from modt.reporting.summary import Summary
 from tests.results import CAR, energy_window, result, status
 
@@ -31,7 +32,8 @@ def test_the_file_of_metrics_is_replaced_as_a_whole(tmp_path):
     write_metrics(tmp_path / "modt.prom", status())
     write_metrics(tmp_path / "modt.prom", status())
     assert [p.name for p in tmp_path.iterdir()] == ["modt.prom"]
-    write_metrics(tmp_path / "missing" / "modt.prom", status())  # no error
+    with pytest.raises(ModtError, match="missing"):
+        write_metrics(tmp_path / "missing" / "modt.prom", status())
 
 
 def test_counts_are_of_what_is_seen_and_the_rate_of_the_time_since_the_last_report():

@@ -1,10 +1,14 @@
 """`modt run` from the outside: a recording as a live source, signals, records, and messages to systemd."""
 
 import json
+import os
 import re
 import signal
 import socket
+import subprocess
+import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -236,10 +240,38 @@ def test_a_power_limit_is_kept_and_named_an_estimate_where_it_is_one(start, tmp_
     assert "more power than the limit" in said
 
 
-def test_where_nothing_can_be_recorded_the_loop_goes_on_and_the_end_says_so(scans, tmp_path):
+@pytest.mark.parametrize(("out", "cause"), [("file/run", "Not a directory"), ("others", "holds lost+found")])
+def test_where_nothing_can_be_recorded_the_loop_goes_on_and_the_end_says_so(scans, tmp_path, out, cause):
     (tmp_path / "file").write_text("")
-    done = modt("run", scans, "--out", tmp_path / "file" / "run", cwd=tmp_path)
+    (tmp_path / "others" / "lost+found").mkdir(parents=True)
+    metrics = tmp_path / "missing" / "modt.prom"
+    done = modt("run", scans, "--out", tmp_path / out, "--metrics", metrics, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     assert "nothing is recorded, " in done.stderr.splitlines()[-1]
-    assert "Not a directory" in done.stderr.splitlines()[-1]
+    assert cause in done.stderr.splitlines()[-1]
+    assert f"metrics: {metrics}" in done.stderr
+
+
+def test_a_log_that_nobody_reads_stops_neither_the_loop_nor_its_end(scans, tmp_path):
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, b"x")
+    os.set_blocking(writer, True)
+    command = [sys.executable, "-m", "modt.cli.main", "run", f"{scans}?loop=yes", "--out", tmp_path / "run"]
+    with subprocess.Popen(command, stderr=writer, env=environment()) as process:
+        try:
+            path = tmp_path / "run" / "tracks.jsonl"
+            ends_s = time.monotonic() + DEADLINE_S
+            while not (path.exists() and path.stat().st_size):
+                assert time.monotonic() < ends_s, "nothing is recorded"
+                time.sleep(0.05)
+            process.terminate()
+            assert process.wait(DEADLINE_S) == 0
+        finally:
+            process.kill()
+    os.close(reader)
+    os.close(writer)
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["frames"]

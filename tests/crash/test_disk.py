@@ -52,7 +52,9 @@ class Service:
             self.recording.write(frame(self.n))
             self.n += 1
             if self.n % 10 == 0:
-                self.recording.write_status(json.dumps({"schema": STATUS_SCHEMA, "frames": self.n}))
+                status = json.dumps({"schema": STATUS_SCHEMA, "frames": self.n})
+                self.recording.write_status(status)
+                self.recording.keep_status(status)
 
     def lost(self):
         kept = frames(self.path.parent)

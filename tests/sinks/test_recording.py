@@ -7,7 +7,7 @@ import pytest
 
 from modt.config import RecordingConfig
 from modt.sinks.recording import KEPT, RETRY_S, AtOnce, WholeRecording
-from modt.sinks.run_directory import RunDirectory
+from modt.sinks.run_directory import RunDirectory, status_paths
 from tests.results import ledger_line
 from tests.sinks.recordings import OURS, Time, begun, files_of_at_most, frame, frames, parts
 
@@ -19,6 +19,23 @@ def test_the_profile_decides_which_records_are_kept(tmp_path, keep):
     recording.ledger(ledger_line(0))
     recording.finish()
     assert {p.name for p in (tmp_path / "run").iterdir()} == {"run.yaml", *KEPT[keep]}
+
+
+def test_a_disk_that_hangs_leaves_the_status_readable_in_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr("modt.sinks.run_directory.MEMORY", tmp_path)
+    memory = status_paths(tmp_path / "run")[1]
+    time = Time()
+    recording = begun(tmp_path, time=time)
+    recording.write_status("first")
+    recording.keep_status("first")
+    assert not memory.exists()
+    for second in (1, 2, 3):  # the thread of the records does not return
+        time.now += 1.0
+        recording.keep_status(f"after {second} s")
+    assert memory.read_text() == "after 3 s"
+    recording.write_status("again")
+    recording.keep_status("again")
+    assert not memory.exists()
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from modt.errors import MisuseError, ModtError
+from modt.errors import ModtError
 from modt.sinks.run_directory import STATUS, RunDirectory
 from tests.sinks.recordings import OURS
 
@@ -68,8 +68,10 @@ def test_nothing_but_records_of_a_service_is_deleted(tmp_path):
 def test_a_path_that_is_no_run_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     for out in (tmp_path, tmp_path / "thesis.tex"):
-        with pytest.raises(MisuseError):
-            RunDirectory(out)
+        directory = RunDirectory(out)
+        with pytest.raises(ModtError, match="give "):
+            directory.begin(OURS, 1e9)
+    assert (tmp_path / "thesis.tex").read_text() == "mine"
 
 
 @pytest.mark.parametrize("first", ["the run that is in", "another one"])

@@ -19,6 +19,7 @@ from modt.app.stop import Stop
 from modt.energy.ledger import Ledger
 from modt.energy.meters.discovery import discover
 from modt.energy.meters.meter import Kind
+from modt.errors import MisuseError
 from modt.sinks.output import Sink
 from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecording
 from modt.sinks.run_directory import RunDirectory
@@ -42,8 +43,11 @@ def replay(
     source = Playback(inputs.stream(request), ledger, request.rate_hz, stop.sleep)
     stages = Stages(request, source.info, ledger)
     name = re.sub(r"[^\w.]+", "-", source.info.name)
+    directory = RunDirectory(out or Path("runs") / f"{name}-{request.mode}")
+    if reason := directory.foreign():
+        raise MisuseError(directory.path, *reason)
     recording = WholeRecording(
-        RunDirectory(out or Path("runs") / f"{name}-{request.mode}"),
+        directory,
         lambda: profile.to_yaml(stages.facts(core, command)),
         source.info.sequence,
         source.info.camera,
@@ -97,6 +101,7 @@ def service(
     def describe() -> str:
         return profile.to_yaml(stages.facts(core, command) | {"service": True})
 
+    # A disk or a file system that hangs stops one of these threads, and neither the loop nor the others.
     writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
     return Service(
         source=source,
@@ -110,4 +115,5 @@ def service(
         core=core,
         refusals=refusals,
         metrics=metrics,
+        writers={name: Background(name, AtOnce(), 1) for name in ("status", "metrics")},
     )

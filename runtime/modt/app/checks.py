@@ -51,7 +51,9 @@ def core(number: int | None, sys: Path = Path("/sys")) -> Finding:
     isolated = host.core_list(host.content(sys / "devices/system/cpu/isolated"))
     if number in isolated:
         return Finding(OK, "core", f"{number}, isolated")
-    remedy = f"give --core {' or '.join(map(str, sorted(isolated)))}, isolated by the kernel, if nothing else runs there"
+    remedy = (
+        f"give --core {' or '.join(map(str, sorted(isolated)))}, isolated by the kernel, if nothing else runs there"
+    )
     if not isolated:
         remedy = f"add isolcpus={number} to the kernel's command line, and give --core {number} from then on"
     return Finding(WARN, "core", f"{number} is shared with other processes", remedy)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -70,8 +71,16 @@ class Failures:
             log.error("%s; later ones are only counted", kind, exc_info=error)
 
 
+NUMBER = re.compile(r"[0-9][0-9a-fA-F.:]*")
+MAX_KINDS = 256
+"""Kinds of lines that are told apart. Beyond, the one that came first is forgotten."""
+
+
 class OncePerSecond(logging.Filter):
-    """Passes one line a second of each kind of message, with the number of lines that were held back."""
+    """Passes one line a second of each kind of message, with the number of lines that were held back.
+
+    Messages are of one kind if they differ by numbers alone, such as the port of a client.
+    """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
@@ -81,12 +90,14 @@ class OncePerSecond(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether a line passes."""
-        kind = f"{record.name} {record.msg}"
+        kind = NUMBER.sub("#", f"{record.name} {record.msg}")
         now_s = self._clock()
         passed_s, held = self._passed.get(kind, (float("-inf"), 0))
         if now_s - passed_s < 1.0:
             self._passed[kind] = (passed_s, held + 1)
             return False
+        if kind not in self._passed and len(self._passed) == MAX_KINDS:
+            del self._passed[next(iter(self._passed))]
         self._passed[kind] = (now_s, 0)
         record.msg = f"{record.msg} (and {held} lines like it)" if held else record.msg
         return True

@@ -8,7 +8,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,12 +28,13 @@ from modt.errors import ModtError
 from modt.pipeline import SINK
 from modt.reporting.summary import Summary
 from modt.sinks.output import LedgerSink, Sink, Writer, close_together
-from modt.sinks.recording import Recording
+from modt.sinks.recording import AtOnce, Job, Recording
 from modt.sinks.records import fields_of
 from modt.sources.stream import Received, StreamEndedError
 from modt.types import FrameResult
 
 if TYPE_CHECKING:
+    from modt.sinks.background import Background
     from modt.sources.live.live_stream import LiveStream
 
 log = logging.getLogger(__name__)
@@ -219,7 +220,7 @@ class Loop:
     def _finish(self) -> None:
         """Write the summary after the queued records."""
         self.summary = run_summary(self)
-        self._finish_status()
+        self.failures.contain("status", self._finish_status)
         text = json.dumps(self.summary, indent=2, default=fields_of) + "\n"
         writer = self.recording.writer
         writer.write(self.recording.finish)
@@ -237,6 +238,7 @@ class Service(Loop):
     Attributes:
         refusals: refused permissions, for the status.
         metrics: file for Prometheus; None for none.
+        writers: run what writes the `status` in memory and the `metrics`; others only show their health here.
         reloads, refused_reloads: number of times that the profile was loaded anew, and that it could not be used.
     """
 
@@ -244,6 +246,9 @@ class Service(Loop):
     deadlines: Deadlines
     refusals: Sequence[str] = ()
     metrics: Path | None = None
+    writers: dict[str, Background[Job] | Background[str] | AtOnce] = field(
+        default_factory=lambda: {"status": AtOnce(), "metrics": AtOnce()}
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -283,19 +288,25 @@ class Service(Loop):
         notifier.ready()
 
     def _report(self, notifier: Notifier) -> None:
-        """Show the status to systemd, in status.json and to Prometheus."""
+        """Show the status to systemd, beside the records, in memory and to Prometheus."""
         status = self.status()
         notifier.status(one_line(status))
-        self.recording.writer.write(lambda: self._write_status(status))
+        self._write_status(status)
 
     def _finish_status(self) -> None:
         status = self.status()
         self.summary |= {"status": status, "lateness": self.deadlines.late_or_later()}
-        self.recording.writer.write(lambda: self._write_status(status))
+        self._write_status(status)
+        for name in ("status", "metrics"):
+            self.writers[name].close()
 
     def _write_status(self, status: Status) -> None:
-        self.recording.write_status(json.dumps(status, indent=1, default=fields_of) + "\n")
+        """Hand the status to a thread for each place, so that one that hangs keeps it from no other."""
+        text = json.dumps(status, indent=1, default=fields_of) + "\n"
+        self.recording.writer.write(lambda: self.recording.write_status(text))
+        self.writers["status"].write(lambda: self.recording.keep_status(text))
         if self.metrics is not None:
             from modt.app.prometheus import write_metrics
 
-            write_metrics(self.metrics, asdict(status))
+            path = self.metrics
+            self.writers["metrics"].write(lambda: write_metrics(path, asdict(status)))

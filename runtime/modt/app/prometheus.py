@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from modt.app.load_shedding import Step
-from modt.errors import ModtError
 from modt.sinks.output import replace_file
 
 COUNTERS = re.compile(
@@ -42,9 +40,12 @@ def metrics_text(status: Mapping[str, Any]) -> str:
 
 
 def write_metrics(path: Path, status: Mapping[str, Any]) -> None:
-    """Replace a file by the metrics of a status, for every user to read; one that cannot be written is left as it is."""
-    with suppress(ModtError):
-        replace_file(path, metrics_text(status), public=True)
+    """Replace a file by the metrics of a status, for every user to read.
+
+    Raises:
+        ModtError: it cannot be written; the file is left as it is.
+    """
+    replace_file(path, metrics_text(status), public=True)
 
 
 Sample = tuple[str, dict[str, str], float]

@@ -40,7 +40,7 @@ def service_status(service: Service, counts: FrameCounts) -> Status:
         | {"faults": service.source.faults.count, "misfits": stages.misfits}
         | {"frames_without_reflectance": service.frames_without_reflectance},
         odometry=stages.odometry.report(),
-        sinks={address: sink.health() for address, sink in service.sinks.items()},
+        sinks={name: writer.health() for name, writer in {**service.sinks, **service.writers}.items()},
         recording=service.recording.health(),
         host=HostStatus(
             core=service.core,

@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import sys
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,27 +52,29 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.app.build import service
-    from modt.app.failures import OncePerSecond
     from modt.app.inputs import Request, live_source
+    from modt.app.log_output import LogOutput
     from modt.app.systemd import notifier_of
     from modt.schemes import open_sink
 
     notifier = notifier_of(os.environ)
-    refusals = host.take_real_time_priority()
-    for refusal in refusals:
-        log.warning("%s", refusal)
-    # The receiver and the writers start their threads here, on the cores that the loop leaves free.
     with host.threads_on(cores):
-        source, path = live_source(arguments.source, cores)
-        addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
-        sinks = {address: open_sink(address) for address in dict.fromkeys(addresses)}
-        request = replace(Request.of(arguments), path=path)
-        command = ["modt", *sys.argv[1:]]
-        loop = service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, refusals)
-    for handler in logging.getLogger().handlers:
-        handler.addFilter(OncePerSecond())
-    status = loop.run(notifier)["status"]
-    print(f"modt: {_last_words(status, loop.recording.health(), arguments.out)}", file=sys.stderr)
+        output = LogOutput()
+    with closing(output):
+        refusals = host.take_real_time_priority()
+        for refusal in refusals:
+            log.warning("%s", refusal)
+        # The receiver and the writers start their threads here, on the cores that the loop leaves free.
+        with host.threads_on(cores):
+            source, path = live_source(arguments.source, cores)
+            addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
+            sinks = {address: open_sink(address) for address in dict.fromkeys(addresses)}
+            request = replace(Request.of(arguments), path=path)
+            command = ["modt", *sys.argv[1:]]
+            loop = service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, refusals)
+        loop.writers["log"] = output.writer
+        status = loop.run(notifier)["status"]
+        output.say(f"modt: {_last_words(status, loop.recording.health(), arguments.out)}")
     return INTERRUPTED if loop.stop.signal == "SIGINT" else 0
 
 

@@ -31,6 +31,8 @@ PARTS = 8
 """Number of parts that share the limit `disk_mb`."""
 RESERVED_BYTES = 20_000
 """Bytes of each part that are kept for run.yaml, status.json and summary.json."""
+STATUS_LATE_S = 2.5
+"""Age of the status beside the records from which on it is kept in memory [s]."""
 RETRY_S = 1.0
 """Time from a failure to the next attempt to write [s]."""
 WHOLE_BYTES = 5e8
@@ -101,6 +103,8 @@ class Recording(Writer[FrameResult]):
         self._pauses = 0
         self._parts = 0
         self._failing: str | None = None
+        self._status_s = float("-inf")  # time at which the status was last written beside the records
+        self._status_failed = True  # it is not there
         # The present part
         self._begun = False
         self._files: dict[str, LineFile[str]] = {}
@@ -147,15 +151,28 @@ class Recording(Writer[FrameResult]):
         )
 
     def write_status(self, status: str) -> None:
-        """Write the status beside the records or in memory, and make the lines so far survive a power cut."""
+        """Write the status beside the records, and make the lines so far survive a power cut."""
         self._check_files()
         self.sync()
-        if self._ready() or self._begun:
-            with suppress(ModtError):
-                self.directory.write(STATUS, status)
-                self.directory.in_memory(None)
-                return
-        self.directory.in_memory(status)
+        self._status_failed = not (self._ready() or self._begun) or not self._wrote(status)
+        if not self._status_failed:
+            self._status_s = self._clock()
+
+    def _wrote(self, status: str) -> bool:
+        """Write the status beside the records; returns whether that succeeded."""
+        try:
+            self.directory.write(STATUS, status)
+        except ModtError:
+            return False
+        return True
+
+    def keep_status(self, status: str) -> None:
+        """Keep the status in memory while it cannot be written beside the records, or a disk that hangs delays it.
+
+        It is called by another thread than that of the writer.
+        """
+        hangs = self._clock() - self._status_s > STATUS_LATE_S
+        self.directory.in_memory(status if hangs or self._status_failed else None)
 
     def write_summary(self, text: str) -> None:
         """Write the summary beside the records, if any could be begun."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from modt.errors import MisuseError, ModtError
+from modt.errors import ModtError
 from modt.sinks.output import replace_file, writing
 
 RUN = "run.yaml"
@@ -27,8 +27,12 @@ _KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) f
 
 def status_paths(directory: Path) -> tuple[Path, Path]:
     """Paths of the status of a run: beside its records, and in memory while those cannot be written."""
-    name = hashlib.sha256(os.fsencode(directory.resolve())).hexdigest()[:16]
-    return directory / STATUS, MEMORY / f"modt-{name}.json"
+    return directory / STATUS, MEMORY / _memory_name(directory)
+
+
+def _memory_name(directory: Path) -> str:
+    """Name of the status in memory. It reads the disk, which may hang later."""
+    return f"modt-{hashlib.sha256(os.fsencode(directory.resolve())).hexdigest()[:16]}.json"
 
 
 class RunDirectory:
@@ -37,9 +41,6 @@ class RunDirectory:
     Attributes:
         path: the directory.
         previous: new path of the previous part, None if there was none.
-
-    Raises:
-        MisuseError: the path is a file, or a directory that holds other files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -49,12 +50,17 @@ class RunDirectory:
         self._lock = ExitStack()
         self._shut_out = False  # another run has the lock
         self._lock_file: int | None = None  # its descriptor
+        self._memory_name = _memory_name(path)
         self._disk = next(folder for folder in path.absolute().parents if os.path.ismount(folder))
-        if path.exists() and not path.is_dir():
-            raise MisuseError(path, "is a file", "give a directory as --out")
-        foreign = sorted({p.name for p in path.iterdir()} - _KNOWN) if path.is_dir() else []
-        if foreign and not (path / TRACKS).exists():
-            raise MisuseError(path, f"holds {foreign[0]}, which is no record", "give an empty or a new directory")
+
+    def foreign(self) -> tuple[str, str] | None:
+        """Why no records can be kept here, and the remedy: the path is a file, or a directory with other files."""
+        if self.path.exists() and not self.path.is_dir():
+            return "is a file", "give a directory as --out"
+        others = sorted({p.name for p in self.path.iterdir()} - _KNOWN) if self.path.is_dir() else []
+        if others and not (self.path / TRACKS).exists():
+            return f"holds {others[0]}, which is no record", "give an empty or a new directory"
+        return None
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -75,9 +81,11 @@ class RunDirectory:
         """Rename the previous part, delete the oldest parts beyond a limit, and begin a new part.
 
         Raises:
-            ModtError: the disk is full, or cannot be written.
+            ModtError: the disk is full, or cannot be written, or the directory is not for records.
         """
         with writing(self.path):
+            if reason := self.foreign():
+                raise ModtError(self.path, *reason)
             if not os.path.ismount(self._disk):
                 raise OSError(f"{self._disk} is not mounted")
             if self._locked:
@@ -103,12 +111,12 @@ class RunDirectory:
         """Keep the status in memory. None removes it. Failures are ignored. Another run's status is left alone."""
         if self._shut_out:
             return
-        path = status_paths(self.path)[1]
+        memory = MEMORY / self._memory_name
         with suppress(OSError, ModtError):
             if status is None:
-                path.unlink(missing_ok=True)
+                memory.unlink(missing_ok=True)
             else:
-                replace_file(path, status)
+                replace_file(memory, status)
 
     def sync(self) -> None:
         """Make the names of the present part and its files survive a power cut.
