@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from threading import Event
+
 import numpy as np
 import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from modt import model_file
+from modt.classification import network as network_module
 from modt.classification.onnx_check import find_flaw
 from modt.errors import MisuseError
+from modt.model_file import ModelFile
 from tests.classification.scenes import classifier, saved
 from tests.fuzz.execution import execute, limits
 from tests.fuzz.runs import network
@@ -148,6 +152,25 @@ def test_an_output_of_another_shape_than_promised_is_refused(tmp_path):
     model.graph.initializer.append(numpy_helper.from_array(np.array([2, 1], np.int64), "repeats"))
     with pytest.raises(MisuseError, match=r"an output of shape \(16, 4\)"):
         classifier(saved(tmp_path, model))
+
+
+def test_outputs_that_are_no_probabilities_are_refused(tmp_path):
+    model = network()
+    model.graph.node[-1].output[0] = "product"
+    model.graph.node.append(helper.make_node("Log", ["product"], ["logarithm"]))
+    model.graph.node.append(helper.make_node("Mul", ["logarithm", "product"], ["probability"]))  # -inf times 0
+    with pytest.raises(MisuseError, match="no probabilities"):
+        classifier(saved(tmp_path, model))
+
+
+def test_a_model_that_takes_for_ever_is_refused(tmp_path, monkeypatch):
+    given = network_module.Network(ModelFile.read(saved(tmp_path, network())))
+    end = Event()
+    monkeypatch.setattr(given, "infer", lambda batch: end.wait(60.0))
+    monkeypatch.setattr(network_module, "MOST_S", 0.0)
+    with pytest.raises(MisuseError, match="longer than 0 s"):
+        given.check_largest(8, 10)
+    end.set()
 
 
 def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):

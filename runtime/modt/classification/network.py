@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from concurrent.futures import Future, TimeoutError
 from contextlib import suppress
 from functools import cache
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -29,6 +32,8 @@ _MODEL_ERRORS = (
     ort_errors.RuntimeException,
     UnicodeDecodeError,  # of its names
 )
+MOST_S = 20.0
+"""Longest run of the largest batch at the start [s]. The slowest boards take a tenth of a second."""
 MEMORY_BYTES = 1 << 30
 """Limit of the memory for the numbers and the results of all models: no file can take more."""
 
@@ -77,13 +82,31 @@ class Network:
         Raises:
             MisuseError: it cannot be run.
         """
+        # Points all over a cube: some models answer zeros alone.
+        cube = np.linspace(-1.0, 1.0, batch * points * 3, dtype=np.float32).reshape(batch, points, 3)
+        # In a thread, since no call of the library ends a node that takes for ever.
+        run = Future[Float32]()
+        Thread(target=lambda: _fulfil(run, lambda: self.infer(cube)), daemon=True).start()
         try:
-            shape = self.infer(np.zeros((batch, points, 3), np.float32)).shape
+            probability = run.result(MOST_S)
+        except TimeoutError:
+            cause = f"{batch} proposals of {points} points take longer than {MOST_S:g} s"
+            raise MisuseError(self._path, cause, "use a smaller model") from None
         except _MODEL_ERRORS as error:
             cause = f"cannot run {batch} proposals of {points} points ({_first_line(error)})"
             raise MisuseError(self._path, cause, f"use a smaller model; it has {MEMORY_BYTES >> 20} MiB") from None
-        if shape != (batch, N_CLASSES):
-            raise MisuseError(self._path, f"an output of shape {shape}", REMEDY)
+        if probability.shape != (batch, N_CLASSES):
+            raise MisuseError(self._path, f"an output of shape {probability.shape}", REMEDY)
+        if not ((probability >= 0) & (probability <= 1)).all():
+            raise MisuseError(self._path, "its outputs are no probabilities", REMEDY)
+
+
+def _fulfil(run: Future[Float32], call: Callable[[], Float32]) -> None:
+    """Give the result of a call to whoever waits for it, or its error."""
+    try:
+        run.set_result(call())
+    except Exception as error:
+        run.set_exception(error)
 
 
 def _first_line(error: Exception) -> str:

@@ -12,6 +12,7 @@ from modt.types import Float64
 HEADER_BYTES = 4
 """Encapsulation header with the byte order; alignment counts from its end."""
 MAX_ALIGNMENT = 8
+INT32_MAX = 2**31 - 1
 MAX_TEXT_BYTES = 4096
 """Longest string that is accepted."""
 
@@ -128,9 +129,10 @@ def text_fields(text: str) -> Fields:
 
 
 def header_fields(stamp_s: float, frame_id: str) -> Fields:
-    """A std_msgs/Header."""
+    """A std_msgs/Header. Its seconds have 31 bits: a stamp beyond is the latest one that it can hold."""
     fields, values = text_fields(frame_id)
-    return ("i", "I", *fields), (*divmod(round(stamp_s * 1e9), 10**9), *values)
+    seconds, nanoseconds = divmod(round(stamp_s * 1e9), 10**9)
+    return ("i", "I", *fields), (min(seconds, INT32_MAX), nanoseconds, *values)
 
 
 @lru_cache(maxsize=1024)

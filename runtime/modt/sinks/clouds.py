@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.ros2 import point_cloud2
+from modt.ros2.cdr import INT32_MAX
 from modt.types import Float32, FrameResult, Int, PointKind
 
 LABELLED = np.dtype(
@@ -43,7 +44,7 @@ def _labelled_cloud(result: FrameResult, frame_id: str, rows: Int) -> bytes:
     points = np.zeros(len(rows), LABELLED)
     for k, axis in enumerate("xyz"):
         points[axis] = xyz[:, k]
-    points["track"] = label
+    points["track"] = np.where(label >= 0, label & INT32_MAX, label)  # the field has 31 bits
     has_track = label >= 0
     by_id = np.argsort(result.tracks.id)
     track = by_id[np.searchsorted(result.tracks.id, label[has_track], sorter=by_id)]

@@ -7,7 +7,7 @@ from itertools import chain
 import numpy as np
 
 from modt.publication import KIND_COLOURS, KIND_NAMES, published_objects
-from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
+from modt.ros2.cdr import INT32_MAX, CdrWriter, Fields, header_fields, text_fields
 from modt.sinks.poses import box_poses, in_sensor_frame
 from modt.types import FrameResult, MotionState
 
@@ -61,7 +61,8 @@ def markers(result: FrameResult, frame_id: str) -> bytes:
     cdr = CdrWriter()
     cdr.record(("I",), 1 + 2 * len(objects) + int(np.count_nonzero(moving)))
     _marker(cdr, header, "", (0, CUBE, DELETE_ALL), NOWHERE)
-    columns = (objects.id, objects.kind, moving, speed, boxes[:, 3:6], *poses)
+    numbers = objects.id & INT32_MAX  # a marker has 31 bits for its number
+    columns = (numbers, objects.kind, moving, speed, boxes[:, 3:6], *poses)
     for track, kind, moves, speed_mps, size, pose, top, way in zip(*(c.tolist() for c in columns), strict=True):
         label = f"{KIND_NAMES[kind]} {track}, {speed_mps:.1f} m/s"
         colour = COLOURS[kind]

@@ -118,6 +118,7 @@ class Sweep:
         stamp_s, points, turn_s, frame_id: as in modt.types.Frame; points may hold values that are not finite.
         complete: no message of the turn is known to be missing.
         index: index of the frame in its recording; None numbers the sweeps as they come.
+        waited_s: time for which its last message lay in the kernel before it was read [s].
     """
 
     stamp_s: float
@@ -126,6 +127,7 @@ class Sweep:
     complete: bool = True
     index: int | None = None
     frame_id: str = ""
+    waited_s: float = 0.0
 
 
 @dataclass(slots=True)

@@ -84,6 +84,12 @@ def test_unusable_sweeps_are_faults_and_the_next_good_one_is_taken(driven, caplo
     assert cause in caplog.text
 
 
+def test_a_sweep_has_arrived_when_the_kernel_received_it(driven):
+    driven.now_s = 7.0
+    driven.stream._put(Sweep(1.0, sweep(1.0).points, waited_s=0.8))
+    assert driven.stream.take(0.0).arrived_s == pytest.approx(6.2)
+
+
 def test_a_failure_of_the_receiving_thread_costs_a_message_and_the_end_comes_after_the_last_sweep(caplog):
     failures = RuntimeError("broken"), [None], RuntimeError("broken"), OSError("down")
     stream = LiveStream(INFO, scripted(*failures, [sweep(1.0)], StreamEndedError()), clock=lambda: 0.0)

@@ -10,8 +10,9 @@ from modt.errors import MisuseError
 from modt.schemes import open_sensor
 from modt.sources.drivers.hesai import HesaiDecoder
 from modt.sources.drivers.livox import LivoxDecoder
-from modt.sources.live.packets import PacketReader, address_of, bound_socket
+from modt.sources.live.packets import TIMESPEC, PacketReader, address_of, bound_socket
 from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.stream import Sweep
 from tests.sources.packets.simulated import decoded, packets
 from tools.send.loops import endless
 
@@ -29,13 +30,13 @@ def now():
 
 
 class Echo(PacketDecoder):
-    """A decoder whose sweeps are the packets, with the times of their reception."""
+    """A decoder whose sweeps hold a packet each, with the time of its reception."""
 
     def accepts(self, payload):
         return True
 
-    def decode(self, *packet):
-        return [packet]
+    def decode(self, received_s, payload):
+        return [Sweep(received_s, payload)]
 
     def _reset(self):
         pass
@@ -60,7 +61,8 @@ def test_a_multicast_group_is_joined_and_another_address_is_refused(port, listen
     reader = listen("239.7.7.7")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(b"packet", ("239.7.7.7", port))
-    assert reader.read(60.0) == [(now(), b"packet")]
+    (sweep,) = reader.read(60.0)
+    assert (sweep.stamp_s, sweep.points) == (now(), b"packet")
     reader.close()
     for group in ("10.0.0.1", "nowhere"):
         with pytest.raises(MisuseError, match=f"group {group} cannot be joined"):
@@ -74,10 +76,16 @@ def test_packets_have_the_time_at_which_the_kernel_received_them(listen, to):
         to.send(b"packet")
         time.sleep(0.05)
         read_s = time.time()
-        ((received_s, _),) = reader.read(60.0)
-        if received_s < read_s:
+        (sweep,) = reader.read(60.0)
+        if sweep.stamp_s < read_s:
             break
-    assert sent_s <= received_s < read_s
+    assert sent_s <= sweep.stamp_s < read_s
+
+
+def test_a_packet_has_waited_since_the_kernel_received_it(listen):
+    reader = listen(clock=lambda: 1000.75)
+    (sweep,) = reader._decoded(b"packet", [(0, 0, TIMESPEC.pack(1000, 500_000_000))], "127.0.0.1")
+    assert (sweep.stamp_s, sweep.waited_s) == (1000.5, 0.25)
 
 
 def test_packets_that_waited_for_a_stopped_process_are_discarded(listen, to, caplog):
@@ -87,7 +95,7 @@ def test_packets_that_waited_for_a_stopped_process_are_discarded(listen, to, cap
     assert reader.read(0.2) == []
     later_s[0] = 0.0
     to.send(b"new")
-    assert [payload for _, payload in reader.read(60.0)] == [b"new"]
+    assert [sweep.points for sweep in reader.read(60.0)] == [b"new"]
     assert sum(reader.reception.refused.values()) == 1
     assert "this process was stopped" in caplog.text
 

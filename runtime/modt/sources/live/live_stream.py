@@ -198,7 +198,7 @@ class LiveStream:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
-            self._newest = Arrival(sweep, flaws, usable, self._clock())
+            self._newest = Arrival(sweep, flaws, usable, self._clock() - sweep.waited_s)
             self._arrived.notify()
 
     def _frame(self, taken: Arrival) -> Received | None:

@@ -8,6 +8,7 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LATE_S
@@ -91,7 +92,8 @@ class PacketReader:
         elif now_s - received_s > LATE_S:
             reason = "late: this process was stopped, or has too little CPU time, or the clock was set"
         else:
-            return self.decoder.decode(received_s, payload)
+            waited_s = max(now_s - received_s, 0.0)
+            return [replace(sweep, waited_s=waited_s) for sweep in self.decoder.decode(received_s, payload)]
         self.decoder.refuse(reason)
         return []
 
