@@ -120,6 +120,7 @@ def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
     return {
         "schema": "modt.status/1",
         "time_s": time.time(),
+        "run": "0123456789abcdef",
         "pid": 1,
         "up_s": 2.0,
         "period_s": 0.1,

@@ -445,6 +445,7 @@ class FrameResult:
     state_names: tuple[str, ...]  # name of each value of tracks.state
     n_deferred: int  # tracks whose request for a class waits for the next frame's budget
     classified: Int = field(default_factory=lambda: np.zeros(0, np.int64))  # identities of the tracks
+    run_id: str = ""  # 16 hexadecimal digits of a service, whose frames and tracks count from 0; "" of a replay
 
     @property
     def labels(self) -> Int:

@@ -65,7 +65,8 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
     classified = np.array(record.get("classified", []), np.int64)
-    return FrameResult(frame, T_world_sensor, proposals, tracks, names, int(record["deferred"]), classified)
+    run_id = record.get("run") or ""
+    return FrameResult(frame, T_world_sensor, proposals, tracks, names, int(record["deferred"]), classified, run_id)
 
 
 def seen_box(row: dict[str, Any]) -> dict[str, float]:

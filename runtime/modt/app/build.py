@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import secrets
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -93,7 +94,7 @@ def service(
     """
     from modt.sinks.background import Background
 
-    stages = Stages(request, source.info, Ledger(), SensorWatch())
+    stages = Stages(request, source.info, Ledger(), SensorWatch(), secrets.token_hex(8))
     meter = discover(stages.config.energy).best
     if stages.config.loop.power_W is not None and meter.facts is not None and meter.facts.kind is Kind.ESTIMATED:
         log.warning("loop.power_W is kept by the %s: an estimate, as no meter can be read", meter.name)

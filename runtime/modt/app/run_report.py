@@ -21,6 +21,7 @@ def service_status(service: Service, counts: FrameCounts) -> Status:
     stages = service.stages
     failures = service.failures
     return Status(
+        run=stages.run_id,
         time_s=time.time(),
         pid=os.getpid(),
         up_s=round(service.elapsed_s, 3),

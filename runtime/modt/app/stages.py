@@ -61,6 +61,7 @@ class Stages:
         info: properties of the source before its first frame.
         ledger: ledger of the run.
         watch: notices sweeps of another sensor; None for a recording, whose sensor is that of its first sweep.
+        run_id: as in FrameResult.
 
     Attributes:
         chosen: the present profile.
@@ -74,10 +75,16 @@ class Stages:
     """
 
     def __init__(
-        self, request: inputs.Request, info: StreamInfo, ledger: Ledger, watch: SensorWatch | None = None
+        self,
+        request: inputs.Request,
+        info: StreamInfo,
+        ledger: Ledger,
+        watch: SensorWatch | None = None,
+        run_id: str = "",
     ) -> None:
         self.request = request
         self.ledger = ledger
+        self.run_id = run_id
         self._info = info
         self._watch = watch
         self._mode = assembly.MODES[request.mode]
@@ -123,7 +130,8 @@ class Stages:
             x, y = frame.points[:, :2].T
             near = np.square(x) + np.square(y) <= (RANGE_SHARE * self.config.sensor.max_range_m) ** 2
             frame = replace(frame, points=frame.points[near])
-        return self.pipeline.step(frame, budget)
+        result = self.pipeline.step(frame, budget)
+        return replace(result, run_id=self.run_id) if self.run_id else result
 
     def watch(self, frame: Frame) -> None:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it."""
@@ -160,6 +168,7 @@ class Stages:
         chosen = self.chosen
         return {
             "schema": "modt.run/1",
+            "run": self.run_id or None,
             "command": list(command),
             "stream": {
                 "name": info.name,

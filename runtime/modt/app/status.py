@@ -92,6 +92,7 @@ class Status:
     """The document modt.status/1."""
 
     schema: str = SCHEMA
+    run: str  # as FrameResult.run_id
     time_s: float
     pid: int
     up_s: float

@@ -96,7 +96,9 @@ def tracked_objects(result: FrameResult, frame_id: str, background: bool = False
         labels = chain.from_iterable(zip(AUTOWARE_LABELS, posterior, strict=True))
         placed = (*pose, *P, *velocity, *V, sign, still)
         no_footprint = 0
-        cdr.record(fields, uuid(track), exists, N_CLASSES, *labels, *placed, BOUNDING_BOX, no_footprint, *size)
+        cdr.record(
+            fields, uuid(result, track), exists, N_CLASSES, *labels, *placed, BOUNDING_BOX, no_footprint, *size
+        )
     return cdr.message()
 
 
@@ -111,13 +113,13 @@ def obstacles(result: FrameResult, frame_id: str, background: bool = False) -> b
     cdr.header(result.frame.stamp_s, frame_id)
     cdr.record(("I",), len(objects))
     for track, exists, centre, velocity, size in zip(*(c.tolist() for c in columns), strict=True):
-        cdr.record(("16s", "f", "3d", "3d", "3d"), uuid(track), exists, *centre, *velocity, *size)
+        cdr.record(("16s", "f", "3d", "3d", "3d"), uuid(result, track), exists, *centre, *velocity, *size)
     return cdr.message()
 
 
-def uuid(track: int) -> bytes:
-    """The 16 bytes of unique_identifier_msgs/UUID of a track: its number."""
-    return track.to_bytes(16, "big")
+def uuid(result: FrameResult, track: int) -> bytes:
+    """The 16 bytes of unique_identifier_msgs/UUID of a track: the identity of the run and the number of the track."""
+    return bytes.fromhex(result.run_id).ljust(8, b"\0") + track.to_bytes(8, "big")
 
 
 def _axes_in_sensor_frame(R_level_sensor: Float64 | None) -> Float64:

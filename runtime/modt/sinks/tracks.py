@@ -79,6 +79,7 @@ def _head(result: FrameResult) -> str:
     """Line of a frame up to its tracks."""
     fields = {
         "schema": SCHEMA,
+        "run": result.run_id or None,
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 6),
         "T_world_sensor": np.round(result.T_world_sensor[:3], 6).ravel().tolist(),
