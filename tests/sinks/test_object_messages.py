@@ -113,6 +113,12 @@ def test_velocities_of_a_tilted_sensor_are_along_its_own_axes(frame):
     np.testing.assert_allclose(T_world_sensor[:3, :3] @ ahead, [0.0, 1.0, 0.0], atol=1e-9)
 
 
+def test_tracks_of_another_run_have_another_identity(frame):
+    run_ids = ("00ff" * 4, "ab" * 8)
+    found = [decoded(dataclasses.replace(frame, run_id=run), "nav2").obstacles[0].uuid.uuid for run in run_ids]
+    assert [bytes(identity) for identity in found] == [bytes.fromhex(run) + bytes([0] * 7 + [1]) for run in run_ids]
+
+
 def test_what_may_be_a_person_too_near_to_be_seen_whole_is_published(frame):
     frame.proposals.cut[3] = 1
     frame.proposals.box[3, 3:6] = [0.4, 0.3, 0.4]
