@@ -28,15 +28,25 @@ typedef struct {
     float low_m, clear_m, foot_share, min_foot_m;
 } Ground;
 
+enum { BLOCK = 512, GROUP = 8 }; /* points in the first-level cache; points kept or left out together */
+enum { POSITIONS = 1024 }; /* of a lowest return in its ring, in the last bits of its height */
+
+/* What a point is compared with: the surface at the inner and the outer edge of its ring, and heights above it from
+ * which the point is a foot, and clear of the ground. */
+typedef enum { INNER, OUTER, FOOT, CLEAR, BELOW } Below;
+
 /* Scratch: a value a cell, a value a ray, and a value a point. */
 typedef struct {
     float *lowest, *surface, *range_before; /* (cells,) range_before: of the ground cell before each cell [m] */
-    float *clear, *foot;                    /* (cells,) height from which a return is clear of the ground; a foot */
+    float *clear;                           /* (cells,) height from which a return is clear of the ground */
+    u4 *below;                              /* (cells,) Below of the points of each cell */
     float (*ends)[2];                       /* (cells,) lowest return, and the highest, negated, side by side */
     uint8_t *kind;                          /* (cells,) flags of Kind */
     float *rays;                            /* (4 * sectors,) */
     float *z, *sqrt_range;                  /* (n,) */
-    i32 *cell;                              /* (n,) */
+    i32 *cell;                              /* (n + BLOCK,) */
+    i64 *low_rows;                          /* (n + 1,) rows of the low points */
+    float *low_height;                      /* (n + 1,) their heights above ground */
 } GroundScratch;
 
 /* Places the scratch for n points at `memory`; returns its size in bytes. */
@@ -48,13 +58,15 @@ static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
     TAKE(&end, s->surface, cells + g->sectors);
     TAKE(&end, s->range_before, cells);
     TAKE(&end, s->clear, cells);
-    TAKE(&end, s->foot, cells);
+    TAKE(&end, s->below, cells);
     TAKE(&end, s->ends, cells);
     TAKE(&end, s->kind, cells);
     TAKE(&end, s->rays, 4 * g->sectors);
     TAKE(&end, s->z, n);
     TAKE(&end, s->sqrt_range, n);
-    TAKE(&end, s->cell, n);
+    TAKE(&end, s->cell, n + BLOCK);
+    TAKE(&end, s->low_rows, n + 1);
+    TAKE(&end, s->low_height, n + 1);
     return (i64)(end - (uintptr_t)memory);
 }
 
@@ -65,9 +77,8 @@ EXPORT i64 modt_ground_scratch(const Ground *g, i64 n)
 }
 
 typedef struct {
-    i64 *rows;      /* (room,) of the points kept; room for one more than there are points */
-    float *kept[5]; /* (room,) x, y, z, square root of range, and height above ground */
-    i64 *low_rows;     /* (room,) scratch: rows of the low points */
+    i64 *rows;         /* (room,) of the points kept; room for one more than there are points */
+    float *kept[5];    /* (room,) x, y, z, square root of range, and height above ground */
     uint8_t *is_clear; /* (room,) low points that are clear of the roughness of the ground */
     float *top;        /* (rings, sectors) highest return of each polar cell */
     int8_t *kind;      /* (room,) PointKind of all points */
@@ -75,26 +86,32 @@ typedef struct {
 
 /* PointKind of types.py, as far as it is known here. */
 enum { MEMBER_KIND = 0, GROUND_KIND = -1, OVERHEAD_KIND = -5, OUT_OF_RANGE_KIND = -6 };
-enum { BLOCK = 512, GROUP = 8 }; /* points in the first-level cache; points kept or left out together */
-enum { POSITIONS = 1024 }; /* of a lowest return in its ring, in the last bits of its height */
 /* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */
 typedef enum { GROUND = 1, STEEP = 2, RAMP = 4 } Kind;
 
-/* The x, y and z of n points, four at a time: a 4x4 transposition without its last row. */
+/* Columns of four rows of four: a transposition. */
+static ALWAYS_INLINE void transpose(const u4 row[4], u4 column[4])
+{
+    u4 first01 = MIXED(row[0], row[1], 0, 4, 1, 5), last01 = MIXED(row[0], row[1], 2, 6, 3, 7);
+    u4 first23 = MIXED(row[2], row[3], 0, 4, 1, 5), last23 = MIXED(row[2], row[3], 2, 6, 3, 7);
+    column[0] = MIXED(first01, first23, 0, 1, 4, 5);
+    column[1] = MIXED(first01, first23, 2, 3, 6, 7);
+    column[2] = MIXED(last01, last23, 0, 1, 4, 5);
+    column[3] = MIXED(last01, last23, 2, 3, 6, 7);
+}
+
+/* The x, y and z of n points, four at a time. */
 static ALWAYS_INLINE void take_columns(const u4 *points, i64 n, float *restrict x, float *restrict y,
                                        float *restrict z)
 {
     i64 i = 0;
     for (; i + 4 <= n; i += 4) {
-        const u4 *four = points + i;
-        __builtin_prefetch(four + BLOCK); /* the processor itself looks ahead within a page only */
-        u4 xy01 = MIXED(four[0], four[1], 0, 4, 1, 5);
-        u4 xy23 = MIXED(four[2], four[3], 0, 4, 1, 5);
-        u4 z01 = MIXED(four[0], four[1], 2, 6, 2, 6);
-        u4 z23 = MIXED(four[2], four[3], 2, 6, 2, 6);
-        *(u4 *)(x + i) = MIXED(xy01, xy23, 0, 1, 4, 5);
-        *(u4 *)(y + i) = MIXED(xy01, xy23, 2, 3, 6, 7);
-        *(u4 *)(z + i) = MIXED(z01, z23, 0, 1, 4, 5);
+        u4 column[4];
+        __builtin_prefetch(points + i + BLOCK); /* the processor itself looks ahead within a page only */
+        transpose(points + i, column);
+        *(u4 *)(x + i) = column[0];
+        *(u4 *)(y + i) = column[1];
+        *(u4 *)(z + i) = column[2];
     }
     for (; i < n; i++) {
         x[i] = points[i][0];
@@ -126,7 +143,7 @@ static void place_points(const Ground *g, const u4 *points, i64 n, float *restri
 }
 
 /* GroundEstimator._lowest and the maxima of _spread, of up to BLOCK points. Afterwards the cell of points out of
- * bounds of range is the one after the last. */
+ * bounds of range, and of places of the block without a point, is the one after the last. */
 static void find_ends(const Ground *g, float height_m, i64 n, const float *z, const float *sqrt_range, i32 *cell,
                       float (*ends)[2])
 {
@@ -142,9 +159,13 @@ static void find_ends(const Ground *g, float height_m, i64 n, const float *z, co
         candidate[i][0] = plausible ? placed : INFINITY;
         candidate[i][1] = -z[i];
     }
+    for (i64 i = n; i < BLOCK; i++) {
+        cell[i] = outside;
+        candidate[i][0] = candidate[i][1] = INFINITY;
+    }
     for (i64 k = 0; k < APART; k++) /* neighbours share cells: those far apart do not wait for one another */
-        for (i64 i = k; i < n; i += APART) {
-            PROVEN(cell[i] >= 0 && cell[i] < outside);
+        for (i64 i = k; i < BLOCK; i += APART) {
+            PROVEN(cell[i] >= 0 && cell[i] <= outside);
             float *of_cell = ends[cell[i]];
             of_cell[0] = minf(candidate[i][0], of_cell[0]);
             of_cell[1] = minf(candidate[i][1], of_cell[1]);
@@ -313,7 +334,7 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
 {
     i32 sectors = g->sectors, cells = g->rings * sectors;
     float *median = s->rays, *beside = median + sectors, *round = beside + sectors; /* the last has two rows */
-    for (i32 row = 0; row < cells; row += sectors) {
+    for (i32 row = cells - sectors; row >= 0; row -= sectors) {
         float *surface = s->surface + row;
         median_across(sectors, 1, surface, round, median);
         median_across(sectors, g->flank_sectors, median, round, beside);
@@ -331,61 +352,64 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
         }
         for (i32 k = row; k < row + sectors; k++) {
             int is_clear = row < g->near_rings * sectors && top[k] - s->surface[k] > s->clear[k];
-            s->foot[k] = is_clear ? maxf(g->foot_share * s->clear[k], g->min_foot_m) : INFINITY;
+            float foot = is_clear ? maxf(g->foot_share * s->clear[k], g->min_foot_m) : INFINITY;
+            s->below[k] = (u4){s->surface[k], s->surface[k + sectors], foot, is_clear ? s->clear[k] : INFINITY};
         }
     }
 }
 
-/* Height of the surface below a point, linear between the edges of its ring; not a number out of bounds of range. */
-static ALWAYS_INLINE float surface_at(const Ground *g, const GroundScratch *s, i64 row)
-{
-    i32 cell = s->cell[row], bits = __builtin_ctz((unsigned)g->sectors);
-    float inner = s->surface[cell], outer = s->surface[cell + g->sectors];
-    float share = s->sqrt_range[row] * g->rings_per_unit - (float)(cell >> bits);
-    return inner + (outer - inner) * share;
-}
-
 /* Kernels.above_ground, of up to BLOCK points from `start` on: those within bounds of height are written from
- * `count` on, where there is room for one more. Returns how many there are then. Rows of low ones go to `low_rows`
- * from `n_low` on. */
+ * `count` on, where there is room for one more. Returns how many there are then. Low ones go to the scratch from
+ * `n_low` on. A point that is out of range has no height: its surface is infinite. */
 static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points, i64 start, i64 n, i64 count,
                        i64 *n_low, const AboveGround *out)
 {
     const uint64_t all = 0x0101010101010101;
-    float height[BLOCK], low = g->min_height_m, high = g->max_height_m;
+    const i32 *cell = s->cell + start, bits = __builtin_ctz((unsigned)g->sectors);
     float *const *kept = out->kept;
-    uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0};
-    for (i64 i = 0; i < n; i++)
-        height[i] = s->z[start + i] - surface_at(g, s, start + i);
-    for (i64 i = 0; i < n; i++)
-        is_kept[i] = (height[i] > low) & (height[i] < high);
-    for (i64 i = 0; i < n; i++) { /* one that is out of range has no height */
-        int8_t other = height[i] >= high ? OVERHEAD_KIND : height[i] > -INFINITY ? GROUND_KIND : OUT_OF_RANGE_KIND;
-        out->kind[start + i] = is_kept[i] ? MEMBER_KIND : other;
+    int8_t *kind = out->kind + start;
+    float below[BELOW][BLOCK], height[BLOCK], low = g->min_height_m, high = g->max_height_m;
+    uint8_t is_kept[BLOCK + GROUP] = {0}, is_low[BLOCK + GROUP] = {0}, is_clear[BLOCK];
+    for (i64 i = 0; i < BLOCK; i += 4) {
+        u4 of_point[4], column[4];
+        for (int k = 0; k < 4; k++)
+            of_point[k] = s->below[cell[i + k]];
+        transpose(of_point, column);
+        for (int v = 0; v < BELOW; v++)
+            *(u4 *)(below[v] + i) = column[v];
     }
-    for (i64 i = 0; i < n; i++)
-        is_low[i] = (height[i] <= low) & (height[i] > s->foot[s->cell[start + i]]);
-    for (i64 first = 0; first < n; first += GROUP) {
-        uint64_t group;
-        __builtin_memcpy(&group, is_low + first, GROUP);
-        for (i64 i = first; group && i < first + GROUP && i < n; i++) {
-            out->low_rows[*n_low] = start + i; /* overwritten by the next, unless it is low */
-            out->is_clear[*n_low] = height[i] > s->clear[s->cell[start + i]];
-            *n_low += is_low[i];
-        }
+    for (i64 i = 0; i < n; i++) {
+        float share = s->sqrt_range[start + i] * g->rings_per_unit - (float)(cell[i] >> bits);
+        height[i] = s->z[start + i] - (below[INNER][i] + (below[OUTER][i] - below[INNER][i]) * share);
+    }
+    for (i64 i = 0; i < n; i++) {
+        int is_known = height[i] > -INFINITY, is_over = height[i] >= high;
+        int is_above = (height[i] > low) & (height[i] < high);
+        kind[i] = (int8_t)(OUT_OF_RANGE_KIND + is_known * (GROUND_KIND - OUT_OF_RANGE_KIND) +
+                           is_over * (OVERHEAD_KIND - GROUND_KIND) + is_above * (MEMBER_KIND - GROUND_KIND));
+        is_kept[i] = (uint8_t)is_above;
+        is_low[i] = (height[i] <= low) & (height[i] > below[FOOT][i]);
+        is_clear[i] = height[i] > below[CLEAR][i];
     }
     for (i64 first = 0; first < n; first += GROUP) {
         i64 row = start + first;
-        uint64_t group;
-        __builtin_memcpy(&group, is_kept + first, GROUP);
-        if (group == all) {
+        uint64_t kept_group, low_group;
+        __builtin_memcpy(&kept_group, is_kept + first, GROUP);
+        __builtin_memcpy(&low_group, is_low + first, GROUP);
+        for (i64 i = first; low_group && i < first + GROUP; i++) {
+            s->low_rows[*n_low] = start + i; /* overwritten by the next, unless it is low */
+            s->low_height[*n_low] = height[i];
+            out->is_clear[*n_low] = is_clear[i];
+            *n_low += is_low[i];
+        }
+        if (kept_group == all) {
             for (i64 i = 0; i < GROUP; i++)
                 out->rows[count + i] = row + i;
             take_columns(points + row, GROUP, kept[0] + count, kept[1] + count, kept[2] + count);
             __builtin_memcpy(kept[3] + count, s->sqrt_range + row, GROUP * sizeof(float));
             __builtin_memcpy(kept[4] + count, height + first, GROUP * sizeof(float));
             count += GROUP;
-        } else if (group) /* most often there is none: ground */
+        } else if (kept_group) /* most often there is none: ground */
             for (i64 i = first; i < first + GROUP && i < n; i++, row++) {
                 out->rows[count] = row; /* overwritten by the next, unless it stays */
                 for (int v = 0; v < 3; v++)
@@ -399,17 +423,16 @@ static i64 keep_points(const Ground *g, const GroundScratch *s, const u4 *points
 }
 
 /* The low points, after the `count` others. */
-static void append_low(const Ground *g, const GroundScratch *s, const u4 *points, i64 count, i64 n_low,
-                       const AboveGround *out)
+static void append_low(const GroundScratch *s, const u4 *points, i64 count, i64 n_low, const AboveGround *out)
 {
     float *const *kept = out->kept;
     for (i64 k = 0; k < n_low; k++) {
-        i64 row = out->low_rows[k], at = count + k;
+        i64 row = s->low_rows[k], at = count + k;
         out->rows[at] = row;
         for (int v = 0; v < 3; v++)
             kept[v][at] = points[row][v];
         kept[3][at] = s->sqrt_range[row];
-        kept[4][at] = s->z[row] - surface_at(g, s, row);
+        kept[4][at] = s->low_height[k];
     }
 }
 
@@ -422,7 +445,7 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
     i64 cells = g->rings * g->sectors, count = 0, n_low = 0;
     GroundScratch scratch, *s = &scratch;
     place_scratch(g, n, memory, s);
-    for (i64 k = 0; k < cells; k++)
+    for (i64 k = 0; k <= cells; k++)
         s->ends[k][0] = s->ends[k][1] = INFINITY;
     for (i64 i = 0; i < n; i += BLOCK) {
         i64 m = n - i < BLOCK ? n - i : BLOCK;
@@ -435,11 +458,10 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
     trace(g, height_m, s);
     interpolate(g, s);
     smooth(g, s, out->top);
-    s->surface[cells] = s->surface[cells + g->sectors] = INFINITY; /* points out of bounds of range have no height */
-    s->foot[cells] = s->clear[cells] = INFINITY;
+    s->below[cells] = spread(INFINITY); /* points out of bounds of range have no height */
     for (i64 i = 0; i < n; i += BLOCK)
         count = keep_points(g, s, points, i, n - i < BLOCK ? n - i : BLOCK, count, &n_low, out);
-    append_low(g, s, points, count, n_low, out);
+    append_low(s, points, count, n_low, out);
     counts[0] = count;
     counts[1] = n_low;
 }

@@ -62,7 +62,6 @@ ABOVE_GROUND = Layout(
     "AboveGround",
     rows=Array(_i64, "room"),
     kept=Rows(_f32, 5, "room"),
-    low_rows=Array(_i64, "room"),
     is_clear=Array(np.bool_, "room"),
     top=Array(_f32, "rings", "sectors"),
     kind=Array(_i8, "room"),
@@ -202,12 +201,12 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         n = len(points)
         structure = self._structure(_ground, ground, bounds)
         scratch = self._memory(self.library.modt_ground_scratch(structure, n))
-        rows, low_rows = np.empty((2, n + 1), np.int64)
+        rows = np.empty(n + 1, np.int64)
         kept = np.empty((5, n + 1), np.float32)
         is_clear = np.empty(n + 1, np.bool_)
         top = np.empty((ground.grid.rings, SECTORS), np.float32)
         kind = np.empty(n + 1, np.int8)
-        out = ABOVE_GROUND(rows=rows, kept=kept, low_rows=low_rows, is_clear=is_clear, top=top, kind=kind)
+        out = ABOVE_GROUND(rows=rows, kept=kept, is_clear=is_clear, top=top, kind=kind)
         counts = np.empty(2, np.int64)
         self.library.modt_above_ground(structure, points, n, sensor_height_m, scratch, out, counts)
         n_tall, n_low = counts.tolist()
