@@ -6,7 +6,7 @@ the number of proposals in a frame, M the number of tracks alive, N the number o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from enum import IntEnum, IntFlag
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -180,25 +180,6 @@ class Proposals:
             feet=self.feet,
         )
 
-    def followed_by(self, other: Proposals, feet: Int) -> Proposals:
-        """These proposals, then others of the same frame, with the (2, F) feet of both."""
-        if not len(other):
-            return replace(self, feet=feet)
-        if not len(self):
-            return replace(other, feet=feet)
-        return Proposals(
-            members=np.concatenate([self.members, other.members]),
-            offsets=np.concatenate([self.offsets, self.offsets[-1] + other.offsets[1:]]),
-            coordinates=np.concatenate([self.coordinates, other.coordinates], axis=1),
-            centroid=np.concatenate([self.centroid, other.centroid]),
-            box=np.concatenate([self.box, other.box]),
-            cut=np.concatenate([self.cut, other.cut]),
-            ground_z_m=_joined(self.ground_z_m, other.ground_z_m),
-            reflectance=_joined(self.reflectance, other.reflectance),
-            kind=self.kind,
-            feet=feet,
-        )
-
     @classmethod
     def empty(cls, kind: Int8 | None = None) -> Proposals:
         """No proposals; with the (N,) PointKind of each point of the frame."""
@@ -211,11 +192,6 @@ class Proposals:
             cut=np.zeros(0, np.int64),
             kind=kind,
         )
-
-
-def _joined(first: Float64 | None, second: Float64 | None) -> Float64 | None:
-    """Rows of both, None unless both have them."""
-    return None if first is None or second is None else np.concatenate([first, second])
 
 
 def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:

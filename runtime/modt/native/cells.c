@@ -81,6 +81,58 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
     return count;
 }
 
+/* low_points: places of what may be low things or feet, and of a tall point beside each, or NONE; returns how many
+ * there are. `sqrt_range` and `sample` are those of the tall cells. Scratch: `is_left_over`, of these.
+ *
+ * In the table stands what is in each wide cell: the place of a tall point, NONE, or CLEAR for a low point only. */
+EXPORT i64 modt_low_points(const Grid *grid, const PointColumns *points, const uint8_t *is_clear, const Clusters *tall,
+                           const Cells *cells, const float *sqrt_range, const i64 *sample, i64 n_low,
+                           float max_sqrt_range, uint8_t *is_left_over, i64 *places, i64 *beside)
+{
+    enum { CLEAR = -2 };
+    i32 *const table = grid->table;
+    const i32 centre = grid->centre, side = grid->side / 2 + 1;
+    const i64 n_tall = tall->n_points;
+    i64 n = 0, used;
+    for (i32 w = 0; w < side * side; w++)
+        table[w] = NONE;
+    for (i64 c = 0; c < tall->n_cells; c++) {
+        int8_t kind = sqrt_range[c] < max_sqrt_range ? tall->kind_of_cell[c] : GROUND_KIND;
+        is_left_over[c] = (kind == LOW_KIND) | (kind == SPARSE_KIND);
+        if (kind == MEMBER_KIND || kind == STRUCTURE_KIND)
+            table[(cells->row[c] >> 1) * side + (cells->column[c] >> 1)] = (i32)sample[c];
+    }
+    for (i64 i = 0; i < n_tall; i++) {
+        places[n] = i; /* overwritten by the next, unless it is left over */
+        n += is_left_over[tall->cell_of_point[i]];
+    }
+    for (i64 k = 0; k < n_low; k++)
+        places[n + k] = n_tall + k;
+    for (i64 p = 0; p < n + n_low; p++) {
+        i64 i = places[p];
+        float scale = grid->cells_per_unit / points->sqrt_range[i];
+        i32 row = line_of(points->x[i], scale, centre) >> 1, column = line_of(points->y[i], scale, centre) >> 1;
+        beside[p] = row * side + column; /* until the last pass the wide cell */
+        if (i >= n_tall && is_clear[i - n_tall] && table[beside[p]] == NONE)
+            table[beside[p]] = CLEAR;
+    }
+    used = n;
+    for (i64 p = n; p < n + n_low; p++) {
+        places[used] = places[p]; /* overwritten by the next, unless it is used */
+        beside[used] = beside[p];
+        used += table[beside[p]] != NONE;
+    }
+    for (i64 p = 0; p < used; p++) {
+        const i32 *wide = table + beside[p];
+        i32 greatest = NONE;
+        for (i32 row = -side; row <= side; row += side)
+            for (i32 column = -1; column <= 1; column++)
+                greatest = wide[row + column] > greatest ? wide[row + column] : greatest;
+        beside[p] = greatest;
+    }
+    return used;
+}
+
 /* ------------------------------------------------------------------------------------------- connected components */
 
 /* Rem's union of the trees of a and b: a parent is never greater than its child, so a root is the least of its

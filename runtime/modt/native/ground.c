@@ -84,8 +84,6 @@ typedef struct {
     int8_t *kind;      /* (room,) PointKind of all points */
 } AboveGround;
 
-/* PointKind of types.py, as far as it is known here. */
-enum { MEMBER_KIND = 0, GROUND_KIND = -1, OVERHEAD_KIND = -5, OUT_OF_RANGE_KIND = -6 };
 /* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */
 typedef enum { GROUND = 1, STEEP = 2, RAMP = 4 } Kind;
 

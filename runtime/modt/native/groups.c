@@ -84,22 +84,44 @@ typedef struct {
     float *columns;       /* (4, m) x, y, z, and z of the ground beneath */
 } Members;
 
-/* members_of: points by cluster, in input order within a cluster, given the cell of each point, and the cluster and
- * the kind of each of the cells. `index` holds the row of each point in the sweep; `kind`, that of every point of it,
- * takes those of the cells. */
-EXPORT void modt_members(const PointColumns *points, const float *height, const i64 *index, const i64 *cell_of_point,
-                         i64 n_points, const i64 *cluster_of_cell, const int8_t *kind_of_cell, const i64 *entries,
-                         i64 n_cells, i64 n, int8_t *kind, const Members *members)
+/* Counts the points of clusters into `count`, of each. */
+static void count_members(const Clusters *clusters, i64 *count)
+{
+    for (i64 c = 0; c < clusters->n_cells; c++)
+        if (clusters->cluster_of_cell[c] != NONE)
+            count[clusters->cluster_of_cell[c]] += clusters->entries[c];
+}
+
+/* Places of the points of clusters by cluster, from `next` of each on, which moves past them. The kinds of the others
+ * go into those of the sweep. Points are at `places`; without these they are the first ones. */
+static ALWAYS_INLINE void place_members(const Clusters *clusters, const i64 *places, const i64 *index, i64 *next,
+                                        i64 *place_of_member, int8_t *kind)
+{
+    for (i64 i = 0; i < clusters->n_points; i++) {
+        i64 c = clusters->cell_of_point[i], place = places ? places[i] : i;
+        PROVEN(c >= 0 && c < clusters->n_cells);
+        i64 g = clusters->cluster_of_cell[c];
+        PROVEN(g >= NONE && g < clusters->n);
+        if (g == NONE)
+            kind[index[place]] = clusters->kind_of_cell[c];
+        else
+            place_of_member[next[g]++] = place;
+    }
+}
+
+/* members_of: points by cluster, in input order within a cluster, those of tall clusters before those of low ones.
+ * `index` holds the row of each point in the sweep; `kind`, that of every point of it, takes those of the points. */
+EXPORT void modt_members(const Clusters *tall, const Clusters *low, const i64 *places, const PointColumns *points,
+                         const float *height, const i64 *index, int8_t *kind, const Members *members)
 {
     /* 1. Sizes of the clusters, and from them where each begins. As its points are placed, `next` goes from the
      * start of a cluster to its end, which is the offset that it shall hold. */
     i64 *next = members->offsets + 1;
-    i64 total = 0;
+    i64 n = tall->n + low->n, total = 0;
     for (i64 g = 0; g <= n; g++)
         members->offsets[g] = 0;
-    for (i64 c = 0; c < n_cells; c++)
-        if (cluster_of_cell[c] != NONE)
-            next[cluster_of_cell[c]] += entries[c];
+    count_members(tall, next);
+    count_members(low, next + tall->n);
     for (i64 g = 0; g < n; g++) {
         i64 count = next[g];
         next[g] = total;
@@ -107,18 +129,13 @@ EXPORT void modt_members(const PointColumns *points, const float *height, const 
     }
     /* 2. Points by cluster, then their rows and columns. Reads may wait for memory together, writes may not: they
      * go in order. */
-    for (i64 i = 0; i < n_points; i++) {
-        PROVEN(cell_of_point[i] >= 0 && cell_of_point[i] < n_cells);
-        i64 g = cluster_of_cell[cell_of_point[i]];
-        PROVEN(g >= NONE && g < n);
-        kind[index[i]] = kind_of_cell[cell_of_point[i]];
-        if (g != NONE)
-            members->index[next[g]++] = i;
-    }
+    place_members(tall, 0, index, next, members->index, kind);
+    place_members(low, places, index, next + tall->n, members->index, kind);
     float *x = members->columns, *y = x + total, *z = y + total, *ground_z = z + total;
     for (i64 m = 0; m < total; m++) {
         i64 i = members->index[m];
         members->index[m] = index[i];
+        kind[index[i]] = MEMBER_KIND;
         x[m] = points->x[i];
         y[m] = points->y[i];
         z[m] = points->z[i];

@@ -51,6 +51,20 @@ typedef struct {
     float *x, *y, *z, *sqrt_range; /* (n,) */
 } PointColumns;
 
+/* Clusters of cells.py: n clusters of n_points points in n_cells cells. */
+typedef struct {
+    i64 *cell_of_point;             /* (n_points,) */
+    i64 *cluster_of_cell, *entries; /* (n_cells,) cluster or NONE, and number of points */
+    int8_t *kind_of_cell;           /* (n_cells,) PointKind of its points */
+    i64 n_points, n_cells, n;
+} Clusters;
+
+/* PointKind of types.py */
+enum {
+    MEMBER_KIND = 0, GROUND_KIND = -1, STRUCTURE_KIND = -2, LOW_KIND = -3, SPARSE_KIND = -4, OVERHEAD_KIND = -5,
+    OUT_OF_RANGE_KIND = -6
+};
+
 /* pseudo_angle of grids.py: direction of a point as a number from 0 to 4 */
 static ALWAYS_INLINE float pseudo_angle(float x, float y)
 {

@@ -338,13 +338,62 @@ class Members:
     columns: Float32  # (4, M) x, y, z, and z of the ground beneath [m, sensor frame]
 
 
-def members_of(clusters: Clusters, index: Int, kind: Int8) -> Members:
-    """Points of each cluster, given (K,) the row of each point in the sweep.
+def members_of(
+    tall: Clusters, low: Clusters, places: Int, points: PointColumns, height: Float32, index: Int, kind: Int8
+) -> Members:
+    """Points of each tall cluster, then of each low one.
 
-    Into (N,) kinds of all points of the sweep go those of the K.
+    Args:
+        tall: clusters of the first K points.
+        low: clusters of the points at (P,) places; of these they replace the tall ones.
+        places: (P,) those places.
+        points: (K + L,) points.
+        height: (K + L,) their heights above ground [m].
+        index: (K + L,) row of each in the sweep.
+        kind: (N,) PointKind of all points of the sweep, into which those of the points go.
     """
-    kind[index] = clusters.kind_of_cell.take(clusters.cell_of_point)
-    groups = Groups.from_labels(clusters.cluster_of_cell.take(clusters.cell_of_point), clusters.n)
-    points = clusters.points
-    x, y, z, height = (v.take(groups.rows) for v in (points.x, points.y, points.z, clusters.height))
+    cluster = np.full(len(index), NONE)
+    for first, at, clusters in ((0, np.arange(len(tall.cell_of_point)), tall), (tall.n, places, low)):
+        kind[index[at]] = clusters.kind_of_cell.take(clusters.cell_of_point)
+        of_cell = np.where(clusters.cluster_of_cell == NONE, NONE, clusters.cluster_of_cell + first)
+        cluster[at] = of_cell.take(clusters.cell_of_point)
+    groups = Groups.from_labels(cluster, tall.n + low.n)
+    x, y, z, height = (v.take(groups.rows) for v in (points.x, points.y, points.z, height))
     return Members(groups.offsets, index.take(groups.rows), np.stack([x, y, z, z - height]))
+
+
+def low_points(
+    grid: SqrtRangeGrid, points: PointColumns, is_clear: Bool, tall: Clusters, max_sqrt_range: float
+) -> tuple[Int, Int]:
+    """(P,) places of what may be low things or feet, and (P,) place of a tall point beside each, or NONE.
+
+    These are tall points whose clusters are too low or too sparse, low ones that are clear of the ground, and low
+    ones that share a wide cell with one of these or with something tall. A wide cell is two by two of the grid.
+
+    Args:
+        grid: fine cells.
+        points: (K + L,) tall points, then low ones.
+        is_clear: (L,) low points that are clear of the roughness of the ground.
+        tall: clusters of the K.
+        max_sqrt_range: range up to which tall points are looked at [sqrt(m)].
+    """
+    side = grid.side // 2 + 1
+    kind = np.where(tall.sampled.sqrt_range < np.float32(max_sqrt_range), tall.kind_of_cell, PointKind.GROUND)
+    cells = np.flatnonzero((kind == PointKind.MEMBER) | (kind == PointKind.STRUCTURE))
+    standing = np.full(side * side, NONE)
+    standing[_wide(tall.cells.row[cells], tall.cells.column[cells], side)] = tall.sample[cells]
+    left_over = np.flatnonzero(((kind == PointKind.LOW) | (kind == PointKind.SPARSE)).take(tall.cell_of_point))
+    wide = _wide(*grid.row_column(points), side)
+    low = wide[len(points) - len(is_clear) :]
+    has_clear = np.zeros(side * side, np.bool_)
+    has_clear[low[is_clear]] = True
+    used = np.flatnonzero(has_clear[low] | (standing[low] != NONE))
+    places = np.concatenate([left_over, len(points) - len(is_clear) + used])
+    step = np.arange(-1, 2)
+    around = (side * step[:, None] + step).ravel()
+    return places, standing.take(wide[places][:, None] + around).max(axis=1)
+
+
+def _wide(row: Int32, column: Int32, side: int) -> Int:
+    """Wide cell of each fine one, by its number."""
+    return (row >> 1).astype(np.int64) * side + (column >> 1)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from modt.geometry.kernels import GeometryKernels
-from modt.segmentation.cells import CellClusterer, members_of, occupied_cells
+from modt.segmentation.cells import CellClusterer, low_points, members_of, occupied_cells
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
@@ -52,6 +52,7 @@ class Kernels(GeometryKernels):
     view_bounds = staticmethod(view_bounds)
     merge_strips = staticmethod(merge_strips)
     group = staticmethod(Groups.from_labels)
+    low_points = staticmethod(low_points)
     members_of = staticmethod(members_of)
     best_headings = staticmethod(best_headings)
     reflectance_statistics = staticmethod(reflectance_statistics)

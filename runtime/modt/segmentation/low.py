@@ -6,13 +6,12 @@ cells. A *place* is an index among the K + L.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.cells import CellClusterer, Clusters, ClusterSizes
-from modt.segmentation.grids import Int32
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Above, Kernels
 from modt.segmentation.tuning import CellTuning, LowTuning, SplitTuning
@@ -20,21 +19,6 @@ from modt.types import NONE, Int, Int8, PointKind
 
 ANY_GAP = CellTuning(max_gap_m=np.inf, max_gap_beams=0.0)
 NO_SPLIT = SplitTuning(min_extent_m=np.inf)
-
-
-@dataclass(frozen=True, slots=True)
-class LowThings:
-    """Clusters of low points, and feet.
-
-    Attributes:
-        clusters: of P points.
-        places: (P,) places of those points.
-        feet: (2, F) places of points at the foot of something, and of a point each of that.
-    """
-
-    clusters: Clusters
-    places: Int
-    feet: Int
 
 
 class LowFinder:
@@ -60,34 +44,24 @@ class LowFinder:
     ) -> None:
         self.kernels = kernels
         self.tuning = tuning
-        self.max_sqrt_range = np.float32(np.sqrt(tuning.max_range_m))
+        self.max_sqrt_range = math.sqrt(tuning.max_range_m)
         self.clusterer = CellClusterer(sensor, config, ANY_GAP, NO_SPLIT)
         self.grid = self.clusterer.fine
-        # Wide cells are two by two fine ones. What stands in each is NONE throughout between calls.
-        self.side = self.grid.side // 2 + 1
-        self.standing = np.full(self.side * self.side, NONE)
-        self.has_clear = np.zeros(self.side * self.side, np.bool_)
-        step = np.arange(-1, 2)
-        self.around = (self.side * step[:, None] + step).ravel()
 
-    def find(self, above: Above, tall: Clusters) -> LowThings:
-        """Low things and feet, given the clusters of the K tall points."""
-        kind = tall.kind_of_cell
-        is_standing = (kind == PointKind.MEMBER.value) | (kind == PointKind.STRUCTURE.value)
-        is_standing &= tall.sampled.sqrt_range < self.max_sqrt_range
-        cells_standing = is_standing.nonzero()[0]
-        wide_standing = self._wide(tall.cells.row.take(cells_standing), tall.cells.column.take(cells_standing))
-        self.standing[wide_standing] = tall.sample.take(cells_standing)
-        places = self._places(above, tall)
+    def find(self, above: Above, tall: Clusters) -> tuple[Clusters, Int, Int]:
+        """Clusters of P points, given those of the K tall ones; (P,) their places; (2, F) feet.
+
+        Feet are places of points at the foot of something, and of a point each of that.
+        """
+        places, beside = self.kernels.low_points(
+            self.clusterer.fine, above.points, above.is_clear, tall, self.max_sqrt_range
+        )
         points = above.points.take(places)
         height = above.height_m.take(places)
-        cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.grid, points, height)
-        beside = self.standing.take(self._wide(cells.row, cells.column)[:, None] + self.around).max(axis=1)
-        self.standing[wide_standing] = NONE
-
+        cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.clusterer.fine, points, height)
         any_beam_m = np.zeros(len(cells), np.float32)
         group_of_cell, sizes = self.kernels.cluster(self.clusterer, cells, sampled, any_beam_m)
-        standing_of_cell = self._standing_of_cell(beside, group_of_cell, sizes)
+        standing_of_cell = self._standing_of_cell(beside.take(sample), group_of_cell, sizes)
         is_foot = standing_of_cell != NONE
         kind_of_group = self._kind(sizes)
         kind_of_cell = np.where(is_foot, np.int8(PointKind.FOOT), kind_of_group.take(group_of_cell))
@@ -98,22 +72,7 @@ class LowFinder:
         )
         foot = is_foot.take(cell_of_point).nonzero()[0]
         feet = np.stack([places.take(foot), standing_of_cell.take(cell_of_point.take(foot))])
-        return LowThings(clusters, places, feet)
-
-    def _places(self, above: Above, tall: Clusters) -> Int:
-        """(P,) places of left-over tall points, clear low ones, and low ones that share a wide cell."""
-        n_tall = above.n_tall
-        kind = tall.kind_of_cell
-        is_left_over = (kind == PointKind.LOW.value) | (kind == PointKind.SPARSE.value)
-        is_left_over &= tall.sampled.sqrt_range < self.max_sqrt_range
-        left_over = is_left_over.take(tall.cell_of_point).nonzero()[0]
-        low = above.points.part(n_tall, len(above.rows))
-        wide = self._wide(*self.grid.row_column(low))
-        wide_clear = wide[above.is_clear]
-        self.has_clear[wide_clear] = True
-        used = self.has_clear.take(wide) | (self.standing.take(wide) != NONE)
-        self.has_clear[wide_clear] = False
-        return np.concatenate([left_over, n_tall + used.nonzero()[0]])
+        return clusters, places, feet
 
     def _standing_of_cell(self, beside: Int, group_of_cell: Int, sizes: ClusterSizes) -> Int:
         """(D,) place of a tall point that each cell is the foot of, NONE where there is none.
@@ -137,7 +96,3 @@ class LowFinder:
         kind[enough] = PointKind.LOW
         kind[enough & small] = PointKind.MEMBER
         return kind
-
-    def _wide(self, row: Int32, column: Int32) -> Int:
-        """Wide cell of each fine one."""
-        return (row >> 1).astype(np.int64) * self.side + (column >> 1)

@@ -14,8 +14,8 @@ from modt.class_sizes import PersonSize
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.geometry.tuning import ShapeTuning
 from modt.native.library import (
+    BOOL,
     FLOAT32,
-    INT8,
     INT64,
     Array,
     Filled,
@@ -34,7 +34,7 @@ from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Above, Bounds, Kernels
 from modt.segmentation.strips import DIRECTION, ViewBounds
 from modt.segmentation.tuning import StripTuning
-from modt.types import N_REFLECTANCE, Float32, Float64, Int, Int8
+from modt.types import N_REFLECTANCE, Bool, Float32, Float64, Int, Int8
 
 T = TypeVar("T", Cells, PointColumns, ClusterSizes)
 _f32, _f64 = map(np.dtype, (np.float32, np.float64))
@@ -108,6 +108,13 @@ STRIP_RULES = Layout(
     ),
     **_members(Number(_f32), "max_gap_m", "min_gap_beams", "max_gap_beams"),
 )
+CLUSTERS = Layout(
+    "Clusters",
+    cell_of_point=Array(_i64, "n_points"),
+    **_members(Array(_i64, "n_cells"), "cluster_of_cell", "entries"),
+    kind_of_cell=Array(_i8, "n_cells"),
+    **_members(Number(_i64), "n_points", "n_cells", "n"),
+)
 MEMBERS = Layout("Members", offsets=Array(_i64, "ends"), index=Array(_i64, "room"), columns=Array(_f32, 4, "room"))
 
 _F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
@@ -140,9 +147,10 @@ _SIGNATURES: Signatures = {
         (STRIP_RULES, PERSON_SIZE, VIEW_BOUNDS, FLOAT32, _L, INT64, OutputArgument, VIEW_BOUNDS, OutputArgument),
     ),
     "modt_group": (_L, (INT64, _L, _L, OutputArgument, OutputArgument)),
-    "modt_members": (
-        None,
-        (POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, INT8, INT64, _L, _L, OutputArgument, MEMBERS),
+    "modt_members": (None, (CLUSTERS, CLUSTERS, INT64, POINT_COLUMNS, FLOAT32, INT64, OutputArgument, MEMBERS)),
+    "modt_low_points": (
+        _L,
+        (GRID, POINT_COLUMNS, BOOL, CLUSTERS, CELLS, FLOAT32, INT64, _L, _F, *[OutputArgument] * 3),
     ),
     "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, OutputArgument)),
     "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, OutputArgument)),
@@ -162,6 +170,11 @@ def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
 def _ground(ground: GroundEstimator, bounds: Bounds) -> Filled:
     sources = bounds, ground, ground.tuning, ground.grid
     return _filled(GROUND, *sources, sectors=SECTORS, quarters=QUARTERS, far_m=FAR_M, clear_m=ground.tuning.clear_m)
+
+
+def _clusters(clusters: Clusters) -> Filled:
+    entries = clusters.cells.entries
+    return CLUSTERS.of(clusters, entries=entries, n_points=len(clusters.cell_of_point), n_cells=len(entries))
 
 
 def _grid(grid: SqrtRangeGrid) -> Filled:
@@ -299,28 +312,54 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         offsets = np.empty(n + 1, np.int64)
         return Groups(rows[: self.library.modt_group(labels, len(labels), n, rows, offsets)], offsets)
 
-    def members_of(self, clusters: Clusters, index: Int, kind: Int8) -> Members:
-        """Points of each cluster, given (K,) the row of each point; their kinds go into (N,) those of the sweep."""
+    def members_of(
+        self,
+        tall: Clusters,
+        low: Clusters,
+        places: Int,
+        points: PointColumns,
+        height: Float32,
+        index: Int,
+        kind: Int8,
+    ) -> Members:
+        """Points of each tall cluster, then of each low one; the kinds of the points go into (N,) `kind`."""
         k = len(index)
-        offsets = np.empty(clusters.n + 1, np.int64)
+        offsets = np.empty(tall.n + low.n + 1, np.int64)
         rows = np.empty(k, np.int64)
         columns = np.empty((4, k), np.float32)
         self.library.modt_members(
-            POINT_COLUMNS.of(clusters.points),
-            clusters.height,
+            _clusters(tall),
+            _clusters(low),
+            places,
+            POINT_COLUMNS.of(points),
+            height,
             index,
-            clusters.cell_of_point,
-            k,
-            clusters.cluster_of_cell,
-            clusters.kind_of_cell,
-            clusters.cells.entries,
-            len(clusters.cells),
-            clusters.n,
             kind,
             MEMBERS(offsets=offsets, index=rows, columns=columns),
         )
         m = int(offsets[-1])
         return Members(offsets, rows[:m], columns.ravel()[: 4 * m].reshape(4, m))
+
+    def low_points(
+        self, grid: SqrtRangeGrid, points: PointColumns, is_clear: Bool, tall: Clusters, max_sqrt_range: float
+    ) -> tuple[Int, Int]:
+        """(P,) places of what may be low things or feet, and (P,) place of a tall point beside each, or NONE."""
+        places, beside = np.empty((2, len(points) + 1), np.int64)
+        p = self.library.modt_low_points(
+            self._structure(_grid, grid),
+            POINT_COLUMNS.of(points),
+            is_clear,
+            _clusters(tall),
+            CELLS.of(tall.cells),
+            tall.sampled.sqrt_range,
+            tall.sample,
+            len(is_clear),
+            max_sqrt_range,
+            np.empty(len(tall.cells), np.bool_),
+            places,
+            beside,
+        )
+        return places[:p], beside[:p]
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""

@@ -11,9 +11,8 @@ from modt.geometry import FieldOfView
 from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.cells import Clusters, Members
 from modt.segmentation.clustering import Clusterer
-from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
-from modt.segmentation.groups import HEADINGS, Groups, has_reflectance
+from modt.segmentation.groups import HEADINGS, has_reflectance
 from modt.segmentation.kernels import NUMPY, Above, Bounds, Kernels
 from modt.segmentation.low import LowFinder
 from modt.segmentation.tuning import SegmentationTuning
@@ -64,22 +63,20 @@ class Segmenter:
             return Proposals.empty(above.kind)
         n_tall = above.n_tall
         tall = self._seen(self.clusterer.cluster(above.points.part(0, n_tall), above.height_m[:n_tall]))
-        low = self.low.find(above, tall)
-        proposals = self._proposals(points, tall, above.rows[:n_tall], above.kind)
-        low_proposals = self._proposals(points, self._seen(low.clusters), above.rows.take(low.places), above.kind)
-        return proposals.followed_by(low_proposals, above.rows.take(low.feet)).lock()
+        low, places, feet = self.low.find(above, tall)
+        low = self._seen(low)
+        members = self.kernels.members_of(tall, low, places, above.points, above.height_m, above.rows, above.kind)
+        return self._proposals(points, [tall, low], members, above.kind, above.rows.take(feet)).lock()
 
-    def _proposals(self, points: Float32, clusters: Clusters, rows: Int, kind: Int8) -> Proposals:
-        """Proposals of clusters of the points at (P,) rows of the sweep; their kinds go into (N,) its kinds."""
-        members = self.kernels.members_of(clusters, rows, kind)
-        if not clusters.n:
-            return Proposals.empty(kind)
-        cells_of_cluster = self.kernels.group(clusters.cluster_of_cell, clusters.n)
-        box = self._boxes(clusters.sampled, cells_of_cluster, members)
+    def _proposals(
+        self, points: Float32, parts: list[Clusters], members: Members, kind: Int8, feet: Int
+    ) -> Proposals:
+        """Proposals of clusters with these members, given the kinds of all points and the feet in the sweep."""
+        heading = np.concatenate([self._headings(clusters) for clusters in parts])
+        box = self.kernels.upright_boxes(members.columns[:3], members.offsets, heading)
         cut = self.ends.cut(members.columns[:3], members.offsets, box)
         if not self.fov.full:
-            depth = self.fov.depth(clusters.sampled.xyz())
-            cut |= Cut.SIDE * self._reaches_end_of_margin(cells_of_cluster, depth)
+            cut |= Cut.SIDE * np.concatenate([self._reach_end_of_margin(clusters) for clusters in parts])
         mean = self.kernels.group_sums(members.columns, members.offsets) / np.diff(members.offsets)
         return Proposals(
             members=members.index,
@@ -91,6 +88,7 @@ class Segmenter:
             ground_z_m=mean[3],
             reflectance=self._reflectance(points, members),
             kind=kind,
+            feet=feet,
         )
 
     def sensor_height_m(self, points: Float32) -> float:
@@ -129,15 +127,20 @@ class Segmenter:
         is_seen = np.bincount(clusters.cluster_of_cell[seen], minlength=clusters.n) > 0
         return clusters.select(is_seen, PointKind.OUT_OF_VIEW)
 
-    def _boxes(self, cells: PointColumns, cells_of_cluster: Groups, members: Members) -> Float64:
-        """(n, 7) boxes about the members of the clusters, at the heading that suits their (C,) cells."""
-        heading = self.tuning.heading
-        best = self.kernels.best_headings(cells.x, cells.y, cells_of_cluster, heading.max_cells, heading.side_noise_m)
-        return self.kernels.upright_boxes(members.columns[:3], members.offsets, HEADINGS[best])
+    def _headings(self, clusters: Clusters) -> Float64:
+        """(n,) heading of the box that suits the cells of each cluster [rad]."""
+        tuning = self.tuning.heading
+        cells_of_cluster = self.kernels.group(clusters.cluster_of_cell, clusters.n)
+        x = clusters.sampled.x
+        y = clusters.sampled.y
+        best = self.kernels.best_headings(x, y, cells_of_cluster, tuning.max_cells, tuning.side_noise_m)
+        return HEADINGS[best]
 
-    def _reaches_end_of_margin(self, cells_of_cluster: Groups, depth: Float32) -> Bool:
-        """(n,) clusters that the margin of the field of view cuts, given the (C,) depth of each cell in it [m]."""
+    def _reach_end_of_margin(self, clusters: Clusters) -> Bool:
+        """(n,) clusters that the margin of the field of view cuts."""
         view = self.tuning.view
+        depth = self.fov.depth(clusters.sampled.xyz())
+        cells_of_cluster = self.kernels.group(clusters.cluster_of_cell, clusters.n)
         deepest: Bool = cells_of_cluster.min(depth[cells_of_cluster.rows]) < view.truncation_m - view.margin_m
         return deepest
 
