@@ -157,7 +157,7 @@ static void join(i32 *parent, i32 a, i32 b)
 /* A cell in a grid of a side below 2^16. */
 typedef struct {
     uint16_t row, column;
-    i32 cell;
+    i32 rank; /* among the cells in use */
 } Place;
 
 /* A wide cell, in the order of the grid. */
@@ -168,25 +168,25 @@ typedef struct {
 } Span;
 
 /* Scratch of modt_cluster, for n cells and a fine grid of `side` rows. The coarse grid has no more rows, so that the
- * scratch serves both. A cell is called wide on the grid in use, which may be twice as wide. Spans and the arrays beside them begin at 1: wide cell 0 is nowhere, for cells that
- * are not used. */
+ * scratch serves both. Some of the cells are used, in ascending order; the number of one among these is its rank. A
+ * cell is called wide on the grid in use, which may be twice as wide. Spans and the arrays beside them begin at 1: span
+ * 0 is nowhere. */
 typedef struct {
     float *max_gap_m;               /* (n,) vertical gap below which a cell is connected */
-    uint8_t *use;                   /* (n,) whether a cell takes part */
-    i64 *part;                      /* (n,) part on the fine grid of each cell */
+    i32 *used;                      /* (n,) cells in use, by rank */
+    i64 *part;                      /* (n,) part on the fine grid of each of these */
     uint8_t *divided;               /* (n,) whether a cluster is divided into parts */
     i32 *cluster_of_part;           /* (n,) number of the cluster that a part becomes, NONE if it does not leave */
     u4 (*ends)[2];                  /* (n,) least and greatest x, y and height of a cluster */
     i32 *next_in_row;               /* (side,) counts of the radix sort, then where the next of a row goes */
     i32 *next_in_column;            /* (side,) the same of columns */
     i32 *latest;                    /* (side,) latest span of each column, see find_components */
-    Place *by_cell, *by_column;     /* (n,) places in the order of cells and of columns */
+    Place *by_rank, *by_column;     /* (n,) places in the order of cells and of columns */
     Place *by_row;                  /* (n,) and of the grid: by row, then column, then cell */
     Span *spans;                    /* (n + 1,) */
     i32 *parent;                    /* (n + 1,) a span of the same component, not after it */
-    i32 *last_cell;                 /* (n + 1,) last cell of each span */
-    i32 *span_of_cell;              /* (n,) */
-    i32 *span_in_order;             /* (n + 1,) spans in the order of their last cells */
+    i32 *last_rank;                 /* (n + 1,) rank of the last cell of each span */
+    i32 *span_of_rank;              /* (n,) */
     i32 *component_of_root;         /* (n + 1,) number of the component of a span that is its own parent */
     i32 *next_of_cluster;           /* (2 n,) where the next cell of a cluster goes that may have surfaces, or NONE */
     i32 *cell_of_row;               /* (n,) cells of those clusters, in their order */
@@ -194,10 +194,8 @@ typedef struct {
     double *x, *y, *width_m;        /* (n,) these cells, as find_surfaces takes them */
     uint8_t *on_surface;            /* (n,) its results */
     double *distance_m;             /* (n,) */
-    float *before_m;                /* (n,) distance of each cell before surfaces, infinite without */
-    Cells free;                     /* (n,) cells on no surface, without the number of points */
-    i32 *cell_of_free;              /* (n,) their numbers among all */
-    i64 *part_of_free;              /* (n,) */
+    uint8_t *is_free;               /* (n,) whether a cell is on no surface of a cluster with one */
+    float *before_m;                /* (n,) distance of such a cell before surfaces, infinite without */
     float *front_m, *back_m;        /* (n,) greatest and least of those of each part */
     SurfaceScratch surface;
 } ClusterScratch;
@@ -207,7 +205,7 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
 {
     uintptr_t end = (uintptr_t)memory;
     TAKE(&end, s->max_gap_m, n);
-    TAKE(&end, s->use, n);
+    TAKE(&end, s->used, n);
     TAKE(&end, s->part, n);
     TAKE(&end, s->divided, n);
     TAKE(&end, s->cluster_of_part, n);
@@ -215,14 +213,13 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->next_in_row, side);
     TAKE(&end, s->next_in_column, side);
     TAKE(&end, s->latest, side);
-    TAKE(&end, s->by_cell, n);
+    TAKE(&end, s->by_rank, n);
     TAKE(&end, s->by_column, n);
     TAKE(&end, s->by_row, n);
     TAKE(&end, s->spans, n + 1);
     TAKE(&end, s->parent, n + 1);
-    TAKE(&end, s->last_cell, n + 1);
-    TAKE(&end, s->span_of_cell, n);
-    TAKE(&end, s->span_in_order, n + 1);
+    TAKE(&end, s->last_rank, n + 1);
+    TAKE(&end, s->span_of_rank, n);
     TAKE(&end, s->component_of_root, n + 1);
     TAKE(&end, s->next_of_cluster, 2 * n);
     TAKE(&end, s->cell_of_row, n);
@@ -232,13 +229,8 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->width_m, n);
     TAKE(&end, s->on_surface, n);
     TAKE(&end, s->distance_m, n);
+    TAKE(&end, s->is_free, n);
     TAKE(&end, s->before_m, n);
-    TAKE(&end, s->free.row, n);
-    TAKE(&end, s->free.column, n);
-    TAKE(&end, s->free.low, n);
-    TAKE(&end, s->free.high, n);
-    TAKE(&end, s->cell_of_free, n);
-    TAKE(&end, s->part_of_free, n);
     TAKE(&end, s->front_m, n);
     TAKE(&end, s->back_m, n);
     place_surface_scratch(n, &end, &s->surface);
@@ -263,44 +255,39 @@ static void starts_of(i32 *count, i32 n)
 }
 
 /* Sorts the places of the used cells on a grid 2^shift times as wide into `by_row`, by a radix sort: by column,
- * then by row, each keeping the order before. Returns how many are used. */
-static i32 sort_places(const Cells *cells, i64 n_cells, int shift, i32 side, const ClusterScratch *s)
+ * then by row, each keeping the order before. */
+static void sort_places(const Cells *cells, i64 n_used, int shift, i32 side, const ClusterScratch *s)
 {
-    i32 used = 0, *in_row = s->next_in_row, *in_column = s->next_in_column;
+    i32 *in_row = s->next_in_row, *in_column = s->next_in_column;
     for (i32 line = 0; line < side; line++) {
         in_row[line] = 0;
         in_column[line] = 0;
     }
-    for (i64 i = 0; i < n_cells; i++) {
-        i32 row = cells->row[i] >> shift, column = cells->column[i] >> shift;
+    for (i64 k = 0; k < n_used; k++) {
+        i32 row = cells->row[s->used[k]] >> shift, column = cells->column[s->used[k]] >> shift;
         PROVEN(row >= 0 && row < side && column > 0 && column < side - 1);
-        s->by_cell[used] = (Place){(uint16_t)row, (uint16_t)column, (i32)i}; /* overwritten, unless it is used */
-        used += s->use[i];
-        in_row[row] += s->use[i];
-        in_column[column] += s->use[i];
+        s->by_rank[k] = (Place){(uint16_t)row, (uint16_t)column, (i32)k};
+        in_row[row]++;
+        in_column[column]++;
     }
     starts_of(in_row, side);
     starts_of(in_column, side);
-    for (i32 k = 0; k < used; k++)
-        s->by_column[in_column[s->by_cell[k].column]++] = s->by_cell[k];
-    for (i32 k = 0; k < used; k++)
+    for (i64 k = 0; k < n_used; k++)
+        s->by_column[in_column[s->by_rank[k].column]++] = s->by_rank[k];
+    for (i64 k = 0; k < n_used; k++)
         s->by_row[in_row[s->by_column[k].row]++] = s->by_column[k];
-    return used;
 }
 
 /* Unites the used cells that lie in one wide cell to a span; its gap is that of the last of them. Returns how many
  * spans there are. */
-static i32 unite_cells(const Cells *cells, i32 used, i64 n_cells, i32 side, const ClusterScratch *s)
+static i32 unite_cells(const Cells *cells, i64 n_used, i32 side, const ClusterScratch *s)
 {
     const f4 none = spread(INFINITY);
     f4 ends = none; /* least height, and the greatest negated */
     i32 n = 0;
     s->spans[0] = (Span){-3 * side, INFINITY, -INFINITY, 0.0f}; /* no neighbour of any */
-    s->last_cell[0] = NONE;
-    for (i64 i = 0; i < n_cells; i++)
-        s->span_of_cell[i] = 0; /* that of the cells not used */
-    for (i32 k = 0; k < used; k++) {
-        i32 i = s->by_row[k].cell, place = s->by_row[k].row * side + s->by_row[k].column;
+    for (i64 k = 0; k < n_used; k++) {
+        i32 rank = s->by_row[k].rank, i = s->used[rank], place = s->by_row[k].row * side + s->by_row[k].column;
         i32 begins = place != s->spans[n].place; /* 1 if a span begins with this cell, else 0 */
         i32 mask = -begins;                      /* all bits set if a span begins, else none */
         i4 anew = {mask, mask, mask, mask};
@@ -308,8 +295,8 @@ static i32 unite_cells(const Cells *cells, i32 used, i64 n_cells, i32 side, cons
         ends = min4((f4){cells->low[i], -cells->high[i]}, so_far);
         n += begins;
         s->spans[n] = (Span){place, ends[0], -ends[1], s->max_gap_m[i]};
-        s->last_cell[n] = i;
-        s->span_of_cell[i] = n;
+        s->last_rank[n] = rank;
+        s->span_of_rank[rank] = n;
     }
     return n;
 }
@@ -374,40 +361,35 @@ static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32
         parent[k] = parent[parent[k]];
 }
 
-/* Gives each cell the number of its span's component, NONE to those not used. Spans are in the order of their last
- * cells, and components in the order of their first spans. Returns how many components there are. */
-static i64 number_components(i64 n_cells, i32 n, const ClusterScratch *s, i64 *component)
+/* Gives each used cell the number of its span's component. Components are in the order of the spans, which are in the
+ * order of their last cells. Returns how many components there are. */
+static i64 number_components(i64 n_used, i32 n, const ClusterScratch *s, i64 *component)
 {
     i32 *const number = s->component_of_root;
-    i32 ended = 0, count = 0;
+    i32 count = 0;
     for (i32 k = 0; k <= n; k++)
         number[k] = NONE;
-    for (i64 i = 0; i < n_cells; i++) {
-        i32 k = s->span_of_cell[i];
-        s->span_in_order[ended] = k; /* overwritten by the next, unless the span ends here */
-        ended += s->last_cell[k] == i;
+    for (i64 k = 0; k < n_used; k++) {
+        i32 span = s->span_of_rank[k], *of_root = &number[s->parent[span]];
+        if (s->last_rank[span] == k && *of_root == NONE)
+            *of_root = count++;
     }
-    for (i32 e = 0; e < ended; e++) {
-        i32 root = s->parent[s->span_in_order[e]];
-        if (number[root] == NONE)
-            number[root] = count++;
-    }
-    for (i64 i = 0; i < n_cells; i++)
-        component[i] = number[s->parent[s->span_of_cell[i]]];
+    for (i64 k = 0; k < n_used; k++)
+        component[k] = number[s->parent[s->span_of_rank[k]]];
     return count;
 }
 
-/* connect, with a shift of 0, and connect_coarse, with 1. Labels each used cell with the component of its cell on the
- * grid 2^shift times as coarse (side * side), NONE if it is not used. Returns how many components there are.
+/* connect, with a shift of 0, and connect_coarse, with 1. Labels each used cell, by rank, with the component of its cell
+ * on the grid 2^shift times as coarse (side * side). Returns how many components there are.
  *
  * Cells and components keep their order outside. Inside, spans are in the order of the grid, in which neighbours lie
  * side by side in memory. */
-static i64 connect(const Cells *cells, i64 n_cells, int shift, i32 side, const ClusterScratch *s, i64 *component)
+static i64 connect(const Cells *cells, i64 n_used, int shift, i32 side, const ClusterScratch *s, i64 *component)
 {
-    i32 used = sort_places(cells, n_cells, shift, side, s);
-    i32 n = unite_cells(cells, used, n_cells, side, s);
+    sort_places(cells, n_used, shift, side, s);
+    i32 n = unite_cells(cells, n_used, side, s);
     find_components(s->spans, n, side, s->latest, s->parent);
-    return number_components(n_cells, n, s, component);
+    return number_components(n_used, n, s, component);
 }
 
 /* --------------------------------------------------------------------------------------------- clusters and parts */
@@ -419,36 +401,35 @@ typedef struct {
     uint8_t *of_oversized;                                      /* (n,) */
 } ClusterSizes;
 
-/* ClusterSizes.of_cells of n clusters, given one point of each cell. `ends` is scratch, of n. */
+/* ClusterSizes.of_cells of n clusters, given one point of each cell, and the cluster of each used one, by rank. */
 static void measure(const Cells *cells, const PointColumns *sampled, const float *beam_m, const i64 *cluster,
-                    i64 n_cells, i64 n, u4 (*ends)[2], const ClusterSizes *sizes)
+                    i64 n_used, i64 n, const ClusterScratch *s, const ClusterSizes *sizes)
 {
     enum { LOW, HIGH };
-    enum { X, Y, Z };
+    enum { X, Y, BOTTOM, TOP };
+    u4 (*const ends)[2] = s->ends;
     for (i64 g = 0; g < n; g++) {
         ends[g][LOW] = spread(INFINITY);
         ends[g][HIGH] = spread(-INFINITY);
         sizes->points[g] = 0;
         sizes->cell[g] = 0;
     }
-    i64 stride = (n_cells + 3) / 4;
-    for (i64 k = 0; k < stride; k++) /* neighbours share clusters: those far apart do not wait for one another */
-        for (i64 i = k; i < n_cells; i += stride) {
-            i64 g = cluster[i];
-            PROVEN(g >= NONE && g < n);
-            if (g == NONE)
-                continue;
-            f4 low = {sampled->x[i], sampled->y[i], cells->low[i]};
-            f4 high = {sampled->x[i], sampled->y[i], cells->high[i]};
-            ends[g][LOW] = min4(low, ends[g][LOW]);
-            ends[g][HIGH] = max4(high, ends[g][HIGH]);
+    i64 stride = (n_used + 3) / 4;
+    for (i64 first = 0; first < stride; first++) /* neighbours share clusters: those far apart do not wait */
+        for (i64 k = first; k < n_used; k += stride) {
+            i64 g = cluster[k];
+            i32 i = s->used[k];
+            PROVEN(g >= 0 && g < n);
+            f4 here = {sampled->x[i], sampled->y[i], cells->low[i], cells->high[i]};
+            ends[g][LOW] = min4(here, ends[g][LOW]);
+            ends[g][HIGH] = max4(here, ends[g][HIGH]);
             sizes->points[g] += cells->entries[i];
             sizes->cell[g] = i > sizes->cell[g] ? i : sizes->cell[g];
         }
     for (i64 g = 0; g < n; g++) {
         float width = ends[g][HIGH][X] - ends[g][LOW][X], depth = ends[g][HIGH][Y] - ends[g][LOW][Y];
-        sizes->bottom_m[g] = ends[g][LOW][Z];
-        sizes->top_m[g] = ends[g][HIGH][Z];
+        sizes->bottom_m[g] = ends[g][LOW][BOTTOM];
+        sizes->top_m[g] = ends[g][HIGH][TOP];
         sizes->extent_m[g] = __builtin_sqrtf(width * width + depth * depth);
         sizes->sqrt_range[g] = sampled->sqrt_range[sizes->cell[g]];
         sizes->beam_m[g] = beam_m[sizes->cell[g]];
@@ -492,51 +473,26 @@ static ClusterSizes sizes_from(const ClusterSizes *s, i64 n)
                           .of_oversized = s->of_oversized + n};
 }
 
-/* connect of the cells in use on the fine grid, where these are few: as `connect` gives for all cells. */
-static i64 connect_few(const Cells *cells, i64 n_cells, i32 side, const ClusterScratch *s, i64 *component)
-{
-    const Cells *few = &s->free;
-    i64 n = 0;
-    for (i64 i = 0; i < n_cells; i++) {
-        component[i] = NONE;
-        s->cell_of_free[n] = (i32)i; /* overwritten by the next, unless it is used */
-        n += s->use[i];
-    }
-    for (i64 k = 0; k < n; k++) {
-        i32 i = s->cell_of_free[k];
-        few->row[k] = cells->row[i];
-        few->column[k] = cells->column[i];
-        few->low[k] = cells->low[i];
-        few->high[k] = cells->high[i];
-        s->max_gap_m[k] = s->max_gap_m[i];
-        s->use[k] = 1;
-    }
-    i64 components = connect(few, n, 0, side, s, s->part_of_free);
-    for (i64 k = 0; k < n; k++)
-        component[s->cell_of_free[k]] = s->part_of_free[k];
-    return components;
-}
-
 /* _moved: the parts whose `cluster_of_part` is not NONE leave their clusters. A part that stays keeps its number, with
  * no points. Of a cluster that parts leave, the number of points alone is corrected. `cluster` is read for all parts
  * before their cells are moved. */
-static void move_parts(const ClusterScratch *s, i64 n_cells, i64 n_parts, i64 *cluster, const ClusterSizes *sizes,
+static void move_parts(const ClusterScratch *s, i64 n_used, i64 n_parts, i64 *cluster, const ClusterSizes *sizes,
                        const ClusterSizes *parts)
 {
     for (i64 p = 0; p < n_parts; p++) {
         parts->points[p] = s->cluster_of_part[p] == NONE ? 0 : parts->points[p];
         sizes->points[cluster[parts->cell[p]]] -= parts->points[p];
     }
-    for (i64 i = 0; i < n_cells; i++)
-        if (s->part[i] != NONE && s->cluster_of_part[s->part[i]] != NONE)
-            cluster[i] = s->cluster_of_part[s->part[i]];
+    for (i64 k = 0; k < n_used; k++)
+        if (s->cluster_of_part[s->part[k]] != NONE)
+            cluster[s->used[k]] = s->cluster_of_part[s->part[k]];
 }
 
-/* CellClusterer._before_surfaces, of n clusters: sets `use` of the cells that are free, and `before_m`. Returns whether
- * surfaces were looked for. */
-static int find_free_cells(const ClusterRules *rules, const StructureRules *r, const PersonSize *person,
-                            const Cells *cells, const PointColumns *sampled, i64 n_cells, const i64 *cluster,
-                            const ClusterSizes *sizes, i64 n, const ClusterScratch *s)
+/* CellClusterer._before_surfaces, of n clusters: uses the cells that are free, and sets their `before_m`. Returns how
+ * many they are. */
+static i64 find_free_cells(const ClusterRules *rules, const StructureRules *r, const PersonSize *person,
+                           const Cells *cells, const PointColumns *sampled, i64 n_cells, const i64 *cluster,
+                           const ClusterSizes *sizes, i64 n, const ClusterScratch *s)
 {
     i32 *const next = s->next_of_cluster, rows = 0;
     for (i64 g = 0; g < n; g++) {
@@ -545,20 +501,22 @@ static int find_free_cells(const ClusterRules *rules, const StructureRules *r, c
                     sizes->sqrt_range[g] * sizes->sqrt_range[g] < r->max_range_m;
         next[g] = tried ? 0 : NONE;
     }
+    i64 n_tried = 0, n_free = 0;
     for (i64 i = 0; i < n_cells; i++) {
-        s->use[i] = 0;
-        s->before_m[i] = INFINITY;
-        next[cluster[i]] += next[cluster[i]] != NONE;
+        s->is_free[i] = 0;
+        s->used[n_tried] = (i32)i; /* overwritten by the next, unless its cluster is tried */
+        n_tried += next[cluster[i]] != NONE;
     }
+    for (i64 k = 0; k < n_tried; k++)
+        next[cluster[s->used[k]]]++;
     for (i64 g = 0; g < n; g++)
         if (next[g] != NONE) {
             i32 of_cluster = next[g];
             next[g] = rows;
             rows += of_cluster;
         }
-    for (i64 i = 0; i < n_cells; i++)
-        if (next[cluster[i]] != NONE)
-            s->cell_of_row[next[cluster[i]]++] = (i32)i;
+    for (i64 k = 0; k < n_tried; k++)
+        s->cell_of_row[next[cluster[s->used[k]]]++] = s->used[k];
     i32 start = 0;
     for (i64 g = 0; g < n && rows; g++) {
         if (next[g] == NONE)
@@ -581,15 +539,20 @@ static int find_free_cells(const ClusterRules *rules, const StructureRules *r, c
         if (!found && !canopy)
             continue;
         for (i32 k = 0; k < m; k++) {
-            s->use[s->row_cells[k]] = !s->on_surface[k];
+            s->is_free[s->row_cells[k]] = !s->on_surface[k];
             s->before_m[s->row_cells[k]] = found ? (float)s->distance_m[k] : FAR_M;
         }
     }
-    return rows > 0;
+    for (i64 k = 0; k < n_tried; k++) {
+        i32 i = s->used[k];
+        s->used[n_free] = i; /* overwritten by the next, unless it is free */
+        n_free += s->is_free[i];
+    }
+    return n_free;
 }
 
 /* CellClusterer._leaves_surface: sets `cluster_of_part` of those that leave, which are numbered from n on. */
-static void find_leaving(const ClusterRules *rules, const StructureRules *r, const PersonSize *person, i64 n_cells,
+static void find_leaving(const ClusterRules *rules, const StructureRules *r, const PersonSize *person, i64 n_used,
                          const i64 *cluster, const ClusterSizes *sizes, i64 n, const ClusterSizes *parts, i64 n_parts,
                          const ClusterScratch *s)
 {
@@ -597,12 +560,13 @@ static void find_leaving(const ClusterRules *rules, const StructureRules *r, con
         s->front_m[p] = -INFINITY;
         s->back_m[p] = INFINITY;
     }
-    for (i64 i = 0; i < n_cells; i++) {
-        i64 p = s->part[i];
-        if (p == NONE || !(s->before_m[i] < INFINITY))
+    for (i64 k = 0; k < n_used; k++) {
+        i64 p = s->part[k];
+        float before_m = s->before_m[s->used[k]];
+        if (!(before_m < INFINITY))
             continue;
-        s->front_m[p] = maxf(s->before_m[i], s->front_m[p]);
-        s->back_m[p] = minf(s->before_m[i], s->back_m[p]);
+        s->front_m[p] = maxf(before_m, s->front_m[p]);
+        s->back_m[p] = minf(before_m, s->back_m[p]);
     }
     const float thickness_m = (float)r->thickness_m;
     for (i64 p = 0; p < n_parts; p++) {
@@ -633,36 +597,40 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structu
     /* 1. Clusters on the coarse grid. */
     for (i64 i = 0; i < n_cells; i++) {
         s->max_gap_m[i] = rules->max_gap_m + rules->max_gap_beams * beam_m[i];
-        s->use[i] = 1;
+        s->used[i] = (i32)i;
     }
     i64 n = connect(cells, n_cells, 1, rules->coarse_side, s, cluster);
-    measure(cells, sampled, beam_m, cluster, n_cells, n, s->ends, sizes);
+    measure(cells, sampled, beam_m, cluster, n_cells, n, s, sizes);
 
     /* 2. Parts, on the fine grid, of those that are oversized or may hold a person and more. Parts of oversized
      * clusters, and those of a person's size, leave their clusters. */
+    i64 n_used = 0;
     for (i64 g = 0; g < n; g++)
         s->divided[g] = sizes->extent_m[g] >= structure->oversized_m || may_hold_person(rules, person, sizes, g);
-    for (i64 i = 0; i < n_cells; i++)
-        s->use[i] = s->divided[cluster[i]];
-    i64 n_parts = connect(cells, n_cells, 0, rules->fine_side, s, s->part);
+    for (i64 i = 0; i < n_cells; i++) {
+        s->used[n_used] = (i32)i; /* overwritten by the next, unless it is used */
+        n_used += s->divided[cluster[i]];
+    }
+    i64 n_parts = connect(cells, n_used, 0, rules->fine_side, s, s->part);
     ClusterSizes parts = sizes_from(sizes, n);
-    measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
+    measure(cells, sampled, beam_m, s->part, n_used, n_parts, s, &parts);
     for (i64 p = 0; p < n_parts; p++) {
         parts.of_oversized[p] = sizes->extent_m[cluster[parts.cell[p]]] >= structure->oversized_m;
         int leaves = parts.of_oversized[p] || may_be_person_part(rules, person, &parts, p);
         s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
     }
-    move_parts(s, n_cells, n_parts, cluster, sizes, &parts);
+    move_parts(s, n_used, n_parts, cluster, sizes, &parts);
     n += n_parts;
 
     /* 3. Parts before surfaces. */
-    if (!find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s))
+    n_used = find_free_cells(rules, structure, person, cells, sampled, n_cells, cluster, sizes, n, s);
+    if (!n_used)
         return n;
-    n_parts = connect_few(cells, n_cells, rules->fine_side, s, s->part);
+    n_parts = connect(cells, n_used, 0, rules->fine_side, s, s->part);
     parts = sizes_from(sizes, n);
-    measure(cells, sampled, beam_m, s->part, n_cells, n_parts, s->ends, &parts);
-    find_leaving(rules, structure, person, n_cells, cluster, sizes, n, &parts, n_parts, s);
-    move_parts(s, n_cells, n_parts, cluster, sizes, &parts);
+    measure(cells, sampled, beam_m, s->part, n_used, n_parts, s, &parts);
+    find_leaving(rules, structure, person, n_used, cluster, sizes, n, &parts, n_parts, s);
+    move_parts(s, n_used, n_parts, cluster, sizes, &parts);
     return n + n_parts;
 }
 
