@@ -47,11 +47,12 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
         float scale = grid->cells_per_unit / points->sqrt_range[i];
         cell[i] = place_in_table(line_of(points->x[i], scale, centre), line_of(points->y[i], scale, centre), side);
     }
-    for (i64 i = 0; i < n; i++) {
-        PROVEN(cell[i] >= 0 && cell[i] < side * side);
-        __builtin_prefetch(&table[cell[i + AHEAD < n ? i + AHEAD : i]], 1);
-        table[cell[i]] = (i32)i;
-    }
+    for (i64 i = 0, ahead = n < AHEAD ? n : n - AHEAD; i < n; ahead = n)
+        for (; i < ahead; i++) {
+            PROVEN(cell[i] >= 0 && cell[i] < side * side);
+            __builtin_prefetch(&table[cell[i + AHEAD]], 1);
+            table[cell[i]] = (i32)i;
+        }
     for (i64 i = 0; i < n; i++) {
         sample[count] = i; /* overwritten by the next, unless it is the last one of its cell */
         count += table[cell[i]] == i;
@@ -94,8 +95,14 @@ EXPORT i64 modt_low_points(const Grid *grid, const PointColumns *points, const u
     const i32 centre = grid->centre, side = grid->side / 2 + 1;
     const i64 n_tall = tall->n_points;
     i64 n = 0, used;
-    for (i32 w = 0; w < side * side; w++)
-        table[w] = NONE;
+    float reach = max_sqrt_range; /* of all points that are looked at */
+    for (i64 i = n_tall; i < n_tall + n_low; i++)
+        reach = maxf(reach, points->sqrt_range[i]);
+    i32 half = (i32)(reach * grid->cells_per_unit) / 2 + 2, first = centre / 2 > half ? centre / 2 - half : 0;
+    i32 end = centre / 2 + half < side ? centre / 2 + half + 1 : side;
+    for (i32 row = first; row < end; row++)
+        for (i32 column = first; column < end; column++)
+            table[row * side + column] = NONE;
     for (i64 c = 0; c < tall->n_cells; c++) {
         int8_t kind = sqrt_range[c] < max_sqrt_range ? tall->kind_of_cell[c] : GROUND_KIND;
         is_left_over[c] = (kind == LOW_KIND) | (kind == SPARSE_KIND);
@@ -112,6 +119,7 @@ EXPORT i64 modt_low_points(const Grid *grid, const PointColumns *points, const u
         i64 i = places[p];
         float scale = grid->cells_per_unit / points->sqrt_range[i];
         i32 row = line_of(points->x[i], scale, centre) >> 1, column = line_of(points->y[i], scale, centre) >> 1;
+        PROVEN(row > first && row < end - 1 && column > first && column < end - 1);
         beside[p] = row * side + column; /* until the last pass the wide cell */
         if (i >= n_tall && is_clear[i - n_tall] && table[beside[p]] == NONE)
             table[beside[p]] = CLEAR;
@@ -166,6 +174,14 @@ typedef struct {
     float low, high; /* height [m] */
     float max_gap_m; /* vertical gap below which it is connected with those after it */
 } Span;
+enum { PLACE, LOW, HIGH, MAX_GAP }; /* members of a span, as a row of four */
+
+static ALWAYS_INLINE u4 as_row(const Span *span)
+{
+    u4 row;
+    __builtin_memcpy(&row, span, sizeof row);
+    return row;
+}
 
 /* Scratch of modt_cluster, for n cells and a fine grid of `side` rows. The coarse grid has no more rows, so that the
  * scratch serves both. Some of the cells are used, in ascending order; the number of one among these is its rank. A
@@ -327,17 +343,16 @@ static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32
             latest[column_before] = k - 1; /* the row of the span before is an earlier one */
         i32 column = place - row_start;
         const i32 *behind = latest + column - 1; /* to the left behind, behind, and to the right behind */
-        const Span *here = &spans[k], *left = here - 1;
-        const Span *behind_left = &spans[behind[0]], *behind_same = &spans[behind[1]];
-        const Span *behind_right = &spans[behind[2]];
+        const Span *here = &spans[k];
 
         /* The four that may be neighbours, each in its lane. */
-        i4 places = {left->place, behind_left->place, behind_same->place, behind_right->place};
-        f4 low = {left->low, behind_left->low, behind_same->low, behind_right->low};
-        f4 high = {left->high, behind_left->high, behind_same->high, behind_right->high};
-        f4 max_gap_m = {left->max_gap_m, behind_left->max_gap_m, behind_same->max_gap_m, behind_right->max_gap_m};
-        f4 gap_m = max4(low, spread(here->low)) - min4(high, spread(here->high));
-        i4 connected = (places == place - back) & (gap_m < max_gap_m);
+        u4 neighbours[4] = {as_row(here - 1), as_row(&spans[behind[0]]), as_row(&spans[behind[1]]),
+                            as_row(&spans[behind[2]])};
+        u4 of_neighbours[4];
+        transpose(neighbours, of_neighbours);
+        i4 places = (i4)of_neighbours[PLACE];
+        f4 gap_m = max4(of_neighbours[LOW], spread(here->low)) - min4(of_neighbours[HIGH], spread(here->high));
+        i4 connected = (places == place - back) & (gap_m < of_neighbours[MAX_GAP]);
 
         i4 itself = {k, k, k, k};
         i4 ancestors = {parent[parent[k - 1]], parent[parent[behind[0]]], parent[parent[behind[1]]],
@@ -405,12 +420,12 @@ typedef struct {
 static void measure(const Cells *cells, const PointColumns *sampled, const float *beam_m, const i64 *cluster,
                     i64 n_used, i64 n, const ClusterScratch *s, const ClusterSizes *sizes)
 {
-    enum { LOW, HIGH };
+    enum { LEAST, GREATEST };
     enum { X, Y, BOTTOM, TOP };
     u4 (*const ends)[2] = s->ends;
     for (i64 g = 0; g < n; g++) {
-        ends[g][LOW] = spread(INFINITY);
-        ends[g][HIGH] = spread(-INFINITY);
+        ends[g][LEAST] = spread(INFINITY);
+        ends[g][GREATEST] = spread(-INFINITY);
         sizes->points[g] = 0;
         sizes->cell[g] = 0;
     }
@@ -421,15 +436,15 @@ static void measure(const Cells *cells, const PointColumns *sampled, const float
             i32 i = s->used[k];
             PROVEN(g >= 0 && g < n);
             f4 here = {sampled->x[i], sampled->y[i], cells->low[i], cells->high[i]};
-            ends[g][LOW] = min4(here, ends[g][LOW]);
-            ends[g][HIGH] = max4(here, ends[g][HIGH]);
+            ends[g][LEAST] = min4(here, ends[g][LEAST]);
+            ends[g][GREATEST] = max4(here, ends[g][GREATEST]);
             sizes->points[g] += cells->entries[i];
             sizes->cell[g] = i > sizes->cell[g] ? i : sizes->cell[g];
         }
     for (i64 g = 0; g < n; g++) {
-        float width = ends[g][HIGH][X] - ends[g][LOW][X], depth = ends[g][HIGH][Y] - ends[g][LOW][Y];
-        sizes->bottom_m[g] = ends[g][LOW][BOTTOM];
-        sizes->top_m[g] = ends[g][HIGH][TOP];
+        float width = ends[g][GREATEST][X] - ends[g][LEAST][X], depth = ends[g][GREATEST][Y] - ends[g][LEAST][Y];
+        sizes->bottom_m[g] = ends[g][LEAST][BOTTOM];
+        sizes->top_m[g] = ends[g][GREATEST][TOP];
         sizes->extent_m[g] = __builtin_sqrtf(width * width + depth * depth);
         sizes->sqrt_range[g] = sampled->sqrt_range[sizes->cell[g]];
         sizes->beam_m[g] = beam_m[sizes->cell[g]];

@@ -87,17 +87,6 @@ typedef struct {
 /* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */
 typedef enum { GROUND = 1, STEEP = 2, RAMP = 4 } Kind;
 
-/* Columns of four rows of four: a transposition. */
-static ALWAYS_INLINE void transpose(const u4 row[4], u4 column[4])
-{
-    u4 first01 = MIXED(row[0], row[1], 0, 4, 1, 5), last01 = MIXED(row[0], row[1], 2, 6, 3, 7);
-    u4 first23 = MIXED(row[2], row[3], 0, 4, 1, 5), last23 = MIXED(row[2], row[3], 2, 6, 3, 7);
-    column[0] = MIXED(first01, first23, 0, 1, 4, 5);
-    column[1] = MIXED(first01, first23, 2, 3, 6, 7);
-    column[2] = MIXED(last01, last23, 0, 1, 4, 5);
-    column[3] = MIXED(last01, last23, 2, 3, 6, 7);
-}
-
 /* The x, y and z of n points, four at a time. */
 static ALWAYS_INLINE void take_columns(const u4 *points, i64 n, float *restrict x, float *restrict y,
                                        float *restrict z)

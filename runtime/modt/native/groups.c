@@ -236,36 +236,55 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
     }
 }
 
+/* Sums over reflectances, four at a time. */
+typedef struct {
+    d4 total, squares;
+    i4 measured, bright, dark; /* their numbers, negated */
+    f4 greatest;
+} Reflectances;
+
+/* Adds four reflectances; negative ones are not measured. */
+static ALWAYS_INLINE void add_reflectances(Reflectances *sum, f4 reflectance, float bright, float dark)
+{
+    i4 measured = reflectance >= 0.0f;
+    f4 value = (f4)((i4)reflectance & measured), square = value * value;
+    sum->total += (d4){value[0], value[1], value[2], value[3]};
+    sum->squares += (d4){square[0], square[1], square[2], square[3]};
+    sum->measured += measured;
+    sum->bright += value > bright;
+    sum->dark += measured & (value < dark);
+    sum->greatest = max4(value, sum->greatest);
+}
+
 /* reflectance_statistics: mean, standard deviation, maximum, share of bright and share of dark ones of the
  * measured reflectances of each of n groups; not a number without any. Points are rows of `width`, of which the
  * fourth is it. */
 EXPORT void modt_reflectance_statistics(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
                                         float bright, float dark, double (*statistics)[5])
 {
-    i64 last = offsets[n];
+    i64 last = offsets[n] - 1;
+    const float *reflectance = points + 3;
     for (i64 g = 0; g < n; g++) {
-        double total = 0.0, squares = 0.0;
-        i64 n_measured = 0, n_bright = 0, n_dark = 0;
-        float greatest = -INFINITY;
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
-            __builtin_prefetch(&points[index[i + AHEAD < last ? i + AHEAD : i] * width + 3]);
-            float r = points[index[i] * width + 3];
-            if (r < 0.0f)
-                continue;
-            n_measured++;
-            total += r;
-            squares += r * r;
-            n_bright += r > bright;
-            n_dark += r < dark;
-            greatest = maxf(r, greatest);
+        Reflectances sum = {0};
+        i64 i = offsets[g], end = offsets[g + 1];
+        for (; i + 4 <= end; i += 4) {
+            __builtin_prefetch(&reflectance[index[i + AHEAD < last ? i + AHEAD : last] * width]);
+            f4 four = {reflectance[index[i] * width], reflectance[index[i + 1] * width],
+                       reflectance[index[i + 2] * width], reflectance[index[i + 3] * width]};
+            add_reflectances(&sum, four, bright, dark);
         }
-        double count = (double)n_measured, mean = total / count;
+        for (; i < end; i++)
+            add_reflectances(&sum, (f4){reflectance[index[i] * width], NONE, NONE, NONE}, bright, dark);
+        double count = -(double)(sum.measured[0] + sum.measured[1] + sum.measured[2] + sum.measured[3]);
+        double mean = ((sum.total[0] + sum.total[1]) + (sum.total[2] + sum.total[3])) / count;
+        double squares = (sum.squares[0] + sum.squares[1]) + (sum.squares[2] + sum.squares[3]);
         double variance = squares / count - mean * mean;
+        float greatest = maxf(maxf(sum.greatest[0], sum.greatest[1]), maxf(sum.greatest[2], sum.greatest[3]));
         double *of_group = statistics[g];
         of_group[0] = mean;
         of_group[1] = __builtin_sqrt(variance < 0.0 ? 0.0 : variance);
-        of_group[2] = n_measured ? (double)greatest : mean;
-        of_group[3] = (double)n_bright / count;
-        of_group[4] = (double)n_dark / count;
+        of_group[2] = count > 0.0 ? (double)greatest : mean;
+        of_group[3] = -(double)(sum.bright[0] + sum.bright[1] + sum.bright[2] + sum.bright[3]) / count;
+        of_group[4] = -(double)(sum.dark[0] + sum.dark[1] + sum.dark[2] + sum.dark[3]) / count;
     }
 }

@@ -46,6 +46,17 @@ static inline i32 bits_of(float a) { i32 bits; __builtin_memcpy(&bits, &a, sizeo
 static inline float float_of(i32 bits) { float a; __builtin_memcpy(&a, &bits, sizeof a); return a; }
 static inline float magnitude(float a) { return __builtin_fabsf(a); }
 
+/* Columns of four rows of four: a transposition. */
+static ALWAYS_INLINE void transpose(const u4 row[4], u4 column[4])
+{
+    u4 first01 = MIXED(row[0], row[1], 0, 4, 1, 5), last01 = MIXED(row[0], row[1], 2, 6, 3, 7);
+    u4 first23 = MIXED(row[2], row[3], 0, 4, 1, 5), last23 = MIXED(row[2], row[3], 2, 6, 3, 7);
+    column[0] = MIXED(first01, first23, 0, 1, 4, 5);
+    column[1] = MIXED(first01, first23, 2, 3, 6, 7);
+    column[2] = MIXED(last01, last23, 0, 1, 4, 5);
+    column[3] = MIXED(last01, last23, 2, 3, 6, 7);
+}
+
 /* PointColumns of grids.py: n points [m, sensor frame], and square roots of their ranges. */
 typedef struct {
     float *x, *y, *z, *sqrt_range; /* (n,) */
@@ -113,8 +124,8 @@ typedef struct {
 
 /* Scratch of find_surfaces, for n cells. */
 typedef struct {
-    i32 *rest, *order;                  /* (n,) cells on no surface yet; those near a line */
-    double *off_m, *along_m, *length_m; /* (n,) distance from a line, position along it, length of a cell along it */
+    i32 *rest, *near;           /* (n,) cells on no surface yet; those near a line */
+    double *along_m, *length_m; /* (n,) position along a line, and length of a cell along it */
 } SurfaceScratch;
 
 void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *s);

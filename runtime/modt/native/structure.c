@@ -8,65 +8,67 @@ typedef struct {
 void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *s)
 {
     TAKE(end, s->rest, n);
-    TAKE(end, s->off_m, n);
+    TAKE(end, s->near, n);
     TAKE(end, s->along_m, n);
-    TAKE(end, s->order, n);
     TAKE(end, s->length_m, n);
 }
 
-/* Number of n points, a multiple of four, that are within `thickness_m` of a line */
+/* Number of n points, a multiple of LANES, that are within `thickness_m` of a line */
 static i32 votes(const float *x, const float *y, i64 n, float cosine, float sine, float distance_m, float thickness_m)
 {
-    const f4 c = spread(cosine), s = spread(sine), d = spread(distance_m), limit = spread(thickness_m);
-    i4 count = {0, 0, 0, 0};
-    for (i64 i = 0; i < n; i += 4) {
-        f4 off = *(const u4 *)(x + i) * c + *(const u4 *)(y + i) * s - d;
-        count -= (off < limit) & (off > -limit);
+    i32 count = 0;
+    for (i64 i = 0; i < n; i++) {
+        float off_m = x[i] * cosine + y[i] * sine - distance_m;
+        count += (off_m < thickness_m) & (off_m > -thickness_m);
     }
-    return count[0] + count[1] + count[2] + count[3];
+    return count;
 }
 
-/* Least squares of the points near a line; 0 if they have no direction. `rest` are n rows. */
-static int refine(Line *line, const double *x, const double *y, const i32 *rest, i64 n, double thickness_m)
+/* Those of n rows `rest` that are within `thickness_m` of a line, into `near`; returns how many they are. */
+static i64 near_line(const Line *line, const double *x, const double *y, const i32 *rest, i64 n, double thickness_m,
+                     i32 *near)
+{
+    i64 count = 0;
+    for (i64 k = 0; k < n; k++) {
+        i32 i = rest[k];
+        double off_m = x[i] * line->cosine + y[i] * line->sine - line->distance_m;
+        near[count] = i; /* overwritten by the next, unless it is near */
+        count += (off_m < thickness_m) & (off_m > -thickness_m);
+    }
+    return count;
+}
+
+/* Least squares of the n points near a line; 0 if they have no direction. */
+static int refine(Line *line, const double *x, const double *y, const i32 *near, i64 n)
 {
     double x_sum = 0.0, y_sum = 0.0, difference = 0.0, product = 0.0;
-    i64 count = 0;
-    for (int pass = 0; pass < 2; pass++) {
-        double x_mean = x_sum / (double)count, y_mean = y_sum / (double)count;
-        for (i64 k = 0; k < n; k++) {
-            double u = x[rest[k]], v = y[rest[k]];
-            double off = u * line->cosine + v * line->sine - line->distance_m;
-            if (!(off < thickness_m && off > -thickness_m))
-                continue;
-            if (pass == 0) {
-                x_sum += u;
-                y_sum += v;
-                count++;
-            } else {
-                u -= x_mean;
-                v -= y_mean;
-                difference += u * u - v * v;
-                product += u * v;
-            }
-        }
-        if (count == 0)
-            return 0;
+    for (i64 k = 0; k < n; k++) {
+        x_sum += x[near[k]];
+        y_sum += y[near[k]];
+    }
+    double x_mean = x_sum / (double)n, y_mean = y_sum / (double)n;
+    for (i64 k = 0; k < n; k++) {
+        double u = x[near[k]] - x_mean, v = y[near[k]] - y_mean;
+        difference += u * u - v * v;
+        product += u * v;
     }
     product *= 2;
     double scatter = __builtin_sqrt(difference * difference + product * product);
-    if (!(scatter > 0))
+    if (!(scatter > 0)) /* nor if there are none */
         return 0;
     line->cosine = __builtin_sqrt((1 - difference / scatter) / 2);
     line->sine = __builtin_copysign(__builtin_sqrt((1 + difference / scatter) / 2), -product);
-    line->distance_m = x_sum / (double)count * line->cosine + y_sum / (double)count * line->sine;
+    line->distance_m = x_mean * line->cosine + y_mean * line->sine;
     return 1;
 }
 
-/* _best_line of the n rows `rest`; 0 without one */
-static int best_line(const StructureRules *r, const double *x, const double *y, const i32 *rest, i64 n, Line *line)
+/* _best_line of the n rows `rest`; 0 without one. `near` is scratch. */
+static int best_line(const StructureRules *r, const double *x, const double *y, const i32 *rest, i64 n, i32 *near,
+                     Line *line)
 {
+    enum { LANES = 8 };
     static const i64 paired[] = {16, 3}; /* PAIRED */
-    float sample_x[MAX_SAMPLE + 3], sample_y[MAX_SAMPLE + 3];
+    float sample_x[MAX_SAMPLE + LANES], sample_y[MAX_SAMPLE + LANES];
     if (n < r->min_cells)
         return 0;
     i64 stride = (n + r->max_cells - 1) / r->max_cells, count = 0;
@@ -75,7 +77,7 @@ static int best_line(const StructureRules *r, const double *x, const double *y, 
         sample_y[count++] = (float)y[rest[k]];
     }
     PROVEN(count <= MAX_SAMPLE);
-    i64 padded = (count + 3) / 4 * 4;
+    i64 padded = (count + LANES - 1) / LANES * LANES;
     for (i64 k = count; k < padded; k++)
         sample_x[k] = sample_y[k] = INFINITY; /* near no line: the product is infinite, or no number */
     i32 most = 0;
@@ -88,14 +90,14 @@ static int best_line(const StructureRules *r, const double *x, const double *y, 
                 continue;
             float cosine = -dy / base_m, sine = dx / base_m;
             float distance_m = sample_x[k] * cosine + sample_y[k] * sine;
-            i32 near = votes(sample_x, sample_y, padded, cosine, sine, distance_m, (float)r->thickness_m);
-            if (near > most) {
-                most = near;
+            i32 n_near = votes(sample_x, sample_y, padded, cosine, sine, distance_m, (float)r->thickness_m);
+            if (n_near > most) {
+                most = n_near;
                 *line = (Line){cosine, sine, distance_m};
             }
         }
     for (i32 k = 0; most && k < r->refinements; k++)
-        most = refine(line, x, y, rest, n, r->thickness_m);
+        most = refine(line, x, y, near, near_line(line, x, y, rest, n, r->thickness_m, near));
     return most > 0;
 }
 
@@ -157,36 +159,33 @@ i64 find_surfaces(const StructureRules *r, const double *x, const double *y, con
         before_m[i] = INFINITY;
     }
     for (i32 lines = 0; lines < r->max_lines; lines++) {
-        i64 rest = 0, near = 0;
+        i64 rest = 0;
         Line line;
         for (i64 i = 0; i < n; i++) {
             s->rest[rest] = (i32)i;
             rest += !on_surface[i];
         }
-        if (!best_line(r, x, y, s->rest, rest, &line))
+        if (!best_line(r, x, y, s->rest, rest, s->near, &line))
             break;
-        for (i64 i = 0; i < n; i++) {
-            s->off_m[i] = x[i] * line.cosine + y[i] * line.sine - line.distance_m;
-            s->along_m[i] = y[i] * line.cosine - x[i] * line.sine;
-        }
-        for (i64 k = 0; k < rest; k++) {
-            i32 i = s->rest[k];
-            s->order[near] = i;
-            near += s->off_m[i] < r->thickness_m && s->off_m[i] > -r->thickness_m;
-        }
+        i64 near = near_line(&line, x, y, s->rest, rest, r->thickness_m, s->near);
         for (i64 k = 0; k < near; k++) {
-            i32 i = s->order[k];
-            s->length_m[i] = width_m[i] * (1 + __builtin_fabs(s->along_m[i]) / __builtin_sqrt(x[i] * x[i] + y[i] * y[i]));
+            i32 i = s->near[k];
+            double along_m = y[i] * line.cosine - x[i] * line.sine;
+            s->along_m[i] = along_m;
+            s->length_m[i] = width_m[i] * (1 + __builtin_fabs(along_m) / __builtin_sqrt(x[i] * x[i] + y[i] * y[i]));
         }
-        sort_rows(s->along_m, s->order, near);
+        sort_rows(s->along_m, s->near, near);
         double first_m = 0.0, last_m = 0.0;
-        i64 kept = long_runs(r, s->along_m, s->length_m, s->order, near, on_surface, &first_m, &last_m);
+        i64 kept = long_runs(r, s->along_m, s->length_m, s->near, near, on_surface, &first_m, &last_m);
         if (!kept)
             break;
         found += kept;
-        for (i64 i = 0; i < n; i++)
-            if (s->along_m[i] > first_m - r->beside_m && s->along_m[i] < last_m + r->beside_m)
-                before_m[i] = mind(before_m[i], line.distance_m > 0 ? -s->off_m[i] : s->off_m[i]);
+        for (i64 i = 0; i < n; i++) {
+            double off_m = x[i] * line.cosine + y[i] * line.sine - line.distance_m;
+            double along_m = y[i] * line.cosine - x[i] * line.sine;
+            if (along_m > first_m - r->beside_m && along_m < last_m + r->beside_m)
+                before_m[i] = mind(before_m[i], line.distance_m > 0 ? -off_m : off_m);
+        }
     }
     return found;
 }
