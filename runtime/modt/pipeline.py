@@ -63,7 +63,7 @@ class TrackingStage(Protocol):
     def static_tracks(self, stamp_s: float) -> StaticTracks:
         """Tracks that a frame at this time may continue, as the odometry needs them."""
 
-    def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+    def track(self, stamp_s: float, proposals: Proposals, located: Located, points: Float32) -> TrackedFrame:
         """Predict, associate and update; afterwards every proposal belongs to one track."""
 
     def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
@@ -113,7 +113,7 @@ class Pipeline:
         frame = self.mount.level(frame)
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
-        tracked = run(TRACKING, self.tracker.track, frame.time_s, proposals, located)
+        tracked = run(TRACKING, self.tracker.track, frame.time_s, proposals, located, frame.points)
         proposals = tracked.proposals
         motion = tracked.motion
         evidence = tracked.evidence  # shares its arrays with own_evidence, so it shows what the fusion writes

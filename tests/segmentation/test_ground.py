@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.grids import SECTORS, PointColumns, pseudo_angle
+from modt.geometry import pseudo_angle
+from modt.segmentation.grids import SECTORS, PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.tuning import SegmentationTuning
 from tests.segmentation import reference, scans

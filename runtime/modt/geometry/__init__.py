@@ -1,5 +1,6 @@
 """Transforms, boxes, k-DOPs and the field of view."""
 
+from modt.geometry.bearings import pseudo_angle
 from modt.geometry.boxes import (
     corners,
     inverse,
@@ -21,6 +22,7 @@ __all__ = [
     "FieldOfView",
     "corners",
     "inverse",
+    "pseudo_angle",
     "quaternion_of",
     "rotation_of",
     "rotation_zyx",

@@ -1,4 +1,4 @@
-/* The extended Kalman filter of tracks (tracking/kalman.py), and what proposals show of their tracks
+/* The filters of tracks (tracking/kalman.py, tracking/motion_filter.py), and what proposals show of their tracks
  * (tracking/extent.py).
  *
  * A state is x, y [m], heading [rad], speed [m/s]; M states are rows of four numbers, and their covariances rows of
@@ -25,15 +25,14 @@ static double wrap(double angle)
     return (from < 0.0 && rest > 0.0 ? full_turn - rest : rest) - PI;
 }
 
-/* The covariance P after an observation of `n_observed` components of the state, the first of which is `first`:
- * P less the gain times the rows observed, and the mean of that and its transpose, which rounding made differ. */
-static void reduce_covariance(double P[N_STATE][N_STATE], const double gain[N_STATE][2], int first, int n_observed)
+/* The covariance P after an observed position: P less the gain times the rows observed, and the mean of that and its
+ * transpose, which rounding made differ. */
+static void reduce_covariance(double P[N_STATE][N_STATE], const double gain[N_STATE][2])
 {
     double reduced[N_STATE][N_STATE];
     for (int i = 0; i < N_STATE; i++)
         for (int k = 0; k < N_STATE; k++)
-            reduced[i][k] = P[i][k] - (n_observed == 1 ? gain[i][0] * P[first][k]
-                                                       : gain[i][0] * P[first][k] + gain[i][1] * P[first + 1][k]);
+            reduced[i][k] = P[i][k] - (gain[i][0] * P[X][k] + gain[i][1] * P[Y][k]);
     for (int i = 0; i < N_STATE; i++)
         for (int k = 0; k < N_STATE; k++)
             P[i][k] = (reduced[i][k] + reduced[k][i]) / 2;
@@ -123,26 +122,165 @@ EXPORT void modt_update(double (*states)[N_STATE], double (*covariances)[N_STATE
             x[i] += gain[i][0] * innovation_x + gain[i][1] * innovation_y;
         }
         x[HEADING] = wrap(x[HEADING]);
-        reduce_covariance(P, gain, X, 2);
+        reduce_covariance(P, gain);
         turn_about(x, P);
     }
 }
 
-/* kalman.observe_speed: the states and covariances of n rows of the table after an observed speed, in place. */
-EXPORT void modt_observe_speed(double (*states)[N_STATE], double (*covariances)[N_STATE][N_STATE], const i64 *rows,
-                               i64 n, double speed, double variance)
+/* motion_filter: states of what moves are x, y [m] and their velocities [m/s], those of what rests x and y. */
+enum { VX = 2 };
+
+/* motion_filter._mixed, of the position: mean and covariance with a share of another estimate. */
+static void mix(double x[2], double P[2][2], const double other[2], const double other_P[2][2], double share)
+{
+    const double keep = 1 - share, spread = share * keep;
+    double step[2];
+    for (int i = 0; i < 2; i++) {
+        step[i] = other[i] - x[i];
+        x[i] += share * step[i];
+    }
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++)
+            P[i][k] = (keep * P[i][k] + share * other_P[i][k]) + spread * step[i] * step[k];
+}
+
+/* motion_filter._mixed and _started: what moves takes in a share of what rests, which starts at an unknown velocity. */
+static void mix_started(double x[N_STATE], double P[N_STATE][N_STATE], const double rest[2], const double rest_P[2][2],
+                        double start_variance, double share)
+{
+    const double keep = 1 - share, spread = share * keep;
+    double step[N_STATE];
+    for (int i = 0; i < N_STATE; i++) {
+        step[i] = (i < VX ? rest[i] : 0.0) - x[i];
+        x[i] += share * step[i];
+    }
+    for (int i = 0; i < N_STATE; i++)
+        for (int k = 0; k < N_STATE; k++) {
+            double other = i < VX && k < VX ? rest_P[i][k] : i >= VX && i == k ? start_variance : 0.0;
+            P[i][k] = (keep * P[i][k] + share * other) + spread * step[i] * step[k];
+        }
+}
+
+/* motion_filter._moved */
+static void move(double x[N_STATE], double P[N_STATE][N_STATE], double dt_s, double acceleration_variance,
+                 double turn_variance)
+{
+    const double dt2 = dt_s * dt_s;
+    const double variance = acceleration_variance + turn_variance * (x[VX] * x[VX] + x[VX + 1] * x[VX + 1]);
+    double cross[2][2];
+    for (int i = 0; i < 2; i++) {
+        x[i] += dt_s * x[i + VX];
+        for (int k = 0; k < 2; k++)
+            cross[i][k] = P[i][k + VX];
+    }
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++) {
+            P[i][k] += dt_s * (cross[i][k] + cross[k][i]) + dt2 * P[i + VX][k + VX];
+            P[i][k + VX] += dt_s * P[i + VX][k + VX];
+        }
+    for (int i = 0; i < 2; i++) {
+        P[i][i] += dt2 * dt2 / 4 * variance;
+        P[i][i + VX] += dt2 * dt_s / 2 * variance;
+        P[i + VX][i + VX] += dt2 * variance;
+    }
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++)
+            P[k + VX][i] = P[i][k + VX];
+}
+
+/* motion_filter.MotionFilter._predict: mixes the hypotheses of n tracks, and predicts both, in place. */
+EXPORT void modt_predict_motion(double (*moving)[N_STATE], double (*moving_P)[N_STATE][N_STATE], double (*resting)[2],
+                                double (*resting_P)[2][2], i64 n, const double *resting_share,
+                                const double *moving_share, double dt_s, double start_variance, double creep_variance,
+                                double acceleration_variance, double turn_variance)
 {
     for (i64 m = 0; m < n; m++) {
-        double *x = states[rows[m]];
-        double(*P)[N_STATE] = covariances[rows[m]];
-        double innovation = speed - x[SPEED];
-        double gain[N_STATE][2] = {{0.0}};
+        const double position[2] = {moving[m][X], moving[m][Y]};
+        const double position_P[2][2] = {{moving_P[m][X][X], moving_P[m][X][Y]}, {moving_P[m][Y][X], moving_P[m][Y][Y]}};
+        mix_started(moving[m], moving_P[m], resting[m], resting_P[m], start_variance, resting_share[m]);
+        mix(resting[m], resting_P[m], position, position_P, moving_share[m]);
+        move(moving[m], moving_P[m], dt_s, acceleration_variance, turn_variance);
+        for (int i = 0; i < 2; i++)
+            resting_P[m][i][i] += creep_variance;
+    }
+}
+
+/* motion_filter._filtered: n_state numbers and their covariance, after the position z of covariance R. Returns how well
+ * it was expected: squared distance and determinant. */
+static ALWAYS_INLINE void filter_position(double *x, double *P, int n_state, const double z[2], const double R[2][2],
+                                          double *distance, double *determinant)
+{
+    const double xx = P[0] + R[X][X], xy = P[1] + R[X][Y], yy = P[n_state + 1] + R[Y][Y];
+    const double det = xx * yy - xy * xy, off_x = z[X] - x[X], off_y = z[Y] - x[Y];
+    double gain_x[N_STATE], gain_y[N_STATE], after[N_STATE * N_STATE];
+    *distance = ((yy * off_x - xy * off_y) * off_x + (xx * off_y - xy * off_x) * off_y) / det;
+    *determinant = det;
+    for (int i = 0; i < n_state; i++) {
+        gain_x[i] = (P[i * n_state] * yy - P[i * n_state + 1] * xy) / det;
+        gain_y[i] = (P[i * n_state + 1] * xx - P[i * n_state] * xy) / det;
+    }
+    for (int i = 0; i < n_state; i++) {
+        x[i] += gain_x[i] * off_x + gain_y[i] * off_y;
+        for (int k = 0; k < n_state; k++)
+            after[i * n_state + k] = P[i * n_state + k] - (gain_x[i] * P[k] + gain_y[i] * P[n_state + k]);
+    }
+    for (int i = 0; i < n_state; i++)
+        for (int k = 0; k < n_state; k++)
+            P[i * n_state + k] = (after[i * n_state + k] + after[k * n_state + i]) / 2;
+}
+
+/* motion_filter.MotionFilter._update: both hypotheses of n rows of the table after positions, in place. `fits` are
+ * four rows of n: distance and determinant of the moving hypothesis, then of the resting one. */
+EXPORT void modt_update_motion(double (*moving)[N_STATE], double (*moving_P)[N_STATE][N_STATE], double (*resting)[2],
+                               double (*resting_P)[2][2], const i64 *rows, i64 n, const double (*position)[2],
+                               const double (*noise)[2][2], double *fits)
+{
+    for (i64 m = 0; m < n; m++) {
+        const i64 row = rows[m];
+        filter_position(moving[row], &moving_P[row][0][0], N_STATE, position[m], noise[m], &fits[m], &fits[n + m]);
+        filter_position(resting[row], &resting_P[row][0][0], 2, position[m], noise[m], &fits[2 * n + m],
+                        &fits[3 * n + m]);
+    }
+}
+
+/* motion_filter.MotionFilter._combine: the means of both hypotheses of n tracks, all but the heading. */
+EXPORT void modt_combine_motion(const double (*moving)[N_STATE], const double (*moving_P)[N_STATE][N_STATE],
+                                const double (*resting)[2], const double (*resting_P)[2][2], i64 n,
+                                const double *probability, double (*states)[N_STATE],
+                                double (*covariances)[N_STATE][N_STATE], double (*velocity)[2],
+                                double (*velocity_P)[2][2])
+{
+    for (i64 m = 0; m < n; m++) {
+        double mean[N_STATE] = {resting[m][X], resting[m][Y]}, P[N_STATE][N_STATE] = {{0.0}};
+        const double share = probability[m], keep = 1 - share, spread = share * keep;
+        double step[N_STATE];
         for (int i = 0; i < N_STATE; i++) {
-            gain[i][0] = P[i][SPEED] / (P[SPEED][SPEED] + variance);
-            x[i] += gain[i][0] * innovation;
+            step[i] = moving[m][i] - mean[i];
+            mean[i] += share * step[i];
         }
-        x[HEADING] = wrap(x[HEADING]);
-        reduce_covariance(P, gain, SPEED, 1);
+        for (int i = 0; i < N_STATE; i++)
+            for (int k = 0; k < N_STATE; k++) {
+                double rest = i < VX && k < VX ? resting_P[m][i][k] : 0.0;
+                P[i][k] = (keep * rest + share * moving_P[m][i][k]) + spread * step[i] * step[k];
+            }
+        const double vx = mean[VX], vy = mean[VX + 1], speed = __builtin_sqrt(vx * vx + vy * vy);
+        const double x = speed > 0 ? vx / speed : 1.0, y = speed > 0 ? vy / speed : 0.0;
+        const double xx = P[VX][VX], xy = P[VX][VX + 1], yy = P[VX + 1][VX + 1];
+        const double along = (xx * x + xy * y) * x + (xy * x + yy * y) * y;
+        const double across = (xx * y - xy * x) * y + (yy * x - xy * y) * x;
+        const double unknown = PI * PI;
+        __builtin_memset(covariances[m], 0, sizeof covariances[m]);
+        for (int i = 0; i < 2; i++) {
+            states[m][i] = mean[i];
+            velocity[m][i] = mean[i + VX];
+            for (int k = 0; k < 2; k++) {
+                covariances[m][i][k] = P[i][k];
+                velocity_P[m][i][k] = P[i + VX][k + VX];
+            }
+        }
+        states[m][SPEED] = speed;
+        covariances[m][HEADING][HEADING] = across < unknown * (speed * speed) ? across / (speed * speed) : unknown;
+        covariances[m][SPEED][SPEED] = along;
     }
 }
 

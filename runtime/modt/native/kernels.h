@@ -76,7 +76,7 @@ enum {
     OUT_OF_RANGE_KIND = -6
 };
 
-/* pseudo_angle of grids.py: direction of a point as a number from 0 to 4 */
+/* pseudo_angle of geometry/bearings.py: direction of a point as a number from 0 to 4 */
 static ALWAYS_INLINE float pseudo_angle(float x, float y)
 {
     float turn = y / maxf(magnitude(x) + magnitude(y), 1e-6f);

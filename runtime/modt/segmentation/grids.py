@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from modt.geometry import pseudo_angle
 from modt.segmentation.tuning import PolarGridTuning
 from modt.types import NONE, Float32, Float64, Int, Self
 
@@ -53,17 +54,6 @@ Int32 = NDArray[np.int32]
 
 SECTORS = 128
 """Sectors of the polar grid, a power of two, so that the compiled passes number cells by shifts."""
-
-
-def pseudo_angle(x: Float32, y: Float32) -> Float32:
-    """(N,) direction as a number from 0 to 4, monotonic in the angle from -90 degrees, without an arctangent."""
-    turn = np.abs(x)
-    turn += np.abs(y)
-    np.maximum(turn, np.float32(1e-6), out=turn)
-    np.divide(y, turn, out=turn)
-    np.subtract(np.float32(2.0), turn, out=turn, where=x < 0)
-    turn += np.float32(1.0)
-    return turn
 
 
 class PolarGrid:

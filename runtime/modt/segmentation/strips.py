@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modt.geometry import pseudo_angle
 from modt.segmentation.cells import Clusters
-from modt.segmentation.grids import PointColumns, pseudo_angle
+from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
 from modt.segmentation.tuning import StripTuning
 from modt.types import Bool, Float32, Int, Self

@@ -106,14 +106,6 @@ def update(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, Flo
     return after, symmetric(P - product(K, P[:2]))
 
 
-def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) -> tuple[Float64, Float64]:
-    """States and covariances after an observed speed of deviation sigma."""
-    K = P[:, SPEED] / (P[SPEED, SPEED] + sigma_mps**2)
-    after = x + K * (speed_mps - x[SPEED])
-    after[HEADING] = wrap(after[HEADING])
-    return after, symmetric(P - K[:, None] * P[SPEED])
-
-
 def with_heading(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64]:
     """Turn the heading of tracks that stand to where they seem to go.
 
@@ -177,11 +169,6 @@ class Filter:
         turned = with_heading(state, covariance, _heading(state, covariance[SPEED, SPEED], position))
         x[rows], P[rows] = tracks_first(*with_forward_speed(*update(*turned, position, noise)))
 
-    def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
-        """The rows after an observed speed of deviation sigma."""
-        before = components_first(x.take(rows, axis=0), P.take(rows, axis=0))
-        x[rows], P[rows] = tracks_first(*observe_speed(*before, speed_mps, sigma_mps))
-
 
 def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
     """(K,) heading towards z (2, K) of states (4, K) whose speed may be 0, of others their own."""
@@ -198,7 +185,6 @@ _SIGNATURES: Signatures = {
         None,
         (FLOAT64, FLOAT64, INT64, _L, OutputArgument, OutputArgument, OutputArgument, FLOAT64, FLOAT64),
     ),
-    "modt_observe_speed": (None, (FLOAT64, FLOAT64, INT64, _L, _D, _D)),
 }
 
 
@@ -224,10 +210,6 @@ class NativeFilter(Filter):
         heading = _heading(state, P[rows, SPEED, SPEED], z.T.copy())
         turn = heading - state[HEADING]
         self._library.modt_update(x, P, rows, len(rows), heading, np.cos(turn), np.sin(turn), z, R)
-
-    def observe_speed(self, x: Float64, P: Float64, rows: Int, speed_mps: float, sigma_mps: float) -> None:
-        """The rows after an observed speed of deviation sigma."""
-        self._library.modt_observe_speed(x, P, rows, len(rows), speed_mps, sigma_mps**2)
 
 
 def filter_of(kernels: GeometryKernels, tuning: FilterTuning = FilterTuning()) -> Filter:

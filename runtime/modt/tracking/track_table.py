@@ -37,6 +37,10 @@ class TrackTable(Tracks):
     kdop_position: Float64 = column(float, 2)  # measured position when `kdop` was observed [m, world]
     rest_position: Float64 = column(float, 2)  # position at which the track was last known to rest [m, world]
     stationary: Bool = column(bool)  # the track is at rest
+    moving_mean: Float64 = column(float, 4)  # x, y [m] and their velocities [m/s] if the track moves, world frame
+    moving_covariance: Float64 = column(float, 4, 4)  # its covariance
+    resting_mean: Float64 = column(float, 2)  # position if the track rests [m, world]
+    resting_covariance: Float64 = column(float, 2, 2)  # its covariance [m2]
     unseen_s: Float64 = column(float)  # time since the last proposal; a stalled clock adds one period a frame [s]
 
     def predicted_kdops(self, rows: Int | slice = slice(None)) -> Float64:

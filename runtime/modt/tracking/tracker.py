@@ -14,14 +14,16 @@ from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
 from modt.tracking.extent import extent_update_of
-from modt.tracking.kalman import HEADING, SPEED, filter_of
+from modt.tracking.kalman import SPEED, filter_of
 from modt.tracking.kdop_association import KdopAssociation
+from modt.tracking.motion_filter import motion_filter_of
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Regrouping
+from modt.tracking.sight import sight_of
 from modt.tracking.states import StateEvent, StateMachine
 from modt.tracking.track_table import LiveTracks, TrackTable
 from modt.tracking.tuning import TrackingTuning
-from modt.types import NONE, Bool, Cut, Float64, Int, MotionState, Proposals, TrackedFrame, Tracks
+from modt.types import NONE, Bool, Cut, Float32, Float64, Int, MotionState, Proposals, TrackedFrame, Tracks
 
 MIN_STEP_SHARE = 0.1
 """A time step shorter than this share of the period means a stalled clock."""
@@ -70,6 +72,9 @@ class Tracker:
         unknown_heading_rad = np.pi
         sigma = [position_m, position_m, unknown_heading_rad, tuning.filter.initial_speed_sigma_mps]
         self._P_new = np.diag(np.square(sigma))
+        self._motion_filter = motion_filter_of(kernels, tuning.motion_filter)
+        self._sight = sight_of(kernels, tuning.sight)
+        self._evidence = tuning.motion_evidence
         self._rest = tuning.rest
         self._live = LiveTracks() if live is None else live
 
@@ -96,7 +101,9 @@ class Tracker:
             predicted_kdop=t.predicted_kdops(),
         )
 
-    def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+    def track(
+        self, stamp_s: float, proposals: Proposals, located: Located, points: Float32 | None = None
+    ) -> TrackedFrame:
         """Match the proposals of a frame with the tracks, and regroup them by known extents.
 
         Each of the proposals returned belongs to one track, a new one where none matched. `confirm` ends the frame.
@@ -105,6 +112,7 @@ class Tracker:
             stamp_s: time of the frame [s].
             proposals: proposals of the frame.
             located: the same in the world.
+            points: (N, 4) points of the frame, in which lines of sight are looked up; None if they are not known.
 
         Returns:
             The tracks, in parts by the stage that writes them, the proposals, and which tracks want a class.
@@ -118,7 +126,7 @@ class Tracker:
         rows = frame.matches.rows
         box_before = self.tracks.box.take(rows, axis=0)
         self._associate(rows)
-        self._update(frame.matches, frame.observations, dt_s)
+        self._update(frame, dt_s, points)
         proposals = self._keep_top(frame, box_before)
         self._observe_rest(rows)
         near_rest = self._near_rest()
@@ -126,8 +134,9 @@ class Tracker:
         settled = self._settled_background(near_rest)
         kept = self._expire(settled)
         self._begin_tracks(kept, settled, frame.matches, frame.observations)
+        if self._extended:
+            self._decide_motion()
         t = self.tracks
-        self._write_motion(t)
         return self._live.tracked(proposals, self.machine.wants_class[t.state] & t.observed)
 
     def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
@@ -182,7 +191,10 @@ class Tracker:
         t = self.tracks
         clock_stalled = dt_s < MIN_STEP_SHARE * self._period_s  # a stalled clock does not keep tracks alive
         t.unseen_s[:] += self._period_s if clock_stalled else dt_s
-        self._filter.predict(t.x, t.P, dt_s)
+        if self._extended:
+            self._motion_filter.predict(t, dt_s)
+        else:
+            self._filter.predict(t.x, t.P, dt_s)
         return dt_s
 
     def _associate(self, rows: Int) -> None:
@@ -200,13 +212,33 @@ class Tracker:
         t.unseen_s[rows] = 0.0
         t.proposal[:] = NONE
 
-    def _update(self, matches: Matches, observations: Observations, dt_s: float) -> None:
+    def _update(self, frame: Associated, dt_s: float, points: Float32 | None) -> None:
         """Update the filter with the matched positions, and the extents with the matched proposals."""
         t = self.tracks
+        matches = frame.matches
         rows = matches.rows
-        self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
+        if self._extended:
+            log_ratio = self._motion_filter.update(t, rows, matches.position, matches.covariance)
+            self._motion_filter.believe(t, rows, self._weighed(log_ratio, frame, points))
+        else:
+            self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         t.end_variance[rows] = matches.end_variance
-        self._update_extent(t, rows, matches.proposals, observations, matches.position, dt_s)
+        self._update_extent(t, rows, matches.proposals, frame.observations, matches.position, dt_s)
+
+    def _weighed(self, log_ratio: Float64, frame: Associated, points: Float32 | None) -> Float64:
+        """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
+
+        Where a proposal is bounded on both sides by what is nearer, or goes on there, its ends say nothing. Evidence
+        of rest counts in any case.
+        """
+        height_m = frame.proposals.box[frame.matches.proposals, 5]
+        weighed = np.where(height_m < self._evidence.min_height_m, np.minimum(log_ratio, 0.0), log_ratio)
+        claims = (weighed > 0).nonzero()[0]
+        if points is None or not len(claims):
+            return weighed
+        sides = self._sight.bounded_sides(points, frame.proposals, frame.matches.proposals[claims])
+        weighed[claims] *= np.array([1.0, self._evidence.one_side_weight, 0.0])[sides]
+        return weighed
 
     def _keep_top(self, frame: Associated, box_before: Float64) -> Proposals:
         """Keep the former height of people whose top the view cuts off, in the tracks and in the returned proposals.
@@ -248,17 +280,14 @@ class Tracker:
         near = np.hypot(step[:, 0], step[:, 1]) < rest.radius_m
         t.stationary[rows] = near & (hits >= rest.min_hits)
         t.rest_position[rows] = position + (rest.gain * near)[:, None] * step
-        if self._extended:
-            self._filter.observe_speed(t.x, t.P, rows[near], 0.0, rest.speed_sigma_mps)
 
-    def _write_motion(self, t: TrackTable) -> None:
-        """Write whether tracks move, and their velocities."""
-        along = np.column_stack([np.cos(t.x[:, HEADING]), np.sin(t.x[:, HEADING])])
-        t.moving_probability[:] = np.where(t.stationary, 0.0, 0.5)
-        t.motion[:] = np.where(t.stationary, MotionState.STILL.value, MotionState.UNKNOWN.value)
-        t.whole_box[:] = t.box
-        t.velocity[:] = along * t.x[:, SPEED, None]
-        t.velocity_covariance[:] = along[:, :, None] * along[:, None] * t.P[:, SPEED, SPEED, None, None]
+    def _decide_motion(self) -> None:
+        """Write which tracks move and which are still, by the probability of moving."""
+        t = self.tracks
+        evidence = self._evidence
+        t.motion[:] = np.where(t.moving_probability >= evidence.moving, MotionState.MOVING, MotionState.UNKNOWN)
+        t.motion[t.moving_probability < 0.5] = MotionState.STILL
+        t.motion[t.hits < evidence.min_hits] = MotionState.UNKNOWN
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
@@ -309,6 +338,8 @@ class Tracker:
         position = self.association.initial_position(observations).take(proposals, axis=0)
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new
+        if self._extended:
+            self._motion_filter.begin(t, new, position)
         t.age[new] = t.hits[new] = 1
         t.lagged_kdop[new] = observations.kdop.T.take(proposals, axis=0)
         t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]

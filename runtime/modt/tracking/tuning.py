@@ -28,6 +28,95 @@ class FilterTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class MotionFilterTuning:
+    """Filter of two hypotheses, at rest and moving."""
+
+    acceleration_sigma_mps2: float = 0.8
+    """Process noise of the velocity of what moves [m/s2]. Greater: velocities follow the last positions faster, and
+    jitter more.
+    Chosen on: simulated streets, by the error of velocities."""
+
+    turn_sigma_radps: float = 0.3
+    """Further process noise of the velocity, relative to the speed [rad/s]. Greater: fast objects are followed
+    through sharper turns, and their velocities jitter more.
+    Chosen on: judgement."""
+
+    start_sigma_mps: float = 1.0
+    """Standard deviation of the velocity of what has just started, along either axis [m/s]. Greater: slow starts are
+    seen later.
+    Chosen on: judgement."""
+
+    starts_per_s: float = 0.1
+    """Rate at which tracks at rest start [1/s]. Greater: starts are seen earlier, and more things seem to move.
+    Chosen on: simulated scenes, by static things that were reported as moving."""
+
+    stops_per_s: float = 0.1
+    """Rate at which moving tracks stop [1/s]. Greater: stops are seen earlier, and slow objects seem to stand.
+    Chosen on: simulated scenes, by the error of velocities."""
+
+    initially_moving: float = 0.5
+    """Probability that a new track moves. Greater: movers are seen earlier, and more things seem to move.
+    Chosen on: simulated scenes, by the delay of movers."""
+
+    initial_position_sigma_m: float = 0.3
+    """Standard deviation of the position of a new track, along either axis [m]. Greater: the second position counts
+    more than the first.
+    Chosen on: judgement."""
+
+    initial_speed_sigma_mps: float = 8.0
+    """Standard deviation of the velocity of a new moving track, along either axis [m/s]. Less: fast objects are lost
+    in their second frame.
+    Chosen on: judgement."""
+
+    creep_mps: float = 0.02
+    """Process noise of a resting position [m/sqrt(s)]. Greater: slow motion is taken for rest.
+    Chosen on: judgement."""
+
+    max_log_ratio: float = 4.0
+    """Most that one frame adds to the logarithm of the odds of moving, or takes from it. Greater: one jump of a
+    proposal makes a mover.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionEvidenceTuning:
+    """Weight of motion that a changing view explains."""
+
+    min_height_m: float = 0.2
+    """A proposal lower than this is no evidence of motion, since where beams meet the ground moves with the robot
+    [m]. Greater: small movers are missed.
+    Chosen on: simulated streets, by low things that were reported as moving."""
+
+    one_side_weight: float = 0.5
+    """Weight of evidence from a proposal that is bounded on one side by what is nearer, or goes on there. Less: fewer
+    parts of walls seem to move, and what moves beside others is seen later.
+    Chosen on: simulated streets, by parts of walls that were reported as moving."""
+
+    moving: float = 0.9
+    """A track moves from this probability on. Greater: fewer static things move, and starts are reported later.
+    Chosen on: simulated scenes, by static things that were reported as moving."""
+
+    min_hits: int = 3
+    """Frames with a proposal from which the motion of a track is known.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class SightTuning:
+    """Lines of sight beside proposals."""
+
+    rays: int = 8000
+    """Number of points of a sweep that are looked at, in turns. Greater: thin things that hide others are found, and
+    it takes longer.
+    Chosen on: judgement."""
+
+    margin_m: float = 0.3
+    """A proposal is bounded where what is beside it is less than this behind its end [m]. Greater: ends near walls
+    are bounded.
+    Chosen on: simulated scenes, by static things that were reported as moving."""
+
+
+@dataclass(frozen=True, slots=True)
 class KdopAssociationTuning:
     """Association of k-DOPs, and the measurement of positions by them."""
 
@@ -56,9 +145,9 @@ class KdopAssociationTuning:
     Less: fewer pairs are compared, and a track that turns is lost.
     Chosen on: judgement."""
 
-    position_sigma_m: float = 0.1
+    position_sigma_m: float = 0.05
     """Standard deviation of a measured position along either axis [m]. Greater: the filter smooths more.
-    Chosen on: judgement."""
+    Chosen on: simulated streets, by the error of velocities."""
 
     size_weight: float = 2.0
     """Cost of a difference of 1 of the logarithms of the widths. Greater: pairs of other sizes are matched less
@@ -140,11 +229,6 @@ class RestTuning:
 
     radius_m: float = 0.5
     """A track this near to its rest position is at rest [m]. Greater: slow walkers are kept in place.
-    Chosen on: judgement."""
-
-    speed_sigma_mps: float = 1.0
-    """Standard deviation of the speed 0 that is observed of a track at rest [m/s]. Less: parked cars are steadier,
-    and cars start later.
     Chosen on: judgement."""
 
     stopped_mps: float = 0.5
@@ -246,6 +330,9 @@ class TrackingTuning:
     """Everything that is chosen in the tracking stage."""
 
     filter: FilterTuning = FilterTuning()
+    motion_filter: MotionFilterTuning = MotionFilterTuning()
+    motion_evidence: MotionEvidenceTuning = MotionEvidenceTuning()
+    sight: SightTuning = SightTuning()
     kdop_association: KdopAssociationTuning = KdopAssociationTuning()
     paper_association: PaperAssociationTuning = PaperAssociationTuning()
     extent: ExtentTuning = ExtentTuning()

@@ -1,0 +1,162 @@
+"""Lines of sight beside proposals: which of their ends the view of the sensor makes.
+
+A proposal ends to the left and to the right where the object ends, or where something nearer hides the rest of it,
+or where the same surface goes on without it. In the latter cases the end is *bounded*: it may move while the object
+rests.
+The nearest return is kept for each direction of a coarse grid of bearings and slopes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from modt.geometry import pseudo_angle
+from modt.geometry.kernels import GeometryKernels
+from modt.native.library import FLOAT32, FLOAT64, INT8, INT64, OutputArgument, Signatures, declare
+from modt.tracking.tuning import SightTuning
+from modt.types import OBSTACLES, Bool, Float32, Float64, Int, Int8, PointKind, Proposals
+
+BEARINGS = 720
+"""Bearings of the grid, of equal pseudo-angle."""
+SLOPES = 32
+"""Slopes of the grid, from LEAST_SLOPE on."""
+LEAST_SLOPE = np.float32(-0.6)
+PER_SLOPE = np.float32(25.0)
+"""Slopes of the grid in a unit of slope."""
+BESIDE = 2
+"""Bearings beside a proposal that are looked at."""
+LOW_SHARE = 0.25
+"""Lowest part of a proposal whose slopes are not looked at, since the ground is near there."""
+HIDES = np.isin(np.arange(-128, 128), [PointKind.MEMBER, *OBSTACLES])
+"""(256,) whether a point of each kind, from -128 on, stands above the ground."""
+
+
+class Sight:
+    """Finds bounded ends: the reference in NumPy.
+
+    Args:
+        tuning: points that are looked at, and distance beyond which an end is free.
+    """
+
+    def __init__(self, tuning: SightTuning = SightTuning()) -> None:
+        self.tuning = tuning
+
+    def bounded_sides(self, points: Float32, proposals: Proposals, which: Int) -> Int:
+        """(R,) number of sides, 0 to 2, on which proposals `which` (R,) are bounded.
+
+        Args:
+            points: (N, 4) points of the frame, sensor frame.
+            proposals: proposals of the frame, with the kinds of its points.
+            which: (R,) proposals that are looked at.
+        """
+        if proposals.kind is None or not len(which):
+            return np.zeros(len(which), np.int64)
+        every = max(1, len(points) // self.tuning.rays) | 1  # odd, since beams may take turns in an even number
+        return self._bounded_sides(points, proposals.kind, every, proposals, which)
+
+    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Int:
+        """The same, looking at one of `every` points."""
+        nearest = _nearest(points[::every], HIDES[kind[::every].astype(np.int64) + 128])
+        sides = np.zeros(len(which), np.int64)
+        for i, proposal in enumerate(which.tolist()):
+            members = slice(*proposals.offsets[proposal : proposal + 2].tolist())
+            x, y, _ = proposals.coordinates[:, members]
+            low, high = _slopes(proposals.box[proposal])
+            bearing = _bearing(x, y)
+            range_m = np.sqrt(x * x + y * y)
+            centre = int(_bearing(*proposals.centroid[proposal, :2].astype(np.float32)[:, None])[0])
+            off = (bearing - centre + 3 * BEARINGS // 2) % BEARINGS - BEARINGS // 2
+            for sign in (-1, 1):
+                outermost = (sign * off).max()
+                end_m = range_m[sign * off == outermost].min()
+                beside = (centre + sign * (outermost + np.arange(1, BESIDE + 1))) % BEARINGS
+                sides[i] += nearest[beside, low:high].min(initial=np.inf) < end_m + np.float32(self.tuning.margin_m)
+        return sides
+
+
+def _bearing(x: Float32, y: Float32) -> Int:
+    """(n,) bearing of the grid."""
+    bearing = (pseudo_angle(x, y) * np.float32(BEARINGS / 4)).astype(np.int64)
+    return np.minimum(bearing, BEARINGS - 1)
+
+
+def _nearest(points: Float32, hides: Bool) -> Float32:
+    """(BEARINGS, SLOPES) distance of the nearest of the points (n, 4) that hide what is behind them [m]."""
+    x, y, z = np.ascontiguousarray(points[hides, :3].T)
+    range_m = np.maximum(np.sqrt(x * x + y * y), np.float32(1e-3))
+    slope = np.floor((z / range_m - LEAST_SLOPE) * PER_SLOPE)
+    inside = ((slope >= 0) & (slope < SLOPES)).nonzero()[0]
+    nearest = np.full((BEARINGS, SLOPES), np.inf, np.float32)
+    at = _bearing(x[inside], y[inside]), slope[inside].astype(np.int64)
+    np.minimum.at(nearest, at, range_m[inside])
+    return nearest
+
+
+def _slopes(box: Float64) -> tuple[int, int]:
+    """First slope of the grid in which a box is seen, and the slope after the last."""
+    range_m = max(float(np.sqrt(box[0] * box[0] + box[1] * box[1])), 1e-3)
+    bottom_m = box[2] - box[5] / 2
+    low = ((bottom_m + LOW_SHARE * box[5]) / range_m - float(LEAST_SLOPE)) * float(PER_SLOPE)
+    high = ((bottom_m + box[5]) / range_m - float(LEAST_SLOPE)) * float(PER_SLOPE)
+    return int(min(max(low, 0.0), SLOPES - 1)), int(min(max(high, 0.0), SLOPES - 1)) + 1
+
+
+_L = ctypes.c_int64
+_SIGNATURES: Signatures = {
+    "modt_bounded_sides": (
+        None,
+        (
+            FLOAT32,
+            INT8,
+            _L,
+            _L,
+            FLOAT32,
+            _L,
+            INT64,
+            FLOAT64,
+            FLOAT64,
+            INT64,
+            _L,
+            ctypes.c_float,
+            FLOAT32,
+            OutputArgument,
+        ),
+    )
+}
+
+
+class NativeSight(Sight):
+    """`Sight` in C (`modt.native`)."""
+
+    def __init__(self, library: ctypes.CDLL, tuning: SightTuning) -> None:
+        super().__init__(tuning)
+        declare(library, _SIGNATURES)
+        self._library = library
+
+    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Int:
+        """The same, looking at one of `every` points."""
+        sides = np.empty(len(which), np.int64)
+        self._library.modt_bounded_sides(
+            points,
+            kind,
+            len(points),
+            every,
+            proposals.coordinates,
+            proposals.coordinates.shape[1],
+            proposals.offsets,
+            proposals.box,
+            proposals.centroid,
+            which,
+            len(which),
+            self.tuning.margin_m,
+            np.empty((BEARINGS, SLOPES), np.float32),
+            sides,
+        )
+        return sides
+
+
+def sight_of(kernels: GeometryKernels, tuning: SightTuning = SightTuning()) -> Sight:
+    """Lines of sight: native if the kernels have a library, else in NumPy."""
+    return Sight(tuning) if kernels.library is None else NativeSight(kernels.library, tuning)
