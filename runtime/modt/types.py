@@ -317,8 +317,8 @@ class Motion(Columns):
     size_m: Float64 = column(float, 3)  # smoothed length, width and height of the boxes seen [m]
     hidden: Bool = column(bool)  # a person whose upper half the view cuts off
     motion: Int = column(int)  # value of MotionState
-    moving_probability: Float64 = column(float)  # probability that it moves
-    velocity: Float64 = column(float, 2)  # velocity, 0 of what is still [m/s, world]
+    moving_probability: Float64 = column(float, fill=0.5)  # probability that it moves
+    velocity: Float64 = column(float, 2)  # velocity, about 0 of what is still [m/s, world]
     velocity_covariance: Float64 = column(float, 2, 2)  # its covariance [m2/s2]
     whole_box: Float64 = column(float, 7)  # box of the whole object: x, y, z, l, w, h [m], yaw [rad], world frame
     heading_known: Bool = column(bool)  # whether the yaw of `whole_box` is that of its front

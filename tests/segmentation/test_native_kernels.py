@@ -28,14 +28,19 @@ from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.tuning import SegmentationTuning
 from modt.tracking.extent import extent_update_of
 from modt.tracking.kalman import filter_of
+from modt.tracking.sight import sight_of
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
+from modt.tracking.tuning import SightTuning
 from modt.types import NONE, UNRECORDED, PointKind
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs
 from tests.segmentation import scans
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_cells import cloud
+from tests.tracking.test_motion_filter import begun
+from tests.tracking.test_motion_filter import step as filter_step
+from tests.tracking.test_sight import scene as sight_scene
 from tests.tracking.tracking_scenes import frame_of, tracks_at
 
 SANITIZED = "MODT_SANITIZED" in os.environ
@@ -286,7 +291,6 @@ def test_filter(kernels, seed, m, dt_s):
         kalman = filter_of(each)
         kalman.predict(own, covariance, dt_s)
         kalman.update(own, covariance, rows, z, R)
-        kalman.observe_speed(own, covariance, rows[1:], 0.0, 0.5)
         tables += [own, covariance]
     for one, other in zip(tables[:2], tables[2:], strict=True):
         np.testing.assert_array_equal(one, other)
@@ -307,6 +311,36 @@ def test_observed_tracks(kernels, seed, n, dt_s):
     assert same(*tables)
 
 
+@given(seed=SEEDS, m=st.integers(0, 5), dt_s=st.sampled_from([0.0, 0.1, 3.0]))
+@settings(max_examples=60, deadline=None)
+def test_resting_and_moving_tracks(kernels, seed, m, dt_s):
+    rng = np.random.default_rng(seed)
+    start = rng.normal(0, 30, (m, 2))
+    later = start + rng.normal(0, 1, (2, m, 2))
+    tables = []
+    for each in (NUMPY, kernels):
+        subject, tracks = begun(start, each)
+        for position in later:
+            filter_step(subject, tracks, position, dt_s)
+        tables.append(tracks)
+    assert same(*tables)
+
+
+@given(seed=SEEDS, n=st.integers(1, 5), rays=st.sampled_from([1, 500, 10**6]))
+@settings(max_examples=40, deadline=None)
+def test_lines_of_sight(kernels, seed, n, rays):
+    rng = np.random.default_rng(seed)
+    boxes = rng.uniform(-12, 12, (n + 2, 7))
+    boxes[:, 2] = rng.uniform(-1, 1, n + 2)
+    boxes[:, 3:6] = rng.uniform(0.1, 4.0, (n + 2, 3))
+    points, proposals = sight_scene(boxes, [PointKind.MEMBER] * n + [PointKind.STRUCTURE, PointKind.GROUND])
+    which = rng.permutation(n)[: rng.integers(0, n + 1)]
+    reference, compiled = (
+        sight_of(each, SightTuning(rays=rays)).bounded_sides(points, proposals, which) for each in (NUMPY, kernels)
+    )
+    np.testing.assert_array_equal(compiled, reference)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "fov"), [("vlp-16", FULL), ("hdl-64e", FULL), ("mid-360", FRONT)])
 def test_tracks_of_simulated_sweeps(kernels, name, fov):
@@ -318,7 +352,7 @@ def test_tracks_of_simulated_sweeps(kernels, name, fov):
         for frame in SyntheticStream("street", name, 1.0, 4):
             proposals = segmenter.segment(frame.points)
             located = odometry.locate(frame, proposals, tracker.static_tracks)
-            tracked = tracker.track(frame.stamp_s, proposals, located)
+            tracked = tracker.track(frame.stamp_s, proposals, located, frame.points)
             tracked.decisions.object_class[:] = tracked.motion.id // 2 % 4  # people and cars grow and lose parts
             runs[-1].append((tracker.confirm(np.zeros(0, np.int64), np.zeros(0, np.bool_)), tracked.proposals))
     assert all(map(same, *runs))

@@ -41,7 +41,7 @@ class Follower:
     def follow(self, frame, proposals):
         located = self.odometry.locate(frame, proposals, self.tracker.static_tracks)
         self.T_world_sensor = located.placement.T_world_sensor
-        self.tracked = self.tracker.track(frame.stamp_s, proposals, located)
+        self.tracked = self.tracker.track(frame.stamp_s, proposals, located, frame.points)
         self.proposals = self.tracked.proposals
         self.wants_class = self.tracked.wants_class
         self.frames += 1

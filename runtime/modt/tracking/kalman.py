@@ -143,6 +143,15 @@ def inverse_2x2(S: Float64) -> Float64:
     return inverse
 
 
+def velocity_of(x: Float64, P: Float64) -> tuple[Float64, Float64]:
+    """Velocities (M, 2) [m/s] and their covariances (M, 2, 2), given states (M, 4) and covariances of a table."""
+    ahead = np.column_stack([np.cos(x[:, HEADING]), np.sin(x[:, HEADING])])
+    velocity = x[:, SPEED, None] * ahead
+    left = np.column_stack([-velocity[:, 1], velocity[:, 0]])
+    J = np.stack([left, ahead], axis=2)  # derivative by heading and speed
+    return velocity, J @ P[:, HEADING:, HEADING:] @ J.transpose(0, 2, 1)
+
+
 class Filter:
     """The filter on a table of states x (M, 4) and covariances P (M, 4, 4), in place: the reference.
 

@@ -85,12 +85,13 @@ class MotionFilter:
         """Update both hypotheses of rows (R,) by positions (R, 2) of covariance `noise` (R, 2, 2).
 
         Returns:
-            (R,) logarithm of the likelihood of moving over that of resting, bounded.
+            (R,) logarithm of the likelihood of moving over that of resting, bounded. A position that a moving track
+            was not expected at either is no evidence of motion.
         """
         moving, resting = self._update(tracks, rows, position, noise)
         log_ratio = (resting.distance - moving.distance + np.log(resting.determinant / moving.determinant)) / 2
-        most = self.tuning.max_log_ratio
-        bounded: Float64 = np.clip(log_ratio, -most, most)
+        most = np.where(moving.distance < self.tuning.max_distance, self.tuning.max_log_ratio, 0.0)
+        bounded: Float64 = np.clip(log_ratio, -self.tuning.max_log_ratio, most)
         return bounded
 
     def believe(self, tracks: TrackTable, rows: Int, log_ratio: Float64) -> None:

@@ -14,7 +14,7 @@ from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
 from modt.tracking.extent import extent_update_of
-from modt.tracking.kalman import SPEED, filter_of
+from modt.tracking.kalman import SPEED, filter_of, velocity_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.motion_filter import motion_filter_of
 from modt.tracking.paper_association import PaperAssociation
@@ -134,9 +134,11 @@ class Tracker:
         settled = self._settled_background(near_rest)
         kept = self._expire(settled)
         self._begin_tracks(kept, settled, frame.matches, frame.observations)
+        t = self.tracks
         if self._extended:
             self._decide_motion()
-        t = self.tracks
+        else:
+            t.velocity[:], t.velocity_covariance[:] = velocity_of(t.x, t.P)
         return self._live.tracked(proposals, self.machine.wants_class[t.state] & t.observed)
 
     def confirm(self, rows: Int, confirmed: Bool) -> Tracks:
@@ -228,16 +230,21 @@ class Tracker:
     def _weighed(self, log_ratio: Float64, frame: Associated, points: Float32 | None) -> Float64:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
 
-        Where a proposal is bounded on both sides by what is nearer, or goes on there, its ends say nothing. Evidence
-        of rest counts in any case.
+        Where a proposal is bounded by what is nearer, or goes on there, its ends may move while the object rests.
+        Evidence of rest counts in any case.
         """
+        tuning = self._evidence
         height_m = frame.proposals.box[frame.matches.proposals, 5]
-        weighed = np.where(height_m < self._evidence.min_height_m, np.minimum(log_ratio, 0.0), log_ratio)
+        weighed = np.where(height_m < tuning.min_height_m, np.minimum(log_ratio, 0.0), log_ratio)
         claims = (weighed > 0).nonzero()[0]
         if points is None or not len(claims):
             return weighed
-        sides = self._sight.bounded_sides(points, frame.proposals, frame.matches.proposals[claims])
-        weighed[claims] *= np.array([1.0, self._evidence.one_side_weight, 0.0])[sides]
+        proposals = frame.matches.proposals[claims]
+        length_m, width_m = frame.proposals.box[proposals, 3:5].T
+        compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)
+        sides = self._sight.bounded_sides(points, frame.proposals, proposals)
+        weights = np.array([tuning.weight_by_sides, tuning.compact_weight_by_sides])
+        weighed[claims] *= weights[compact.astype(np.int64), sides]
         return weighed
 
     def _keep_top(self, frame: Associated, box_before: Float64) -> Proposals:
@@ -282,17 +289,24 @@ class Tracker:
         t.rest_position[rows] = position + (rest.gain * near)[:, None] * step
 
     def _decide_motion(self) -> None:
-        """Write which tracks move and which are still, by the probability of moving."""
+        """Write which tracks move and which are still, by the probability of moving and the distance gone."""
         t = self.tracks
         evidence = self._evidence
-        t.motion[:] = np.where(t.moving_probability >= evidence.moving, MotionState.MOVING, MotionState.UNKNOWN)
-        t.motion[t.moving_probability < 0.5] = MotionState.STILL
-        t.motion[t.hits < evidence.min_hits] = MotionState.UNKNOWN
+        went = self._from_rest_m() > evidence.min_distance_m
+        moves = (t.moving_probability > evidence.moving) & went
+        known = (moves | (t.moving_probability < 0.5)) & (t.hits >= evidence.min_hits)
+        t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
+        t.motion[~known] = MotionState.UNKNOWN.value
+
+    def _from_rest_m(self) -> Float64:
+        """(M,) distance of tracks from their rest positions [m]."""
+        step = self.tracks.x[:, :2] - self.tracks.rest_position
+        distance_m: Float64 = np.hypot(step[:, 0], step[:, 1])
+        return distance_m
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
-        step = self.tracks.x[:, :2] - self.tracks.rest_position
-        near: Bool = np.hypot(step[:, 0], step[:, 1]) < self._rest.radius_m
+        near: Bool = self._from_rest_m() < self._rest.radius_m
         return near
 
     def _settled_background(self, near_rest: Bool) -> Bool:

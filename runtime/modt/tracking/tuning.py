@@ -31,12 +31,12 @@ class FilterTuning:
 class MotionFilterTuning:
     """Filter of two hypotheses, at rest and moving."""
 
-    acceleration_sigma_mps2: float = 0.8
+    acceleration_sigma_mps2: float = 1.0
     """Process noise of the velocity of what moves [m/s2]. Greater: velocities follow the last positions faster, and
     jitter more.
     Chosen on: simulated streets, by the error of velocities."""
 
-    turn_sigma_radps: float = 0.3
+    turn_sigma_radps: float = 0.4
     """Further process noise of the velocity, relative to the speed [rad/s]. Greater: fast objects are followed
     through sharper turns, and their velocities jitter more.
     Chosen on: judgement."""
@@ -54,16 +54,16 @@ class MotionFilterTuning:
     """Rate at which moving tracks stop [1/s]. Greater: stops are seen earlier, and slow objects seem to stand.
     Chosen on: simulated scenes, by the error of velocities."""
 
-    initially_moving: float = 0.5
+    initially_moving: float = 0.8
     """Probability that a new track moves. Greater: movers are seen earlier, and more things seem to move.
     Chosen on: simulated scenes, by the delay of movers."""
 
-    initial_position_sigma_m: float = 0.3
+    initial_position_sigma_m: float = 0.05
     """Standard deviation of the position of a new track, along either axis [m]. Greater: the second position counts
     more than the first.
-    Chosen on: judgement."""
+    Chosen on: simulated streets, by the error of velocities of new tracks."""
 
-    initial_speed_sigma_mps: float = 8.0
+    initial_speed_sigma_mps: float = 5.0
     """Standard deviation of the velocity of a new moving track, along either axis [m/s]. Less: fast objects are lost
     in their second frame.
     Chosen on: judgement."""
@@ -72,7 +72,12 @@ class MotionFilterTuning:
     """Process noise of a resting position [m/sqrt(s)]. Greater: slow motion is taken for rest.
     Chosen on: judgement."""
 
-    max_log_ratio: float = 4.0
+    max_distance: float = 9.2
+    """Squared distance of a position from where a moving track was expected, in standard deviations, beyond which it
+    is no evidence of motion: 99 % of those of movers are nearer. Greater: what flickers moves.
+    Chosen on: judgement."""
+
+    max_log_ratio: float = 3.0
     """Most that one frame adds to the logarithm of the odds of moving, or takes from it. Greater: one jump of a
     proposal makes a mover.
     Chosen on: judgement."""
@@ -87,18 +92,37 @@ class MotionEvidenceTuning:
     [m]. Greater: small movers are missed.
     Chosen on: simulated streets, by low things that were reported as moving."""
 
-    one_side_weight: float = 0.5
-    """Weight of evidence from a proposal that is bounded on one side by what is nearer, or goes on there. Less: fewer
-    parts of walls seem to move, and what moves beside others is seen later.
+    weight_by_sides: tuple[float, float, float] = (1.0, 0.2, 0.0)
+    """Weight of evidence from a proposal that is bounded on no, one or both sides by what is nearer or
+    goes on there. Less: fewer parts of walls seem to move, and what moves beside others is seen later.
     Chosen on: simulated streets, by parts of walls that were reported as moving."""
 
-    moving: float = 0.9
+    compact_weight_by_sides: tuple[float, float, float] = (1.0, 0.5, 0.15)
+    """The same of a compact proposal, which is rarely a part of a surface. Less: people who walk among other things
+    are seen later.
+    Chosen on: simulated streets and aisles, by static things that were reported as moving."""
+
+    max_compact_m: float = 1.2
+    """Greatest length of a compact proposal [m]. Greater: parts of shelves seem to move.
+    Chosen on: simulated aisles, by static things that were reported as moving."""
+
+    min_compact_width: float = 0.4
+    """Least width of a compact proposal, relative to its length. Less: parts of walls seem to move.
+    Chosen on: simulated aisles, by static things that were reported as moving."""
+
+    moving: float = 0.95
     """A track moves from this probability on. Greater: fewer static things move, and starts are reported later.
     Chosen on: simulated scenes, by static things that were reported as moving."""
 
-    min_hits: int = 3
-    """Frames with a proposal from which the motion of a track is known.
+    min_distance_m: float = 0.2
+    """Distance from its rest position from which a track moves [m]. Greater: what sways does not move, and slow
+    starts are reported later.
     Chosen on: judgement."""
+
+    min_hits: int = 4
+    """Frames with a proposal from which the motion of a track is known. Less: movers are reported earlier, and what
+    flickers moves.
+    Chosen on: simulated snow."""
 
 
 @dataclass(frozen=True, slots=True)
