@@ -74,7 +74,14 @@ class Tracker:
         self._P_new = np.diag(np.square(sigma))
         self._motion_filter = motion_filter_of(kernels, tuning.motion_filter)
         self._sight = sight_of(kernels, tuning.sight)
-        self._evidence = tuning.motion_evidence
+        self._evidence = evidence = tuning.motion_evidence
+        self._weight_by_sides = np.array(
+            [
+                [1.0, evidence.one_side_weight, 0.0],
+                [1.0, evidence.compact_one_side_weight, evidence.compact_two_sides_weight],
+            ]
+        )
+        """(2, 3) weight of evidence of motion, by whether a proposal is compact and its number of bounded sides."""
         self._rest = tuning.rest
         self._live = LiveTracks() if live is None else live
 
@@ -234,17 +241,15 @@ class Tracker:
         Evidence of rest counts in any case.
         """
         tuning = self._evidence
-        height_m = frame.proposals.box[frame.matches.proposals, 5]
-        weighed = np.where(height_m < tuning.min_height_m, np.minimum(log_ratio, 0.0), log_ratio)
+        length_m, width_m, height_m = frame.proposals.box[frame.matches.proposals, 3:6].T
+        flat = (height_m < tuning.min_height_m) & (height_m < tuning.flat_height * length_m)
+        weighed = np.where(flat, np.minimum(log_ratio, 0.0), log_ratio)
         claims = (weighed > 0).nonzero()[0]
         if points is None or not len(claims):
             return weighed
-        proposals = frame.matches.proposals[claims]
-        length_m, width_m = frame.proposals.box[proposals, 3:5].T
         compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)
-        sides = self._sight.bounded_sides(points, frame.proposals, proposals)
-        weights = np.array([tuning.weight_by_sides, tuning.compact_weight_by_sides])
-        weighed[claims] *= weights[compact.astype(np.int64), sides]
+        sides = self._sight.bounded_sides(points, frame.proposals, frame.matches.proposals[claims])
+        weighed[claims] *= self._weight_by_sides[compact[claims].astype(np.int64), sides]
         return weighed
 
     def _keep_top(self, frame: Associated, box_before: Float64) -> Proposals:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class FilterTuning:
-    """Noise of the extended Kalman filter (Equation 1)."""
+    """Noise of the extended Kalman filter (Equation 1), which profiles without extensions use."""
 
     acceleration_sigma_mps2: float = 2.0
     """Process noise of the speed [m/s2]. Greater: speed follows the last positions faster, and jitters more.
@@ -88,18 +88,26 @@ class MotionEvidenceTuning:
     """Weight of motion that a changing view explains."""
 
     min_height_m: float = 0.2
-    """A proposal lower than this is no evidence of motion, since where beams meet the ground moves with the robot
+    """A flat proposal lower than this is no evidence of motion, since where beams meet the ground moves with the robot
     [m]. Greater: small movers are missed.
     Chosen on: simulated streets, by low things that were reported as moving."""
 
-    weight_by_sides: tuple[float, float, float] = (1.0, 0.2, 0.0)
-    """Weight of evidence from a proposal that is bounded on no, one or both sides by what is nearer or
-    goes on there. Less: fewer parts of walls seem to move, and what moves beside others is seen later.
+    flat_height: float = 0.4
+    """Height of a proposal, relative to its length, below which it is flat. Greater: balls do not move.
+    Chosen on: simulated balls and streets."""
+
+    one_side_weight: float = 0.1
+    """Weight of evidence from a proposal that is bounded on one side by what is nearer or goes on there; from one
+    bounded on both sides it is 0. Less: fewer parts of walls seem to move, and movers beside others are seen later.
     Chosen on: simulated streets, by parts of walls that were reported as moving."""
 
-    compact_weight_by_sides: tuple[float, float, float] = (1.0, 0.5, 0.15)
+    compact_one_side_weight: float = 0.5
     """The same of a compact proposal, which is rarely a part of a surface. Less: people who walk among other things
     are seen later.
+    Chosen on: simulated streets and aisles, by static things that were reported as moving."""
+
+    compact_two_sides_weight: float = 0.15
+    """The same of a compact proposal that is bounded on both sides.
     Chosen on: simulated streets and aisles, by static things that were reported as moving."""
 
     max_compact_m: float = 1.2

@@ -213,7 +213,9 @@ class IdealTracking(PlayedBack):
             predicted_kdop=np.zeros((8, 0)),
         )
 
-    def track(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+    def track(
+        self, stamp_s: float, proposals: Proposals, located: Located, points: Float32 | None = None
+    ) -> TrackedFrame:
         """The table with a row for each track of the drive."""
         t, rows = self._tracks, next(self._rows)[self._which]
         t.proposal[:] = NONE
