@@ -65,9 +65,9 @@ def test_bounded_sides(others, kinds, sides):
     boxes = [SUBJECT, *(other for _, other in members_first)]
     points, proposals = scene(boxes, [MEMBER, *(kind for kind, _ in members_first)])
     found = Sight(SightTuning(rays=10**6)).bounded_sides(points, proposals, np.array([0]))
-    assert found.tolist() == [sides]
+    assert found.sum(axis=1).tolist() == [sides]
 
 
 def test_nothing_is_bounded_where_the_kinds_of_points_are_unknown():
     points, proposals = scene([SUBJECT, HIDES_LEFT], [MEMBER, STRUCTURE])
-    assert Sight().bounded_sides(points, replace(proposals, kind=None), np.array([0])).tolist() == [0]
+    assert not Sight().bounded_sides(points, replace(proposals, kind=None), np.array([0])).any()

@@ -39,11 +39,12 @@ static i64 slope_at(double height_m, double range_m)
     return (i64)mind(maxd(slope, 0.0), SLOPES - 1);
 }
 
-/* sight.Sight._bounded_sides: of each of n_which proposals, the number of sides on which it is bounded. The proposals
+/* sight.Sight._bounded_sides: whether each of n_which proposals is bounded clockwise and counter-clockwise. The proposals
  * own columns of the coordinates (3, n_members) from offsets on. `nearest` is scratch. */
 EXPORT void modt_bounded_sides(const float (*points)[4], const int8_t *kind, i64 n, i64 every, const float *coordinates,
                                i64 n_members, const i64 *offsets, const double (*box)[7], const double (*centroid)[3],
-                               const i64 *which, i64 n_which, float margin_m, float (*nearest)[SLOPES], i64 *sides)
+                               const i64 *which, i64 n_which, float margin_m, float (*nearest)[SLOPES],
+                               uint8_t (*sides)[2])
 {
     find_nearest(points, kind, n, every, nearest);
     for (i64 w = 0; w < n_which; w++) {
@@ -68,7 +69,6 @@ EXPORT void modt_bounded_sides(const float (*points)[4], const int8_t *kind, i64
                     end_m[side] = minf(end_m[side], distance_m);
             }
         }
-        sides[w] = 0;
         for (int side = 0; side < 2; side++) {
             float beside_m = INFINITY;
             for (i64 k = 1; k <= BESIDE; k++) {
@@ -76,7 +76,7 @@ EXPORT void modt_bounded_sides(const float (*points)[4], const int8_t *kind, i64
                 for (i64 s = low; s <= high; s++)
                     beside_m = minf(beside_m, nearest[bearing][s]);
             }
-            sides[w] += beside_m < end_m[side] + margin_m;
+            sides[w][side] = beside_m < end_m[side] + margin_m;
         }
     }
 }

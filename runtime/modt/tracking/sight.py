@@ -43,8 +43,8 @@ class Sight:
     def __init__(self, tuning: SightTuning = SightTuning()) -> None:
         self.tuning = tuning
 
-    def bounded_sides(self, points: Float32, proposals: Proposals, which: Int) -> Int:
-        """(R,) number of sides, 0 to 2, on which proposals `which` (R,) are bounded.
+    def bounded_sides(self, points: Float32, proposals: Proposals, which: Int) -> Bool:
+        """(R, 2) whether proposals `which` (R,) are bounded clockwise, and counter-clockwise.
 
         Args:
             points: (N, 4) points of the frame, sensor frame.
@@ -52,14 +52,14 @@ class Sight:
             which: (R,) proposals that are looked at.
         """
         if proposals.kind is None or not len(which):
-            return np.zeros(len(which), np.int64)
+            return np.zeros((len(which), 2), np.bool_)
         every = max(1, len(points) // self.tuning.rays) | 1  # odd, since beams may take turns in an even number
         return self._bounded_sides(points, proposals.kind, every, proposals, which)
 
-    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Int:
+    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Bool:
         """The same, looking at one of `every` points."""
         nearest = _nearest(points[::every], HIDES[kind[::every].astype(np.int64) + 128])
-        sides = np.zeros(len(which), np.int64)
+        sides = np.zeros((len(which), 2), np.bool_)
         for i, proposal in enumerate(which.tolist()):
             members = slice(*proposals.offsets[proposal : proposal + 2].tolist())
             x, y, _ = proposals.coordinates[:, members]
@@ -68,11 +68,13 @@ class Sight:
             range_m = np.sqrt(x * x + y * y)
             centre = int(_bearing(*proposals.centroid[proposal, :2].astype(np.float32)[:, None])[0])
             off = (bearing - centre + 3 * BEARINGS // 2) % BEARINGS - BEARINGS // 2
-            for sign in (-1, 1):
+            for side, sign in enumerate((-1, 1)):
                 outermost = (sign * off).max()
                 end_m = range_m[sign * off == outermost].min()
                 beside = (centre + sign * (outermost + np.arange(1, BESIDE + 1))) % BEARINGS
-                sides[i] += nearest[beside, low:high].min(initial=np.inf) < end_m + np.float32(self.tuning.margin_m)
+                sides[i, side] = nearest[beside, low:high].min(initial=np.inf) < end_m + np.float32(
+                    self.tuning.margin_m
+                )
         return sides
 
 
@@ -135,9 +137,9 @@ class NativeSight(Sight):
         declare(library, _SIGNATURES)
         self._library = library
 
-    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Int:
+    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Bool:
         """The same, looking at one of `every` points."""
-        sides = np.empty(len(which), np.int64)
+        sides = np.empty((len(which), 2), np.bool_)
         self._library.modt_bounded_sides(
             points,
             kind,

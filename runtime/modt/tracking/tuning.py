@@ -88,8 +88,8 @@ class MotionEvidenceTuning:
     """Weight of motion that a changing view explains."""
 
     min_height_m: float = 0.2
-    """A flat proposal lower than this is no evidence of motion, since where beams meet the ground moves with the robot
-    [m]. Greater: small movers are missed.
+    """A flat proposal lower than this is no evidence of motion, since where beams meet the ground moves with the
+    robot [m]. Greater: small movers are missed.
     Chosen on: simulated streets, by low things that were reported as moving."""
 
     flat_height: float = 0.4
@@ -117,6 +117,11 @@ class MotionEvidenceTuning:
     min_compact_width: float = 0.4
     """Least width of a compact proposal, relative to its length. Less: parts of walls seem to move.
     Chosen on: simulated aisles, by static things that were reported as moving."""
+
+    young_hits: int = 5
+    """Frames with a proposal up to which a track that comes into view goes as far as its leading end. Greater: parts
+    of surfaces move.
+    Chosen on: simulated streets, by the error of velocities of new tracks."""
 
     moving: float = 0.95
     """A track moves from this probability on. Greater: fewer static things move, and starts are reported later.
