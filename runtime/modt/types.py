@@ -410,6 +410,49 @@ class Budget:
 UNLIMITED = Budget()
 
 
+class TrustLevel(IntEnum):
+    """How far what is reported can be believed, from best to worst."""
+
+    GOOD = 0
+    DEGRADED = 1  # a part of the view, or a source beside the sweeps, is wrong
+    BLIND = 2  # what is reported does not follow from what is around
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """A cause for less than good trust.
+
+    Attributes:
+        key: name of the check.
+        level: what it makes of the trust.
+        cause, remedy: phrases for people.
+        since_s: time of the frame with which it began [s].
+    """
+
+    key: str
+    level: TrustLevel
+    cause: str
+    remedy: str
+    since_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """Whether what is reported can be believed, since when [s], and the reasons against it."""
+
+    level: TrustLevel = TrustLevel.GOOD
+    since_s: float = 0.0
+    reasons: tuple[Reason, ...] = ()
+
+    @property
+    def word(self) -> str:
+        """The level as it is reported."""
+        return self.level.name.lower()
+
+
+TRUSTED = Trust()
+
+
 @dataclass(frozen=True, slots=True)
 class FrameResult:
     """Result of a frame."""
@@ -422,6 +465,7 @@ class FrameResult:
     n_deferred: int  # tracks whose request for a class waits for the next frame's budget
     classified: Int = field(default_factory=lambda: np.zeros(0, np.int64))  # identities of the tracks
     run_id: str = ""  # 16 hexadecimal digits of a service, whose frames and tracks count from 0; "" of a replay
+    trust: Trust = TRUSTED
 
     @property
     def labels(self) -> Int:

@@ -1,0 +1,170 @@
+"""Plane of the ground near the sensor against the usual one, which the robot stands on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.trust.sample import Sample
+from modt.trust.tuning import GroundTuning
+from modt.types import Bool, Float64
+
+HEIGHTS = 8.0
+"""Reach of the plane [heights of the sensor], between REACH_M."""
+REACH_M = (6.0, 15.0)
+ROUNDS_M = (0.4, 0.2, 0.1)
+"""Distance from the plane within which a point counts in each round of a fit [m]."""
+MIN_POINTS = 40
+"""Fewest sampled points on a plane."""
+LOST_SHARE = 0.4
+"""Share of the usual points on the ground below which the plane is sought elsewhere."""
+TILTS_DEG = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
+SCALES = (*np.geomspace(0.25, 3.0, 22).tolist(), -1.0)
+"""Tilts and shares of the height at which a lost plane is sought; below 0 it is above the sensor."""
+ON_HEIGHTS = 0.1
+"""Distance from the usual plane within which a point is on it [heights of the sensor], between ON_M."""
+ON_M = (0.04, 0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """z = plane @ (1, x, y); `points` sampled points lie on it."""
+
+    plane: Float64
+    points: int
+
+    @property
+    def up(self) -> Float64:
+        """(3,) normal."""
+        normal = np.array([-self.plane[1], -self.plane[2], 1.0])
+        return np.asarray(normal / np.linalg.norm(normal))
+
+    @property
+    def height_m(self) -> float:
+        """Height of the sensor above it [m], negative if it is above the sensor."""
+        return float(-self.plane[0] * self.up[2])
+
+
+class GroundCheck:
+    """The usual plane of the ground. It is only followed while the plane is where it usually is.
+
+    Args:
+        tuning: what counts as another plane.
+    """
+
+    def __init__(self, tuning: GroundTuning, height_m: float | None) -> None:
+        self._tuning = tuning
+        self._height_m = height_m
+        self.usual: Float64 | None = None
+        self._points = 0.0  # usual number of sampled points on it
+        self.lost = False  # whether the usual plane has few points in the last look
+        self._differs = False  # whether another plane was there
+
+    def learn(self, sample: Sample, elapsed_s: float) -> None:
+        """Follow the plane of a sweep."""
+        if self.usual is None:
+            found = self._search(sample, np.array([-(self._height_m or 1.0), 0.0, 0.0]))
+            if found is not None and found.height_m > 0:
+                self.usual = found.plane
+                self._points = found.points
+            return
+        found = self._fit(sample, self.usual)
+        if found is None:
+            return
+        gain = min(elapsed_s / self._tuning.memory_s, 1.0)
+        self.usual = self.usual + gain * (found.plane - self.usual)
+        self._points += gain * (found.points - self._points)
+
+    def heights(self, sample: Sample) -> Float64:
+        """(k,) heights of the sampled points above the usual plane [m]."""
+        plane = np.array([-(self._height_m or 1.0), 0.0, 0.0]) if self.usual is None else self.usual
+        x, y, z = sample.xyz
+        return np.asarray(z - (plane[0] + plane[1] * x + plane[2] * y))
+
+    def change(self, sample: Sample, share: float = 1.0) -> str:
+        """Phrase for another plane than the usual one, empty if there is none within a share of the limits."""
+        differs = self._change(sample, share)
+        self._differs = bool(differs)
+        return differs
+
+    def _change(self, sample: Sample, share: float) -> str:
+        self.lost = False
+        if self.usual is None or self._points < MIN_POINTS:
+            return ""
+        found = self._fit(sample, self.usual)
+        if found is None or found.points < LOST_SHARE * self._points:
+            self.lost = True
+            found = self._search(sample, self.usual)
+            if found is None or found.points < LOST_SHARE * self._points:
+                return ""
+        before = Plane(self.usual, 0)
+        tilt_deg = float(np.rad2deg(np.arccos(np.clip(found.up @ before.up, -1.0, 1.0))))
+        ratio = found.height_m / before.height_m
+        if ratio < 0:
+            return "the ground is above the sensor"
+        if tilt_deg > share * self._tuning.tilt_deg:
+            return f"the ground is tilted by {tilt_deg:.0f} deg against the mount"
+        if abs(ratio - 1) > share * self._tuning.height_share:
+            return f"the ground is {found.height_m:.2f} m below the sensor, not {before.height_m:.2f}"
+        return ""
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the ground is known, and was as usual at the last look."""
+        return self.usual is not None and self._points >= MIN_POINTS and not self.lost and not self._differs
+
+    def jumped(self, samples: Sequence[Sample]) -> bool:
+        """Whether the points on the usual plane became few between two of the samples, or a few became many."""
+        on = np.array([self._share_on(sample) for sample in samples])
+        least = self._tuning.jump * np.maximum(on[1:], on[:-1])
+        return bool((np.minimum(on[1:], on[:-1]) < least).any())
+
+    def _share_on(self, sample: Sample) -> float:
+        """Share of the points near the sensor that lie on the usual plane."""
+        assert self.usual is not None
+        columns, z = self._near(sample, abs(float(self.usual[0])))
+        near_m = np.clip(ON_HEIGHTS * abs(self.usual[0]), *ON_M)
+        return float(np.mean(np.abs(z - self.usual @ columns) < near_m)) if len(z) else 0.0
+
+    def _near(self, sample: Sample, height_m: float) -> tuple[Float64, Float64]:
+        """(3, k) rows 1, x, y and (k,) z of the points near the sensor."""
+        reach_m = float(np.clip(HEIGHTS * height_m, *REACH_M))
+        rows = sample.counted[sample.range_m.take(sample.counted) < reach_m]
+        x, y, z = sample.xyz.take(rows, axis=1).astype(np.float64)
+        return np.stack([np.ones(len(x)), x, y]), z
+
+    def _fit(self, sample: Sample, plane: Float64) -> Plane | None:
+        """Plane by least squares from a first guess; None if too few points lie on it."""
+        columns, z = self._near(sample, abs(float(plane[0])))
+        return _fitted(columns, z, plane)
+
+    def _search(self, sample: Sample, usual: Float64) -> Plane | None:
+        """The plane with the most points among tilts and heights around the usual one."""
+        columns, z = self._near(sample, abs(float(usual[0])))
+        if len(z) < MIN_POINTS:
+            return None
+        slopes = np.tan(np.deg2rad(TILTS_DEG))
+        tilts = np.stack(np.meshgrid(slopes, slopes), axis=-1).reshape(-1, 2)
+        best = None
+        for scale in SCALES:
+            level = usual * np.array([scale, np.sign(scale), np.sign(scale)])
+            offset = z - (tilts + level[1:]) @ columns[1:] - level[0]
+            on = (np.abs(offset) < ROUNDS_M[1]).sum(axis=1)
+            k = int(on.argmax())
+            if best is None or on[k] > best[0]:
+                best = (int(on[k]), np.array([level[0], *(tilts[k] + level[1:])]))
+        return None if best is None else _fitted(columns, z, best[1])
+
+
+def _fitted(columns: Float64, z: Float64, plane: Float64) -> Plane | None:
+    n = 0
+    for round_m in ROUNDS_M:
+        on: Bool = np.abs(z - plane @ columns) < round_m
+        n = int(np.count_nonzero(on))
+        if n < MIN_POINTS:
+            return None
+        used = columns[:, on]
+        plane = np.linalg.solve(used @ used.T + 1e-6 * np.eye(3), used @ z[on])
+    return Plane(plane, n)

@@ -1,0 +1,127 @@
+"""Returns by sector and beam against the usual ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.trust.sample import Sample
+from modt.trust.tuning import ReturnsTuning
+from modt.types import Bool, Float64
+
+SECTORS = 24
+BANDS = 12
+"""Bands of elevation, of the same width in its tangent."""
+OUTER = 0.01
+"""Share of the returns of the first sweep below the lowest band, and above the highest one."""
+AROUND = 8
+"""Number of sectors in which a band must usually have returns to be expected. One tree does not count."""
+BAND_POINTS = 24.0
+"""Fewest sampled points of a band that is expected."""
+MIN_POINTS = 8.0
+"""Fewest sampled points of a sector, and half those of a cell in which the share of returns is judged."""
+THIRDS = 3
+"""Parts of the bands in which the share of returns is judged."""
+SIDES = ("ahead", "to the left", "behind", "to the right")
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Returns that are missing: whether too many, whether whole sectors are, and a phrase for them."""
+
+    blind: bool
+    sectors: bool
+    what: str
+
+
+class ReturnsCheck:
+    """Usual returns of each sector and band of beams. They are only followed while nothing is missing.
+
+    Args:
+        tuning: what is usual, and what counts as lost.
+    """
+
+    def __init__(self, tuning: ReturnsTuning) -> None:
+        self._tuning = tuning
+        self._edges: Float64 | None = None  # (BANDS - 1,) tangents between the bands
+        self._usual = np.zeros((SECTORS, BANDS))
+        self._dead: Bool = np.zeros(BANDS, np.bool_)
+
+    def learn(self, sample: Sample, elapsed_s: float) -> None:
+        """Follow the returns of a sweep."""
+        if self._edges is None:
+            if len(sample.counted) < MIN_POINTS * BANDS:
+                return
+            self._edges = np.linspace(*np.quantile(_tangents(sample), (OUTER, 1 - OUTER)), BANDS + 1)[1:-1]
+            self._usual = self._count(sample)
+        gain = min(elapsed_s / self._tuning.memory_s, 1.0)
+        self._usual += gain * (self._count(sample) - self._usual)
+
+    def loss(self, samples: Sequence[Sample]) -> Loss | None:
+        """What is missing in the last of the sweeps since the last look; None if nothing is, or nothing is known."""
+        if self._edges is None:
+            return None
+        tuning = self._tuning
+        sample = samples[-1]
+        least = MIN_POINTS * sample.weight
+        count = self._count(sample)
+        usual = self._usual.sum(axis=1)
+        expected = usual > np.maximum(tuning.usual_share * np.median(usual), least)
+        lost = expected & (count.sum(axis=1) < tuning.lost_share * usual)
+        n_lost = int(np.count_nonzero(lost))
+        if n_lost >= tuning.degraded_sectors:
+            blind = n_lost >= tuning.blind_share * np.count_nonzero(expected)
+            where = "any direction" if n_lost >= 0.9 * np.count_nonzero(expected) else _sides(lost)
+            return Loss(blind, True, f"no returns from {where} ({360 // SECTORS * n_lost} deg)")
+        usual_of_band = self._usual.sum(axis=0)
+        around = (self._usual > sample.weight).sum(axis=0) >= AROUND
+        dead = around & (usual_of_band > BAND_POINTS * sample.weight)
+        dead &= count.sum(axis=0) < tuning.beam_share * usual_of_band
+        self._dead = dead & (self._dead | self._ended(samples)) if dead.any() else dead
+        if self._dead.any():
+            dead = self._dead
+            return Loss(dead.sum() * 3 >= BANDS, False, f"no returns from {_bands(dead)} beams, in any direction")
+        in_thirds = SECTORS, THIRDS, BANDS // THIRDS
+        usual_in_thirds = self._usual.reshape(in_thirds).sum(axis=2)
+        full = usual_in_thirds > 2 * least
+        if np.count_nonzero(full) >= SECTORS:
+            ratio = np.quantile(count.reshape(in_thirds).sum(axis=2)[full] / usual_in_thirds[full], 0.8)
+            if ratio < tuning.thin_ratio:
+                return Loss(False, False, f"{100 * (1 - ratio):.0f} % of the returns are missing, in all directions")
+        return None
+
+    def _ended(self, samples: Sequence[Sample]) -> Bool:
+        """(BANDS,) whether the returns of each band ended at once, from one of the sweeps to the next."""
+        count = np.array([self._count(sample).sum(axis=0) for sample in samples])
+        return np.asarray((count[1:] < self._tuning.ended_share * count[:-1]).any(axis=0))
+
+    def _count(self, sample: Sample) -> Float64:
+        """(SECTORS, BANDS) returns of a sweep."""
+        assert self._edges is not None
+        x, y, _ = sample.xyz
+        bearing = np.arctan2(y, x).take(sample.counted)
+        sector = ((bearing + np.pi) * (SECTORS / (2 * np.pi))).astype(np.int64) % SECTORS
+        band = np.searchsorted(self._edges, _tangents(sample))
+        count = np.bincount(sector * BANDS + band, minlength=SECTORS * BANDS)
+        return (sample.weight * count).reshape(SECTORS, BANDS)
+
+
+def _tangents(sample: Sample) -> Float64:
+    """(k,) tangents of the elevations of the returns that count."""
+    return (sample.xyz[2] / np.maximum(sample.range_m, 1e-3)).take(sample.counted).astype(np.float64)
+
+
+def _sides(lost: Bool) -> str:
+    """The side on which most of the lost sectors lie."""
+    bearing = (np.flatnonzero(lost) + 0.5) * (2 * np.pi / SECTORS) - np.pi
+    mean = np.arctan2(np.sin(bearing).sum(), np.cos(bearing).sum())
+    return SIDES[round(float(mean) / (np.pi / 2)) % len(SIDES)]
+
+
+def _bands(dead: Bool) -> str:
+    which = np.flatnonzero(dead)
+    if which.min() >= BANDS // 2:
+        return "the upper"
+    return "the lower" if which.max() < BANDS // 2 else "several"

@@ -1,0 +1,121 @@
+"""Tuning of the trust: how often it looks, what it expects, and how long a doubt has to last."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnsTuning:
+    """Returns by sector and by beam against the usual ones."""
+
+    memory_s: float = 10.0
+    """Time over which the usual number of returns is averaged [s]. Greater: slower to follow another scene.
+    Chosen on: judgement."""
+
+    usual_share: float = 0.2
+    """Share of the median sector's returns that a sector must usually have to be expected. Less: open sky and water
+    are expected to return.
+    Chosen on: judgement."""
+
+    lost_share: float = 0.1
+    """Share of the usual returns below which a sector is lost.
+    Chosen on: judgement."""
+
+    degraded_sectors: int = 4
+    """Number of lost sectors from which a part of the view is reported as lost.
+    Chosen on: simulated drives."""
+
+    blind_share: float = 0.45
+    """Share of the expected sectors from which the view is lost.
+    Chosen on: half a view is blind."""
+
+    beam_share: float = 0.03
+    """Share of the usual returns of a band of beams, all around, below which the band is dead. A scene without returns
+    at some height has a few left behind the sensor.
+    Chosen on: simulated drives."""
+
+    ended_share: float = 0.3
+    """Share of the returns of a band that is left from one sweep to the next when its beams die.
+    Chosen on: judgement."""
+
+    thin_ratio: float = 0.7
+    """Share of its usual returns that the fullest fifth of the cells has at least. Below it, returns are lost
+    everywhere alike.
+    Chosen on: simulated drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroundTuning:
+    """Plane of the ground against the one before."""
+
+    memory_s: float = 10.0
+    """Time over which the usual plane is averaged [s].
+    Chosen on: judgement."""
+
+    tilt_deg: float = 4.0
+    """Change of the tilt beyond which the sensor is reported as knocked [deg].
+    Chosen on: simulated ramps and hills, and real drives."""
+
+    jump: float = 0.6
+    """Share of the points near the ground that are left from one frame to the next when the ground moves at once.
+    Chosen on: simulated drives."""
+
+    height_share: float = 0.12
+    """Change of the height, as a share of it, beyond which it is reported.
+    Chosen on: simulated ramps and hills, and real drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneTuning:
+    """Obstacles against those of the sweep before, brought by the pose into the present one."""
+
+    suspected: float = 0.7
+    """Share of the obstacle points at known places below which the frames since the last look are compared one by one.
+    Greater: more comparisons.
+    Chosen on: simulated drives."""
+
+    same: float = 0.6
+    """Share of the obstacle points at known places below which two frames in a row show different scenes.
+    Chosen on: simulated drives, in which the least is 0.82."""
+
+    back: float = 0.75
+    """Share of the obstacle points at the places before a change from which the scene is as it was.
+    Chosen on: simulated drives."""
+
+    better: float = 0.2
+    """Share of the obstacle points by which an explanation is better than none.
+    Chosen on: simulated drives."""
+
+    explained: float = 0.6
+    """Share of the obstacle points that a turn, a mirror or a scale has to bring to known places to explain them.
+    Chosen on: simulated drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrustTuning:
+    """Everything that is chosen in the trust."""
+
+    returns: ReturnsTuning = ReturnsTuning()
+    ground: GroundTuning = GroundTuning()
+    scene: SceneTuning = SceneTuning()
+
+    look_s: float = 0.5
+    """Time between two looks [s]. Less: earlier alarms, at more cost.
+    Chosen on: an alarm within 2 s."""
+
+    looks: int = 2
+    """Number of looks in a row after which a lasting finding is reported, or withdrawn.
+    Chosen on: an alarm within 2 s."""
+
+    another_s: float = 3.0
+    """Time for which another scene, with no explanation, is reported [s].
+    Chosen on: good again within 5 s."""
+
+    back_looks: int = 3
+    """Number of looks in a row in which ground or scene are as they were, after which a change is withdrawn.
+    Chosen on: good again within 5 s."""
+
+    learn_s: float = 2.0
+    """Time after the start before anything is expected [s].
+    Chosen on: judgement."""

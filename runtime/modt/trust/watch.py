@@ -1,0 +1,201 @@
+"""The watch over the trust: a sample of every frame, and a look at all checks twice a second."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from modt.config import SensorConfig
+from modt.trust.ground import GroundCheck
+from modt.trust.returns import ReturnsCheck
+from modt.trust.sample import Sample, sample
+from modt.trust.scene import SAME, Change, agreement, explain
+from modt.trust.tuning import TrustTuning
+from modt.types import Float64, Frame, Reason, Trust, TrustLevel
+
+CLEAN = "clean and uncover the sensor, and check what stands before it"
+MOUNT = "check the mount of the sensor, then start anew"
+DRIVER = "restart the sensor and its driver"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a check has against the sweeps at a look."""
+
+    level: TrustLevel
+    cause: str
+    remedy: str
+
+
+class Debounced:
+    """Reasons that begin after some looks in a row with a finding, and end after some without one."""
+
+    def __init__(self, looks: int) -> None:
+        self._looks = looks
+        self._found: dict[str, int] = {}  # looks in a row with a finding, or minus those without one
+        self.reasons: dict[str, Reason] = {}
+
+    def update(self, findings: dict[str, Finding], now_s: float, at_once: frozenset[str]) -> None:
+        """Take the findings of a look; those of the checks in `at_once` count from the first look on."""
+        for key in {*findings, *self.reasons, *self._found}:
+            finding = findings.get(key)
+            before = self._found.get(key, 0)
+            in_a_row = max(before, 0) + 1 if finding else min(before, 0) - 1
+            self._found[key] = in_a_row
+            if finding and (in_a_row >= self._looks or key in at_once or key in self.reasons):
+                known = self.reasons.get(key)
+                since_s = known.since_s if known else now_s
+                self.reasons[key] = Reason(key, finding.level, finding.cause, finding.remedy, since_s)
+            elif in_a_row <= -self._looks:
+                self.reasons.pop(key, None)
+                del self._found[key]
+
+
+class TrustWatch:
+    """Judges whether the sweeps of a sensor are possible, by those before.
+
+    Args:
+        sensor: its range and mount.
+        tuning: what is expected.
+    """
+
+    def __init__(self, sensor: SensorConfig, tuning: TrustTuning = TrustTuning()) -> None:
+        self._sensor = sensor
+        self._tuning = tuning
+        self._returns = ReturnsCheck(tuning.returns)
+        self._ground = GroundCheck(tuning.ground, sensor.height_m)
+        self._samples: list[Sample] = []  # those since the last look, its own included
+        self._debounced = Debounced(tuning.looks)
+        self._looked_s = -np.inf
+        self._began_s: float | None = None
+        self._change = Change(False, 0, 0)  # of the scene, since it was last believed
+        self._before: Sample | None = None  # the last frame before that change
+        self._scene_looks = 0  # in a row in which the scene is as it was in that frame
+        self._moved = ""  # how the ground moved at once, while it is not back
+        self._ground_looks = 0  # in a row in which it is back
+        self._another_s = -np.inf  # when another scene was seen
+        self._comparable = True  # the last look showed a whole sweep
+        self.trust = Trust()
+
+    def add(self, frame: Frame, T_world_sensor: Float64) -> Trust:
+        """Take a level frame and its pose; the trust after it."""
+        seen = sample(frame, T_world_sensor, self._sensor)
+        now_s = seen.time_s
+        if self._began_s is None or now_s < self._samples[-1].time_s or now_s - self._samples[-1].time_s > GAP_S:
+            self._began_s = now_s if self._began_s is None else self._began_s
+            self._samples = [seen]
+            self._looked_s = now_s
+            return self.trust
+        self._samples = [*self._samples[-MOST_SAMPLES:], seen]
+        elapsed_s = now_s - self._looked_s
+        if elapsed_s < self._tuning.look_s - 1e-3:
+            return self.trust
+        learning = now_s - self._began_s < self._tuning.learn_s
+        findings = {} if learning else dict(self._findings(seen))
+        self._debounced.update(findings, now_s, AT_ONCE)
+        if not findings and not self._debounced.reasons:
+            self._returns.learn(seen, elapsed_s)
+            self._ground.learn(seen, elapsed_s)
+        self._samples = [seen]
+        self._looked_s = now_s
+        self.trust = self._judged(now_s)
+        return self.trust
+
+    def _judged(self, now_s: float) -> Trust:
+        reasons = tuple(sorted(self._debounced.reasons.values(), key=lambda reason: (-reason.level, reason.since_s)))
+        level = reasons[0].level if reasons else TrustLevel.GOOD
+        since_s = self.trust.since_s if level == self.trust.level else now_s
+        return Trust(level, since_s, reasons)
+
+    def _findings(self, seen: Sample) -> Iterator[tuple[str, Finding]]:
+        """Findings of a look by the name of the check."""
+        repeated = _repeated(self._samples[-2], seen)
+        if repeated:
+            yield "frozen", Finding(TrustLevel.BLIND, "the same sweep comes again and again", DRIVER)
+        loss = self._returns.loss(self._samples)
+        if loss is not None:
+            level = TrustLevel.BLIND if loss.blind else TrustLevel.DEGRADED
+            yield "returns", Finding(level, loss.what, CLEAN)
+        comparable = not repeated and (loss is None or not loss.sectors)
+        if comparable and self._comparable:
+            self._follow_ground(seen)
+            if not self._moved:
+                self._follow_scene(seen)
+        self._comparable = comparable
+        if self._moved:
+            yield "ground", Finding(TrustLevel.BLIND, self._moved, MOUNT)
+        if not self._change.is_none:
+            yield "scene", Finding(TrustLevel.BLIND, f"the scene is {self._change} against the one before", MOUNT)
+        elif seen.time_s - self._another_s < self._tuning.another_s:
+            yield "scene", Finding(TrustLevel.DEGRADED, "another scene than a moment before", MOUNT)
+
+    def _follow_ground(self, seen: Sample) -> None:
+        """Notice a ground that moves at once, and one that is back."""
+        if not self._moved:
+            moved = self._ground.change(seen)
+            self._moved = moved if moved and self._ground.jumped(self._samples) else ""
+            return
+        moved = self._ground.change(seen, BACK_SHARE)
+        is_back = not moved and not self._ground.lost
+        self._ground_looks = self._ground_looks + 1 if is_back else 0
+        self._moved = moved or self._moved
+        if self._ground_looks >= self._tuning.back_looks:
+            self._moved = ""
+
+    def _follow_scene(self, seen: Sample) -> None:
+        """Notice a scene that changes at once, between two frames, and one that is back."""
+        scene = self._tuning.scene
+        if self._agreement(self._samples[0], seen) < scene.suspected or not self._change.is_none:
+            pairs = list(zip(self._samples, self._samples[1:], strict=False))
+            agreements = [self._agreement(before, after) for before, after in pairs]
+            least = int(np.argmin(agreements))
+            if agreements[least] < scene.same:
+                self._explain(*pairs[least], agreements[least])
+        if self._change.is_none or self._before is None:
+            return
+        is_back = agreement(self._before, seen, self._ground, SAME.motion(self._before, seen)) >= scene.back
+        self._scene_looks = self._scene_looks + 1 if is_back else 0
+        if self._scene_looks >= self._tuning.back_looks:
+            self._change = SAME
+        elif self._change.scaled and self._ground.in_place and not self._moved:
+            self._change = replace(self._change, scaled=0)  # the ground shows the scale better
+
+    def _agreement(self, before: Sample, after: Sample) -> float:
+        """Agreement of two sweeps in the scene as it is changed."""
+        return agreement(before, after, self._ground, self._change.motion(before, after))
+
+    def _explain(self, before: Sample, after: Sample, least: float) -> None:
+        """Write how the scene changed from one frame to the next."""
+        scene = self._tuning.scene
+        change, share = explain(before, after, self._ground, self._change.motion(before, after))
+        if share < scene.explained or share < least + scene.better:
+            self._another_s = after.time_s
+            self._change = SAME
+            if self._ground.lost and self._ground.jumped(self._samples):
+                self._moved = "the ground is out of view at once"
+            return
+        if self._change.is_none:
+            self._before = before
+        self._change = self._change.then(change)
+
+
+BACK_SHARE = 0.7
+"""Share of the limits of the ground within which it is back."""
+GAP_S = 1.0
+"""Longest time between two frames that are compared [s]."""
+MOST_SAMPLES = 24
+"""Greatest number of frames between two looks that are kept."""
+AT_ONCE = frozenset({"scene", "ground"})
+"""Checks whose finding is a step between two frames, which is not waited for twice."""
+REPEATED_SHARE = 0.5
+"""Share of the points at the same place to the last bit from which a sweep is one before."""
+
+
+def _repeated(before: Sample, now: Sample) -> bool:
+    """Whether a sweep is the one before, to the last bit."""
+    if before.xyz.shape != now.xyz.shape or not len(now.counted):
+        return False
+    same = (before.xyz == now.xyz).all(axis=0).take(now.counted)
+    return float(same.mean()) >= REPEATED_SHARE
