@@ -20,6 +20,19 @@ MIN_POINTS = 40
 """Fewest sampled points on a plane."""
 LOST_SHARE = 0.4
 """Share of the usual points on the ground below which the plane is sought elsewhere."""
+WHOLE_SHARE = 0.5
+"""Share of the usual points that lie on the plane before it moves, or once it is back."""
+TILTS_DEG = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
+TILTS_DEG = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
+SCALES = (*np.geomspace(0.25, 3.0, 22).tolist(), -1.0)
+"""Tilts and shares of the height at which a lost plane is sought; below 0 it is above the sensor."""
+SECTORS = 24
+MOST_RINGS = 15
+"""Cells in which the lowest points of two sweeps are compared: sectors, and rings of a metre."""
+MIN_CELLS = 12
+"""Fewest cells in which the ground of two sweeps is compared."""
+STEP_ROUNDS = 3
+"""Rounds of the fit of a step of the ground."""
 TILTS_DEG = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
 SCALES = (*np.geomspace(0.25, 3.0, 22).tolist(), -1.0)
 """Tilts and shares of the height at which a lost plane is sought; below 0 it is above the sensor."""
@@ -60,7 +73,6 @@ class GroundCheck:
         self.usual: Float64 | None = None
         self._points = 0.0  # usual number of sampled points on it
         self.lost = False  # whether the usual plane has few points in the last look
-        self._differs = False  # whether another plane was there
 
     def learn(self, sample: Sample, elapsed_s: float) -> None:
         """Follow the plane of a sweep."""
@@ -85,11 +97,6 @@ class GroundCheck:
 
     def change(self, sample: Sample, share: float = 1.0) -> str:
         """Phrase for another plane than the usual one, empty if there is none within a share of the limits."""
-        differs = self._change(sample, share)
-        self._differs = bool(differs)
-        return differs
-
-    def _change(self, sample: Sample, share: float) -> str:
         self.lost = False
         if self.usual is None or self._points < MIN_POINTS:
             return ""
@@ -110,23 +117,32 @@ class GroundCheck:
             return f"the ground is {found.height_m:.2f} m below the sensor, not {before.height_m:.2f}"
         return ""
 
-    @property
-    def in_place(self) -> bool:
-        """Whether the ground is known, and was as usual at the last look."""
-        return self.usual is not None and self._points >= MIN_POINTS and not self.lost and not self._differs
-
     def jumped(self, samples: Sequence[Sample]) -> bool:
-        """Whether the points on the usual plane became few between two of the samples, or a few became many."""
-        on = np.array([self._share_on(sample) for sample in samples])
-        least = self._tuning.jump * np.maximum(on[1:], on[:-1])
-        return bool((np.minimum(on[1:], on[:-1]) < least).any())
+        """Whether the ground moved at once, from one of the samples to the next."""
+        if self.usual is None:
+            return False
+        reach_m = float(np.clip(HEIGHTS * abs(self.usual[0]), *REACH_M))
+        lows = [_lowest(sample, reach_m) for sample in samples]
+        return any(self._is_step(before, after) for before, after in zip(lows, lows[1:], strict=False))
 
-    def _share_on(self, sample: Sample) -> float:
-        """Share of the points near the sensor that lie on the usual plane."""
+    def _is_step(self, before_m: Float64, after_m: Float64) -> bool:
+        """Whether the lowest points of cells moved together by a share of the limits."""
         assert self.usual is not None
-        columns, z = self._near(sample, abs(float(self.usual[0])))
-        near_m = np.clip(ON_HEIGHTS * abs(self.usual[0]), *ON_M)
-        return float(np.mean(np.abs(z - self.usual @ columns) < near_m)) if len(z) else 0.0
+        both = np.flatnonzero(np.isfinite(before_m) & np.isfinite(after_m))
+        if len(both) < MIN_CELLS:
+            return False
+        columns = _CELLS[:, both]
+        step_m = after_m[both] - before_m[both]
+        plane = np.zeros(3)
+        for _ in range(STEP_ROUNDS):
+            off = np.abs(step_m - plane @ columns)
+            used = off <= 2 * np.median(off)
+            plane = np.linalg.solve(
+                columns[:, used] @ columns[:, used].T + 1e-6 * np.eye(3), columns[:, used] @ step_m[used]
+            )
+        tilt_deg = np.rad2deg(np.arctan(np.hypot(plane[1], plane[2])))
+        limit_m = self._tuning.jump * self._tuning.height_share * abs(self.usual[0])
+        return bool(tilt_deg > self._tuning.jump * self._tuning.tilt_deg or abs(plane[0]) > limit_m)
 
     def _near(self, sample: Sample, height_m: float) -> tuple[Float64, Float64]:
         """(3, k) rows 1, x, y and (k,) z of the points near the sensor."""
@@ -168,3 +184,25 @@ def _fitted(columns: Float64, z: Float64, plane: Float64) -> Plane | None:
         used = columns[:, on]
         plane = np.linalg.solve(used @ used.T + 1e-6 * np.eye(3), used @ z[on])
     return Plane(plane, n)
+
+
+def _cell_centres() -> Float64:
+    """(3, n) rows 1, x, y of the centres of the cells."""
+    bearing = (np.arange(SECTORS) + 0.5) * (2 * np.pi / SECTORS) - np.pi
+    range_m = np.arange(MOST_RINGS) + 0.5
+    x = np.outer(np.cos(bearing), range_m).ravel()
+    y = np.outer(np.sin(bearing), range_m).ravel()
+    return np.stack([np.ones(len(x)), x, y])
+
+
+_CELLS = _cell_centres()
+
+
+def _lowest(sample: Sample, reach_m: float) -> Float64:
+    """(n,) height of the lowest point of each cell [m], infinite without one."""
+    rows = sample.counted[sample.range_m.take(sample.counted) < reach_m]
+    x, y, z = sample.xyz.take(rows, axis=1)
+    sector = ((np.arctan2(y, x) + np.pi) * (SECTORS / (2 * np.pi))).astype(np.int64) % SECTORS
+    lowest = np.full(SECTORS * MOST_RINGS, np.inf)
+    np.minimum.at(lowest, sector * MOST_RINGS + sample.range_m.take(rows).astype(np.int64), z)
+    return lowest

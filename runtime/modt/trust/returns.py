@@ -16,8 +16,11 @@ BANDS = 12
 """Bands of elevation, of the same width in its tangent."""
 OUTER = 0.01
 """Share of the returns of the first sweep below the lowest band, and above the highest one."""
-AROUND = 8
+AROUND = 10
 """Number of sectors in which a band must usually have returns to be expected. One tree does not count."""
+MIN_DEAD = 2
+DEAD_SHARE = 0.08
+"""Fewest bands that are dead, or their least share of all returns. One may end at an object that is out of view."""
 BAND_POINTS = 24.0
 """Fewest sampled points of a band that is expected."""
 MIN_POINTS = 8.0
@@ -79,8 +82,9 @@ class ReturnsCheck:
         around = (self._usual > sample.weight).sum(axis=0) >= AROUND
         dead = around & (usual_of_band > BAND_POINTS * sample.weight)
         dead &= count.sum(axis=0) < tuning.beam_share * usual_of_band
-        self._dead = dead & (self._dead | self._ended(samples)) if dead.any() else dead
-        if self._dead.any():
+        self._dead = dead & (self._dead | self._ended(samples, usual_of_band)) if dead.any() else dead
+        share = usual_of_band[self._dead].sum() / max(usual.sum(), 1.0)
+        if np.count_nonzero(self._dead) >= MIN_DEAD or share > DEAD_SHARE:
             dead = self._dead
             return Loss(dead.sum() * 3 >= BANDS, False, f"no returns from {_bands(dead)} beams, in any direction")
         in_thirds = SECTORS, THIRDS, BANDS // THIRDS
@@ -92,10 +96,12 @@ class ReturnsCheck:
                 return Loss(False, False, f"{100 * (1 - ratio):.0f} % of the returns are missing, in all directions")
         return None
 
-    def _ended(self, samples: Sequence[Sample]) -> Bool:
+    def _ended(self, samples: Sequence[Sample], usual_of_band: Float64) -> Bool:
         """(BANDS,) whether the returns of each band ended at once, from one of the sweeps to the next."""
         count = np.array([self._count(sample).sum(axis=0) for sample in samples])
-        return np.asarray((count[1:] < self._tuning.ended_share * count[:-1]).any(axis=0))
+        was_whole = count[:-1] > self._tuning.whole_share * usual_of_band
+        ended = count[1:] < self._tuning.beam_share * usual_of_band
+        return np.asarray((was_whole & ended).any(axis=0))
 
     def _count(self, sample: Sample) -> Float64:
         """(SECTORS, BANDS) returns of a sweep."""

@@ -21,8 +21,9 @@ LOG_STEP = 0.08
 NEAREST_M = 1.0
 RANGES = 50
 """Cells along the range, up to 54 m."""
-OBSTACLE_M = (0.35, 3.0)
-"""Heights above the ground between which a point belongs to an obstacle [m]."""
+OBSTACLE_M = (0.35, 1.8)
+"""Heights above the ground between which a point belongs to an obstacle, and not to the ground
+or to a ceiling [m]."""
 MIN_POINTS = 40
 
 
@@ -102,9 +103,7 @@ def agreement(before: Sample, after: Sample, ground: GroundCheck, T_after_before
     return float(_grown(known).ravel().take(cells).mean())
 
 
-def explain(
-    before: Sample, after: Sample, ground: GroundCheck, T_after_before: Float64
-) -> tuple[Change, float]:
+def explain(before: Sample, after: Sample, ground: GroundCheck, T_after_before: Float64) -> tuple[Change, float]:
     """The change that brings most of the points of a sweep to known places, and their share."""
     known = places(before, ground, T_after_before)
     cells = places(after, ground)

@@ -35,9 +35,9 @@ class ReturnsTuning:
     at some height has a few left behind the sensor.
     Chosen on: simulated drives."""
 
-    ended_share: float = 0.3
-    """Share of the returns of a band that is left from one sweep to the next when its beams die.
-    Chosen on: judgement."""
+    whole_share: float = 0.4
+    """Share of its usual returns that a band has in the sweep before its beams die.
+    Chosen on: simulated drives past trees and houses."""
 
     thin_ratio: float = 0.7
     """Share of its usual returns that the fullest fifth of the cells has at least. Below it, returns are lost
@@ -57,9 +57,9 @@ class GroundTuning:
     """Change of the tilt beyond which the sensor is reported as knocked [deg].
     Chosen on: simulated ramps and hills, and real drives."""
 
-    jump: float = 0.6
-    """Share of the points near the ground that are left from one frame to the next when the ground moves at once.
-    Chosen on: simulated drives."""
+    jump: float = 1.0
+    """Share of the limits by which the ground moves from one frame to the next when the sensor is knocked.
+    Chosen on: simulated ramps and hills."""
 
     height_share: float = 0.12
     """Change of the height, as a share of it, beyond which it is reported.
@@ -70,7 +70,7 @@ class GroundTuning:
 class SceneTuning:
     """Obstacles against those of the sweep before, brought by the pose into the present one."""
 
-    suspected: float = 0.7
+    suspected: float = 0.85
     """Share of the obstacle points at known places below which the frames since the last look are compared one by one.
     Greater: more comparisons.
     Chosen on: simulated drives."""
@@ -83,13 +83,18 @@ class SceneTuning:
     """Share of the obstacle points at the places before a change from which the scene is as it was.
     Chosen on: simulated drives."""
 
-    better: float = 0.2
+    better: float = 0.15
     """Share of the obstacle points by which an explanation is better than none.
     Chosen on: simulated drives."""
 
     explained: float = 0.6
-    """Share of the obstacle points that a turn, a mirror or a scale has to bring to known places to explain them.
+    """Share of the obstacle points that a turn, a mirror or a scale has to bring to known places to explain another
+    scene.
     Chosen on: simulated drives."""
+
+    surely_explained: float = 0.85
+    """The same share where the scene could be the one before, as between two like walls.
+    Chosen on: simulated aisles."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -151,7 +151,7 @@ class TrustWatch:
             pairs = list(zip(self._samples, self._samples[1:], strict=False))
             agreements = [self._agreement(before, after) for before, after in pairs]
             least = int(np.argmin(agreements))
-            if agreements[least] < scene.same:
+            if agreements[least] < scene.suspected:
                 self._explain(*pairs[least], agreements[least])
         if self._change.is_none or self._before is None:
             return
@@ -159,8 +159,6 @@ class TrustWatch:
         self._scene_looks = self._scene_looks + 1 if is_back else 0
         if self._scene_looks >= self._tuning.back_looks:
             self._change = SAME
-        elif self._change.scaled and self._ground.in_place and not self._moved:
-            self._change = replace(self._change, scaled=0)  # the ground shows the scale better
 
     def _agreement(self, before: Sample, after: Sample) -> float:
         """Agreement of two sweeps in the scene as it is changed."""
@@ -170,7 +168,12 @@ class TrustWatch:
         """Write how the scene changed from one frame to the next."""
         scene = self._tuning.scene
         change, share = explain(before, after, self._ground, self._change.motion(before, after))
-        if share < scene.explained or share < least + scene.better:
+        if change.is_none and least >= scene.same:
+            return
+        another = least < scene.same
+        if share < (scene.explained if another else scene.surely_explained) or share < least + scene.better:
+            if not another:
+                return
             self._another_s = after.time_s
             self._change = SAME
             if self._ground.lost and self._ground.jumped(self._samples):
