@@ -359,6 +359,18 @@ class LoopConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TrustConfig(StageConfig):
+    """Results while modt is blind, that is while what it reports does not follow from what is around."""
+
+    results: str = choice(
+        "always",
+        ("always", "unless_blind"),
+        "What sinks get. always: every result, with its trust. unless_blind: none while the trust is blind; "
+        "the records go on.",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingConfig(StageConfig):
     """Records of the live loop, in effect with `modt run`."""
 
@@ -385,6 +397,7 @@ class ProfileConfig:
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     energy: EnergyConfig = field(default_factory=EnergyConfig)
     loop: LoopConfig = field(default_factory=LoopConfig)
+    trust: TrustConfig = field(default_factory=TrustConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
 
     def __post_init__(self) -> None:

@@ -449,6 +449,19 @@ class Trust:
         """The level as it is reported."""
         return self.level.name.lower()
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Names of the checks with a reason, ascending."""
+        return tuple(sorted(reason.key for reason in self.reasons))
+
+    def record(self) -> dict[str, Any]:
+        """Plain data for records and messages."""
+        reasons = [
+            {"check": r.key, "level": r.level.name.lower(), "since_s": round(r.since_s, 3), "cause": r.cause}
+            for r in self.reasons
+        ]
+        return {"level": self.word, "since_s": round(self.since_s, 3), "reasons": reasons}
+
 
 TRUSTED = Trust()
 

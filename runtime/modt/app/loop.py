@@ -31,7 +31,7 @@ from modt.sinks.output import LedgerSink, Sink, Writer, close_together
 from modt.sinks.recording import AtOnce, Job, Recording
 from modt.sinks.records import fields_of
 from modt.sources.stream import Received, StreamEndedError
-from modt.types import FrameResult
+from modt.types import FrameResult, TrustLevel
 
 if TYPE_CHECKING:
     from modt.sinks.background import Background
@@ -41,6 +41,9 @@ log = logging.getLogger(__name__)
 
 WAIT_S = 0.2
 """Longest wait for a sweep without a check of the signals and the watchdog [s]."""
+RECORDING = "recording"
+UNLESS_BLIND = "unless_blind"
+"""Value of trust.results that withholds the results from the sinks while the trust is blind."""
 REPORT_S = 1.0
 """Time between two reports of the status [s]."""
 
@@ -80,7 +83,7 @@ class Loop:
         self.power = PowerStatus()
         self.frames_without_reflectance = 0
         self.summary: dict[str, Any] = {}
-        self._writers: dict[str, Writer[FrameResult]] = {**self.sinks, "recording": self.recording}
+        self._writers: dict[str, Writer[FrameResult]] = {**self.sinks, RECORDING: self.recording}
         self._ledger_sinks = [writer for writer in self._writers.values() if isinstance(writer, LedgerSink)]
         self._recorded_profile = self.stages.chosen
         self._windows = Windows(self.meters, Clocks(), Conditions(self.core or 0))
@@ -180,7 +183,8 @@ class Loop:
         frame = received.frame
         budget = self.deadlines.budget(stages.budget, received.arrived_s, frame.index)
         result = stages.step(frame, budget, reduced=self.deadlines.reduced)
-        for name, writer in self._writers.items():
+        withheld = stages.config.trust.results == UNLESS_BLIND and result.trust.level is TrustLevel.BLIND
+        for name, writer in ({RECORDING: self.recording} if withheld else self._writers).items():
             self.failures.contain(name, stages.ledger.run, SINK, writer.write, result)
         line = stages.ledger.close_frame(frame.index)
         self.failures.contain("records", self._account, result, line)

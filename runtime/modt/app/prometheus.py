@@ -9,6 +9,7 @@ from typing import Any
 
 from modt.app.load_shedding import Step
 from modt.sinks.output import replace_file
+from modt.types import TrustLevel
 
 COUNTERS = re.compile(
     r"(frames|proposals|classifications|deferred|missed_deadlines|shed_sweeps|reloads|refused_reloads|steps_entered"
@@ -56,6 +57,11 @@ def _samples(status: Mapping[str, Any]) -> Iterator[Sample]:
     for key in ("time_s", "up_s", "period_s"):
         yield f"modt_{key}", {}, status[key]
     yield "modt_loop_step", {}, Step[status["loop"]["step"].upper()]
+    yield "modt_trust_level", {}, TrustLevel[status["trust"]["level"].upper()]
+    for reason in status["trust"]["reasons"]:
+        yield "modt_trust_reason", {"check": reason["check"]}, TrustLevel[reason["level"].upper()]
+    for level, frames in status["trust"]["frames"].items():
+        yield "modt_trust_frames_total", {"level": level}, frames
     for part in ("counts", "loop", "power", "sensor", "odometry", "recording", "host"):
         yield from _of_table(f"modt_{part}", status[part], {})
     for sink, health in status["sinks"].items():

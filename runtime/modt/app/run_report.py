@@ -29,6 +29,7 @@ def service_status(service: Service, counts: FrameCounts) -> Status:
         mode=stages.request.mode,
         profile=stages.chosen.name,
         period_s=stages.info.period_s,
+        trust=stages.trust.record(silent=bool(service.source.health()["silent"])),
         counts=counts,
         loop=LoopStatus(
             **fields_of(service.deadlines.figures()),
@@ -71,6 +72,7 @@ def run_summary(loop: Loop) -> dict[str, Any]:
             "stopped_by": loop.stop.signal,
             **loop.pace(),
         },
+        "trust": stages.trust.record(),
         "odometry": stages.odometry.report(),
         "class_frequency": dict(zip(CLASS_NAMES, pipeline.decision.frequency.tolist(), strict=True)),
         "host": loop.failures.contain("host", host.usage, loop.core),

@@ -11,7 +11,8 @@ import numpy as np
 
 from modt import host, profile
 from modt.app import assembly, inputs
-from modt.app.chosen_profile import ChosenProfile, choose
+from modt.app.chosen_profile import FOUND, ChosenProfile, choose
+from modt.app.trust_report import TrustReport
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.pipeline import Pipeline
@@ -19,7 +20,8 @@ from modt.placement import Mount
 from modt.poses.pose_source import PoseSource
 from modt.sensor_fit.recognition import recognise
 from modt.sources.stream import StreamInfo
-from modt.types import Budget, Float32, Frame, FrameResult
+from modt.trust.watch import Finding, TrustWatch
+from modt.types import Budget, Float32, Frame, FrameResult, TrustLevel
 
 SWEEPS = 10
 """Number of sweeps of another size in a row, after which the sensor is recognised anew."""
@@ -67,6 +69,7 @@ class Stages:
         chosen: the present profile.
         pipeline: its stages.
         odometry: source of the poses.
+        trust: judges the results.
         recognising: thread that compares a sweep with the profile; None before the first comparison.
         misfits: number of times that sweeps were found to be of another sensor than before.
 
@@ -96,6 +99,7 @@ class Stages:
         self._continuity = assembly.Continuity()
         self.chosen = self._choose()
         self.pipeline = self._new_pipeline(self.chosen.config)
+        self.trust = TrustReport(self.chosen.config.sensor)
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
 
     @property
@@ -124,14 +128,23 @@ class Stages:
             self._use(chosen)
 
     def step(self, frame: Frame, budget: Budget, *, reduced: bool) -> FrameResult:
-        """Process a frame; `reduced` leaves out distant points."""
+        """Process a frame, and judge how far its result can be believed; `reduced` leaves out distant points."""
         frame = self.odometry.place(frame)
         if reduced:
             x, y = frame.points[:, :2].T
             near = np.square(x) + np.square(y) <= (RANGE_SHARE * self.config.sensor.max_range_m) ** 2
             frame = replace(frame, points=frame.points[near])
         result = self.pipeline.step(frame, budget)
-        return replace(result, run_id=self.run_id) if self.run_id else result
+        return replace(result, run_id=self.run_id, trust=self.trust.judge(result, self._findings()))
+
+    def _findings(self) -> dict[str, Finding]:
+        """What is held against the profile, and what the odometry holds against its poses."""
+        findings = {}
+        recognition = self.chosen.recognition
+        if not recognition.same_sensor and recognition.differences and self.chosen.sensor != FOUND:
+            cause = f"the sweeps do not fit the profile {self.chosen.sensor}: {', '.join(recognition.differences)}"
+            findings["profile"] = Finding(TrustLevel.DEGRADED, cause, "give the profile of this sensor")
+        return findings
 
     def watch(self, frame: Frame) -> None:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it."""
@@ -212,5 +225,7 @@ class Stages:
     def _use(self, chosen: ChosenProfile) -> None:
         """Exchange the stages for those of another profile; the tracks are kept."""
         self.pipeline = self._new_pipeline(chosen.config)
+        if chosen.config.sensor != self.config.sensor:
+            self.trust.watch = TrustWatch(chosen.config.sensor)
         self.chosen = chosen
         host.release_freed_pages()

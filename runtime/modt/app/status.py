@@ -20,11 +20,12 @@ from modt.energy.windows import EnergyWindow
 from modt.reporting.summary import Summary
 from modt.sinks.output import Health
 from modt.sinks.recording import RecordingHealth
-from modt.types import NONE, Self
+from modt.types import NONE, Self, TrustLevel
 
 SCHEMA = "modt.status/1"
 MIN_RATE_S = 0.5
 """Shortest time over which a rate is computed [s]."""
+GOOD = TrustLevel.GOOD.name.lower()
 STALE_S = 5.0
 """Greatest age of the status of a running service [s]."""
 
@@ -100,6 +101,7 @@ class Status:
     mode: str
     profile: str
     period_s: float
+    trust: Mapping[str, Any] = field(default_factory=dict)  # level, since when, reasons, and frames of each level
     counts: FrameCounts
     loop: LoopStatus
     power: PowerStatus
@@ -170,7 +172,9 @@ def one_line(status: Status) -> str:
     step = "" if status.loop.step == "all" else f", load: {status.loop.step}"
     silent = ", sensor silent" if status.sensor.get("silent") else ""
     seen = f" ({classes})" if classes else ""
-    return f"{counts.rate_hz:.1f} Hz, {counts.tracks} tracks{seen}, {watts}{step}{silent}"
+    level = status.trust.get("level", GOOD)
+    trust = "" if level == GOOD else f", {level}"
+    return f"{counts.rate_hz:.1f} Hz, {counts.tracks} tracks{seen}, {watts}{step}{silent}{trust}"
 
 
 def status_text(status: Status, now_s: float) -> str:
@@ -188,6 +192,7 @@ def status_text(status: Status, now_s: float) -> str:
     lines = [
         f"{status.source}: {state}, mode {status.mode}, profile {status.profile}",
         f"  {one_line(status)}",
+        f"  trust       {_trust(status.trust)}",
         f"  deadlines   {loop.missed_deadlines} of {loop.frames} missed, {loop.shed_sweeps} sweeps left out",
         f"  lateness    {_times(loop.lateness_ms)}",
         f"  execution   {_times(loop.execution_ms)}",
@@ -204,6 +209,12 @@ def status_text(status: Status, now_s: float) -> str:
         *(f"  warning     {refusal}" for refusal in status.host.lacking),
     ]
     return "\n".join("".join(c if c.isprintable() else "?" for c in line) for line in lines)
+
+
+def _trust(trust: Mapping[str, Any]) -> str:
+    """Level, and the causes of one that is not good."""
+    causes = "; ".join(reason["cause"] for reason in trust.get("reasons", ()))
+    return f"{trust.get('level', GOOD)}" + (f": {causes}" if causes else "")
 
 
 def _times(figures: Mapping[str, float]) -> str:

@@ -35,6 +35,11 @@ DEFINITIONS = {
         "geometry_msgs/TwistWithCovariance twist"
     ),
     "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
+    "diagnostic_msgs/KeyValue": "string key, string value",
+    "diagnostic_msgs/DiagnosticStatus": (
+        "byte level, string name, string message, string hardware_id, diagnostic_msgs/KeyValue[] values"
+    ),
+    "diagnostic_msgs/DiagnosticArray": "std_msgs/Header header, diagnostic_msgs/DiagnosticStatus[] status",
     "vision_msgs/ObjectHypothesis": "string class_id, float64 score",
     "vision_msgs/ObjectHypothesisWithPose": (
         "vision_msgs/ObjectHypothesis hypothesis, geometry_msgs/PoseWithCovariance pose"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from modt.address import Address
 from modt.ros2 import odometry, point_cloud2
-from modt.sinks import clouds, markers, object_messages, poses
+from modt.sinks import clouds, diagnostics, markers, object_messages, poses
 from modt.types import FrameResult, Self
 
 # Names used if neither the address nor the input gives one
@@ -96,6 +96,7 @@ def topics(options: TopicOptions = TopicOptions()) -> list[Topic]:
     made = [
         topic(f"/{prefix}/{name}", kind, encode, options.background),
         topic(f"/{prefix}/markers", markers.TYPE, markers.markers),
+        topic(f"/{prefix}/diagnostics", diagnostics.TYPE, diagnostics.diagnostics),
         topic(f"/{prefix}/odometry", odometry.TYPE, poses.pose, options.world_frame_id or WORLD_FRAME_ID),
     ]
     if options.world_frame_id:

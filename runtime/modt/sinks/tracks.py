@@ -83,6 +83,7 @@ def _head(result: FrameResult) -> str:
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 6),
         "T_world_sensor": np.round(result.T_world_sensor[:3], 6).ravel().tolist(),
+        "trust": result.trust.record(),
         "proposals": len(result.proposals),
         "classifications": len(result.classified),
         "deferred": result.n_deferred,

@@ -20,9 +20,6 @@ MIN_POINTS = 40
 """Fewest sampled points on a plane."""
 LOST_SHARE = 0.4
 """Share of the usual points on the ground below which the plane is sought elsewhere."""
-WHOLE_SHARE = 0.5
-"""Share of the usual points that lie on the plane before it moves, or once it is back."""
-TILTS_DEG = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
 TILTS_DEG = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
 SCALES = (*np.geomspace(0.25, 3.0, 22).tolist(), -1.0)
 """Tilts and shares of the height at which a lost plane is sought; below 0 it is above the sensor."""
@@ -33,12 +30,6 @@ MIN_CELLS = 12
 """Fewest cells in which the ground of two sweeps is compared."""
 STEP_ROUNDS = 3
 """Rounds of the fit of a step of the ground."""
-TILTS_DEG = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
-SCALES = (*np.geomspace(0.25, 3.0, 22).tolist(), -1.0)
-"""Tilts and shares of the height at which a lost plane is sought; below 0 it is above the sensor."""
-ON_HEIGHTS = 0.1
-"""Distance from the usual plane within which a point is on it [heights of the sensor], between ON_M."""
-ON_M = (0.04, 0.1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +77,7 @@ class GroundCheck:
         if found is None:
             return
         gain = min(elapsed_s / self._tuning.memory_s, 1.0)
-        self.usual = self.usual + gain * (found.plane - self.usual)
+        self.usual = np.asarray(self.usual + gain * (found.plane - self.usual))
         self._points += gain * (found.points - self._points)
 
     def heights(self, sample: Sample) -> Float64:
@@ -117,48 +108,37 @@ class GroundCheck:
             return f"the ground is {found.height_m:.2f} m below the sensor, not {before.height_m:.2f}"
         return ""
 
-    def jumped(self, samples: Sequence[Sample]) -> bool:
-        """Whether the ground moved at once, from one of the samples to the next."""
+    def step(self, samples: Sequence[Sample]) -> Float64 | None:
+        """Plane (3,) by which the ground moved at once, from one of the samples to the next; None if it did not."""
         if self.usual is None:
-            return False
-        reach_m = float(np.clip(HEIGHTS * abs(self.usual[0]), *REACH_M))
+            return None
+        reach_m = _reach_m(self.usual)
         lows = [_lowest(sample, reach_m) for sample in samples]
-        return any(self._is_step(before, after) for before, after in zip(lows, lows[1:], strict=False))
+        steps = (_step(before, after) for before, after in zip(lows[:-1], lows[1:], strict=True))
+        return next((step for step in steps if step is not None and self.is_step(step)), None)
 
-    def _is_step(self, before_m: Float64, after_m: Float64) -> bool:
-        """Whether the lowest points of cells moved together by a share of the limits."""
+    def is_step(self, plane: Float64) -> bool:
+        """Whether a plane (3,) differs from none by more than the limits."""
         assert self.usual is not None
-        both = np.flatnonzero(np.isfinite(before_m) & np.isfinite(after_m))
-        if len(both) < MIN_CELLS:
-            return False
-        columns = _CELLS[:, both]
-        step_m = after_m[both] - before_m[both]
-        plane = np.zeros(3)
-        for _ in range(STEP_ROUNDS):
-            off = np.abs(step_m - plane @ columns)
-            used = off <= 2 * np.median(off)
-            plane = np.linalg.solve(
-                columns[:, used] @ columns[:, used].T + 1e-6 * np.eye(3), columns[:, used] @ step_m[used]
-            )
         tilt_deg = np.rad2deg(np.arctan(np.hypot(plane[1], plane[2])))
-        limit_m = self._tuning.jump * self._tuning.height_share * abs(self.usual[0])
-        return bool(tilt_deg > self._tuning.jump * self._tuning.tilt_deg or abs(plane[0]) > limit_m)
+        limit_m = self._tuning.height_share * abs(self.usual[0])
+        return bool(tilt_deg > self._tuning.tilt_deg or abs(plane[0]) > limit_m)
 
-    def _near(self, sample: Sample, height_m: float) -> tuple[Float64, Float64]:
+    def _near(self, sample: Sample, plane: Float64) -> tuple[Float64, Float64]:
         """(3, k) rows 1, x, y and (k,) z of the points near the sensor."""
-        reach_m = float(np.clip(HEIGHTS * height_m, *REACH_M))
+        reach_m = _reach_m(plane)
         rows = sample.counted[sample.range_m.take(sample.counted) < reach_m]
         x, y, z = sample.xyz.take(rows, axis=1).astype(np.float64)
         return np.stack([np.ones(len(x)), x, y]), z
 
     def _fit(self, sample: Sample, plane: Float64) -> Plane | None:
         """Plane by least squares from a first guess; None if too few points lie on it."""
-        columns, z = self._near(sample, abs(float(plane[0])))
+        columns, z = self._near(sample, plane)
         return _fitted(columns, z, plane)
 
     def _search(self, sample: Sample, usual: Float64) -> Plane | None:
         """The plane with the most points among tilts and heights around the usual one."""
-        columns, z = self._near(sample, abs(float(usual[0])))
+        columns, z = self._near(sample, usual)
         if len(z) < MIN_POINTS:
             return None
         slopes = np.tan(np.deg2rad(TILTS_DEG))
@@ -181,9 +161,34 @@ def _fitted(columns: Float64, z: Float64, plane: Float64) -> Plane | None:
         n = int(np.count_nonzero(on))
         if n < MIN_POINTS:
             return None
-        used = columns[:, on]
-        plane = np.linalg.solve(used @ used.T + 1e-6 * np.eye(3), used @ z[on])
+        plane = _least_squares(columns[:, on], z[on])
     return Plane(plane, n)
+
+
+def _step(before_m: Float64, after_m: Float64) -> Float64 | None:
+    """Plane (3,) by which most of the lowest points (n,) of the cells moved; None if too few cells have both."""
+    both = np.flatnonzero(np.isfinite(before_m) & np.isfinite(after_m))
+    if len(both) < MIN_CELLS:
+        return None
+    columns = _CELLS[:, both]
+    step_m = after_m[both] - before_m[both]
+    plane = np.zeros(3)
+    for _ in range(STEP_ROUNDS):
+        off_m = np.abs(step_m - plane @ columns)
+        used = off_m <= 2 * np.median(off_m)
+        plane = _least_squares(columns[:, used], step_m[used])
+    return plane
+
+
+def _least_squares(columns: Float64, values: Float64) -> Float64:
+    """(3,) factors of the columns (3, k) that make the values (k,)."""
+    factors: Float64 = np.linalg.solve(columns @ columns.T + 1e-6 * np.eye(3), columns @ values)
+    return factors
+
+
+def _reach_m(plane: Float64) -> float:
+    """Range within which points belong to the ground near the sensor [m]."""
+    return float(np.clip(HEIGHTS * abs(plane[0]), *REACH_M))
 
 
 def _cell_centres() -> Float64:

@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.trust.sample import Sample
 from modt.trust.tuning import ReturnsTuning
-from modt.types import Bool, Float64
+from modt.types import Bool, Float32, Float64
 
 SECTORS = 24
 BANDS = 12
@@ -57,7 +57,8 @@ class ReturnsCheck:
         if self._edges is None:
             if len(sample.counted) < MIN_POINTS * BANDS:
                 return
-            self._edges = np.linspace(*np.quantile(_tangents(sample), (OUTER, 1 - OUTER)), BANDS + 1)[1:-1]
+            low, high = np.quantile(_tangents(sample), (OUTER, 1 - OUTER)).tolist()
+            self._edges = np.linspace(low, high, BANDS + 1)[1:-1]
             self._usual = self._count(sample)
         gain = min(elapsed_s / self._tuning.memory_s, 1.0)
         self._usual += gain * (self._count(sample) - self._usual)
@@ -75,7 +76,7 @@ class ReturnsCheck:
         lost = expected & (count.sum(axis=1) < tuning.lost_share * usual)
         n_lost = int(np.count_nonzero(lost))
         if n_lost >= tuning.degraded_sectors:
-            blind = n_lost >= tuning.blind_share * np.count_nonzero(expected)
+            blind = bool(n_lost >= tuning.blind_share * np.count_nonzero(expected))
             where = "any direction" if n_lost >= 0.9 * np.count_nonzero(expected) else _sides(lost)
             return Loss(blind, True, f"no returns from {where} ({360 // SECTORS * n_lost} deg)")
         usual_of_band = self._usual.sum(axis=0)
@@ -86,7 +87,9 @@ class ReturnsCheck:
         share = usual_of_band[self._dead].sum() / max(usual.sum(), 1.0)
         if np.count_nonzero(self._dead) >= MIN_DEAD or share > DEAD_SHARE:
             dead = self._dead
-            return Loss(dead.sum() * 3 >= BANDS, False, f"no returns from {_bands(dead)} beams, in any direction")
+            return Loss(
+                bool(dead.sum() * 3 >= BANDS), False, f"no returns from {_bands(dead)} beams, in any direction"
+            )
         in_thirds = SECTORS, THIRDS, BANDS // THIRDS
         usual_in_thirds = self._usual.reshape(in_thirds).sum(axis=2)
         full = usual_in_thirds > 2 * least
@@ -111,12 +114,13 @@ class ReturnsCheck:
         sector = ((bearing + np.pi) * (SECTORS / (2 * np.pi))).astype(np.int64) % SECTORS
         band = np.searchsorted(self._edges, _tangents(sample))
         count = np.bincount(sector * BANDS + band, minlength=SECTORS * BANDS)
-        return (sample.weight * count).reshape(SECTORS, BANDS)
+        return np.asarray(sample.weight * count).reshape(SECTORS, BANDS)
 
 
 def _tangents(sample: Sample) -> Float64:
     """(k,) tangents of the elevations of the returns that count."""
-    return (sample.xyz[2] / np.maximum(sample.range_m, 1e-3)).take(sample.counted).astype(np.float64)
+    tangent: Float32 = sample.xyz[2] / np.maximum(sample.range_m, 1e-3)
+    return tangent.take(sample.counted).astype(np.float64)
 
 
 def _sides(lost: Bool) -> str:

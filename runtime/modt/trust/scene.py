@@ -25,11 +25,13 @@ OBSTACLE_M = (0.35, 1.8)
 """Heights above the ground between which a point belongs to an obstacle, and not to the ground
 or to a ceiling [m]."""
 MIN_POINTS = 40
+UNSCALED_FAVOUR = 0.02
+"""Share of the points by which a scale has to be better for each of its steps, as places are several steps wide."""
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """How the scene changed at once: turned by so many bearings, then mirrored; scaled by so many steps of the range."""
+    """How the scene changed at once: turned by so many bearings, then mirrored, and scaled by so many steps."""
 
     mirrored: bool
     turned: int
@@ -52,7 +54,7 @@ class Change:
         return not self.mirrored and abs(self.turned) <= 2 and abs(self.scaled) <= 1
 
     def then(self, other: Change) -> Change:
-        """This change and another one after it."""
+        """Change that these two make, the other one after this."""
         turned = self.turned + (-other.turned if self.mirrored else other.turned)
         turned = (turned + BEARINGS // 2) % BEARINGS - BEARINGS // 2
         return Change(self.mirrored != other.mirrored, turned, self.scaled + other.scaled)
@@ -118,8 +120,9 @@ def explain(before: Sample, after: Sample, ground: GroundCheck, T_after_before: 
             bearing = BEARINGS - 1 - bearing
         now = np.bincount(bearing * n + far, minlength=BEARINGS * n).reshape(BEARINGS, n).astype(np.float64)
         hits = np.fft.irfft2(spectrum * np.fft.rfft2(now), s=wide.shape) / max(len(cells), 1)
-        turned, scaled = np.unravel_index(int(hits.argmax()), hits.shape)
-        turned = int((turned + BEARINGS // 2) % BEARINGS - BEARINGS // 2)
-        scaled = int(scaled if scaled < n // 2 else scaled - n)
-        found.append((Change(mirrored, turned, scaled), float(hits.max())))
+        scales = np.arange(n)
+        scales[n // 2 :] -= n
+        turned, column = np.divmod(int((hits - UNSCALED_FAVOUR * np.abs(scales)).argmax()), n)
+        turned = (int(turned) + BEARINGS // 2) % BEARINGS - BEARINGS // 2
+        found.append((Change(mirrored, turned, int(scales[column])), float(hits.max())))
     return max(found, key=lambda each: each[1])

@@ -31,8 +31,7 @@ class ReturnsTuning:
     Chosen on: half a view is blind."""
 
     beam_share: float = 0.03
-    """Share of the usual returns of a band of beams, all around, below which the band is dead. A scene without returns
-    at some height has a few left behind the sensor.
+    """Share of the usual returns of a band of beams, all around, below which the band is dead.
     Chosen on: simulated drives."""
 
     whole_share: float = 0.4
@@ -54,15 +53,11 @@ class GroundTuning:
     Chosen on: judgement."""
 
     tilt_deg: float = 4.0
-    """Change of the tilt beyond which the sensor is reported as knocked [deg].
+    """Change of the tilt from one frame to the next beyond which the sensor is reported as knocked [deg].
     Chosen on: simulated ramps and hills, and real drives."""
 
-    jump: float = 1.0
-    """Share of the limits by which the ground moves from one frame to the next when the sensor is knocked.
-    Chosen on: simulated ramps and hills."""
-
     height_share: float = 0.12
-    """Change of the height, as a share of it, beyond which it is reported.
+    """Change of the height from one frame to the next, as a share of it, beyond which it is reported.
     Chosen on: simulated ramps and hills, and real drives."""
 
 
@@ -71,7 +66,7 @@ class SceneTuning:
     """Obstacles against those of the sweep before, brought by the pose into the present one."""
 
     suspected: float = 0.85
-    """Share of the obstacle points at known places below which the frames since the last look are compared one by one.
+    """Share of the obstacle points at known places below which all frames since the last look are compared.
     Greater: more comparisons.
     Chosen on: simulated drives."""
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -74,13 +75,22 @@ class TrustWatch:
         self._before: Sample | None = None  # the last frame before that change
         self._scene_looks = 0  # in a row in which the scene is as it was in that frame
         self._moved = ""  # how the ground moved at once, while it is not back
+        self._step = np.zeros(3)  # plane by which it moved
         self._ground_looks = 0  # in a row in which it is back
         self._another_s = -np.inf  # when another scene was seen
         self._comparable = True  # the last look showed a whole sweep
         self.trust = Trust()
 
-    def add(self, frame: Frame, T_world_sensor: Float64) -> Trust:
-        """Take a level frame and its pose; the trust after it."""
+    def add(
+        self, frame: Frame, T_world_sensor: Float64, others: Mapping[str, Finding] = MappingProxyType({})
+    ) -> Trust:
+        """The trust after another frame.
+
+        Args:
+            frame: the level frame.
+            T_world_sensor: (4, 4) its pose.
+            others: findings of other checks by their names.
+        """
         seen = sample(frame, T_world_sensor, self._sensor)
         now_s = seen.time_s
         if self._began_s is None or now_s < self._samples[-1].time_s or now_s - self._samples[-1].time_s > GAP_S:
@@ -93,9 +103,11 @@ class TrustWatch:
         if elapsed_s < self._tuning.look_s - 1e-3:
             return self.trust
         learning = now_s - self._began_s < self._tuning.learn_s
-        findings = {} if learning else dict(self._findings(seen))
+        findings = dict(others)
+        found_here = {} if learning else dict(self._findings(seen))
+        findings |= found_here
         self._debounced.update(findings, now_s, AT_ONCE)
-        if not findings and not self._debounced.reasons:
+        if not found_here and not OWN & self._debounced.reasons.keys():
             self._returns.learn(seen, elapsed_s)
             self._ground.learn(seen, elapsed_s)
         self._samples = [seen]
@@ -120,8 +132,9 @@ class TrustWatch:
             yield "returns", Finding(level, loss.what, CLEAN)
         comparable = not repeated and (loss is None or not loss.sectors)
         if comparable and self._comparable:
+            was_moved = self._moved
             self._follow_ground(seen)
-            if not self._moved:
+            if not was_moved and not self._moved:
                 self._follow_scene(seen)
         self._comparable = comparable
         if self._moved:
@@ -133,15 +146,22 @@ class TrustWatch:
 
     def _follow_ground(self, seen: Sample) -> None:
         """Notice a ground that moves at once, and one that is back."""
+        ground = self._ground
         if not self._moved:
-            moved = self._ground.change(seen)
-            self._moved = moved if moved and self._ground.jumped(self._samples) else ""
+            moved = ground.change(seen)
+            step = ground.step(self._samples) if moved else None
+            if step is not None:
+                self._moved = moved
+                self._step = step
             return
-        moved = self._ground.change(seen, BACK_SHARE)
-        is_back = not moved and not self._ground.lost
+        step = ground.step(self._samples)
+        if step is not None:
+            self._step = self._step + step
+        moved = ground.change(seen, BACK_SHARE)
+        is_back = not moved and not ground.lost
         self._ground_looks = self._ground_looks + 1 if is_back else 0
         self._moved = moved or self._moved
-        if self._ground_looks >= self._tuning.back_looks:
+        if self._ground_looks >= self._tuning.back_looks or not ground.is_step(self._step):
             self._moved = ""
 
     def _follow_scene(self, seen: Sample) -> None:
@@ -176,8 +196,10 @@ class TrustWatch:
                 return
             self._another_s = after.time_s
             self._change = SAME
-            if self._ground.lost and self._ground.jumped(self._samples):
+            step = self._ground.step(self._samples) if self._ground.lost else None
+            if step is not None:
                 self._moved = "the ground is out of view at once"
+                self._step = step
             return
         if self._change.is_none:
             self._before = before
@@ -190,6 +212,8 @@ GAP_S = 1.0
 """Longest time between two frames that are compared [s]."""
 MOST_SAMPLES = 24
 """Greatest number of frames between two looks that are kept."""
+OWN = frozenset({"frozen", "returns", "scene", "ground"})
+"""Checks of the sweeps themselves. Nothing is learned while one of them has a reason."""
 AT_ONCE = frozenset({"scene", "ground"})
 """Checks whose finding is a step between two frames, which is not waited for twice."""
 REPEATED_SHARE = 0.5

@@ -12,7 +12,7 @@ from modt.energy.ledger import LedgerLine
 from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.sinks.records import line
-from modt.types import FrameResult, PointKind
+from modt.types import FrameResult, PointKind, Trust
 from modt.viewer import theme
 from modt.viewer.html_page import LIVE, content, page
 from modt.viewer.live_server import LiveServer
@@ -83,6 +83,7 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
         "proposals": len(result.proposals),
         "classifications": len(result.classified),
         "deferred": result.n_deferred,
+        "trust": _trust_text(result.trust),
         "pose": planar(result.T_world_sensor).round(4).tolist(),
         **costs,
     }
@@ -93,6 +94,11 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
         "points": packed_cells(live_cells(result).thinned(MOST_CELLS), FASTEST),
     }
     return line(content)
+
+
+def _trust_text(trust: Trust) -> str:
+    """Level and causes of a trust that is not good, else nothing."""
+    return "; ".join([trust.word, *(reason.cause for reason in trust.reasons)]) if trust.level else ""
 
 
 def live_cells(result: FrameResult) -> Cells:

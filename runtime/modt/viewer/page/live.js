@@ -14,6 +14,7 @@ async function take({ frame, states, tracks, points }) {
   await addTracks(tracks, at);
   frames[at] = frame;
   packedSweeps[at] = points;
+  notice.textContent = frame.trust || "live";
   last = slider.max = at;
   forget(at - HISTORY);
   if (run.states.length !== states.length) legend("states", (run.states = states), true);

@@ -1,0 +1,60 @@
+"""The trust of a run: its log lines, and its part of status and summary."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from typing import Any
+
+from modt.config import SensorConfig
+from modt.trust.watch import Finding, TrustWatch
+from modt.types import FrameResult, Trust, TrustLevel
+
+log = logging.getLogger(__name__)
+
+SILENT = "no sweeps come from the sensor"
+
+
+class TrustReport:
+    """Judges each result, logs each change once, and counts the frames of each level.
+
+    Args:
+        sensor: the sensor of the profile.
+
+    Attributes:
+        watch: the checks; another sensor needs another one.
+        trust: that of the last frame.
+        frames: number of frames by level.
+    """
+
+    def __init__(self, sensor: SensorConfig) -> None:
+        self.watch = TrustWatch(sensor)
+        self.trust = Trust()
+        self.frames: Counter[str] = Counter({level.name.lower(): 0 for level in TrustLevel})
+
+    def judge(self, result: FrameResult, others: dict[str, Finding]) -> Trust:
+        """The trust of a result; `others` are findings of other checks by their names."""
+        trust = self.watch.add(result.frame, result.T_world_sensor, others)
+        self.frames[trust.word] += 1
+        if (trust.level, trust.keys) != (self.trust.level, self.trust.keys):
+            _log_change(self.trust, trust)
+        self.trust = trust
+        return trust
+
+    def record(self, *, silent: bool = False) -> dict[str, Any]:
+        """The trust and the frames of each level. A sensor that is silent makes it blind."""
+        record = self.trust.record()
+        if silent:
+            record["level"] = TrustLevel.BLIND.name.lower()
+            reason = {"check": "silent", "level": record["level"], "since_s": None, "cause": SILENT}
+            record["reasons"] = [reason, *record["reasons"]]
+        return record | {"frames": dict(self.frames)}
+
+
+def _log_change(before: Trust, after: Trust) -> None:
+    """One line for each reason that has come, or one for all that have gone."""
+    came = [reason for reason in after.reasons if reason.key not in before.keys]
+    for reason in came:
+        log.warning("trust is %s: %s; %s", after.word, reason.cause, reason.remedy)
+    if not came:
+        log.warning("trust is %s: it was %s because of %s", after.word, before.word, ", ".join(before.keys))
