@@ -27,6 +27,9 @@ SWEEPS = 10
 """Number of sweeps of another size in a row, after which the sensor is recognised anew."""
 RATIO = 2.0
 """Ratio of the numbers of returns from which a sweep counts as one of another size."""
+DOUBTED_S = 0.5
+"""Time for which given poses are doubted before it is reported [s]."""
+POSES_REMEDY = "check the odometry: its scale, units, frames, and whether it stands still"
 RANGE_SHARE = 0.6
 """Share of sensor.max_range_m that is kept while the range is reduced."""
 
@@ -144,6 +147,10 @@ class Stages:
         if not recognition.same_sensor and recognition.differences and self.chosen.sensor != FOUND:
             cause = f"the sweeps do not fit the profile {self.chosen.sensor}: {', '.join(recognition.differences)}"
             findings["profile"] = Finding(TrustLevel.DEGRADED, cause, "give the profile of this sensor")
+        doubted_s = self._continuity.odometry.pose_check.doubted_s if self._continuity.odometry else 0.0
+        if doubted_s >= DOUBTED_S:
+            cause = "what stands still moves by the given poses, which are left out: the sweeps tell the motion"
+            findings["poses"] = Finding(TrustLevel.DEGRADED, cause, POSES_REMEDY)
         return findings
 
     def watch(self, frame: Frame) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from modt.geometry import inverse, se3
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks, observe
+from modt.odometry.pose_check import PoseCheck
 from modt.odometry.registration import LandmarkMap, Landmarks, Registration
 from modt.odometry.tuning import OdometryTuning
 from modt.placement import Placement, PlanarMotion
@@ -23,7 +24,7 @@ not overlap are compared a second time, in double precision."""
 
 
 class PoseEstimator:
-    """Places sweeps by their poses, or, where a sweep has none, by registration against stationary tracks.
+    """Places sweeps by poses that can be believed, others by registration against stationary tracks.
 
     Registration begins at a prediction: the sensor moves as it did between the two frames before. Frames are taken to
     be equally far apart in time; a frame left out makes the prediction wrong by the motion in its time.
@@ -38,6 +39,7 @@ class PoseEstimator:
         self._tuning = tuning
         self._registration = Registration(kernels, tuning.registration)
         self._landmarks = LandmarkMap(tuning.landmarks)
+        self.pose_check = PoseCheck(kernels, tuning.pose_check)
         self._time_s: float | None = None
         self._T_world_before = np.eye(4)  # pose two frames ago
         self._T_world_last = np.eye(4)  # pose one frame ago
@@ -64,8 +66,7 @@ class PoseEstimator:
             frame: sweep; its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
             proposals: proposals of the frame.
             static_tracks: function of a time that returns the tracks that a frame may continue, and forgets the
-                expired ones. It is called if the frame has no pose, or one that is not aligned with the world of the
-                tracks yet.
+                expired ones.
         """
         # The world of a frame's pose is that of its odometry, which begins anew with each restart.
         T_odometry_sensor = frame.T_world_sensor
@@ -75,17 +76,41 @@ class PoseEstimator:
         if self._time_s is None and T_odometry_sensor is not None:
             self._begin(T_odometry_sensor)
         sweep = self._sweep(frame, proposals)
+        landmarks = self._landmarks.update(static_tracks(frame.time_s))
         if T_odometry_sensor is not None and self._T_world_odometry is not None:
-            self._landmarks.clear()  # the registration keeps whether a motion was known, and its inliers
-            placement = sweep.place(self._T_world_odometry @ T_odometry_sensor)
+            located = self._checked(frame.time_s, sweep, landmarks, T_odometry_sensor)
         else:
-            placement = self._register(sweep, self._landmarks.update(static_tracks(frame.time_s)))
+            placement = self._register(sweep, landmarks)
             if T_odometry_sensor is not None:  # an odometry that begins late or restarts is aligned with the world
                 self._T_world_odometry = placement.T_world_sensor @ inverse(T_odometry_sensor)
+            located = Located(placement, sweep.observe(placement))
+        placement = located.placement
         self._T_world_before = self._T_world_last
         self._T_world_last = placement.T_world_sensor
         self._time_s = frame.time_s
-        return Located(placement, sweep.observe(placement))
+        return located
+
+    def _checked(self, now_s: float, sweep: _Sweep, landmarks: Landmarks, T_odometry_sensor: Float64) -> Located:
+        """The sweep by its pose, or by registration while the poses are doubted."""
+        check = self.pose_check
+        assert self._T_world_odometry is not None
+        if check.doubted:
+            placement = self._register(sweep, landmarks)
+            check.follow(now_s, T_odometry_sensor, placement.T_world_sensor)
+            if not check.doubted:  # where the poses began to be right again is not known, so they are aligned anew
+                self._T_world_odometry = placement.T_world_sensor @ inverse(T_odometry_sensor)
+            return Located(placement, sweep.observe(placement))
+        given_placement = sweep.place(self._T_world_odometry @ T_odometry_sensor)
+        located = Located(given_placement, sweep.observe(given_placement))
+        known, near = check.near(landmarks, located.observations)
+        if check.agrees(known, near):
+            return located
+        placement = self._register(sweep, landmarks)
+        registered = Located(placement, sweep.observe(placement))
+        if not check.convinces(known, near, check.near(landmarks, registered.observations)[1]):
+            return located
+        check.begin(now_s)
+        return registered
 
     def _begin(self, T_odometry_sensor: Float64) -> None:
         """Start the world at the odometry's own origin, or at the first pose's position if that is beyond FAR_M."""

@@ -33,7 +33,7 @@ class Landmarks:
 
 
 class LandmarkMap:
-    """Mean k-DOPs of stationary tracks, by track id; kept only while no poses are given.
+    """Mean k-DOPs of stationary tracks, by track id.
 
     A landmark lies at the mean of its sightings, so that the error of one frame is not carried on.
 

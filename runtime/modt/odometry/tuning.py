@@ -77,6 +77,44 @@ class RegistrationTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class PoseCheckTuning:
+    """Given poses against the landmarks."""
+
+    near_m: float = 0.2
+    """Distance along x and y within which a landmark is seen where it is known to be [m]. Less: smaller errors of the
+    poses are noticed.
+    Chosen on: simulated streets."""
+
+    min_landmarks: int = 5
+    """Fewest landmarks that tell whether a pose is right.
+    Chosen on: judgement."""
+
+    agreeing_share: float = 0.35
+    """Share of the landmarks that are where a right pose says.
+    Chosen on: simulated streets and drives of KITTI."""
+
+    convincing_share: float = 0.35
+    """Share of the landmarks that registration has to bring back before a pose is doubted.
+    Chosen on: simulated streets."""
+
+    better: float = 1.5
+    """Ratio of the landmarks that registration has to bring back to those that the pose leaves in place.
+    Chosen on: judgement."""
+
+    motion_m: float = 0.12
+    """Difference of the motions in `agree_s` up to which pose and registration agree [m].
+    Chosen on: simulated streets."""
+
+    motion_rad: float = 0.03
+    """Difference of the turns in `agree_s` up to which they agree [rad].
+    Chosen on: simulated streets."""
+
+    agree_s: float = 1.5
+    """Time of agreement after which poses are believed [s].
+    Chosen on: good again within 5 s."""
+
+
+@dataclass(frozen=True, slots=True)
 class OdometryTuning:
     """Everything that is chosen in the odometry.
 
@@ -86,6 +124,7 @@ class OdometryTuning:
 
     landmarks: LandmarkTuning = LandmarkTuning()
     registration: RegistrationTuning = RegistrationTuning()
+    pose_check: PoseCheckTuning = PoseCheckTuning()
 
     repeat_range_m: float = 20.0
     """Range at which the change of the deskewed positions is judged [m]. Greater: changes of the turn count more.
