@@ -18,10 +18,15 @@ from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Kind
 from modt.errors import ModtError
 from modt.sources.live.live_stream import LiveStream
+from modt.sources.stream import StreamEndedError
+from modt.trust.first_sweeps import doubts
+from modt.types import Float32
 
 OK = "ok"
 WARN = "warn"
 FAIL = "fail"
+SWEEPS = 3
+"""Number of sweeps in which the view is judged."""
 REACH_S = 2.0
 """Time in which a sensor has to send a sweep [s]."""
 COMPILE = "install modt from a wheel for this machine, or where a C compiler is"
@@ -143,24 +148,33 @@ def clock(state: int | None = None, now_s: float | None = None) -> Finding:
     return Finding(OK, "clock", "synchronised")
 
 
-def sensor(open_source: Callable[[], LiveStream], timeout_s: float = REACH_S) -> list[Finding]:
-    """Check that a source can be opened and sends sweeps."""
+def sensor(
+    open_source: Callable[[], LiveStream], timeout_s: float = REACH_S, config: ProfileConfig | None = None
+) -> list[Finding]:
+    """Check that a source can be opened and sends sweeps; with a profile, that its sweeps are whole."""
     try:
         stream = open_source()
     except ModtError as error:
         return [Finding(FAIL, "sensor", f"{error.subject}: {error.cause}", error.remedy)]
     stream.start()
     end_s = time.monotonic() + timeout_s
-    received = None
+    sweeps: list[Float32] = []
     try:
-        while received is None and time.monotonic() < end_s:
+        while len(sweeps) < (1 if config is None else SWEEPS) and time.monotonic() < end_s:
             received = stream.take(max(end_s - time.monotonic(), 0.0))
+            sweeps += [] if received is None else [received.frame.points]
+        health = stream.health()
+    except StreamEndedError:
         health = stream.health()
     except Exception as error:
         return [Finding(FAIL, "sensor", f"{stream.info.name}: {error}", "check its address")]
     finally:
         stream.close()
-    return [_sensor_finding(stream.info.name, health, None if received is None else len(received.frame.points))]
+    found = [_sensor_finding(stream.info.name, health, len(sweeps[0]) if sweeps else None)]
+    if config is not None and sweeps:
+        of_view = doubts(sweeps, config.sensor)
+        found += [Finding(FAIL if useless else WARN, "view", what, remedy) for useless, what, remedy in of_view]
+    return found
 
 
 def _sensor_finding(name: str, health: dict[str, Any], points: int | None) -> Finding:

@@ -72,6 +72,10 @@ class Deadlines:
         self._warm_s: float | None = None  # end of the first frame
         self._shed_last = False
 
+    def follow(self, period_s: float) -> None:
+        """Take another period of the sensor [s]."""
+        self._period_s = period_s
+
     @property
     def reduced(self) -> bool:
         """Whether the range of the sensor is cut."""

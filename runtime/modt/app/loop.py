@@ -21,6 +21,7 @@ from modt.app.stages import Stages
 from modt.app.status import FrameCounter, PowerStatus, Status, one_line
 from modt.app.stop import Stop
 from modt.app.systemd import Notifier
+from modt.app.trust_report import source_findings
 from modt.energy.ledger import LedgerLine
 from modt.energy.meters.meter import Conditions, Meter
 from modt.energy.windows import Clocks, EnergyWindow, Windows
@@ -260,6 +261,7 @@ class Service(Loop):
         self.refused_reloads = 0
         self._counter = FrameCounter(self.totals, self.clock())
         self._reported_s = float("-inf")
+        self._health: dict[str, Any] = {}  # of the source at the last report
 
     def pace(self) -> dict[str, Any]:
         """Figures of the deadlines for the summary."""
@@ -292,7 +294,12 @@ class Service(Loop):
         notifier.ready()
 
     def _report(self, notifier: Notifier) -> None:
-        """Show the status to systemd, beside the records, in memory and to Prometheus."""
+        """Judge the source, and show the status to systemd, beside the records, in memory and to Prometheus."""
+        health = self.source.health()
+        nominal_s = self.source.info.period_s
+        self.stages.source_findings = source_findings(health, self._health, nominal_s)
+        self._health = health
+        self.deadlines.follow(self.source.period_s if "period" in self.stages.source_findings else nominal_s)
         status = self.status()
         notifier.status(one_line(status))
         self._write_status(status)

@@ -73,6 +73,7 @@ class Stages:
         pipeline: its stages.
         odometry: source of the poses.
         trust: judges the results.
+        source_findings: what is held against a live source, by the names of the checks.
         recognising: thread that compares a sweep with the profile; None before the first comparison.
         misfits: number of times that sweeps were found to be of another sensor than before.
 
@@ -103,6 +104,7 @@ class Stages:
         self.chosen = self._choose()
         self.pipeline = self._new_pipeline(self.chosen.config)
         self.trust = TrustReport(self.chosen.config.sensor)
+        self.source_findings: dict[str, Finding] = {}
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
 
     @property
@@ -141,8 +143,8 @@ class Stages:
         return replace(result, run_id=self.run_id, trust=self.trust.judge(result, self._findings()))
 
     def _findings(self) -> dict[str, Finding]:
-        """What is held against the profile, and what the odometry holds against its poses."""
-        findings = {}
+        """What is held against source and profile, and what the odometry holds against its poses."""
+        findings = dict(self.source_findings)
         recognition = self.chosen.recognition
         if not recognition.same_sensor and recognition.differences and self.chosen.sensor != FOUND:
             cause = f"the sweeps do not fit the profile {self.chosen.sensor}: {', '.join(recognition.differences)}"

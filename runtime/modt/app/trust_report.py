@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 from modt.config import SensorConfig
+from modt.sources.packets.turn_decoder import OTHER_SENSOR
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import FrameResult, Trust, TrustLevel
 
@@ -49,6 +51,24 @@ class TrustReport:
             reason = {"check": "silent", "level": record["level"], "since_s": None, "cause": SILENT}
             record["reasons"] = [reason, *record["reasons"]]
         return record | {"frames": dict(self.frames)}
+
+
+PERIOD_RATIO = 1.4
+"""Ratio of the measured and the nominal period of the sweeps, either by the other, from which it is reported."""
+
+
+def source_findings(health: Mapping[str, Any], before: Mapping[str, Any], nominal_s: float) -> dict[str, Finding]:
+    """What is held against a live source, by its health and the one before."""
+    findings = {}
+    period_s = health["period_s"]
+    if max(period_s / nominal_s, nominal_s / max(period_s, 1e-6)) > PERIOD_RATIO:
+        cause = f"a sweep comes every {period_s:.3f} s, not every {nominal_s:.3f} s"
+        remedy = "set the sensor to that rate, and have one sensor send to a port"
+        findings["period"] = Finding(TrustLevel.DEGRADED, cause, remedy)
+    refused = health["refused_messages"].get(OTHER_SENSOR, 0)
+    if refused > before.get("refused_messages", {}).get(OTHER_SENSOR, 0):
+        findings["port"] = Finding(TrustLevel.DEGRADED, f"messages {OTHER_SENSOR}", "give each sensor a port")
+    return findings
 
 
 def _log_change(before: Trust, after: Trust) -> None:

@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         checks.clock(),
     ]
     if arguments.source is not None:
-        found += checks.sensor(lambda: live_source(arguments.source, cores)[0])
+        found += checks.sensor(lambda: live_source(arguments.source, cores)[0], config=config)
     for finding in found:
         print(finding)
     return int(any(finding.level == checks.FAIL for finding in found))

@@ -79,7 +79,11 @@ class PoseCheck:
         given = inverse(T_given_before) @ T_given
         difference = inverse(given) @ inverse(T_registered_before) @ T_registered
         far_m = float(np.hypot(difference[0, 3], difference[1, 3]))
-        if far_m > self._tuning.motion_m or abs(yaw_of(difference)) > self._tuning.motion_rad:
+        way_m = float(np.hypot(given[0, 3], given[1, 3]))
+        if (
+            far_m > self._tuning.motion_m + self._tuning.motion_share * way_m
+            or abs(yaw_of(difference)) > self._tuning.motion_rad
+        ):
             self._compared_from = now_s, T_given, T_registered
         elif now_s - from_s >= self._tuning.agree_s:
             self.doubted = False

@@ -105,6 +105,10 @@ class PoseCheckTuning:
     """Difference of the motions in `agree_s` up to which pose and registration agree [m].
     Chosen on: simulated streets."""
 
+    motion_share: float = 0.03
+    """Further difference as a share of the way.
+    Chosen on: simulated streets."""
+
     motion_rad: float = 0.03
     """Difference of the turns in `agree_s` up to which they agree [rad].
     Chosen on: simulated streets."""

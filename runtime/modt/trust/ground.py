@@ -108,13 +108,12 @@ class GroundCheck:
             return f"the ground is {found.height_m:.2f} m below the sensor, not {before.height_m:.2f}"
         return ""
 
-    def step(self, samples: Sequence[Sample]) -> Float64 | None:
-        """Plane (3,) by which the ground moved at once, from one of the samples to the next; None if it did not."""
+    def step(self, pairs: Sequence[tuple[Sample, Sample]]) -> Float64 | None:
+        """Plane (3,) by which the ground moved at once, between two samples of a pair; None if it did not."""
         if self.usual is None:
             return None
         reach_m = _reach_m(self.usual)
-        lows = [_lowest(sample, reach_m) for sample in samples]
-        steps = (_step(before, after) for before, after in zip(lows[:-1], lows[1:], strict=True))
+        steps = (_step(_lowest(before, reach_m), _lowest(after, reach_m)) for before, after in pairs)
         return next((step for step in steps if step is not None and self.is_step(step)), None)
 
     def is_step(self, plane: Float64) -> bool:
@@ -182,8 +181,7 @@ def _step(before_m: Float64, after_m: Float64) -> Float64 | None:
 
 def _least_squares(columns: Float64, values: Float64) -> Float64:
     """(3,) factors of the columns (3, k) that make the values (k,)."""
-    factors: Float64 = np.linalg.solve(columns @ columns.T + 1e-6 * np.eye(3), columns @ values)
-    return factors
+    return np.asarray(np.linalg.solve(columns @ columns.T + 1e-6 * np.eye(3), columns @ values), np.float64)
 
 
 def _reach_m(plane: Float64) -> float:

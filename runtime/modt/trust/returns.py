@@ -77,7 +77,7 @@ class ReturnsCheck:
         n_lost = int(np.count_nonzero(lost))
         if n_lost >= tuning.degraded_sectors:
             blind = bool(n_lost >= tuning.blind_share * np.count_nonzero(expected))
-            where = "any direction" if n_lost >= 0.9 * np.count_nonzero(expected) else _sides(lost)
+            where = "any direction" if n_lost >= 0.9 * np.count_nonzero(expected) else sides(lost)
             return Loss(blind, True, f"no returns from {where} ({360 // SECTORS * n_lost} deg)")
         usual_of_band = self._usual.sum(axis=0)
         around = (self._usual > sample.weight).sum(axis=0) >= AROUND
@@ -123,8 +123,8 @@ def _tangents(sample: Sample) -> Float64:
     return tangent.take(sample.counted).astype(np.float64)
 
 
-def _sides(lost: Bool) -> str:
-    """The side on which most of the lost sectors lie."""
+def sides(lost: Bool) -> str:
+    """Name of the side on which most of the lost sectors (SECTORS,) lie."""
     bearing = (np.flatnonzero(lost) + 0.5) * (2 * np.pi / SECTORS) - np.pi
     mean = np.arctan2(np.sin(bearing).sum(), np.cos(bearing).sum())
     return SIDES[round(float(mean) / (np.pi / 2)) % len(SIDES)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -149,12 +150,12 @@ class TrustWatch:
         ground = self._ground
         if not self._moved:
             moved = ground.change(seen)
-            step = ground.step(self._samples) if moved else None
+            step = ground.step(self._pairs()) if moved else None
             if step is not None:
                 self._moved = moved
                 self._step = step
             return
-        step = ground.step(self._samples)
+        step = ground.step(self._pairs())
         if step is not None:
             self._step = self._step + step
         moved = ground.change(seen, BACK_SHARE)
@@ -168,17 +169,21 @@ class TrustWatch:
         """Notice a scene that changes at once, between two frames, and one that is back."""
         scene = self._tuning.scene
         if self._agreement(self._samples[0], seen) < scene.suspected or not self._change.is_none:
-            pairs = list(zip(self._samples, self._samples[1:], strict=False))
-            agreements = [self._agreement(before, after) for before, after in pairs]
-            least = int(np.argmin(agreements))
-            if agreements[least] < scene.suspected:
-                self._explain(*pairs[least], agreements[least])
+            agreements = [(self._agreement(*pair), pair) for pair in self._pairs()]
+            least, pair = min(agreements, key=lambda each: each[0], default=(1.0, None))
+            if pair is not None and least < scene.suspected:
+                self._explain(*pair, least)
         if self._change.is_none or self._before is None:
             return
         is_back = agreement(self._before, seen, self._ground, SAME.motion(self._before, seen)) >= scene.back
         self._scene_looks = self._scene_looks + 1 if is_back else 0
         if self._scene_looks >= self._tuning.back_looks:
             self._change = SAME
+
+    def _pairs(self) -> list[tuple[Sample, Sample]]:
+        """Frames in a row since the last look, unless too much time lies between them."""
+        pairs = pairwise(self._samples)
+        return [(before, after) for before, after in pairs if after.time_s - before.time_s <= AT_ONCE_S]
 
     def _agreement(self, before: Sample, after: Sample) -> float:
         """Agreement of two sweeps in the scene as it is changed."""
@@ -196,7 +201,7 @@ class TrustWatch:
                 return
             self._another_s = after.time_s
             self._change = SAME
-            step = self._ground.step(self._samples) if self._ground.lost else None
+            step = self._ground.step(self._pairs()) if self._ground.lost else None
             if step is not None:
                 self._moved = "the ground is out of view at once"
                 self._step = step
@@ -209,7 +214,9 @@ class TrustWatch:
 BACK_SHARE = 0.7
 """Share of the limits of the ground within which it is back."""
 GAP_S = 1.0
-"""Longest time between two frames that are compared [s]."""
+"""Longest time between two frames after which a look is made [s]."""
+AT_ONCE_S = 0.25
+"""Longest time between two frames of which a step tells that it came at once [s]."""
 MOST_SAMPLES = 24
 """Greatest number of frames between two looks that are kept."""
 OWN = frozenset({"frozen", "returns", "scene", "ground"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -36,6 +37,10 @@ READ_S = 0.2
 """Time that the receiving thread waits for a message before it checks for its end [s]."""
 JITTER_S = 0.1
 """A larger change of the least stamp-to-arrival delay means that the stamps stepped [s]."""
+PERIOD_GAIN = 0.05
+"""Weight of a step between two sweeps in the mean period."""
+MOST_PERIODS = 5.0
+"""A longer step is a pause [nominal periods]."""
 LATE_S = 1.0
 """Greatest age of a sweep or packet that is used [s]."""
 
@@ -59,6 +64,7 @@ class LiveStream:
         sweeps, incomplete, dropped: numbers of sweeps received, of sweeps with missing messages, and of sweeps
             replaced by a newer one before they were taken.
         silences: number of times that the sensor fell silent.
+        period_s: mean time between the last sweeps by their stamps, at first the nominal one.
     """
 
     def __init__(
@@ -97,6 +103,8 @@ class LiveStream:
         self._silent = False
         self._last_s = clock()  # arrival of the latest sweep
         self._looked_s = self._last_s  # when `take` last looked for one
+        self.period_s = info.period_s
+        self._stamp_s = math.inf  # of the last sweep
         self._index = 0
         self._steady_s = 0.0
         self._delay = DeviceClock()
@@ -156,6 +164,7 @@ class LiveStream:
             "silences": self.silences,
             "time_steps": self._check.steps,
             "silent": self._silent,
+            "period_s": round(self.period_s, 4),
             "frame_id": reception.frame_id,
         }
 
@@ -194,12 +203,20 @@ class LiveStream:
         except ScanError as error:
             flaws = [error.cause]
             usable = False
+        self._follow_period(sweep.stamp_s)
         with self._arrived:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
             self._newest = Arrival(sweep, flaws, usable, self._clock() - sweep.waited_s)
             self._arrived.notify()
+
+    def _follow_period(self, stamp_s: float) -> None:
+        """Follow the time between the sweeps, those included that nobody takes."""
+        step_s = stamp_s - self._stamp_s
+        self._stamp_s = stamp_s
+        if 0.0 < step_s < MOST_PERIODS * self.info.period_s:
+            self.period_s += PERIOD_GAIN * (step_s - self.period_s)
 
     def _frame(self, taken: Arrival) -> Received | None:
         """The frame of a sweep; None if it cannot be used."""

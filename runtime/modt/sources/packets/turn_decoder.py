@@ -136,6 +136,12 @@ LONGEST_TURN_S = 0.3
 """1.5 times the slowest turn [s]."""
 LEAST_TURN = 1000
 """A phase that falls by more begins another turn; if it falls by less, the head stands still [0.01 deg]."""
+FASTEST_HZ = 25.0
+"""Greatest rate of a head."""
+SLACK = 500
+"""Angle between two packets beside that which the head turns in the time between them [0.01 deg]."""
+OTHER_SENSOR = "of another head: do several sensors send to this port?"
+"""Reason of the refusal of packets from where the head cannot be."""
 SILENCE_S = 1.0
 """Longest gap in which packets count as missing [s]; beyond it the sensor was off."""
 NO_TURN = Turn(0.0, None)
@@ -283,12 +289,20 @@ class TurnDecoder(PacketDecoder):
             if not self._turn.insert(entry):
                 self.refuse("late or twice")
             return []
+        if self._is_elsewhere(last, entry, gap_s):
+            self.refuse(OTHER_SENSOR)
+            return []
         self._last = entry
         if entry.phase < last.phase - LEAST_TURN:  # the head has passed the seam
             self._ending = self._turn
             self._turn = Turn(entry.time_s, last, self._ending.shared(self._reach))
         self._turn.entries.append(entry)
         return self._ended(entry)
+
+    def _is_elsewhere(self, last: Entry, entry: Entry, gap_s: float) -> bool:
+        """Whether no head can have turned from a packet to another one in this time."""
+        turned = (entry.phase - last.end) % TURN
+        return FASTEST_HZ * TURN * gap_s + SLACK < turned < TURN - LEAST_TURN
 
     def _ended(self, entry: Entry) -> Sequence[Sweep]:
         """Sweep of the turn before, once the latest packet lies beyond the reach of its beams."""

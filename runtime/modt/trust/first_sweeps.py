@@ -1,0 +1,57 @@
+"""What the first sweeps of a source show, without any history."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from modt.config import SensorConfig
+from modt.trust.returns import SECTORS, sides
+from modt.types import Float32
+
+FEW_SHARE = 0.15
+"""Share of the returns that beams and steps of a profile make below which a sweep has too few."""
+EMPTY_SECTORS = 4
+"""Number of sectors in a row without returns from which a part of the view is missing."""
+ONE_RING = 0.03
+"""Width of the tangents of the elevations within which nine tenths of a sweep are one ring."""
+NEAR_M = 8.0
+"""Range within which nine tenths of the returns lie in fog, in dust, or in a small room [m]."""
+
+
+def doubts(sweeps: Sequence[Float32], sensor: SensorConfig) -> Iterator[tuple[bool, str, str]]:
+    """Each doubt about sweeps of (N, 4) points: whether it makes results useless, a phrase for it, and its remedy."""
+    if len(sweeps) > 1 and any(np.array_equal(a[:, :3], b[:, :3]) for a, b in pairwise(sweeps)):
+        yield True, "the same sweep comes again and again", "restart the sensor and its driver"
+    points = sweeps[-1]
+    range_m = np.hypot(points[:, 0], points[:, 1])
+    points = points[(range_m > 0) & (range_m < sensor.max_range_m)]
+    expected = _expected(sensor)
+    if len(points) < FEW_SHARE * expected:
+        yield True, f"{len(points)} returns of about {expected:.0f}", "uncover and clean the sensor"
+    if not len(points):
+        return
+    sector = ((np.arctan2(points[:, 1], points[:, 0]) + np.pi) * (SECTORS / (2 * np.pi))).astype(np.int64) % SECTORS
+    empty = np.bincount(sector, minlength=SECTORS) == 0
+    if np.count_nonzero(empty) >= EMPTY_SECTORS:
+        what = f"no returns from {sides(empty)} ({360 // SECTORS * np.count_nonzero(empty)} deg)"
+        yield False, what, "uncover the sensor, if its field of view is meant to be wider"
+    near_far_m = np.hypot(points[:, 0], points[:, 1])
+    low, high = np.quantile(points[:, 2] / near_far_m, (0.05, 0.95)).tolist()
+    if high - low < ONE_RING:
+        yield True, "all returns are at one elevation, as of one beam", "check the sensor, or its driver"
+    reach_m = float(np.quantile(near_far_m, 0.9))
+    if reach_m < NEAR_M:
+        yield False, f"nine tenths of the returns are within {reach_m:.1f} m", "look for fog, dust or a cover"
+
+
+def _expected(sensor: SensorConfig) -> float:
+    """Number of firings in a turn, by the beams of a profile."""
+    if sensor.elevations_deg is not None:
+        beams = float(len(sensor.elevations_deg))
+    else:
+        low_deg, high_deg = sensor.span_deg or (-15.0, 15.0)
+        beams = (high_deg - low_deg) / sensor.elevation_step_deg + 1
+    return beams * 360 / sensor.azimuth_step_deg
