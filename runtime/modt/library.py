@@ -244,6 +244,7 @@ class Pipeline:
         T_world_sensor: ArrayLike | None = None,
         *,
         turn_s: float = 0.0,
+        mid_rad: float = 0.0,
     ) -> TrackedObjects:
         """Process one sweep and return the tracks after it.
 
@@ -252,7 +253,7 @@ class Pipeline:
                 x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
             T_world_sensor: (4, 4) pose at the stamp. None estimates the motion of the sensor from the proposals.
-            turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
+            turn_s, mid_rad: as in modt.types.Frame, for sweeps that are not compensated for the motion of the sensor.
 
         Raises:
             MisuseError: an argument has another shape, a stamp goes back, or a matrix is no pose.
@@ -261,11 +262,12 @@ class Pipeline:
         if isinstance(points, Frame):
             stamp_s = points.stamp_s
             turn_s = points.turn_s
+            mid_rad = points.mid_rad
             T_world_sensor = points.T_world_sensor if T_world_sensor is None else T_world_sensor
             points = points.points
         stamp_s = self._checked_stamp(stamp_s)
         pose = _checked_pose(T_world_sensor)
-        frame = Frame(self._index, stamp_s, _checked_points(points), pose, turn_s=turn_s)
+        frame = Frame(self._index, stamp_s, _checked_points(points), pose, turn_s=turn_s, mid_rad=mid_rad)
         if self._index == 0:
             chosen = choose(self._asked, frame, None)
             if chosen.config != self.config:

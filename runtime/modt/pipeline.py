@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -128,10 +128,11 @@ class Pipeline:
         run(FUSION, self.decision.decide, tracked.decisions, evidence, motion)
         # Last, since it takes the snapshot of all columns, the reported class among them.
         tracks = run(TRACKING, self.tracker.confirm, rows, confirmed)
+        placement = located.placement
         return FrameResult(
             frame=frame,
-            T_world_sensor=located.placement.T_world_sensor,
-            proposals=proposals,
+            T_world_sensor=placement.T_world_sensor,
+            proposals=replace(proposals, box=placement.at_stamp(proposals.centroid, proposals.box)),
             tracks=tracks,
             state_names=self.tracker.state_names,
             n_deferred=chosen.deferred,

@@ -35,6 +35,11 @@ N_REFLECTANCE = 5
 """Number of statistics of a proposal's reflectance."""
 
 
+DESKEWED = "by the times of the turn"
+COMPENSATED = "without times of points"
+"""Kinds of the times of sweeps: those of a turn, by which they are deskewed, and none, as if all were seen at the stamp."""
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One full sweep.
@@ -46,12 +51,13 @@ class Frame:
             UNRECORDED. Finite throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
         restarts: number of times that the odometry has begun anew in a world unrelated to the one before.
-        turn_s: duration of one turn of the head [s]. A turn begins and ends behind the sensor, and faces straight
-            ahead at the stamp. Clockwise seen from above is positive. With 0 all points are as if seen at the stamp,
-            because they are compensated or the sensor does not turn.
+        turn_s: duration of one turn of the head [s], which faces mid_rad at the stamp and begins and ends opposite to
+            it. Clockwise seen from above is positive. With 0 all points are as if seen at the stamp, because they are
+            compensated or the sensor does not turn.
         steady_s: time by a clock that is never set [s], if the clock of the stamps may be set; else None.
         R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
         frame_id: name of the frame of the points in the messages they came in; "" where those name none.
+        mid_rad: bearing that the head faces in the middle of the sweep [rad]; 0 is straight ahead.
     """
 
     index: int
@@ -63,6 +69,7 @@ class Frame:
     steady_s: float | None = None
     R_level_sensor: Float64 | None = None
     frame_id: str = ""
+    mid_rad: float = 0.0
 
     def __repr__(self) -> str:
         pose = "no" if self.T_world_sensor is None else "its"

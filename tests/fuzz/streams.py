@@ -7,7 +7,7 @@ import pytest
 
 from modt.poses.pose_socket import read_datagram
 from modt.ros2.cdr import MessageError
-from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
+from modt.ros2.odometry import Transforms, read_odometry, write_odometry
 from modt.ros2.point_cloud2 import read_cloud, write_cloud
 from modt.sources.drivers.hesai import HesaiDecoder, read_angles
 from modt.sources.drivers.livox import LivoxDecoder
@@ -128,7 +128,7 @@ def odometry(folder):
 @target(MessageError)
 def transforms(folder):
     def call(raw):
-        found = StaticTransforms()
+        found = Transforms()
         found.add(raw)
         found.between("base_link", "lidar")
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from modt.geometry import inverse, rotation_zyx, se3, transform, yaw_of
 from modt.geometry.kdop import centres
-from modt.odometry.pose_estimator import delays
-from modt.placement import Placement, PlanarMotion
+from modt.placement import Placement, PlanarMotion, delays
 from modt.types import Proposals
 from tests.odometry.odometry_scenes import constant_turn, constant_turn_pose, street
 from tests.tracking.tracking_scenes import Follower, frame_of
@@ -74,7 +73,8 @@ def test_the_delay_is_the_mean_over_the_bearings_also_across_the_seam(towards, d
     bearing = towards + side * wide
     parts = np.linspace(bearing - wide, bearing + wide, 20001)
     mean = np.angle(np.exp(1j * parts)).mean()
-    found = delays(one(distance * np.cos(bearing), distance * np.sin(bearing), length), turn_s)[0]
+    seen = one(distance * np.cos(bearing), distance * np.sin(bearing), length)
+    found = delays(seen.centroid, seen.box, turn_s)[0]
     assert found == pytest.approx(-turn_s * mean / (2 * np.pi), abs=1e-3)
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from modt.geometry import rotation_zyx, se3
-from modt.ros2.odometry import StaticTransforms, read_odometry, write_odometry
+from modt.ros2.odometry import Transforms, read_odometry, write_odometry
 from tests.ros2 import messages
 
 T = se3(rotation_zyx(0.1, -0.2, 2.0), np.array([10.0, -20.0, 0.5]))
@@ -34,7 +34,7 @@ LEFT = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
 
 
 def tree_of(*messages_of_edges):
-    found = StaticTransforms()
+    found = Transforms()
     for edges in messages_of_edges:
         found.add(messages.encode(messages.transforms(*edges)))
     return found

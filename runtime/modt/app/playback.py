@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from modt.energy.ledger import Ledger
 from modt.pipeline import SOURCE
-from modt.sources.stream import Received, Stream, StreamEndedError
+from modt.sources.stream import Reading, Received, Stream, StreamEndedError
 
 
 class Playback:
@@ -28,6 +28,7 @@ class Playback:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.info = stream.info
+        self._stream = stream
         self.faults = stream.faults
         self.profile = stream.info.profile
         self._frames = iter(stream)
@@ -36,6 +37,11 @@ class Playback:
         self._sleep = sleep
         self._clock = clock
         self._due_s: float | None = None  # time of the next frame
+
+    @property
+    def reading(self) -> Reading:
+        """What was read so far."""
+        return self._stream.reading
 
     def start(self) -> None:
         """No effect."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from modt import host
+from modt.app.account import account
 from modt.app.status import FrameCounts, HostStatus, LoopStatus, Status
 from modt.classes import CLASS_NAMES
 from modt.sinks.records import fields_of
@@ -73,6 +74,7 @@ def run_summary(loop: Loop) -> dict[str, Any]:
             **loop.pace(),
         },
         "trust": stages.trust.record(),
+        "read": account(loop),
         "odometry": stages.odometry.report(),
         "class_frequency": dict(zip(CLASS_NAMES, pipeline.decision.frequency.tolist(), strict=True)),
         "host": loop.failures.contain("host", host.usage, loop.core),

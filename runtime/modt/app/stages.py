@@ -75,6 +75,7 @@ class Stages:
         trust: judges the results.
         source_findings: what is held against a live source, by the names of the checks.
         recognising: thread that compares a sweep with the profile; None before the first comparison.
+        read: account of what was read, once the run has ended.
         misfits: number of times that sweeps were found to be of another sensor than before.
 
     Raises:
@@ -97,6 +98,7 @@ class Stages:
         self._mode = assembly.MODES[request.mode]
         self._first: Frame | None = None  # identifies the sensor
         self.misfits = 0
+        self.read: dict[str, Any] | None = None  # account of what was read, at the end
         self._changed = False  # sweeps of another size wait for a comparison
         self.recognising: Thread | None = None
         self._recognised: list[ChosenProfile] = []  # profile chosen by the thread `recognising`
@@ -200,6 +202,7 @@ class Stages:
                 "poses": info.has_poses,
                 "odometry": self.odometry.report()["source"],
                 "notes": [*info.notes, *info.pose_notes],
+                **({} if self.read is None else {"read": self.read}),
             },
             "mode": request.mode,
             "fov": request.fov,

@@ -16,7 +16,7 @@ INTERRUPTED = 130
 
 
 def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Sequence[str] | None) -> int:
-    """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted.
+    """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 3 read in part, 130 interrupted.
 
     `commands` maps each command to its module. Only the module of the given command is imported. Its add_parser sets
     `run` to a function of the parsed arguments that returns the status. Without a command the help is printed and the

@@ -26,7 +26,7 @@ def commands() -> dict[str, str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted."""
+    """Run a command; returns the exit status: 0 success, 1 failure, 2 misuse, 3 read in part, 130 interrupted."""
     return dispatch("modt", "Detect, track and classify objects in a LiDAR stream.", commands(), argv)
 
 

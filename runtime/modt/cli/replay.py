@@ -46,9 +46,13 @@ def rate(text: str) -> float | None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Replay; SIGTERM ends it with exit status 0, SIGINT with 130, both with complete records."""
+    """Replay; returns 0, or 3 if a part of what was asked for could not be read.
+
+    SIGTERM ends it with this status, SIGINT with 130, both with complete records.
+    """
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
+    from modt.app.account import PARTLY, closing_lines
     from modt.app.build import replay
     from modt.app.inputs import Request
     from modt.app.systemd import notifier_of
@@ -68,11 +72,15 @@ def run(arguments: argparse.Namespace) -> int:
     if shown:
         print(summary_text(summary))
         print(_place(loop.recording.directory))
+    for line in closing_lines(summary["read"]):
+        print(f"modt: {line}", file=sys.stderr)
     signal = loop.stop.signal
     if signal:
         whole = f"{summary['frames']} frames: {loop.recording.directory.path} is whole"
         print(f"modt: stopped by {signal} after {whole}", file=sys.stderr)
-    return INTERRUPTED if signal == "SIGINT" else 0
+    if signal == "SIGINT":
+        return INTERRUPTED
+    return PARTLY if summary["read"]["left_out"] else 0
 
 
 def _place(directory: RunDirectory) -> str:

@@ -51,6 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
+    from modt.app.account import closing_lines
     from modt.app.build import service
     from modt.app.inputs import Request, live_source
     from modt.app.log_output import LogOutput
@@ -75,6 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
         loop.writers["log"] = output.writer
         status = loop.run(notifier)["status"]
         output.say(f"modt: {_last_words(status, loop.recording.health(), arguments.out)}")
+        for line in closing_lines(loop.summary["read"]):
+            output.say(f"modt: {line}")
     return INTERRUPTED if loop.stop.signal == "SIGINT" else 0
 
 

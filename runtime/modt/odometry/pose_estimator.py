@@ -13,7 +13,7 @@ from modt.observations import Located, Observations, StaticTracks, observe
 from modt.odometry.pose_check import PoseCheck
 from modt.odometry.registration import LandmarkMap, Landmarks, Registration
 from modt.odometry.tuning import OdometryTuning
-from modt.placement import Placement, PlanarMotion
+from modt.placement import Placement, PlanarMotion, delays
 from modt.types import Float64, Frame, Proposals
 
 FAR_M = 1e5
@@ -127,8 +127,10 @@ class PoseEstimator:
             # Motion over less than half the sweep would extrapolate the errors of the poses, so none is assumed: any
             # displacement over an infinite time is a velocity of zero.
             dt_s = np.inf
-        delay_s = None if first or not frame.turn_s else delays(proposals, frame.turn_s)
-        return _Sweep(proposals, self._T_world_last, dt_s, frame.turn_s, delay_s, self._kernels)
+        delay_s = None
+        if not first and frame.turn_s:
+            delay_s = delays(proposals.centroid, proposals.box, frame.turn_s, frame.mid_rad)
+        return _Sweep(proposals, self._T_world_last, dt_s, frame.turn_s, delay_s, self._kernels, frame.mid_rad)
 
     def _register(self, sweep: _Sweep, landmarks: Landmarks) -> Placement:
         """Placement of a sweep without a pose, by stationary objects."""
@@ -158,6 +160,7 @@ class _Sweep:
         turn_s: as in Frame.
         delay_s: (P,) time after the stamp at which each proposal was seen; None if all were seen at the stamp.
         kernels: passes over points.
+        mid_rad: as in Frame.
     """
 
     proposals: Proposals
@@ -166,11 +169,12 @@ class _Sweep:
     turn_s: float
     delay_s: Float64 | None
     kernels: GeometryKernels
+    mid_rad: float
 
     def place(self, T_world_sensor: Float64) -> Placement:
         """Placement by a pose, with the motion that leads to it."""
         motion = PlanarMotion.between(self.T_world_last, T_world_sensor, self.dt_s)
-        return Placement(T_world_sensor, motion, self.turn_s)
+        return Placement(T_world_sensor, motion, self.turn_s, self.mid_rad)
 
     def observe(self, placement: Placement) -> Observations:
         """The proposals in the world, where they are at the stamp."""
@@ -195,25 +199,6 @@ class _Sweep:
         b = other.motion
         difference_mps = abs(b.velocity_mps - a.velocity_mps) + range_m * abs(b.yaw_rate_radps - a.yaw_rate_radps)
         return difference_mps * abs(self.turn_s) / 2
-
-
-def delays(proposals: Proposals, turn_s: float) -> Float64:
-    """(P,) time after the stamp at which each proposal was seen [s]; turn_s as in Frame.
-
-    A proposal is moved as a whole, by the time at which its middle was seen. For a body of radius r at distance d two
-    errors remain. It turns about itself by at most r times the turn of the sensor in half a sweep. Its ends are seen
-    r / (2 pi d) of a sweep before and after its middle (3 cm for a car 10 m away at 10 m/s).
-
-    The time is the mean over the bearings that its box covers. A proposal across the seam is seen at both ends of the
-    sweep, and its delay is continuous as its centroid crosses the seam.
-    """
-    x, y = proposals.centroid[:, :2].T
-    length, width = proposals.box[:, 3:5].T
-    bearing = np.arctan2(y, x)
-    half_angle = np.arctan2(np.hypot(length, width) / 2, np.hypot(x, y))
-    beyond_seam = np.maximum(np.abs(bearing) + half_angle - np.pi, 0.0)
-    bearing -= np.copysign(np.pi * beyond_seam / np.maximum(half_angle, 1e-9), bearing)
-    return np.asarray(bearing * (-turn_s / (2 * np.pi)))
 
 
 def _rigid(T: Float64) -> Float64:

@@ -137,7 +137,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         )
     if "host" in summary:
         lines.append(_host_line(summary["host"]))
-    return "\n".join([*lines, *_fault_lines(summary.get("faults", {}))])
+    return "\n".join([*lines, *_fault_lines(summary.get("faults", {})), *_read_lines(summary.get("read", {}))])
 
 
 def _around_lines(summary: dict[str, Any]) -> list[str]:
@@ -200,6 +200,19 @@ def _fault_lines(faults: dict[str, Any]) -> list[str]:
         remedy = "have the driver write it, or set sensor.reflectance to none"
         lines.append(f"  without reflectance: {faults['frames_without_reflectance']} frames; {remedy}")
     return lines
+
+
+def _read_lines(read: dict[str, Any]) -> list[str]:
+    """What was read, and what the points and poses are."""
+    if not read:
+        return []
+    joined = f", {read['joined']} of them parts of turns" if read["joined"] else ""
+    frame = f"; points in {read['frame_id']}" if read["frame_id"] else ""
+    skewed = f"{read['deskewed']} of {read['sweeps']} deskewed"
+    return [
+        f"  read: {read['messages']} messages{joined}, {read['sweeps']} sweeps, {read['used']} used, {skewed}{frame}; "
+        f"poses: {read['poses']}"
+    ]
 
 
 def _stage_line(name: str, stage: dict[str, Any]) -> str:

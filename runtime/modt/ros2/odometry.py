@@ -1,8 +1,10 @@
-"""nav_msgs/Odometry, and tf2_msgs/TFMessage of /tf_static."""
+"""nav_msgs/Odometry, and tf2_msgs/TFMessage of /tf and /tf_static."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +51,15 @@ def read_pose(cdr: CdrReader) -> Float64:
     Raises:
         MessageError: `malformed`, or `non_finite`.
     """
-    numbers = cdr.doubles(7)
+    return pose_of(cdr.doubles(7))
+
+
+def pose_of(numbers: Float64) -> Float64:
+    """(4, 4) of a position and a quaternion x, y, z, w.
+
+    Raises:
+        MessageError: `malformed`, or `non_finite`.
+    """
     if not np.isfinite(numbers).all():
         raise MessageError("non_finite", "the pose is not finite")
     if not 0.9 < math.hypot(*numbers[3:]) < 1.1:
@@ -68,16 +78,47 @@ def write_odometry(stamp_s: float, frame_id: str, child_frame_id: str, T_odom_ch
 
 TF = "tf2_msgs/TFMessage"
 """Type of the messages of transforms."""
-TF_STATIC = "/tf_static"
-"""Topic of the robot's fixed transforms."""
+TF_STATIC = "tf_static"
+"""Last part of the topic of a robot's fixed transforms."""
 MAX_TRANSFORMS = 10_000
+FIXED_M = 1e-3
+"""Greatest change of the elements of a transform that counts as fixed."""
 
 
-class StaticTransforms:
-    """The tree of the robot's fixed frames."""
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Pose of a frame in its parent at a time; names have no leading slash."""
+
+    stamp_s: float
+    parent: str
+    child: str
+    T_parent_child: Float64
+
+
+def read_transforms(message: bytes) -> Iterator[Transform]:
+    """Yield the transforms of a TFMessage that can be used; one that is no pose is left out.
+
+    Raises:
+        MessageError: it is not a TFMessage, or ends within a transform.
+    """
+    cdr = CdrReader(message)
+    n = cdr.count()
+    if n > MAX_TRANSFORMS:
+        raise MessageError("malformed", f"{n} transforms")
+    for _ in range(n):
+        stamp_s, parent = cdr.header()
+        child = cdr.text()
+        numbers = cdr.doubles(7)
+        with suppress(MessageError):
+            yield Transform(stamp_s, parent.lstrip("/"), child.lstrip("/"), pose_of(numbers))
+
+
+class Transforms:
+    """The tree of a robot's frames. A transform that changes is known as one that moves."""
 
     def __init__(self) -> None:
         self._parents: dict[str, tuple[str, Float64]] = {}
+        self._moving: set[str] = set()
 
     def add(self, message: bytes) -> None:
         """Add the transforms of a message.
@@ -85,27 +126,38 @@ class StaticTransforms:
         Raises:
             MessageError: it is not a TFMessage.
         """
-        cdr = CdrReader(message)
-        n = cdr.count()
-        if n > MAX_TRANSFORMS:
-            raise MessageError("malformed", f"{n} transforms")
-        for _ in range(n):
-            _, parent = cdr.header()
-            child = cdr.text()
-            self._parents[child.lstrip("/")] = (parent.lstrip("/"), read_pose(cdr))
+        for transform in read_transforms(message):
+            before = self._parents.get(transform.child)
+            if before and np.abs(before[1] - transform.T_parent_child).max() > FIXED_M:
+                self._moving.add(transform.child)
+            self._parents[transform.child] = (transform.parent, transform.T_parent_child)
 
     def between(self, base: str, sensor: str) -> Float64 | None:
-        """(4, 4) pose of `sensor` in `base`; None if they are not connected."""
-        base_root, T_root_base = self._root(base.lstrip("/"))
-        sensor_root, T_root_sensor = self._root(sensor.lstrip("/"))
-        return inverse(T_root_base) @ T_root_sensor if base_root == sensor_root else None
+        """(4, 4) pose of `sensor` in `base`; None if no fixed transforms connect them."""
+        base_chain = self.chain(base)
+        sensor_chain = self.chain(sensor)
+        common = next((frame for frame in sensor_chain if frame in base_chain), None)
+        if common is None:
+            return None
+        below = [*base_chain[: base_chain.index(common)], *sensor_chain[: sensor_chain.index(common)]]
+        if self._moving.intersection(below):
+            return None
+        return inverse(self._pose(base_chain, common)) @ self._pose(sensor_chain, common)
 
-    def _root(self, frame: str) -> tuple[str, Float64]:
-        """The root of a frame, and the pose of the frame in it."""
+    def moves(self, frame: str) -> bool:
+        """Whether the transform of a frame into its parent has changed."""
+        return frame in self._moving
+
+    def chain(self, frame: str) -> list[str]:
+        """A frame and those above it, up to the root."""
+        chain = [frame.lstrip("/")]
+        while chain[-1] in self._parents and len(chain) <= len(self._parents):  # ends if the transforms form a loop
+            chain.append(self._parents[chain[-1]][0])
+        return chain
+
+    def _pose(self, chain: list[str], end: str) -> Float64:
+        """(4, 4) pose of the first frame of a chain in another one of it."""
         T: Float64 = np.eye(4)
-        for _ in range(len(self._parents)):  # ends if the transforms form a loop
-            if frame not in self._parents:
-                break
-            frame, T_parent_frame = self._parents[frame]
-            T = T_parent_frame @ T
-        return frame, T
+        for frame in chain[: chain.index(end)]:
+            T = self._parents[frame][1] @ T
+        return T

@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
-from modt.types import UNRECORDED, Float32
+from modt.types import COMPENSATED, DESKEWED, UNRECORDED, Float32, Float64
 
 TYPE = "sensor_msgs/PointCloud2"
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -41,19 +41,34 @@ def reflectance_name(names: Iterable[str]) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class PointCloud:
-    """A sweep as received.
+    """A message of points as received.
 
     Attributes:
-        ahead_s: time of straight ahead, or the stamp of a sweep that is not skewed [s]; 0 if the driver states none.
+        stamp_s: stamp as in Frame [s]; 0 if the driver states none.
         frame_id: frame of the coordinates.
         points: (N, 4) float32 x, y, z [m], reflectance or UNRECORDED. Points without a return lie at the origin.
-        turn_s: as in Frame.turn_s, by the times of the points; 0 if they tell none.
+        turn_s, mid_rad: as in Frame, by the times of the points; 0 if they tell no turn.
+        began_s: time of the first point [s], the stamp where points have no times.
+        times: what the times of the points are, for the account of what was read.
+        corrected: what the message says of its own layout and is not so; empty if all is as it says.
     """
 
-    ahead_s: float
+    stamp_s: float
     frame_id: str
     points: Float32
-    turn_s: float
+    turn_s: float = 0.0
+    mid_rad: float = 0.0
+    began_s: float = 0.0
+    times: str = COMPENSATED
+    corrected: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Records of points, and what was corrected to read them."""
+
+    rows: NDArray[Any]
+    corrected: str = ""
 
 
 def read_cloud(message: bytes) -> PointCloud:
@@ -67,15 +82,30 @@ def read_cloud(message: bytes) -> PointCloud:
     height = cdr.count()
     width = cdr.count()
     table = _table(cdr, height, width, _fields(cdr))
-    fields: Mapping[str, Any] = table.dtype.fields or {}
-    points = _points(table, fields)
-    time = next((name for name in TIMES if name in fields), None)
+    return cloud_of(stamp_s, frame_id, table)
+
+
+def cloud_of(stamp_s: float, frame_id: str, table: Table) -> PointCloud:
+    """The sweep of a table of points.
+
+    Raises:
+        MessageError: `fields`: without x, y and z as floating-point numbers.
+    """
+    fields: Mapping[str, Any] = table.rows.dtype.fields or {}
+    points = _points(table.rows, fields)
+    name = next((name for name in TIMES if name in fields), None)
+    if name is None:
+        return PointCloud(stamp_s, frame_id, points, began_s=stamp_s, corrected=table.corrected)
     with np.errstate(all="ignore"):  # times may be any numbers
-        turn = None if time is None else turn_of(points, table[time].reshape(-1))
-    turn_s, ahead_s = turn or (0.0, 0.0)
-    if turn and stamp_s:
-        stamp_s = ahead_s if abs(ahead_s - stamp_s) < MAX_DELAY_S else stamp_s + ahead_s
-    return PointCloud(stamp_s, frame_id, points, turn_s)
+        turn = turn_of(points, table.rows[name].reshape(-1))
+    if isinstance(turn, str):
+        return PointCloud(stamp_s, frame_id, points, began_s=stamp_s, times=turn, corrected=table.corrected)
+    # Times are on the clock of the header, or count from its stamp, as they do without a stamp.
+    since_s = 0.0 if not stamp_s or abs(turn.mid_s - stamp_s) < MAX_DELAY_S else stamp_s
+    seen_s = turn.mid_s + since_s if stamp_s else 0.0
+    began_s = turn.began_s + since_s if stamp_s else 0.0
+    forms = (turn.turn_s, turn.mid_rad, began_s, DESKEWED, table.corrected)
+    return PointCloud(seen_s, frame_id, points, *forms)
 
 
 def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
@@ -115,27 +145,67 @@ def _fields(cdr: CdrReader) -> dict[str, tuple[str, int]]:
     return fields
 
 
-def _table(cdr: CdrReader, height: int, width: int, kinds: dict[str, tuple[str, int]]) -> NDArray[Any]:
+def _table(cdr: CdrReader, height: int, width: int, kinds: dict[str, tuple[str, int]]) -> Table:
     """(height, width) records of the points, which are not copied; fields beyond the size of a point are left out.
+
+    Drivers are known to state another size of a row than that of their dense rows, and another order of bytes than the
+    one in which coordinates make sense.
 
     Raises:
         MessageError: `empty`, or `malformed`: the data are too few for the points.
     """
-    order = ">" if cdr.number("B") else "<"
+    big = bool(cdr.number("B"))
     point_step = cdr.count()
     row_step = cdr.count()
     data = cdr.octets()
     if not height * width:
         raise MessageError("empty", "no points")
+    dense = width * point_step
+    beyond = row_step < dense or (height - 1) * row_step + dense > len(data)
+    corrected = ""
     if height == 1:  # a single row may state 0
-        row_step = point_step * width
-    if row_step < width * point_step or (height - 1) * row_step + width * point_step > len(data):
+        row_step = dense
+    elif beyond and len(data) == height * dense:
+        corrected = f"row_step is {row_step}, rows have {dense} bytes"
+        row_step = dense
+    if row_step < dense or (height - 1) * row_step + dense > len(data):
         raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
+    shape = (height, width)
+    steps = (row_step, point_step)
+    rows = _rows(data, kinds, shape, steps, big=big)
+    if _sensible(rows):
+        return Table(rows, corrected)
+    swapped = _rows(data, kinds, shape, steps, big=not big)
+    if not _sensible(swapped):
+        return Table(rows, corrected)
+    return Table(swapped, "; ".join(filter(None, [corrected, f"is_bigendian is {str(big).lower()}, which is wrong"])))
+
+
+def _rows(
+    data: memoryview, kinds: dict[str, tuple[str, int]], shape: tuple[int, int], steps: tuple[int, int], *, big: bool
+) -> NDArray[Any]:
+    """Records over the data; `steps` are the sizes of a row and of a point [bytes]."""
+    point_step = steps[1]
     within = {name: (kind, at) for name, (kind, at) in kinds.items() if at + np.dtype(kind).itemsize <= point_step}
-    formats = [order + kind for kind, _ in within.values()]
+    formats = [(">" if big else "<") + kind for kind, _ in within.values()]
     offsets = [at for _, at in within.values()]
     row = np.dtype({"names": [*within], "formats": formats, "offsets": offsets, "itemsize": point_step})
-    return np.ndarray((height, width), row, data, 0, (row_step, point_step))
+    return np.ndarray(shape, row, data, 0, steps)
+
+
+SENSIBLE_M = (1e-4, 1e5)
+"""Coordinates between these sizes make sense, as do 0 and values that are not finite, which mean no return [m]."""
+CHECKED = 64
+
+
+def _sensible(rows: NDArray[Any]) -> bool:
+    """Whether most coordinates of a sample of points make sense."""
+    if "x" not in (rows.dtype.names or ()) or rows.dtype["x"].kind != "f":
+        return True  # it is refused for what it is
+    x = np.abs(rows["x"][:, :: max(1, rows.shape[1] // CHECKED)])
+    with np.errstate(invalid="ignore"):
+        odd = (x != 0) & ((x < SENSIBLE_M[0]) | ((x > SENSIBLE_M[1]) & (x < np.inf)))
+    return bool(np.count_nonzero(odd) <= odd.size // 4)
 
 
 def _points(table: NDArray[Any], fields: Mapping[str, Any]) -> Float32:
@@ -177,34 +247,75 @@ SPANS_S = (0.02, 0.5)
 """Shortest and longest sweep [s]. The unit of the times is the one in which their span lies between these."""
 UNITS_S = (1.0, 1e-6, 1e-9)
 MAX_RESIDUAL = 0.03
-"""Share of a turn by which most points may deviate from the line of time over bearing."""
+"""Share of a turn by which most points may deviate from the line of time over the angle that the head has turned."""
+FIRST_SHARE = 0.05
+"""Share of the points by which the bearing is known at which a sweep begins."""
+MARGIN_RAD = 0.35
+"""Angle before that bearing in which points still count as seen at the begin [rad]."""
+AHEAD_RAD = 0.2
+"""A sweep whose middle lies within this angle of straight ahead is stamped there [rad]."""
 
 
-def turn_of(points: Float32, times: NDArray[np.generic]) -> tuple[float, float] | None:
-    """Duration of a turn, as in Frame.turn_s, and time of straight ahead by the clock of the points [s].
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A turn of a head: turn_s and mid_rad as in Frame, times of its first point and of mid_rad by the points' clock."""
 
-    None for a sweep whose seam does not lie behind the sensor, or times that fit no turn.
+    turn_s: float
+    mid_rad: float
+    began_s: float
+    mid_s: float
+
+
+def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | str:
+    """The turn that the times of the points tell, wherever its seam is; the reason if they tell none.
 
     Args:
         points: (N, 4) points of the sweep; those at the origin are ignored.
-        times: (N,) times of the points, in seconds, microseconds or nanoseconds.
+        times: (N,) times of the points, in seconds, microseconds or nanoseconds; few of them may be wild.
     """
     chosen = slice(None, None, max(1, len(points) // TURN_SAMPLES))
     x, y, _, _ = points[chosen].T.astype(np.float64)
     t = times[chosen].astype(np.float64)
     used = ((x != 0) | (y != 0)) & np.isfinite(t)
     if used.sum() < TURN_SAMPLES // 8:
-        return None
-    t = t[used]
-    unit_s = next((unit for unit in UNITS_S if SPANS_S[0] <= np.ptp(t) * unit <= SPANS_S[1]), None)
+        return "too few points with times"
+    early, middle, late = np.quantile(t[used], (0.02, 0.5, 0.98))
+    if early == late:
+        return COMPENSATED
+    used &= np.abs(t - middle) <= late - early
+    unit_s = next((unit for unit in UNITS_S if SPANS_S[0] <= np.ptp(t[used]) * unit <= SPANS_S[1]), None)
     if unit_s is None:
-        return None
-    begin = t.min()
-    t = (t - begin) * unit_s
+        return "their points' times span no sweep"
+    begin = t[used].min()
+    since_s = (t[used] - begin) * unit_s
     bearing = np.arctan2(y[used], x[used])
-    slope, ahead_s = np.polyfit(bearing, t, 1)
-    turn_s = -2 * np.pi * slope
-    off = np.quantile(np.abs(t - slope * bearing - ahead_s), 0.9)
-    if not off <= MAX_RESIDUAL * abs(turn_s):
-        return None
-    return float(turn_s), float(begin * unit_s + ahead_s)
+    turn = min((_fitted(bearing, since_s, way) for way in (1.0, -1.0)), key=lambda fit: fit[1])[0]
+    if turn is None:
+        return "their points' times are of no turning head"
+    began_s = float(begin * unit_s)
+    return Turn(turn.turn_s, turn.mid_rad, began_s, began_s + turn.mid_s)
+
+
+def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None, float]:
+    """Turn of a head that turns clockwise (way 1) or not (-1), and its residual as a share; None if times do not fit."""
+    first = bearing[since_s <= np.quantile(since_s, FIRST_SHARE)]
+    begin_rad = float(np.angle(np.exp(1j * first).mean()))
+    turned = np.mod(way * (begin_rad - bearing) + MARGIN_RAD, 2 * np.pi) - MARGIN_RAD
+    inside = np.ones(len(turned), bool)
+    slope = offset_s = 0.0
+    for _ in range(2):  # the second time without the points on the wrong side of the seam
+        centred = turned[inside] - turned[inside].mean()
+        slope = float(centred @ since_s[inside] / max(centred @ centred, 1e-9))
+        offset_s = float(since_s[inside].mean() - slope * turned[inside].mean())
+        off_s = np.abs(since_s - offset_s - slope * turned)
+        inside = off_s <= max(np.quantile(off_s, 0.9), 1e-9)
+    residual = float(np.quantile(off_s, 0.9)) / max(2 * np.pi * slope, 1e-9)
+    if residual > MAX_RESIDUAL:
+        return None, residual
+    # The middle of what the head has swept by the time of the last point, which is a whole turn or less.
+    swept = (float(since_s[inside].max()) / 2 - offset_s) / slope
+    mid_rad = float(np.angle(np.exp(1j * (begin_rad - way * swept))))
+    if abs(mid_rad) < AHEAD_RAD:
+        swept += way * mid_rad
+        mid_rad = 0.0
+    return Turn(way * 2 * np.pi * slope, mid_rad, 0.0, float(offset_s + slope * swept)), residual

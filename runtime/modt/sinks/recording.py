@@ -136,7 +136,7 @@ class Recording(Writer[FrameResult]):
     def configure(self, config: RecordingConfig) -> None:
         """Record as another profile says, and describe that profile in run.yaml."""
         self.config = config
-        self.writer.write(self._redescribe)
+        self.writer.write(self.redescribe)
 
     def health(self) -> RecordingHealth:
         """Counts so far. Lines that wait for a hanging disk are dropped, and count as lost."""
@@ -246,7 +246,8 @@ class Recording(Writer[FrameResult]):
             with suppress(ModtError):
                 file.close()
 
-    def _redescribe(self) -> None:
+    def redescribe(self) -> None:
+        """Write run.yaml anew."""
         if self._begun:
             self._attempt(lambda: self.directory.write(RUN, self._describe(), lasting=True))
 

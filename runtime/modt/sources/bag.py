@@ -1,208 +1,223 @@
-"""Recordings of ROS 2: PointCloud2 messages as frames, Odometry messages as their poses."""
+"""Recordings of ROS 2: point clouds as frames, odometry or transforms as their poses."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
-from contextlib import suppress
+import logging
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, islice, pairwise
 from pathlib import Path
+from types import MappingProxyType
 
-import numpy as np
-
-from modt.config import OdometryConfig
 from modt.errors import MisuseError, ModtError
-from modt.ros2 import odometry, point_cloud2
+from modt.ros2 import foxglove_cloud, point_cloud2
 from modt.ros2.cdr import CdrReader, MessageError
-from modt.ros2.odometry import StaticTransforms, read_odometry
-from modt.ros2.point_cloud2 import PointCloud, read_cloud
-from modt.sources.bag_files import BagFile, BagMessage, BagTopic, bag_files, messages_of
-from modt.sources.pose_buffer import PoseBuffer
-from modt.sources.stamp_check import STEP_S, StampCheck
-from modt.sources.stream import Faults, StreamInfo, Sweep
-from modt.types import Float64, Frame, Self
+from modt.ros2.point_cloud2 import PointCloud
+from modt.sources.bag_file import BagMessage, BagTopic
+from modt.sources.bag_files import Bag
+from modt.sources.bag_poses import PoseTopic, RecordedPoses, find_poses
+from modt.sources.stamp_check import StampCheck
+from modt.sources.stream import Faults, Reading, StreamInfo, Sweep, reason_of
+from modt.sources.turn_parts import TurnParts
+from modt.types import Frame, Self
 
-Poses = tuple[str, Float64]
-"""Topic of the poses, and pose of the sensor in the frame that they describe."""
-
-
-def find_poses(
-    files: list[BagFile], topics: dict[str, BagTopic], sensor: str
-) -> tuple[Poses | None, tuple[str, ...]]:
-    """Topic of the poses with the mount of the sensor, and notes.
-
-    The topic is None without poses, or without a transform from their frame to the sensor's.
-    """
-    names = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE and topic.count)
-    if not names:
-        return None, ("no nav_msgs/Odometry: no poses",)
-    if len(names) > 1:
-        return None, (f"several topics of odometry ({', '.join(names)}): none is used, no poses",)
-    (topic,) = names
-    base = ""
-    with suppress(MessageError, StopIteration):
-        base = read_odometry(next(messages_of(files, {topic})).data).child_frame_id
-    if base.lstrip("/") == sensor.lstrip("/") or not base or not sensor:
-        return (topic, np.eye(4)), ()
-    transforms = StaticTransforms()
-    if topics.get(odometry.TF_STATIC, BagTopic("", 0)).type == odometry.TF:
-        for message in messages_of(files, {odometry.TF_STATIC}):
-            with suppress(MessageError):
-                transforms.add(message.data)
-    T_base_sensor = transforms.between(base, sensor)
-    if T_base_sensor is None:
-        where = f"{odometry.TF_STATIC} does not lead from {base}, their frame, to {sensor}"
-        return None, (f"poses of {topic} are not used: {where}",)
-    return (topic, T_base_sensor), ()
-
-
-class RecordedPoses:
-    """Poses of a recording on the clock of its sweeps, which begins at a stamp and a recorded time [s]."""
-
-    def __init__(self, poses: Poses | None, began: tuple[float, float]) -> None:
-        self.topics: set[str] = set()
-        self._T_base_sensor = np.eye(4)
-        if poses is not None:
-            topic, self._T_base_sensor = poses
-            self.topics = {topic}
-        self._began = began
-        self._buffer = PoseBuffer(OdometryConfig())
-        self._stamps: StampCheck | None = None
-
-    @property
-    def newest_s(self) -> float:
-        """Stamp of the latest pose [s], minus infinity before the first."""
-        return self._buffer.newest_s
-
-    def add(self, message: BagMessage) -> None:
-        """Add the pose of a message; one that is wrong or out of order is left out."""
-        if self._stamps is None:  # the clock of the poses is that of the sweeps
-            began_s = message.recorded_s - STEP_S / 2
-            self._stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
-        with suppress(MessageError):
-            pose = read_odometry(message.data)
-            if self._stamps.doubt(pose.stamp_s, message.recorded_s):
-                return
-            stamp_s = pose.stamp_s + self._stamps.shift_s - self._began[0]
-            if stamp_s > self.newest_s:
-                self._buffer.add(stamp_s, pose.T_odom_child @ self._T_base_sensor)
-
-    def place(self, frame: Frame) -> Frame:
-        """The frame with its pose, None where the latest poses are too old."""
-        return replace(frame, T_world_sensor=self._buffer.at(frame.stamp_s))
-
+log = logging.getLogger(__name__)
 
 PEEKED = 50
 """Greatest number of messages that are searched for the first usable sweeps."""
 COMPARED = 4
 """Number of first sweeps whose stamps are compared. The first stamp that fits a later one begins the stream."""
+OPTIONS = frozenset({"topic", "odometry"})
+"""Options of `open_bag`."""
+ROS1 = "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDER"
 
 
 class BagStream:
     """Frames of a recording; stamps count from its first usable sweep.
 
     A frame is held back until a pose at least as late or the next sweep is read, so that its pose is interpolated.
-    Unusable messages are counted and skipped, the first ones are logged.
+    Messages that are parts of a turn are joined. Unusable messages are counted and skipped, the first ones are logged.
     """
 
     def __init__(
-        self, info: StreamInfo, files: list[BagFile], topic: str, began: tuple[float, float], poses: Poses | None
+        self,
+        info: StreamInfo,
+        bag: Bag,
+        topic: str,
+        began: tuple[float, float],
+        poses: PoseTopic | None,
+        parts: TurnParts | None = None,
     ) -> None:
-        """`began`: stamp and recorded time of the first sweep whose stamp is accepted [s]."""
+        """Read a topic.
+
+        Args:
+            info: properties of the stream.
+            bag: the recording.
+            topic: topic of point clouds.
+            began: stamp and recorded time of the first sweep whose stamp is accepted [s].
+            poses: topic of poses.
+            parts: joins messages that are parts of a turn; None where a message is a sweep.
+        """
         self.info = info
         self.faults = Faults()
-        self._files = files
+        self.reading = Reading()
+        self._bag = bag
         self._topic = topic
+        self._encoding = bag.topics()[topic].encoding
         self._began = began
         self._poses = poses
+        self._parts = parts
         self._first = 0
-        self._last = info.n_frames or 0
+        self._last: int | None = None
 
     def __iter__(self) -> Iterator[Frame]:
-        """Yield the frames, with poses where there are any."""
+        """Yield the frames, with poses where there are any.
+
+        Raises:
+            ModtError: none can be used.
+        """
         poses = RecordedPoses(self._poses, self._began)
-        stamps = StampCheck(self._began)
+        self.reading = Reading(poses=str(self._poses or ""))
+        used = 0
         held: Frame | None = None
-        index = -1
-        for message in self._readable({self._topic} | poses.topics):
-            is_sweep = message.topic == self._topic
-            if is_sweep:
-                index += 1
-            else:
-                poses.add(message)
-            if held is not None and (is_sweep or poses.newest_s >= held.stamp_s):
+        for frame in self._frames(poses):
+            if held is not None and (frame is not None or poses.newest_s >= held.stamp_s):
+                used += 1
                 yield poses.place(held)
                 held = None
-            if index >= self._last:
-                return
-            if is_sweep and index >= self._first:
-                held = self._frame(index, message, stamps)
-            elif is_sweep:
-                with suppress(MessageError):
-                    stamps.doubt(CdrReader(message.data).stamp_s() or message.recorded_s, message.recorded_s)
+            held = frame or held
         if held is not None:
+            used += 1
             yield poses.place(held)
+        if poses.lost:
+            self.faults.leave_out(self.reading.messages, self._poses, "messages of poses cannot be read", poses.lost)
+        if not used and self.reading.messages:
+            first = f" ({self.faults.first[0].cause})" if self.faults.first else ""
+            cause = f"none of its {self.reading.messages} messages of {self._topic} can be used{first}"
+            raise ModtError(self.info.name, cause, "have the driver write x, y, z [m] as float32 in the sensor's frame")
 
     def between(self, first: int, last: int | None) -> Self:
-        """Frames with first <= index < last; others are not decoded."""
+        """Frames with first <= index < last; others are not decoded, unless they come in parts."""
         part = copy.copy(self)
         part.faults = Faults()
         part._first = max(first, self._first)
-        part._last = max(part._first, self._last if last is None else min(last, self._last))
-        part.info = replace(self.info, n_frames=part._last - part._first, end=part._last)
+        ends = [end for end in (last, self._last) if end is not None]
+        part._last = min(ends, default=None)
+        if self.info.n_frames is not None:
+            end = min([*ends, self.info.end or 0])
+            part.info = replace(self.info, n_frames=max(end - part._first, 0), end=end)
         return part
 
-    def _readable(self, topics: set[str]) -> Iterator[BagMessage]:
-        """Messages up to where the recording is broken."""
-        try:
-            yield from messages_of(self._files, topics)
-        except ModtError as error:
-            self.faults.report(self._last, self._topic, error.cause, skipped=True)
+    def _frames(self, poses: RecordedPoses) -> Iterator[Frame | None]:
+        """Frames in their order; None after a message of a pose, or one without a frame."""
+        stamps = StampCheck(self._began)
+        parts = copy.deepcopy(self._parts)
+        index = -1
+        for message in self._bag.messages({self._topic} | poses.topics):
+            if message.topic != self._topic:
+                if message.flaw:
+                    poses.lost += 1
+                else:
+                    poses.add(message)
+                yield None
+                continue
+            if self._parts is None:
+                index += 1
+                if self._last is not None and index >= self._last:
+                    return
+                if index < self._first:
+                    self._pass_over(message, stamps)
+                    continue
+            cloud = self._cloud(index, message)
+            if parts is not None:
+                cloud = None if cloud is None else parts.add(cloud, message.recorded_s)
+                index += cloud is not None
+                if self._last is not None and index >= self._last:
+                    return
+            yield None if cloud is None or index < self._first else self._frame(index, cloud, message, stamps)
+        if parts is not None and (cloud := parts.finish()) is not None:
+            yield self._frame(index + 1, cloud, message, stamps)
+        self._account_for_damage()
 
-    def _frame(self, index: int, message: BagMessage, stamps: StampCheck) -> Frame | None:
+    def _account_for_damage(self) -> None:
+        """Count what the recording promises and does not hold, once it is read to its end."""
+        for flaw in self._bag.flaws:
+            self.faults.leave_out(self.reading.messages, self.info.name, flaw)
+        for topic, number in self._bag.missing.items():
+            if number:
+                self.faults.leave_out(self.reading.messages, self.info.name, f"messages of {topic} are missing", number)
+
+    def _cloud(self, index: int, message: BagMessage) -> PointCloud | None:
+        """The points of a message; None if it cannot be read."""
+        self.reading.messages += 1
         try:
-            cloud = read_cloud(message.data)
+            if message.flaw:
+                raise MessageError("damaged", message.flaw)
+            cloud = _read(message, self._encoding)
         except MessageError as error:
-            self.faults.report(index, self._topic, str(error), skipped=True)
+            self.faults.report(max(index, 0), self._topic, str(error), skipped=True)
             return None
-        sweep = Sweep(_stamp_s(cloud, message), cloud.points, cloud.turn_s)
+        self.reading.frame_id = cloud.frame_id
+        if cloud.corrected:
+            if not self.reading.corrected:
+                log.warning("%s: %s; read as it makes sense", self._topic, cloud.corrected)
+            self.reading.corrected[reason_of(cloud.corrected)] += 1
+        self.reading.joined += self._parts is not None
+        return cloud
+
+    def _frame(self, index: int, cloud: PointCloud, message: BagMessage, stamps: StampCheck) -> Frame | None:
+        self.reading.sweeps += 1
+        self.reading.times[cloud.times] += 1
+        sweep = Sweep(_stamp_s(cloud, message), cloud.points, cloud.turn_s, mid_rad=cloud.mid_rad)
         return stamps.frame(sweep, message.recorded_s, index, self._topic, self.faults, began_s=self._began[0])
 
+    def _pass_over(self, message: BagMessage, stamps: StampCheck) -> None:
+        """Follow the stamp of a sweep before the first one asked for."""
+        stamp_s = message.recorded_s
+        if self._encoding == "cdr" and not message.flaw:
+            try:
+                stamp_s = CdrReader(message.data).stamp_s() or stamp_s
+            except MessageError:
+                return
+        stamps.doubt(stamp_s, message.recorded_s)
 
-def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream:
+
+def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingProxyType({})) -> BagStream:
     """Stream of a rosbag2 folder, a .db3 or an .mcap file; `period_s` holds for a recording of a single sweep.
+
+    The options are `topic`, of point clouds, and `odometry`, a topic of odometry or of transforms.
 
     Raises:
         MisuseError: no topic of point clouds, several and none is chosen, or no library to read the file.
         ModtError: the file cannot be read.
     """
     path = path.resolve()
-    files = bag_files(path)
-    topics: dict[str, BagTopic] = {}
-    for file in files:
-        for name, entry in file.topics().items():
-            topics[name] = BagTopic(entry.type, entry.count + (topics[name].count if name in topics else 0))
-    chosen = _choose(path, topics, topic)
-    began = _first_clouds(path, files, chosen)
-    stamps = [(_stamp_s(cloud, message), message.recorded_s) for cloud, message in began]
+    bag = Bag(path)
+    topics = bag.topics()
+    chosen = _choose(path, topics, options.get("topic"))
+    began = _first_clouds(path, bag, chosen, topics[chosen].encoding)
+    stamps = [(_stamp_s(cloud, message), message.recorded_s) for cloud, message in began[:COMPARED]]
     first = next((a for a, b in combinations(stamps, 2) if not StampCheck(a).doubt(*b)), stamps[0])
     steps_s = (b[0] - a[0] for a, b in pairwise(stamps) if b[0] > a[0] and not StampCheck(a).doubt(*b))
-    poses, notes = find_poses(files, topics, began[0][0].frame_id)
+    poses, notes = find_poses(bag, began[0][0].frame_id, options.get("odometry"))
+    parts = TurnParts.of([(cloud, message.recorded_s) for cloud, message in began])
+    count = topics[chosen].count
     info = StreamInfo(
         name=path.stem if path.is_file() else path.name,
         layout="rosbag2",
-        n_frames=topics[chosen].count,
-        period_s=next(steps_s, period_s),
+        n_frames=count if parts is None else None,
+        period_s=next(steps_s, period_s) if parts is None else round(abs(parts.turn_s), 3),
         has_poses=poses is not None,
+        notes=() if parts is None else (parts.note(),),
         pose_notes=notes,
-        end=topics[chosen].count,
+        end=count if parts is None else None,
     )
-    return BagStream(info, files, chosen, first, poses)
+    return BagStream(info, bag, chosen, first, poses, parts)
 
 
 def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
-    clouds = sorted(name for name, topic in topics.items() if topic.type == point_cloud2.TYPE and topic.count)
+    clouds = sorted(name for name, topic in topics.items() if topic.count and _is_read(topic))
     if asked is not None:
         asked = "/" + asked.strip("/")
         if asked not in clouds:
@@ -210,8 +225,11 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
             raise MisuseError(path, f"no point clouds in {asked}", f"topics of sensor_msgs/PointCloud2: {there}")
         return asked
     if not clouds:
-        there = ", ".join(sorted({topic.type for topic in topics.values() if topic.count})) or "nothing"
-        raise MisuseError(path, "no sensor_msgs/PointCloud2", f"record the driver's point clouds; it holds {there}")
+        kinds = {(topic.type, topic.encoding) for topic in topics.values() if topic.count}
+        there = ", ".join(sorted(k if e == "cdr" else f"{k} in {e}" for k, e in kinds)) or "nothing"
+        old = any(e == "ros1" for _, e in kinds)
+        remedy = f"convert it from ROS 1: {ROS1}" if old else "record the driver's point clouds"
+        raise MisuseError(path, "no sensor_msgs/PointCloud2", f"{remedy}; it holds {there}")
     if len(clouds) > 1:
         raise MisuseError(
             path, f"{len(clouds)} topics of point clouds", f"choose by --capture topic=NAME: {', '.join(clouds)}"
@@ -219,25 +237,39 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
     return clouds[0]
 
 
-def _first_clouds(path: Path, files: list[BagFile], topic: str) -> list[tuple[PointCloud, BagMessage]]:
-    """First usable sweeps, at least one.
+def _is_read(topic: BagTopic) -> bool:
+    """Whether the messages of a topic are point clouds that can be read."""
+    if topic.type == point_cloud2.TYPE:
+        return topic.encoding == "cdr"
+    return topic.type == foxglove_cloud.TYPE and topic.encoding in foxglove_cloud.READERS
+
+
+def _read(message: BagMessage, encoding: str) -> PointCloud:
+    """The points of a message.
+
+    Raises:
+        MessageError: it cannot be used.
+    """
+    return foxglove_cloud.READERS.get(encoding, point_cloud2.read_cloud)(message.data)
+
+
+def _first_clouds(path: Path, bag: Bag, topic: str, encoding: str) -> list[tuple[PointCloud, BagMessage]]:
+    """First usable messages, at least one, and enough to tell whether they are parts of a turn.
 
     Raises:
         ModtError: no message can be used.
     """
     clouds: list[tuple[PointCloud, BagMessage]] = []
     refused = "no message"
-    try:
-        for message in islice(messages_of(files, {topic}), PEEKED):
-            try:
-                clouds.append((read_cloud(message.data), message))
-            except MessageError as error:
-                refused = str(error)
-            if len(clouds) == COMPARED:
-                break
-    except ModtError:
-        if not clouds:
-            raise
+    for message in islice(bag.messages({topic}), PEEKED):
+        try:
+            if message.flaw:
+                raise MessageError("damaged", message.flaw)
+            clouds.append((_read(message, encoding), message))
+        except MessageError as error:
+            refused = str(error)
+        if len(clouds) >= COMPARED and not TurnParts.may_be([cloud for cloud, _ in clouds]):
+            break
     if not clouds:
         remedy = "record sensor_msgs/PointCloud2 in CDR, with x, y, z [m] as float32"
         raise ModtError(path, f"no usable sweep at the begin of {topic} ({refused})", remedy)
@@ -245,4 +277,4 @@ def _first_clouds(path: Path, files: list[BagFile], topic: str) -> list[tuple[Po
 
 
 def _stamp_s(cloud: PointCloud, message: BagMessage) -> float:
-    return cloud.ahead_s or message.recorded_s
+    return cloud.stamp_s or message.recorded_s

@@ -13,8 +13,18 @@ from modt.sources.drivers import Driver, all_drivers
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.stamp_check import StampCheck
-from modt.sources.stream import Faults, StreamInfo, Sweep
-from modt.types import Frame, Self
+from modt.sources.stream import Faults, Reading, StreamInfo, Sweep
+from modt.types import COMPENSATED, DESKEWED, Frame, Self
+
+
+CHOICES = frozenset({"host", "port"})
+"""Options that choose one of several sensors in a capture."""
+PEEKED = 50
+"""Number of packets of a flow by which a sensor is recognised."""
+SEARCHED = 20_000
+"""Number of packets among which other sensors are searched, some seconds of two."""
+FOREIGN = {b"\x55\xaa\x05\x0a": "RoboSense", b"\x55\xaa\x05\x5a": "RoboSense", b"\xa5\xff\x00\x5a": "RoboSense"}
+"""Makers whose packets are not decoded, by the first bytes of a packet."""
 
 
 class PacketStream:
@@ -30,6 +40,7 @@ class PacketStream:
         """Select the frames with first <= index < info.end; each pass decodes with a fresh copy of the decoder."""
         self.info = info
         self.faults = Faults()
+        self.reading = Reading()
         self.reception = decoder.reception
         self.capture = capture
         self.decoder = decoder
@@ -38,12 +49,16 @@ class PacketStream:
     def __iter__(self) -> Iterator[Frame]:
         decoder = self.decoder.fresh()
         self.reception = decoder.reception
+        self.reading = Reading()
         path = str(self.capture.path)
         stamps = StampCheck()
         lost = 0
         index = -1
         sweeps = islice(_decoded(self.capture, decoder), self.info.end)
         for index, (arrived_s, sweep) in enumerate(sweeps):
+            self.reading.messages = self.reception.messages
+            self.reading.sweeps += 1
+            self.reading.times[DESKEWED if sweep.turn_s else COMPENSATED] += 1
             missing = self.reception.lost - lost
             lost = self.reception.lost
             if index < self._first:
@@ -53,9 +68,11 @@ class PacketStream:
             if frame := stamps.frame(sweep, arrived_s, index, path, self.faults, flaws):
                 yield frame
         if index + 1 != self.info.end:  # the file was read to its end
-            refused = [f"{count} packets refused: {reason}" for reason, count in self.reception.refused.items()]
-            for flaw in [*refused, *filter(None, [self.capture.flaw])]:
-                self.faults.report(index + 1, path, flaw, skipped=False)
+            self.reading.messages = self.reception.messages
+            for reason, count in self.reception.refused.items():
+                self.faults.report(index + 1, path, f"{count} packets refused: {reason}", skipped=False)
+            for flaw in self.capture.flaws:
+                self.faults.leave_out(index + 1, path, flaw)
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; the file is read up to the last one."""
@@ -69,15 +86,19 @@ class PacketStream:
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     """Stream of the sensor whose packets come first in a PCAP file.
 
-    `options` are those of the sensor's driver. Some of them default to files with the name of the capture.
+    `options` are those of the sensor's driver, and `host` and `port`, which choose one of several sensors by the address
+    that its packets come from and the port that they go to. Options of a driver default to files with the name of the
+    capture.
 
     Raises:
         MisuseError: no PCAP file, no packets of a sensor, no whole sweep; an invalid option, a missing extra.
     """
     capture = PcapFile(path)
+    capture.flow = _asked(capture, options)
+    options = {key: value for key, value in options.items() if key not in CHOICES}
     driver = _driver_of(capture, options)
-    decoder = driver.decoder(path.stem, driver.options_beside(path) | dict(options), "")
-    capture.flow = next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
+    decoder = driver.decoder(path.stem, driver.options_beside(path) | options, "")
+    capture.flow = capture.flow or next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
     if capture.flow is None:
         raise _without_packets(capture, driver.maker, f"give the {driver.identified_by} of the sensor that sent them")
     _, first = next(_decoded(capture, decoder), (0.0, None))
@@ -87,7 +108,52 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         cause = f"no whole sweep ({driver.maker})" + (f", packets are refused: {why}" if why else "")
         raise MisuseError(path, cause, remedy or "record at least two turns of the sensor")
     info = decoder.info(path.stem, driver.maker)
-    return PacketStream(replace(info, period_s=round(first.turn_s, 3) or info.period_s), capture, decoder)
+    others = _notes_of_others(PcapFile(path), capture.flow)
+    period_s = round(first.turn_s, 3) or info.period_s
+    return PacketStream(replace(info, period_s=period_s, notes=(*info.notes, *others)), capture, decoder)
+
+
+def _asked(capture: PcapFile, options: Mapping[str, str]) -> tuple[str, int] | None:
+    """Source and port of the sensor that `host` and `port` choose; None without them.
+
+    Raises:
+        MisuseError: no packet is of it.
+    """
+    host = options.get("host")
+    port = options.get("port")
+    if host is None and port is None:
+        return None
+    flows = Counter((d.source, d.port) for d in capture)
+    chosen = [flow for flow in flows if host in (None, flow[0]) and port in (None, str(flow[1]))]
+    sensors = [flow for flow in chosen if _sends_points(capture, flow)]
+    if not chosen:
+        there = ", ".join(f"host={source} port={number}" for source, number in flows) or "none"
+        raise MisuseError(capture.path, f"no packets of host={host or 'any'} port={port or 'any'}", f"there are {there}")
+    return (sensors or chosen)[0]
+
+
+def _sends_points(capture: PcapFile, flow: tuple[str, int]) -> bool:
+    """Whether the first packets of a flow are those of a known sensor."""
+    capture.flow = flow
+    first = [d.payload for d in islice(capture, PEEKED)]
+    capture.flow = None
+    return any(driver.recognises(payload) for driver in all_drivers() for payload in first)
+
+
+def _notes_of_others(capture: PcapFile, flow: tuple[str, int]) -> list[str]:
+    """A line for each other sensor among the first packets of a capture."""
+    drivers = all_drivers()
+    others = Counter[tuple[str, int, str]]()
+    for datagram in islice(capture, SEARCHED):
+        if (datagram.source, datagram.port) != flow:
+            maker = next((driver.maker for driver in drivers if driver.recognises(datagram.payload)), None)
+            if maker is not None:
+                others[datagram.source, datagram.port, maker] += 1
+    there = [
+        f"another {maker} at {source}, port {port}: --capture host={source} --capture port={port} reads it"
+        for source, port, maker in others
+    ]
+    return [f"the packets of {flow[0]}, port {flow[1]}, are read; {line}" for line in there]
 
 
 def _driver_of(capture: PcapFile, options: Mapping[str, str]) -> Driver:
@@ -101,10 +167,15 @@ def _driver_of(capture: PcapFile, options: Mapping[str, str]) -> Driver:
         for driver in drivers:
             if driver.identified_by in given:
                 return driver
+    foreign = ""
     for datagram in capture:
         for driver in drivers:
             if driver.recognises(datagram.payload):
                 return driver
+        foreign = foreign or FOREIGN.get(datagram.payload[:4], "")
+    if foreign:
+        remedy = "record the point clouds of its driver in ROS 2 and give that recording, or modt run ros2:///TOPIC"
+        raise MisuseError(capture.path, f"packets of a {foreign}, which are not decoded", remedy)
     remedies = [
         f"for an {driver.maker}, save its {option} as {capture.path.with_suffix(suffix)} or give {option}=FILE"
         for driver in drivers

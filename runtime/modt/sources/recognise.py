@@ -38,23 +38,23 @@ REMEDY = "give a KITTI drive, a sequence, a folder of .bin, .pcd or .ply scans, 
 def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, str] = MappingProxyType({})) -> Stream:
     """Stream at a path: packets, a recording of ROS 2, or scan files.
 
-    `capture` adds facts that the recording does not hold: options of `open_capture`, or the topic for `open_bag`.
+    `capture` adds facts that the recording does not hold: options of `open_capture` or of `open_bag`.
 
     Raises:
         MisuseError: the path does not exist or holds no stream, or an option does not apply.
         ModtError: the recording cannot be read.
     """
     if path.is_file() and path.suffix in CAPTURES:
-        from modt.sources.capture import open_capture
+        from modt.sources.capture import CHOICES, open_capture
         from modt.sources.drivers import all_drivers
 
-        _only(path, capture, {option for driver in all_drivers() for option in driver.options})
+        _only(path, capture, {option for driver in all_drivers() for option in driver.options} | CHOICES)
         return open_capture(path, capture)
     if _is_bag(path):
-        from modt.sources.bag import open_bag
+        from modt.sources.bag import OPTIONS, open_bag
 
-        _only(path, capture, {"topic"})
-        return open_bag(path, period_s, capture.get("topic"))
+        _only(path, capture, OPTIONS)
+        return open_bag(path, period_s, capture)
     _only(path, capture, set())
     return open_scans(path, period_s)
 
@@ -120,10 +120,14 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
 
 
 def _is_bag(path: Path) -> bool:
-    """Whether a path is a recording: a file, a folder with `metadata.yaml`, or a folder of a single file."""
-    files = [p for p in (path.iterdir() if path.is_dir() else [path]) if p.is_file()]
-    joined = len(files) == 1 or (path / "metadata.yaml").is_file()
-    return joined and any(file.name.endswith(BAGS) for file in files)
+    """Whether a path is a recording: a file, or a folder of the files of one recording and of nothing else to read."""
+    if not path.is_dir():
+        return path.is_file() and path.name.endswith(BAGS)
+    from modt.sources.bag_files import METADATA, bag_in
+
+    if (path / METADATA).is_file():
+        return any(file.name.endswith(BAGS) for file in path.iterdir())
+    return bool(bag_in(path)) and not any(_has_scans(path, suffix) for suffix in SUFFIXES)
 
 
 def _is_tracking(path: Path) -> bool:

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import ModtError, ScanError
-from modt.sources.stream import Faults, StreamInfo
-from modt.types import UNRECORDED, Float32, Float64, Frame, Self
+from modt.sources.stream import Faults, Reading, StreamInfo
+from modt.types import COMPENSATED, DESKEWED, UNRECORDED, Float32, Float64, Frame, Self
 
 SUFFIXES = (".bin", ".pcd", ".ply")
 """Suffixes of scan files; a folder that holds several kinds is read by the first one."""
@@ -135,10 +135,15 @@ class ScanStream:
         self.info = replace(info, n_frames=len(scans), end=scans[-1].index + 1 if scans else 0)
         self.scans = scans
         self.faults = Faults()
+        self.reading = Reading()
 
     def __iter__(self) -> Iterator[Frame]:
+        self.reading = Reading(poses="the recording" if self.info.has_poses else "")
         used = 0
         for scan in self.scans:
+            self.reading.messages += 1
+            self.reading.sweeps += 1
+            self.reading.times[DESKEWED if scan.turn_s else COMPENSATED] += 1
             try:
                 points, flaws = read_scan(scan.path)
             except ScanError as error:

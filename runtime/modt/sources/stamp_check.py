@@ -121,4 +121,4 @@ class StampCheck:
         if flaws:
             faults.report(index, subject, "; ".join(flaws), skipped=False)
         stamp_s = sweep.stamp_s + self.shift_s - began_s
-        return Frame(index, stamp_s, points, turn_s=sweep.turn_s)
+        return Frame(index, stamp_s, points, turn_s=sweep.turn_s, mid_rad=sweep.mid_rad)

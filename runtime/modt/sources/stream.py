@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -63,6 +65,14 @@ def no_seconds(stamp_s: float) -> str:
     return f"stamp {stamp_s:g} is no time in seconds{unit}"
 
 
+_NUMBER = re.compile(r"[-+]?\d[\d.e+]*")
+
+
+def reason_of(cause: str) -> str:
+    """Cause of a fault without its numbers, by which faults are counted."""
+    return _NUMBER.sub("N", cause)
+
+
 MAX_KEPT_FAULTS = 20
 """Number of faults that are kept and logged; later ones are only counted."""
 
@@ -74,15 +84,36 @@ class Faults:
     count: int = 0  # number of all faults
     skipped: int = 0  # number of skipped scans
     first: list[Fault] = field(default_factory=list)  # the first MAX_KEPT_FAULTS faults
+    left_out: Counter[str] = field(default_factory=Counter)  # what was asked for and not read: numbers by reason
+
+    def leave_out(self, frame: int, subject: object, reason: str, number: int = 1) -> None:
+        """Count and log what is not read before a frame, and is no sweep that can be told."""
+        self.left_out[reason] += number
+        self.report(frame, subject, reason if number == 1 else f"{number} {reason}", skipped=False)
 
     def report(self, frame: int, subject: object, cause: str, *, skipped: bool) -> None:
         """Count a fault, and log it unless there are too many."""
         self.count += 1
         self.skipped += skipped
+        if skipped:
+            self.left_out[reason_of(cause)] += 1
         if self.count <= MAX_KEPT_FAULTS:
             self.first.append(Fault(frame, str(subject), cause, skipped))
             more = "; later faults are only counted" if self.count == MAX_KEPT_FAULTS else ""
             log.warning("%s: frame %d: %s%s%s", subject, frame, cause, "; frame skipped" if skipped else "", more)
+
+
+@dataclass(slots=True)
+class Reading:
+    """What the latest pass over a stream has read."""
+
+    messages: int = 0  # messages, packets or files of sweeps
+    sweeps: int = 0  # sweeps that they hold, usable or not
+    joined: int = 0  # messages that are parts of a turn, and were joined
+    times: Counter[str] = field(default_factory=Counter)  # sweeps by what the times of their points are
+    corrected: Counter[str] = field(default_factory=Counter)  # messages by what they say of their layout and is not so
+    frame_id: str = ""  # frame of the points, where messages name it
+    poses: str = ""  # where the poses are from
 
 
 class Stream(Protocol):
@@ -90,6 +121,7 @@ class Stream(Protocol):
 
     info: StreamInfo
     faults: Faults
+    reading: Reading
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames; faults are added to `faults` on the way."""
@@ -115,7 +147,7 @@ class Sweep:
     """One turn of a sensor.
 
     Attributes:
-        stamp_s, points, turn_s, frame_id: as in modt.types.Frame; points may hold values that are not finite.
+        stamp_s, points, turn_s, mid_rad, frame_id: as in modt.types.Frame; points may hold values that are not finite.
         complete: no message of the turn is known to be missing.
         index: index of the frame in its recording; None numbers the sweeps as they come.
         waited_s: time for which its last message lay in the kernel before it was read [s].
@@ -128,6 +160,7 @@ class Sweep:
     index: int | None = None
     frame_id: str = ""
     waited_s: float = 0.0
+    mid_rad: float = 0.0
 
 
 @dataclass(slots=True)
@@ -137,6 +170,7 @@ class Reception:
     messages: int = 0  # messages taken from the network or file
     lost: int = 0  # messages missing by their sequence numbers, stamps or angles
     refused: dict[str, int] = field(default_factory=dict)  # number of unusable messages by reason
+    joined: int = 0  # messages that are parts of a turn, and were joined
     frame_id: str = ""  # frame of the points, where messages name it
 
     def refuse(self, reason: str) -> bool:

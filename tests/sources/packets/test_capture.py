@@ -122,7 +122,8 @@ def test_a_file_is_read_up_to_its_broken_end(tmp_path, end, flaw):
     path.write_bytes(path.read_bytes() + end)
     capture = PcapFile(path)
     assert len(list(capture)) == 1
-    assert flaw in capture.flaw
+    (found,) = capture.flaws
+    assert flaw in found
 
 
 @pytest.mark.parametrize(

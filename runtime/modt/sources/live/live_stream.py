@@ -6,6 +6,7 @@ import logging
 import math
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from modt.sources.scan_file import sanitised
 from modt.sources.stamp_check import StampCheck
 from modt.sources.stream import (
     Faults,
+    Reading,
     Received,
     Reception,
     Stream,
@@ -27,7 +29,7 @@ from modt.sources.stream import (
     no_seconds,
     unit_of,
 )
-from modt.types import Frame
+from modt.types import COMPENSATED, DESKEWED, Frame
 
 log = logging.getLogger(__name__)
 
@@ -63,6 +65,7 @@ class LiveStream:
         faults: unusable sweeps and points.
         sweeps, incomplete, dropped: numbers of sweeps received, of sweeps with missing messages, and of sweeps
             replaced by a newer one before they were taken.
+        skewed: number of sweeps that are deskewed by the times of a turn.
         silences: number of times that the sensor fell silent.
         period_s: mean time between the last sweeps by their stamps, at first the nominal one.
     """
@@ -92,6 +95,7 @@ class LiveStream:
         self.sweeps = 0
         self.incomplete = 0
         self.dropped = 0
+        self.skewed = 0
         self.silences = 0
         self._cores = cores
         self._clock = clock
@@ -151,6 +155,13 @@ class LiveStream:
             return None
         return self._frame(taken)
 
+    @property
+    def reading(self) -> Reading:
+        """What was read so far."""
+        reception = self.reader.reception
+        times = Counter({DESKEWED: self.skewed, COMPENSATED: self.sweeps - self.skewed})
+        return Reading(reception.messages, self.sweeps, reception.joined, +times, frame_id=reception.frame_id)
+
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
         reception = self.reader.reception
@@ -208,6 +219,7 @@ class LiveStream:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
+            self.skewed += sweep.turn_s != 0
             self._newest = Arrival(sweep, flaws, usable, self._clock() - sweep.waited_s)
             self._arrived.notify()
 
@@ -238,6 +250,7 @@ class LiveStream:
             sweep.stamp_s,
             sweep.points,
             turn_s=sweep.turn_s,
+            mid_rad=sweep.mid_rad,
             steady_s=self._steady_s,
             frame_id=sweep.frame_id,
         )
@@ -315,7 +328,8 @@ class PlayedReader:
         self.reception.messages += 1
         if self._stream.faults.count:
             self.reception.refused["faulty scans"] = self._stream.faults.count
-        return (Sweep(stamp_s, frame.points, frame.turn_s, index=None if self._loop else frame.index),)
+        index = None if self._loop else frame.index
+        return (Sweep(stamp_s, frame.points, frame.turn_s, index=index, mid_rad=frame.mid_rad),)
 
     def close(self) -> None:
         """End a wait."""

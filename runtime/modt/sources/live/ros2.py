@@ -96,7 +96,8 @@ class PointCloudReader:
             remedy = ", not in the sensor's: subscribe to what its driver publishes" if foreign else ""
             level = logging.WARNING if foreign else logging.INFO
             log.log(level, "%s: points are in the frame %r%s", self._name, cloud.frame_id, remedy)
-        return Sweep(cloud.ahead_s or message.sent_s, cloud.points, cloud.turn_s, frame_id=cloud.frame_id)
+        stamp_s = cloud.stamp_s or message.sent_s
+        return Sweep(stamp_s, cloud.points, cloud.turn_s, frame_id=cloud.frame_id, mid_rad=cloud.mid_rad)
 
 
 def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:

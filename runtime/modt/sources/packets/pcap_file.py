@@ -1,6 +1,7 @@
 """UDP datagrams in PCAP files.
 
-Files of either byte order with stamps in µs or ns are read; IPv4 and IPv6 over Ethernet, Linux cooked or raw IP.
+Files of either byte order with stamps in µs or ns are read; IPv4 and IPv6 over Ethernet, Linux cooked, loopback or raw
+IP. Behind damaged bytes reading goes on at the next record.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ COOKED = 113
 COOKED_2 = 276
 LINK_HEADERS = {ETHERNET: (12, 14), COOKED: (14, 16), COOKED_2: (0, 20)}
 """Offsets of the protocol and of the payload by link type."""
+IP_AT = {RAW_IP: 0, 12: 0, 14: 0, 228: 0, 229: 0, 0: 4, 108: 4}
+"""Offset of the IP packet by link type: raw IP by its numbers on several systems, IPv4, IPv6, loopback in both orders."""
 IP_PROTOCOLS = (0x0800, 0x86DD)
 """Protocols of IPv4 and IPv6 in the header of the link."""
 VLAN_TAGS = (0x8100, 0x88A8, 0x9100)
@@ -41,6 +44,12 @@ UDP_BYTES = 8
 """Size of a header of UDP."""
 MAX_RECORD_BYTES = 262_144
 """Greatest snapshot length of tcpdump; a record that promises more is broken."""
+MAX_APART_S = 86_400
+"""Greatest time between two records [s]; a header of one farther from the last record is broken."""
+
+
+SEARCHED_BYTES = 1 << 22
+"""Bytes behind a damage in which the next record is searched."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +74,7 @@ class PcapFile:
 
     Attributes:
         flow: source and port of the datagrams wanted; None selects all.
-        flaw: reason why the last pass ended before the end of the file; None if it did not.
+        flaws: bytes that the last pass could not read, one line each.
     """
 
     def __init__(self, path: Path) -> None:
@@ -76,7 +85,7 @@ class PcapFile:
         """
         self.path = path
         self.flow: tuple[str, int] | None = None
-        self.flaw: str | None = None
+        self.flaws: list[str] = []
         try:
             with path.open("rb") as file:
                 head = file.read(HEADER_BYTES)
@@ -88,11 +97,11 @@ class PcapFile:
             raise MisuseError(path, "is no PCAP file", "record one: tcpdump -w FILE udp")
         self._order, self._unit_s = MAGICS[head[:4]]
         self._link = struct.unpack_from(self._order + "I", head, 20)[0] & 0xFFFF
-        if self._link != RAW_IP and self._link not in LINK_HEADERS:
+        if self._link not in {*IP_AT, *LINK_HEADERS}:
             raise MisuseError(path, f"link type {self._link} is unknown", "record it on an Ethernet interface")
 
     def __iter__(self) -> Iterator[Datagram]:
-        self.flaw = None
+        self.flaws = []
         fragments = Fragments()
         with self.path.open("rb") as file:
             file.seek(HEADER_BYTES)
@@ -109,26 +118,70 @@ class PcapFile:
                     yield Datagram(stamp_s, source, port, payload[UDP_BYTES : length or None])
 
     def _records(self, file: BinaryIO) -> Iterator[tuple[float, bytes]]:
-        """Stamp [s] and bytes of each record up to the first broken one."""
+        """Stamp [s] and bytes of each record."""
         header = struct.Struct(self._order + "IIII")
+        at = HEADER_BYTES
+        before = at  # begin of the last whole record, whose length may be wrong
+        second: int | None = None
         while head := file.read(header.size):
             if len(head) < header.size:
-                self.flaw = "truncated within the header of a record"
+                self.flaws.append("truncated within the header of a record")
                 return
+            if not self._is_header(header.unpack(head), second):
+                found = self._next_record(file, header, max(before + 1, HEADER_BYTES), second, at)
+                length = header.unpack(head)[2]
+                cause = f"a record promises {length} bytes" if length > MAX_RECORD_BYTES else "damaged"
+                self.flaws.append(f"{cause} at byte {at}" if found else f"{cause} from byte {at} on")
+                if found is None:
+                    return
+                before = at = found
+                file.seek(at)
+                continue
             second, fraction, length, _ = header.unpack(head)
-            if length > MAX_RECORD_BYTES:
-                self.flaw = f"a record promises {length} bytes: the rest of the file is not read"
-                return
             frame = file.read(length)
             if len(frame) < length:
-                self.flaw = "truncated within a record"
-                return
+                found = self._next_record(file, header, at + 1, second, at)
+                self.flaws.append("truncated within a record" if found is None else f"damaged at byte {at}")
+                if found is None:
+                    return
+                before = at = found
+                file.seek(at)
+                continue
             yield second + fraction * self._unit_s, frame
+            before = at
+            at += header.size + length
+
+    def _is_header(self, numbers: tuple[int, ...], second: int | None) -> bool:
+        """Whether numbers can be the header of the record after one of a second."""
+        now, fraction, length, original = numbers
+        near = second is None or abs(now - second) <= MAX_APART_S
+        return near and length <= min(original, MAX_RECORD_BYTES) and fraction * self._unit_s < 1.0
+
+    def _next_record(
+        self, file: BinaryIO, header: struct.Struct, start: int, second: int | None, beyond: int
+    ) -> int | None:
+        """Offset, from `start` on, of a record that ends with the file or where another one begins; None without one.
+
+        A record within what was read before counts only if it does not begin at `beyond`, the damaged place.
+        """
+        file.seek(start)
+        data = file.read(SEARCHED_BYTES)
+        size = start + len(data)
+        for at in range(len(data) - header.size + 1):
+            numbers = header.unpack_from(data, at)
+            if start + at == beyond or numbers[2] == 0 or not self._is_header(numbers, second):
+                continue
+            end = at + header.size + numbers[2]
+            last = end == len(data) and size == self.path.stat().st_size
+            follows = end + header.size <= len(data) and self._is_header(header.unpack_from(data, end), second)
+            if last or follows:
+                return start + at
+        return None
 
     def _start_of_ip(self, frame: bytes) -> int | None:
         """Offset of the IP header, None where there is none."""
-        if self._link == RAW_IP:
-            return 0
+        if self._link in IP_AT:
+            return IP_AT[self._link]
         protocol_at, start = LINK_HEADERS[self._link]
         while len(frame) >= start:
             protocol = int.from_bytes(frame[protocol_at : protocol_at + 2], "big")

@@ -1,0 +1,168 @@
+"""SQLite databases of rosbag2, also those that a killed recorder has left, or that are damaged."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import sys
+import tempfile
+import weakref
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from modt.errors import ModtError
+from modt.sources.bag_file import DAMAGED, MAX_RECORD_BYTES, REMEDY, BagFile, BagTopic, Stored
+from modt.sources.sqlite_pages import Pages
+
+STEPS = 10_000
+"""Instructions of a database between two checks of their number. Their limit is that of the unpacked bytes."""
+BESIDE = ("-wal", "-journal")
+"""Suffixes of files in which a recorder that was killed leaves what is not in its database yet, or must be undone."""
+TABLES = "SELECT name FROM sqlite_master WHERE type != 'index' AND (type != 'table' OR sql NOT LIKE 'CREATE TABLE%')"
+"""Names of what is no plain table; views and triggers are programs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """What a database lists.
+
+    Attributes:
+        topics: name, type and encoding of each topic by its number.
+        messages: time [ns], number, and number of the topic of each message, ordered.
+        pages: the pages of a database that SQLite cannot read; None if it can.
+    """
+
+    topics: dict[int, tuple[str, str, str]]
+    messages: list[tuple[int, int, int]]
+    pages: Pages | None = None
+
+
+class DatabaseFile(BagFile):
+    """A .db3 file. Messages are listed first and then read one by one, so that a damage costs those it lies in."""
+
+    def _topics(self) -> dict[str, BagTopic]:
+        listing = self._listing
+        counts = Counter(topic for _, _, topic in listing.messages)
+        found = ((counts[number], *facts) for number, facts in listing.topics.items())
+        return {name: BagTopic(kind, count, encoding or "cdr") for count, name, kind, encoding in found}
+
+    def _messages(self, topics: Collection[str]) -> Iterator[Stored]:
+        listing = self._listing
+        names = {number: name for number, (name, _, _) in listing.topics.items() if name in topics}
+        if listing.pages is not None:
+            self.flaws.append("damaged: its pages are read one by one")
+        with closing(self._database()) as database:
+            for recorded_ns, number, topic in listing.messages:
+                if topic in names:
+                    data = self._data(database, listing.pages, number)
+                    yield Stored(names[topic], recorded_ns, data or b"", DAMAGED if data is None else "")
+
+    def _data(self, database: sqlite3.Connection, pages: Pages | None, number: int) -> bytes | None:
+        """Bytes of a message, None if they cannot be read."""
+        if pages is not None:
+            return pages.blob(number)
+        with suppress(sqlite3.Error):
+            (data,) = self._run(database, "SELECT data FROM messages WHERE id = ?", number).fetchone()
+            return data if isinstance(data, bytes) else None
+        return None
+
+    @cached_property
+    def _listing(self) -> Listing:
+        """Topics and messages by the tables, or by the pages where the tables are damaged."""
+        pages = None
+        try:
+            topics, messages = self._tables()
+        except sqlite3.Error as error:
+            pages = Pages(self._merged)
+            topics = pages.topics
+            messages = pages.messages
+            if not topics or not messages:
+                raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
+        known = {number: (name, kind, form) for number, name, kind, form in topics if _are(str, name, kind, form)}
+        listed = {row[1]: row for row in messages if _are(int, *row) and row[2] in known}
+        return Listing(known, sorted(listed.values()), pages)
+
+    def _tables(self) -> tuple[list[Any], list[Any]]:
+        """Rows of the topics and of the messages.
+
+        Raises:
+            sqlite3.Error: they are damaged.
+            ModtError: there is more than tables.
+        """
+        with closing(self._database()) as database:
+            for (name,) in self._run(database, TABLES):
+                raise ModtError(self.path, f"holds {name!r}, which is no table", REMEDY)
+            topics = self._run(database, "SELECT id, name, type, serialization_format FROM topics").fetchall()
+            # Without the index of times, which may be damaged by itself. It has as many entries if nothing is.
+            messages = self._run(database, "SELECT timestamp, id, topic_id FROM messages NOT INDEXED").fetchall()
+            indexed = len(messages)
+            with suppress(sqlite3.Error):
+                indexed = self._run(database, "SELECT count(*) FROM messages INDEXED BY timestamp_idx").fetchone()[0]
+            if indexed > len(messages):
+                raise sqlite3.DatabaseError("its table has fewer messages than the index of their times")
+        return topics, messages
+
+    def _run(self, database: sqlite3.Connection, query: str, *values: int) -> sqlite3.Cursor:
+        """A query of limited length."""
+        left = iter(range(self._most // STEPS))
+        database.set_progress_handler(lambda: next(left, None) is None, STEPS)
+        return database.execute(query, values)
+
+    def _database(self) -> sqlite3.Connection:
+        """Connection that reads, and changes nothing."""
+        database = sqlite3.connect(self._address, uri=True, check_same_thread=False)
+        if sys.version_info >= (3, 11):
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(MAX_RECORD_BYTES, self._stored_bytes))
+        database.execute("PRAGMA trusted_schema = OFF")
+        return database
+
+    @property
+    def _stored_bytes(self) -> int:
+        """Size of the database with what lies beside it [bytes]."""
+        return sum(file.stat().st_size for file in (self.plain, *self._left_beside()))
+
+    @cached_property
+    def _address(self) -> str:
+        """Address by which SQLite opens the database together with what a killed recorder has left beside it.
+
+        SQLite reads the log of a database in place where it may write an index of it. Otherwise, and where a
+        transaction must be undone, it works on a copy.
+        """
+        if not self._left_beside():
+            return f"file:{quote(str(self.plain))}?immutable=1"
+        address = f"file:{quote(str(self.plain))}?mode=ro"
+        with suppress(sqlite3.Error), closing(sqlite3.connect(address, uri=True)) as database:
+            database.execute("SELECT count(*) FROM sqlite_master")
+            return address
+        return f"file:{quote(str(self._merged))}?mode=ro"
+
+    @cached_property
+    def _merged(self) -> Path:
+        """The database, or a copy of it that has taken up what lies beside it."""
+        left = self._left_beside()
+        if not left:
+            return self.plain
+        folder = tempfile.mkdtemp()
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        copy = Path(folder) / self.plain.name
+        for file in (self.plain, *left):
+            shutil.copyfile(file, copy.with_name(file.name))
+        with suppress(sqlite3.Error), closing(sqlite3.connect(copy)) as database:
+            database.execute("SELECT count(*) FROM sqlite_master")  # undoes an unfinished transaction
+            database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        return copy
+
+    def _left_beside(self) -> list[Path]:
+        """Files that a killed recorder has left."""
+        beside = (self.plain.with_name(self.plain.name + suffix) for suffix in BESIDE)
+        return [file for file in beside if file.is_file() and file.stat().st_size]
+
+
+def _are(kind: type, *values: Any) -> bool:
+    return all(isinstance(value, kind) for value in values)

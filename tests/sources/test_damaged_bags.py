@@ -1,0 +1,163 @@
+"""Recordings that were killed or are damaged: what they still hold is read, and what is lost is counted."""
+
+import os
+import sqlite3
+import struct
+from contextlib import closing
+
+import pytest
+from mcap.reader import make_reader
+
+from modt.errors import ModtError
+from modt.sources.recognise import open_stream
+from tests.sources.bags import by_time, clouds, poses, write_mcap, write_rosbag2
+
+N = 12
+
+
+def read(path):
+    stream = open_stream(path)
+    return stream, [frame.index for frame in stream]
+
+
+def killed(folder, recorded, *pragmas, commit_every=2):
+    """A database whose recorder ended without closing it, so that what it wrote last lies beside it."""
+    folder.mkdir()
+    path = folder / "drive_0.db3"
+    if (child := os.fork()) == 0:
+        database = sqlite3.connect(path, isolation_level=None)
+        for pragma in pragmas:
+            database.execute(pragma)
+        database.execute(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
+            "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)"
+        )
+        database.execute(
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, "
+            "data BLOB NOT NULL)"
+        )
+        database.execute("INSERT INTO topics VALUES(1, '/points', 'sensor_msgs/msg/PointCloud2', 'cdr', '')")
+        database.execute("BEGIN")
+        for k, (_, _, recorded_s, data) in enumerate(recorded):
+            row = (round(recorded_s * 1e9), data)
+            database.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(1, ?, ?)", row)
+            if k % commit_every == commit_every - 1:
+                database.execute("COMMIT")
+                database.execute("BEGIN")
+        os._exit(9)
+    os.waitpid(child, 0)
+    return folder, path
+
+
+@pytest.mark.parametrize("as_folder", [True, False])
+def test_what_a_killed_recorder_left_in_its_log_is_read(tmp_path, as_folder):
+    folder, path = killed(tmp_path / "drive", clouds(N), "PRAGMA journal_mode=WAL", "PRAGMA wal_autocheckpoint=0")
+    before = path.read_bytes()
+    assert path.with_name("drive_0.db3-wal").stat().st_size
+    stream, frames = read(folder if as_folder else path)
+    assert frames == list(range(N))
+    assert not stream.faults.count
+    assert path.read_bytes() == before
+
+
+def test_an_unfinished_transaction_is_undone_in_a_copy(tmp_path):
+    pragmas = ("PRAGMA cache_size=1", "PRAGMA cache_spill=1")
+    _, path = killed(tmp_path / "drive", clouds(N + 1), *pragmas)
+    before = path.read_bytes()
+    _, frames = read(path)
+    assert frames == list(range(N))
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("compression", ["zstd", ""])
+def test_a_damaged_chunk_costs_its_own_messages(tmp_path, closed, compression):
+    from mcap.writer import CompressionType
+
+    kind = CompressionType.ZSTD if compression else CompressionType.NONE
+    path = write_mcap(tmp_path / "drive", clouds(N), chunk_size=900, compression=kind)
+    with path.open("rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes
+    raw = bytearray(path.read_bytes())
+    at = chunks[2].chunk_start_offset + 9 + 40 + len(compression)  # its first message, or the begin of its compressed data
+    raw[at : at + 30] = b"\xff" * 30
+    path.write_bytes(raw if closed else raw[: chunks[-1].chunk_start_offset + chunks[-1].chunk_length])
+    stream, frames = read(path)
+    lost = sorted(set(range(N)) - set(frames))
+    assert 1 <= len(lost) <= N // len(chunks) + 1
+    assert frames[-1] == N - 1
+    assert stream.faults.left_out["damaged in the recording"] == len(lost)
+
+
+@pytest.mark.parametrize("header", [True, False])
+def test_records_behind_damaged_bytes_are_found_without_an_index(tmp_path, header):
+    path = write_mcap(tmp_path / "drive", clouds(N), use_chunking=False)
+    raw = bytearray(path.read_bytes())
+    places = [raw.index(struct.pack("<Q", round(message[2] * 1e9))) for message in clouds(N)]
+    at = places[4] - 15 + (1 if header else 40)  # the length of the record, or its data
+    raw[at : at + 8] = b"\xee" * 8
+    path.write_bytes(raw)
+    stream, frames = read(path)
+    assert len(frames) >= N - 1
+    assert stream.reading.messages + stream.faults.left_out.total() >= N
+
+
+def test_a_bad_file_of_a_split_recording_costs_no_other(tmp_path, caplog):
+    recorded = clouds(N)
+    for k in range(3):
+        write_mcap(tmp_path / f"drive_{k}", recorded[4 * k : 4 * k + 4])
+    (tmp_path / "drive_1.mcap").write_bytes(b"garbage" * 100)
+    stream, frames = read(tmp_path)
+    assert len(frames) == 8
+    assert any("drive_1.mcap" in reason for reason in stream.faults.left_out)
+    (tmp_path / "drive_0.mcap").write_bytes(b"")
+    (tmp_path / "drive_2.mcap").write_bytes(b"")
+    with pytest.raises(ModtError):
+        open_stream(tmp_path)
+
+
+def test_a_lost_file_of_a_split_recording_is_counted_by_its_metadata(tmp_path):
+    folder = write_rosbag2(tmp_path / "drive", clouds(N))
+    (file,) = folder.glob("*.db3")
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute("DELETE FROM messages WHERE id > 7")
+    stream, frames = read(folder)
+    assert frames == list(range(7))
+    assert stream.faults.left_out["messages of /points are missing"] == N - 7
+
+
+def pages_of(raw):
+    return [raw[at : at + 4096] for at in range(0, len(raw), 4096)]
+
+
+def big(n):
+    """Messages that overflow a page."""
+    return [(*message[:3], message[3] + bytes(9000)) for message in clouds(n)]
+
+
+@pytest.mark.parametrize("what", ["index", "root of the table", "leaf", "overflow", "end"])
+def test_a_damaged_database_gives_all_rows_that_its_pages_hold(tmp_path, what):
+    (path,) = write_rosbag2(tmp_path / "drive", by_time(big(N), poses())).glob("*.db3")
+    with closing(sqlite3.connect(path)) as database:
+        root = {name: page for name, page in database.execute("SELECT name, rootpage FROM sqlite_master")}
+    raw = bytearray(path.read_bytes())
+    pages = pages_of(raw)
+    leaves = [k for k, page in enumerate(pages) if page[0] == 13 and k and k + 1 != root["topics"]]
+    overflow = [k for k, page in enumerate(pages) if not page[0] and any(page[:4])]
+    lost = 0
+    if what == "end":
+        raw = raw[: len(raw) - len(raw) // 4]
+    else:
+        damaged = {"index": root["timestamp_idx"] - 1, "root of the table": root["messages"] - 1}
+        page = damaged.get(what, leaves[len(leaves) // 2] if what == "leaf" else overflow[len(overflow) // 2])
+        raw[4096 * page : 4096 * page + 64] = b"\xa5" * 64
+    copy = tmp_path / "copy.db3"
+    copy.write_bytes(raw)
+    stream, frames = read(copy)
+    if what in ("index", "root of the table"):
+        assert frames == list(range(N))
+    elif what == "end":
+        assert frames[: N // 2] == list(range(N // 2))
+    else:
+        lost = N - len(frames)
+        assert lost <= 4
