@@ -10,7 +10,7 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.sources.stream import Faults, StreamInfo
+from modt.sources.stream import Faults, Reading, StreamInfo
 from modt.types import Frame, Self
 from modt_simulation.indoors import carpark, corridor, hall, lift, lobby, warehouse
 from modt_simulation.obstacles import grass, heaps, hedges, hills, lying, movers, stairs, wall
@@ -68,6 +68,7 @@ class SyntheticStream:
         self.simulator = Simulator(replace(world, mount_rad=(roll, pitch)), model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults = Faults()
+        self.reading = Reading()
         self.info = StreamInfo(
             name=f"{scene}, {sensor}, seed {seed}",
             layout="synthetic",

@@ -59,6 +59,8 @@ def participant(domain_id: int, cores: frozenset[int] | None = None) -> Particip
 class Subscription:
     """The messages of a topic, the last `depth` of them; read by one thread."""
 
+    mismatch = ""  # rclpy logs a quality of service that does not fit
+
     def __init__(self, joined: Participant, name: str, kind: str, *, depth: int, reliable: bool = False) -> None:
         self._messages: deque[Message] = deque(maxlen=depth)
         self._arrival = threading.Condition()

@@ -183,6 +183,8 @@ def _sensor_finding(name: str, health: dict[str, Any], points: int | None) -> Fi
         return Finding(OK, "sensor", f"{name}: a sweep of {points} points")
     messages = health["messages"]
     refused = health["refused_messages"]
+    if health["silence"]:
+        return Finding(FAIL, "sensor", f"{name}: nothing received in {REACH_S:g} s", health["silence"])
     if refused:
         remedy = "give the address of the sensor that sends here"
         return Finding(FAIL, "sensor", f"{name}: only unusable messages ({', '.join(refused)})", remedy)

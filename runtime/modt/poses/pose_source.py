@@ -8,6 +8,7 @@ from typing import Any
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
+from modt.poses.leap_watch import LeapWatch
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.stream import StreamInfo
 from modt.types import Frame
@@ -17,6 +18,10 @@ class PoseSource:
     """Sets the poses of frames; by default those of the recording stay."""
 
     name = "recording"
+
+    def __init__(self) -> None:
+        self.watch = LeapWatch()
+
     has_poses: bool | None = None
     """Whether a stream with these poses has poses; None keeps the property of the stream."""
 
@@ -26,11 +31,11 @@ class PoseSource:
 
     def place(self, frame: Frame) -> Frame:
         """Return the frame with its pose, None where unknown; frames come in order."""
-        return frame
+        return self.watch.watched(frame, self.name)
 
     def report(self) -> dict[str, Any]:
         """Name of the source, and statistics."""
-        return {"source": self.name}
+        return {"source": self.name, "leaps": self.watch.leaps}
 
     def close(self) -> None:
         """Release the resources of the source."""
@@ -60,6 +65,7 @@ class PoseFile(PoseSource):
     has_poses = True
 
     def __init__(self, path: Path, camera: Camera | None, end: int | None) -> None:
+        super().__init__()
         self.name = str(path)
         poses = read_poses(path)
         self._poses = poses if camera is None else sensor_poses(poses, camera.T_camera_sensor)
@@ -73,7 +79,7 @@ class PoseFile(PoseSource):
             MisuseError: the file has too few poses.
         """
         self._require(frame.index)
-        return replace(frame, T_world_sensor=self._poses[frame.index])
+        return super().place(replace(frame, T_world_sensor=self._poses[frame.index]))
 
     def _require(self, frame: int) -> None:
         if frame >= len(self._poses):

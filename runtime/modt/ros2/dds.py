@@ -99,6 +99,14 @@ class Subscription:
         self._arrival.attach(self._unread)
         self._joined = joined
 
+    @property
+    def mismatch(self) -> str:
+        """Why a sender's messages do not come, with the remedy; empty if none is known to send in vain."""
+        status = getattr(self._reader, "get_requested_incompatible_qos_status", lambda: None)()
+        if status is None or not status.total_count:
+            return ""
+        return "its sender offers another quality of service than is asked for: give ?reliability=best_effort"
+
     def take(self, timeout_s: float = 0.0) -> list[Message]:
         """The messages that have arrived, oldest first; waits at most `timeout_s` for one."""
         if timeout_s > 0:

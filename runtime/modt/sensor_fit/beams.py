@@ -9,7 +9,7 @@ transform).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -271,18 +271,34 @@ def azimuth_ratio(a: SensorConfig, b: SensorConfig) -> float:
     return max(ratio, 1 / ratio)
 
 
+SPEEDS = (0.5, 1.0, 2.0)
+"""Speeds of a head relative to that of a profile."""
+SAME_RATIO = 1.03
+"""Ratio of spacings up to which profiles fit equally well."""
+
+
+def azimuth_ratio_at_any_speed(a: SensorConfig, b: SensorConfig) -> float:
+    """Ratio of the spacings along a beam at the speed of the head at which they are most alike."""
+    return min(azimuth_ratio(replace(a, azimuth_step_deg=a.azimuth_step_deg * speed), b) for speed in SPEEDS)
+
+
 def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
-    """Name of the shipped profile with the same beams; of several the one whose mount is nearest in height."""
-    best = None
+    """Name of the shipped profile with the same beams; of those that fit best the one whose mount is nearest in height.
+
+    A head may turn at half or twice the speed of the profile, with other steps of azimuth.
+    """
+    likely = []
     for path in sorted(assets.folder("profiles").glob("*.yaml")):
         shipped = profile.resolve(path.stem)
         if shipped.sensor is None:  # the profile of a board
             continue
         sensor = shipped.config.sensor
-        if max(spacing_ratio(sensor, found, tangent), azimuth_ratio(sensor, found)) < MAX_LIKENESS_RATIO:
+        spacing = spacing_ratio(sensor, found, tangent)
+        if max(spacing, azimuth_ratio_at_any_speed(sensor, found)) < MAX_LIKENESS_RATIO:
             away_m = abs((sensor.height_m or 0.0) - (found.height_m or 0.0))
-            best = min(best or (np.inf, ""), (away_m, path.stem))
-    return best[1] if best else None
+            likely.append((spacing, away_m, path.stem))
+    least = min((spacing for spacing, _, _ in likely), default=0.0)
+    return min(((away_m, name) for spacing, away_m, name in likely if spacing < least * SAME_RATIO), default=("", None))[1]
 
 
 MAX_SPACING_DEG = 10.0

@@ -35,8 +35,15 @@ def times_ns(names: Sequence[str]) -> list[int] | None:
     A time is a date and time of day, or seconds since 1970. A name that is a number with a fraction may count its
     seconds from any moment.
     """
-    known = [time for name in names if (time := _time(name)) is not None]
-    if not names or len(known) < len(names):
+    for find in (_date, _time, _since_1970):  # a date may be that of the log, the same in all names
+        if (times := _distinct([time for name in names if (time := find(name)) is not None], len(names))) is not None:
+            return times
+    return None
+
+
+def _distinct(known: Sequence[tuple[int, str, str]], n: int) -> list[int] | None:
+    """Times [ns] of n names; None if some have none, or two the same."""
+    if not n or len(known) < n:
         return None
     longest = max(len(fraction) for _, _, fraction in known)
     uneven = any(len(fraction) < longest for _, _, fraction in known)
@@ -66,10 +73,20 @@ def seconds_ns(text: str) -> int | None:
 
 def _time(name: str) -> tuple[int, str, str] | None:
     """Second, separator and digits of the fraction of a second."""
+    return _date(name) or _since_1970(name)
+
+
+def _date(name: str) -> tuple[int, str, str] | None:
+    """Those of a date and time of day."""
     if match := _CALENDAR.search(name):
         with suppress(ValueError):
             second = datetime.strptime("".join(match.groups()[:6]) + "+0000", "%Y%m%d%H%M%S%z").timestamp()
             return int(second), match[7], match[8][:9]
+    return None
+
+
+def _since_1970(name: str) -> tuple[int, str, str] | None:
+    """Those of a number of seconds, with the digits of its fraction."""
     match = _SINCE_1970.search(name)
     if match is None or not (match[2] or len(match[3]) in (0, 3, 6, 9)):
         match = _SECONDS.fullmatch(name)

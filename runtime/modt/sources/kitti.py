@@ -21,6 +21,7 @@ from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_file import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
+from modt.sources.viewpoints import Viewpoints, viewpoints_of
 from modt.types import Float64
 
 MAX_NUMBER_DIGITS = 10
@@ -105,9 +106,13 @@ def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") 
     apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
     stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(scans)}
     notes = [f"folder of scans: no calibration, frames {apart}"]
-    pose_notes = [f"folder of scans: {NO_POSES}"]
     info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
-    return _stream(info, scans, notes, pose_notes, {}, stamps, {})
+    viewpoints = viewpoints_of(scans) if suffix == ".pcd" else Viewpoints()
+    notes += viewpoints.notes
+    pose_notes = [] if viewpoints.poses else [f"folder of scans: {NO_POSES}"]
+    stream = _stream(info, scans, notes, pose_notes, viewpoints.poses, stamps, {})
+    stream.scans = [replace(scan, T_sensor_file=viewpoints.T_sensor_file.get(scan.index)) for scan in stream.scans]
+    return stream
 
 
 def _scans(data: Path, suffix: str = ".bin") -> dict[int, Path]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
@@ -10,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modt.geometry import rotation_of, se3, transform
 from modt.ros2.point_cloud2 import reflectance_name
-from modt.types import UNRECORDED, Float32
+from modt.types import UNRECORDED, Float32, Float64
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -34,8 +37,21 @@ PLY_TYPES |= {np.dtype(kind).name: kind for kind in PLY_TYPES.values()}
 BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 
 
-def read_pcd(raw: bytes) -> Float32:
-    """(N, 4) points of a PCD file, as `points_of` scales them.
+def viewpoint_of(raw: bytes) -> Float64 | None:
+    """(4, 4) pose of the sensor by the line VIEWPOINT of a PCD file; None without one, or if it is the identity."""
+    line = re.search(rb"^VIEWPOINT[ \t]+([^\r\n]+)", raw[:MAX_HEADER_BYTES], re.MULTILINE)
+    try:
+        x, y, z, qw, qx, qy, qz = map(float, line[1].split()) if line else ()
+    except ValueError:
+        return None
+    if not 0.9 < math.hypot(qw, qx, qy, qz) < 1.1 or not math.isfinite(x + y + z):
+        return None
+    T = se3(rotation_of(np.array([qx, qy, qz, qw])), [x, y, z])
+    return None if np.allclose(T, np.eye(4), atol=1e-6) else T
+
+
+def read_pcd(raw: bytes, T_sensor_file: Float64 | None = None) -> Float32:
+    """(N, 4) points of a PCD file, as `points_of` scales them and places them in the sensor's frame.
 
     Raises:
         CloudError: the file is no PCD file, is truncated, or its header promises impossible data.
@@ -49,7 +65,7 @@ def read_pcd(raw: bytes) -> Float32:
         columns = _from_compressed(raw[start:], names, n_points, row)
     else:
         raise CloudError(f"DATA {encoding!r} is unknown")
-    return points_of(columns)
+    return points_of(columns, T_sensor_file)
 
 
 def read_ply(raw: bytes) -> Float32:
@@ -84,8 +100,8 @@ def read_ply(raw: bytes) -> Float32:
     return points_of(_columns([name.lower() for name, _ in properties], table))
 
 
-def points_of(columns: Columns) -> Float32:
-    """(N, 4) points of named columns.
+def points_of(columns: Columns, T_sensor_file: Float64 | None = None) -> Float32:
+    """(N, 4) points of named columns, placed by a (4, 4) transform while they have their full precision.
 
     Reflectance is UNRECORDED without a column and NaN where its scale is unknown. Whole numbers are divided by 255,
     or by 65535 where they exceed 255; `sanitised` scales the others.
@@ -98,8 +114,12 @@ def points_of(columns: Columns) -> Float32:
         raise CloudError(f"no column {', '.join(missing)}")
     points = np.empty((len(columns["x"]), 4), np.float32)
     with np.errstate(over="ignore"):  # doubles beyond float32 become infinite, which counts as no return
-        for i, axis in enumerate("xyz"):
-            points[:, i] = columns[axis]
+        if T_sensor_file is not None:
+            xyz = np.stack([columns[axis] for axis in "xyz"], axis=1).astype(np.float64)
+            points[:, :3] = transform(T_sensor_file, xyz)
+        else:
+            for i, axis in enumerate("xyz"):
+                points[:, i] = columns[axis]
     name = reflectance_name(columns)
     points[:, 3] = UNRECORDED if name is None else _reflectance(columns[name])
     return points

@@ -68,7 +68,7 @@ class PoseBuffer:
         if self.leaps(stamp_s, T):
             return "leap"
         slack_m = POSITION_NOISE_M + MAX_ACCELERATION_MPS2 * dt_s * dt_s
-        return "leap" if self._off_m(stamp_s, T) > slack_m else None
+        return "leap" if self.off_m(stamp_s, T) > slack_m else None
 
     def leaps(self, stamp_s: float, T: Float64) -> bool:
         """Whether a (4, 4) pose is farther from the latest than the sensor can have moved, so of another world."""
@@ -109,7 +109,7 @@ class PoseBuffer:
             first = min(first, after - 1)
         return [(self._stamps[k], self._poses[k]) for k in (first, after)] if first >= 0 else None
 
-    def _off_m(self, stamp_s: float, T: Float64) -> float:
+    def off_m(self, stamp_s: float, T: Float64) -> float:
         """Distance of a (4, 4) pose, later than the latest, from its extrapolation; zero without one [m]."""
         ends = self._ends(stamp_s)
         if ends is None:

@@ -18,15 +18,15 @@ SUFFIXES = (".bin", ".pcd", ".ply")
 COLUMNS = 4
 """Float32 numbers of a point in a file of KITTI."""
 NUSCENES_COLUMNS = 5
-"""Float32 numbers of a point in a file of nuScenes (`.pcd.bin`), of which the fifth is the beam."""
+"""Float32 numbers of a point in a file of nuScenes (`.pcd.bin`): x to the right, y forward; the fifth is the beam."""
 MAX_BYTES = 256 << 20
 MAX_COORDINATE_M = 1000.0
 MAX_IMPLAUSIBLE_SHARE = 0.02
 """Greatest share of implausible rows in a valid scan."""
 
 
-def read_scan(path: Path) -> tuple[Float32, list[str]]:
-    """Points of a scan file, and its flaws.
+def read_scan(path: Path, T_sensor_file: Float64 | None = None) -> tuple[Float32, list[str]]:
+    """Points of a scan file in the sensor's frame, and its flaws. `T_sensor_file` places those of a PCD file.
 
     Points that are not finite, or far beyond any range, are set to the origin, which counts as no return, so that
     rows keep their indices. A reflectance that is not finite or negative counts as not recorded. Reflectances from 0
@@ -50,7 +50,7 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
     from modt.sources.point_cloud_file import CloudError, read_pcd, read_ply
 
     try:
-        points = read_pcd(raw) if path.suffix == ".pcd" else read_ply(raw)
+        points = read_pcd(raw, T_sensor_file) if path.suffix == ".pcd" else read_ply(raw)
     except CloudError as error:
         remedy = "the frame is skipped; convert it to x, y, z [m] and reflectance"
         raise ScanError(path, str(error), remedy) from None
@@ -62,7 +62,10 @@ def _read_rows(path: Path, raw: bytes) -> Float32:
     if len(raw) % (4 * columns):
         cause = f"truncated: {len(raw)} bytes are no multiple of {4 * columns}-byte rows"
         raise ScanError(path, cause, "the frame is skipped; copy it again, or convert it to x, y, z, reflectance")
-    return np.frombuffer(raw, np.float32).reshape(-1, columns)[:, :COLUMNS].copy()
+    points = np.frombuffer(raw, np.float32).reshape(-1, columns)[:, :COLUMNS].copy()
+    if columns == NUSCENES_COLUMNS:
+        points[:, :2] = points[:, 1::-1] * np.float32([1, -1])
+    return points
 
 
 def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
@@ -126,6 +129,7 @@ class ScanReference:
     stamp_s: float  # its time [s]
     T_world_sensor: Float64 | None  # (4, 4) pose, None where unknown
     turn_s: float = 0.0  # duration of the sweep [s], as in Frame
+    T_sensor_file: Float64 | None = None  # (4, 4) transform of its points to the sensor's frame, None for those in it
 
 
 class ScanStream:
@@ -145,7 +149,7 @@ class ScanStream:
             self.reading.sweeps += 1
             self.reading.times[DESKEWED if scan.turn_s else COMPENSATED] += 1
             try:
-                points, flaws = read_scan(scan.path)
+                points, flaws = read_scan(scan.path, scan.T_sensor_file)
             except ScanError as error:
                 self.faults.report(scan.index, scan.path, error.cause, skipped=True)
                 continue

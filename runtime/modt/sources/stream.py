@@ -172,6 +172,7 @@ class Reception:
     refused: dict[str, int] = field(default_factory=dict)  # number of unusable messages by reason
     joined: int = 0  # messages that are parts of a turn, and were joined
     frame_id: str = ""  # frame of the points, where messages name it
+    silence: str = ""  # why no messages come, with the remedy, where it is known
 
     def refuse(self, reason: str) -> bool:
         """Count a refused message; True for the first one with this reason."""

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from modt.sources.live.live_stream import PlayedReader
-from modt.sources.stream import Faults, StreamEndedError, StreamInfo
+from modt.sources.stream import Faults, Reading, StreamEndedError, StreamInfo
 from modt.types import Frame
 
 
 class Recording(list):
     info = StreamInfo("recording", "test", 0, 3, 0.1, None, False)
     faults = Faults()
+    reading = Reading()
 
 
 class Time:

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -200,7 +201,7 @@ def _rails(folder: Path, chip: str) -> dict[str, Meter]:
 
 
 def find_batteries(sys: Path) -> list[Candidate]:
-    """A candidate for each battery of the machine itself; batteries of peripherals (scope Device) are left out."""
+    """A candidate for all batteries of the machine itself; batteries of peripherals (scope Device) are left out."""
     supplies = sorted((sys / "class" / "power_supply").glob("*"))
     batteries = [
         p for p in supplies if text_or_none(p / "type") == "Battery" and text_or_none(p / "scope") != "Device"
@@ -208,7 +209,27 @@ def find_batteries(sys: Path) -> list[Candidate]:
     if not batteries:
         remedy = "run from a battery with a fuel gauge"
         return [Candidate("battery", (), "none under /sys/class/power_supply", remedy)]
-    return [probe(f"battery {p.name}", (_battery(p),), "unplug the charger") for p in batteries]
+    meter = _sum_of(batteries) if len(batteries) > 1 else _battery(batteries[0])
+    return [probe(meter.facts.name, (meter,), "unplug the charger")]
+
+
+RESTING = ("Full", "Not charging")
+"""Status of a battery that gives nothing while another one discharges."""
+
+
+def _sum_of(folders: Sequence[Path]) -> Meter:
+    """Power drawn from several batteries, of which at least one discharges and none is charged."""
+    meters = {folder: _battery(folder) for folder in folders}
+    first = next(iter(meters.values())).facts
+    facts = replace(first, name=f"batteries {' + '.join(folder.name for folder in folders)}")
+
+    def read() -> float:
+        drawn = [folder for folder in folders if read_text(folder / "status") not in RESTING]
+        if not drawn:
+            raise MeterLostError("no battery is discharging")
+        return sum(meters[folder].read() for folder in drawn)
+
+    return Meter(facts, read)
 
 
 def _battery(folder: Path) -> Meter:

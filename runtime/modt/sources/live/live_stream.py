@@ -150,7 +150,8 @@ class LiveStream:
             if not self._silent and now_s - self._last_s > SILENT_S:
                 self._silent = True
                 self.silences += 1
-                remedy = "check its power, cable, address and port; tracks are kept until it returns"
+                remedy = self.reader.reception.silence or "check its power, cable, address and port"
+                remedy = f"{remedy}; tracks are kept until it returns"
                 log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)
             return None
         return self._frame(taken)
@@ -177,6 +178,7 @@ class LiveStream:
             "silent": self._silent,
             "period_s": round(self.period_s, 4),
             "frame_id": reception.frame_id,
+            "silence": reception.silence,
         }
 
     def close(self) -> None:

@@ -11,9 +11,10 @@ from modt.address import Address
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
-from modt.ros2.point_cloud2 import TYPE, read_cloud
+from modt.ros2.point_cloud2 import TYPE, PointCloud, read_cloud
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.stream import Reception, StreamInfo, Sweep
+from modt.sources.turn_parts import TurnParts
 
 REMEMBERED = 32
 NEEDED = 8
@@ -46,6 +47,8 @@ class MissingSweeps:
 
 log = logging.getLogger(__name__)
 
+WATCHED = 8
+"""Number of messages by which it is known whether they are parts of turns."""
 DEPTH = 5
 """Number of sweeps that wait to be read, as in ROS 2's QoS for sensors."""
 FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint"})
@@ -62,6 +65,8 @@ class PointCloudReader:
         self._subscription: Subscription | None = subscription
         self._name = name
         self._missing = MissingSweeps()
+        self._first: list[tuple[PointCloud, float]] | None = []  # until it is known whether messages are parts of turns
+        self._parts: TurnParts | None = None
 
     def read(self, timeout_s: float) -> list[Sweep]:
         """Sweeps received until the timeout, oldest first."""
@@ -69,8 +74,10 @@ class PointCloudReader:
         if subscription is None:
             return []
         messages = subscription.take(timeout_s)
+        if not messages:
+            self.reception.silence = subscription.mismatch
         self.reception.messages += len(messages)
-        sweeps = [sweep for message in messages if (sweep := self._sweep(message)) is not None]
+        sweeps = [sweep for message in messages for sweep in self._sweeps(message)]
         lost = sum(self._missing.before(sweep.stamp_s) for sweep in sweeps)
         if lost and not self.reception.lost:
             remedy = "raise net.core.rmem_max here, or check the network and the sender; later ones are only counted"
@@ -82,7 +89,37 @@ class PointCloudReader:
         """Leave the topic, once `read` has returned."""
         self._subscription = None
 
-    def _sweep(self, message: Message) -> Sweep | None:
+    def _sweeps(self, message: Message) -> list[Sweep]:
+        """The sweep in a message, or that it completes.
+
+        A source whose first messages do not cover a turn is watched for some of them, which count as sweeps until it
+        is known that they are parts.
+        """
+        cloud = self._cloud(message)
+        if cloud is None:
+            return []
+        if self._first is not None:
+            self._watch(cloud, message.sent_s)
+        if self._parts is not None:
+            self.reception.joined += 1
+            cloud = self._parts.add(cloud, message.sent_s)
+            if cloud is None:
+                return []
+        stamp_s = cloud.stamp_s or message.sent_s
+        return [Sweep(stamp_s, cloud.points, cloud.turn_s, frame_id=cloud.frame_id, mid_rad=cloud.mid_rad)]
+
+    def _watch(self, cloud: PointCloud, sent_s: float) -> None:
+        """Keep a message until it is known whether messages are parts of turns."""
+        first = [] if self._first is None else self._first
+        first.append((cloud, sent_s))
+        if len(first) <= WATCHED and TurnParts.may_be([one for one, _ in first]):
+            return
+        self._parts = TurnParts.of(first)
+        self._first = None
+        if self._parts is not None:
+            log.warning("%s: %s", self._name, self._parts.note())
+
+    def _cloud(self, message: Message) -> PointCloud | None:
         try:
             cloud = read_cloud(message.data)
         except MessageError as error:
@@ -96,8 +133,7 @@ class PointCloudReader:
             remedy = ", not in the sensor's: subscribe to what its driver publishes" if foreign else ""
             level = logging.WARNING if foreign else logging.INFO
             log.log(level, "%s: points are in the frame %r%s", self._name, cloud.frame_id, remedy)
-        stamp_s = cloud.stamp_s or message.sent_s
-        return Sweep(stamp_s, cloud.points, cloud.turn_s, frame_id=cloud.frame_id, mid_rad=cloud.mid_rad)
+        return cloud
 
 
 def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
