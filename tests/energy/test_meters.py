@@ -263,3 +263,17 @@ def test_candidates_are_ordered_measured_integrated_estimated(tmp_path):
     server(tmp_path)
     kinds = [c.facts.kind for c in board(tmp_path, NX).candidates if c.usable]
     assert list(dict.fromkeys(kinds)) == [Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED]
+
+
+def test_two_batteries_are_one_source_and_a_full_one_gives_nothing(tmp_path):
+    supplies = tmp_path / "class" / "power_supply"
+    for name, status in (("BAT0", "Discharging"), ("BAT1", "Discharging")):
+        write_files(supplies / name, **BATTERY | {"status": status})
+    (battery,) = find_batteries(tmp_path)
+    both_W = battery.meters[0].read()
+    assert battery.name == "batteries BAT0 + BAT1"
+    (supplies / "BAT1" / "status").write_text("Not charging")
+    assert battery.meters[0].read() == pytest.approx(both_W / 2)
+    (supplies / "BAT1" / "status").write_text("Charging")
+    with pytest.raises(MeterLostError, match="BAT1 is charging"):
+        battery.meters[0].read()

@@ -52,3 +52,16 @@ def test_static_transforms_connect_frames_by_their_ancestors():
 def test_a_loop_of_static_transforms_ends():
     loop = ("a", "b", [1.0, 0.0, 0.0], UP), ("b", "a", [1.0, 0.0, 0.0], UP)
     assert tree_of(loop).between("a", "c") is None
+
+
+def test_a_transform_that_is_none_drops_no_other():
+    good = ("base_link", "lidar", [1.0, 0.0, 0.5], UP)
+    for bad in (("base_link", "camera", [np.nan, 0.0, 0.0], UP), ("base_link", "imu", [0.0, 0.0, 0.0], [0.0] * 4)):
+        tree = tree_of([bad, good])
+        np.testing.assert_allclose(tree.between("base_link", "lidar")[:3, 3], [1.0, 0.0, 0.5])
+
+
+def test_a_transform_that_moves_is_no_mount():
+    tree = tree_of([("base_link", "arm", [0.0, 0.0, 0.0], UP)], [("base_link", "arm", [0.1, 0.0, 0.0], UP)])
+    assert tree.between("base_link", "arm") is None
+    assert tree.moves("arm")

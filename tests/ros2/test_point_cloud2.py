@@ -133,3 +133,44 @@ def test_times_on_the_clock_of_the_header_are_not_added_to_it(unit):
 def test_times_of_no_head_are_not_used(odd):
     cloud = turning(**odd)
     assert (cloud.turn_s, cloud.stamp_s) == (0.0, 1000.0)
+
+
+@pytest.mark.parametrize("row_step", [0, 16, 16 * 40, 2**32 - 1])
+def test_a_wrong_size_of_a_row_does_not_hide_dense_rows(row_step):
+    points = messages.xyzi(40).reshape(4, 10)
+    message = messages.cloud(points)
+    cloud = read_cloud(messages.encode(dataclasses.replace(message, row_step=row_step)))
+    np.testing.assert_array_equal(cloud.points, read_cloud(messages.encode(message)).points)
+    assert "row_step" in cloud.corrected
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_a_wrong_order_of_bytes_is_known_by_the_coordinates(order):
+    layout = [(name, f"{order}f4") for name in ("x", "y", "z", "intensity")]
+    message = messages.cloud(messages.xyzi(40, layout))
+    cloud = read_cloud(messages.encode(dataclasses.replace(message, is_bigendian=order == "<")))
+    np.testing.assert_array_equal(cloud.points, read_cloud(messages.encode(message)).points)
+    assert "is_bigendian" in cloud.corrected
+    assert not read_cloud(messages.encode(message)).corrected
+
+
+@pytest.mark.parametrize("turn_s", [0.1, -0.1, 0.05])
+@pytest.mark.parametrize("seam", [0.0, 0.5 * np.pi, -0.7 * np.pi])
+def test_a_turn_is_known_wherever_its_seam_is(seam, turn_s):
+    cloud = turning(turn_s=turn_s, seam=seam)
+    assert cloud.turn_s == pytest.approx(turn_s, rel=1e-2)
+    assert np.cos(cloud.mid_rad - seam) == pytest.approx(-1.0, abs=1e-3)
+    assert cloud.stamp_s == pytest.approx(1000.0 + abs(turn_s) / 2, abs=1e-3)
+
+
+@pytest.mark.parametrize("wild", [1e9, -3.0, np.nan, np.inf])
+def test_a_wild_time_of_a_point_costs_no_deskewing(wild):
+    bearing = np.linspace(np.pi, -np.pi, 512, endpoint=False)
+    points = np.zeros((1, 512), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), ("time", "f8")])
+    points["x"] = 10 * np.cos(bearing)
+    points["y"] = 10 * np.sin(bearing)
+    points["time"] = np.linspace(0, 0.1, 512)
+    points["time"][0, 77] = wild
+    cloud = read_cloud(messages.encode(messages.cloud(points, stamp_s=1000.0)))
+    assert cloud.turn_s == pytest.approx(0.1, rel=1e-2)
+    assert cloud.stamp_s == pytest.approx(1000.05, abs=1e-3)

@@ -82,3 +82,18 @@ def test_every_kitti_scan_is_of_the_default(kitti_root):
     config = profile.load()
     assert len(scans) > 100
     assert [s.name for s in scans[::12] if recognise(read_scan(s)[0], config).differences] == []
+
+
+def test_no_profile_is_recommended_in_place_of_itself():
+    own = profile.load()
+    turned = dataclasses.replace(own, sensor=dataclasses.replace(own.sensor, azimuth_step_deg=0.5))
+    found = dataclasses.replace(recognise(recording("hdl-64e").sweeps[0], turned), nearest="hdl-64e")
+    for name in ("hdl-64e", "hdl-64e (the default)"):
+        assert "--profile" not in next(found.warnings(name, replaced=True))
+
+
+def test_a_head_that_turns_twice_as_fast_is_the_same_sensor():
+    sweep = recording("hdl-32e").sweeps[0]
+    bearing = np.round(np.rad2deg(np.arctan2(sweep[:, 1], sweep[:, 0])) / profile.load("hdl-32e").sensor.azimuth_step_deg)
+    found = recognise(sweep[bearing % 2 == 0], profile.load())
+    assert found.nearest == "hdl-32e"

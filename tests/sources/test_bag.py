@@ -206,3 +206,49 @@ def test_scans_go_before_a_recording_beside_them(tmp_path):
     scans = layouts.bare(tmp_path)
     write_mcap(scans / "drive", clouds())
     assert open_stream(scans).info.layout != "rosbag2"
+
+
+NAMESPACE = "/j100_0000"
+MOUNT = ("base_link", "lidar", [1.0, 0.0, 2.0], UP)
+
+
+def moving(topic, *, with_mount=False):
+    """The poses as transforms, of the base in the odometry's frame, with the mount in the same messages or not."""
+    recorded = []
+    for _, _, recorded_s, _ in poses():
+        edges = [("odom", "base_link", [10.0 + recorded_s - 0.001 - BEGAN_S, 0.0, 0.0], UP)]
+        message = messages.transforms(*edges, *([MOUNT] if with_mount else []))
+        for transform in message.transforms:
+            transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(round((recorded_s - 0.001) * 1e9), 10**9)
+        recorded.append((topic, TF, recorded_s, messages.encode(message)))
+    return recorded
+
+
+def static(topic):
+    return [(topic, TF, BEGAN_S - 1, messages.encode(messages.transforms(MOUNT)))]
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        by_time(poses("base_link", NAMESPACE + "/odom"), static(NAMESPACE + "/tf_static")),
+        by_time(poses("base_link"), [(t, k, s, d) for t, k, s, d in moving("/tf", with_mount=True)]),
+        by_time(moving("/tf"), static("/tf_static")),
+        moving(NAMESPACE + "/tf", with_mount=True),
+    ],
+)
+def test_poses_come_from_any_namespace_and_from_transforms(write, tmp_path, others):
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), others)))
+    assert stream.info.has_poses
+    assert x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
+
+
+def test_an_option_chooses_one_of_several_topics_of_poses(write, tmp_path):
+    recorded = by_time(clouds(), poses(), poses(topic="/wheels"))
+    path = write(tmp_path / "drive", recorded)
+    assert "--capture odometry=" in " ".join(open_stream(path).info.pose_notes)
+    stream = open_stream(path, capture={"odometry": "wheels"})
+    assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+    assert stream.reading.poses == "/wheels"
+    with pytest.raises(MisuseError, match=r"/gps: no poses in this topic; .*/odom, /wheels"):
+        open_stream(path, capture={"odometry": "gps"})

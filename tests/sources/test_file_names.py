@@ -98,3 +98,9 @@ def test_only_regular_files_are_scans(tmp_path):
         (folder / "1.bin").write_bytes(CONTENTS[".bin"])
         (folder / "5.bin").symlink_to(folder / "1.bin")
         assert [scan.path.name for scan in open_stream(folder).scans] == ["1.bin", "5.bin"]
+
+
+def test_the_date_of_the_log_does_not_hide_the_times_of_its_sweeps():
+    log = "n008-2018-08-01-15-16-36-0400__LIDAR_TOP__"
+    stamps_us = [1_533_151_603_547_590, 1_533_151_603_597_900]
+    assert times_ns([f"{log}{stamp_us}.pcd" for stamp_us in stamps_us]) == [1000 * stamp_us for stamp_us in stamps_us]

@@ -6,6 +6,7 @@ import pytest
 from modt.errors import ScanError
 from modt.ros2.point_cloud2 import read_cloud
 from modt.sources.point_cloud_file import decompress
+from modt.sources.recognise import open_scans
 from modt.sources.scan_file import read_scan
 from modt.types import UNRECORDED
 from tests.ros2 import messages
@@ -147,3 +148,37 @@ def test_lzf_repeats():
     # "abc", then 7 bytes from 3 before, then 262 + 2 bytes from 1 before
     packed = b"\x02abc" + bytes([5 << 5, 2]) + bytes([7 << 5, 255, 0])
     assert decompress(packed, 274) == b"abc" + b"abcabca" + b"a" * 264
+
+
+def seen(x_m, n=4000):
+    """Points around a sensor that stands at x [m] in a world, in that world."""
+    rng = np.random.default_rng(1)
+    bearing = rng.uniform(-np.pi, np.pi, n)
+    range_m = rng.uniform(2.0, 30.0, n)
+    xyz = np.stack([range_m * np.cos(bearing) + x_m, range_m * np.sin(bearing), rng.uniform(-1, 1, n)], axis=1)
+    rows = np.zeros(n, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("intensity", "f4")])
+    rows["x"], rows["y"], rows["z"] = xyz.T
+    return rows
+
+
+@pytest.mark.parametrize("in_world", [True, False])
+@pytest.mark.parametrize("origin_m", [0.0, 4.5e6])
+def test_the_viewpoint_is_the_pose_whatever_the_frame_of_the_points(tmp_path, in_world, origin_m):
+    for k in range(4):
+        x_m = origin_m + 5.0 * k
+        rows = seen(x_m if in_world else 0.0)
+        (tmp_path / f"{k:06d}.pcd").write_bytes(pcd(rows, VIEWPOINT=f"{x_m} 0 0 1 0 0 0"))
+    stream = open_scans(tmp_path)
+    frames = list(stream)
+    assert [frame.T_world_sensor[0, 3] - origin_m for frame in frames] == pytest.approx([0, 5, 10, 15])
+    for frame in frames:
+        np.testing.assert_allclose(frame.points[:, :3], frames[0].points[:, :3], atol=1e-4)
+    assert np.median(np.abs(frames[3].points[:, 0])) < 20
+
+
+def test_a_viewpoint_that_never_changes_is_a_mount_and_no_pose(tmp_path):
+    for k in range(3):
+        (tmp_path / f"{k:06d}.pcd").write_bytes(pcd(seen(0.0), VIEWPOINT="0 0 1.8 1 0 0 0"))
+    stream = open_scans(tmp_path)
+    assert not stream.info.has_poses
+    assert [frame.T_world_sensor for frame in stream] == [None] * 3

@@ -112,4 +112,5 @@ def test_the_fifth_column_of_nuscenes_is_ignored(tmp_path):
     path = tmp_path / "n015__LIDAR_TOP__1532402927647951.pcd.bin"
     path.write_bytes(rows.tobytes())  # 16 rows of 5, which would be 20 rows of 4
     points, _ = read_scan(path)
-    assert points == pytest.approx(rows[:, :4] / [1, 1, 1, 255])
+    ahead_left = np.stack([rows[:, 1], -rows[:, 0]], axis=1)  # from x to the right, y forward
+    assert points == pytest.approx(np.hstack([ahead_left, rows[:, 2:4] / [1, 255]]))

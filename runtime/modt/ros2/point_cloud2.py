@@ -252,6 +252,8 @@ FIRST_SHARE = 0.05
 """Share of the points by which the bearing is known at which a sweep begins."""
 MARGIN_RAD = 0.35
 """Angle before that bearing in which points still count as seen at the begin [rad]."""
+EDGE_RAD = 0.02
+"""Angle before the fitted begin of a sweep in which points still count as seen at the begin [rad]."""
 AHEAD_RAD = 0.2
 """A sweep whose middle lies within this angle of straight ahead is stamped there [rad]."""
 
@@ -303,12 +305,18 @@ def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None
     turned = np.mod(way * (begin_rad - bearing) + MARGIN_RAD, 2 * np.pi) - MARGIN_RAD
     inside = np.ones(len(turned), bool)
     slope = offset_s = 0.0
-    for _ in range(2):  # the second time without the points on the wrong side of the seam
+    for _ in range(2):  # the second time with the seam where the first fit has it
         centred = turned[inside] - turned[inside].mean()
         slope = float(centred @ since_s[inside] / max(centred @ centred, 1e-9))
         offset_s = float(since_s[inside].mean() - slope * turned[inside].mean())
         off_s = np.abs(since_s - offset_s - slope * turned)
-        inside = off_s <= max(np.quantile(off_s, 0.9), 1e-9)
+        inside = off_s <= MAX_RESIDUAL * 2 * np.pi * abs(slope)
+        if not inside.any() or slope <= 0:
+            return None, np.inf
+        begin = -offset_s / slope - EDGE_RAD
+        turned = np.mod(turned - begin, 2 * np.pi) + begin
+        off_s = np.abs(since_s - offset_s - slope * turned)
+        inside = off_s <= MAX_RESIDUAL * 2 * np.pi * slope
     residual = float(np.quantile(off_s, 0.9)) / max(2 * np.pi * slope, 1e-9)
     if residual > MAX_RESIDUAL:
         return None, residual

@@ -144,7 +144,7 @@ class TurnParts:
         """The parts so far as a turn; None for the first one if it began within a turn."""
         points = np.concatenate(self._points)
         times_s, phases = np.array(self._marks).T
-        whole = not self._first or phases[0] < 2 * np.pi / max(self.n_parts, 2.0)
+        whole = not self._first or phases[0] < TOLERANCE_SHARE * 2 * np.pi / self.n_parts
         ahead_s = float((times_s + (np.pi - phases) / (2 * np.pi) * abs(self.turn_s)).mean())
         self._points = []
         self._marks = []

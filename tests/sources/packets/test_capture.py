@@ -141,3 +141,22 @@ def test_another_file_is_refused(tmp_path, raw, cause):
     path.write_bytes(raw)
     with pytest.raises(MisuseError, match=cause):
         PcapFile(path)
+
+
+@pytest.mark.parametrize(("link", "head"), [(12, b""), (14, b""), (228, b""), (0, b"\2\0\0\0"), (108, b"\0\0\0\2")])
+def test_ip_packets_of_any_link_are_read(tmp_path, link, head):
+    assert payloads(file_of(tmp_path / "a.pcap", [head + DATAGRAM], link=link)) == [b"payload"]
+
+
+@pytest.mark.parametrize("at", [0, 4, 8, 12])
+@pytest.mark.parametrize("value", [0xFFFFFFFF, 70])
+def test_records_behind_a_damaged_one_are_read(tmp_path, at, value):
+    frames = [ethernet(ipv4(udp(bytes([k]) * 40, 2368))) for k in range(9)]
+    path = file_of(tmp_path / "a.pcap", frames)
+    raw = bytearray(path.read_bytes())
+    struct.pack_into("<I", raw, 24 + 4 * (16 + len(frames[0])) + at, value)
+    path.write_bytes(raw)
+    capture = PcapFile(path)
+    read = {d.payload[:1] for d in capture if len(d.payload) == 40}
+    assert read >= {bytes([k]) for k in range(9)} - {b"\4", b"\5"}
+    assert len(read) >= 8 or capture.flaws

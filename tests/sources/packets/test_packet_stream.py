@@ -84,3 +84,41 @@ def test_an_ouster_is_recognised_by_the_metadata_beside_its_capture(kitti_root):
     assert len(stream.info.elevations_deg) == 32
     named = {"metadata": str(folder / "OS-1-128_v2.3.0_1024x10.json")}
     assert len(list(open_stream(folder / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", capture=named))) == 3
+
+
+def of_two(path):
+    """The packets of a sensor, and those of another one from the half on."""
+    whole = path.read_bytes()
+    records = []
+    at = 24
+    while at < len(whole):
+        size = 16 + int.from_bytes(whole[at + 8 : at + 12], "little")
+        records.append(whole[at : at + size])
+        at += size
+    mixed = []
+    for k, record in enumerate(records):
+        mixed.append(record)
+        if k >= len(records) // 2:
+            other = bytearray(record)
+            other[16 + 14 + 12 : 16 + 14 + 16] = bytes([192, 0, 2, 9])
+            mixed.append(bytes(other))
+    path.write_bytes(whole[:24] + b"".join(mixed))
+
+
+def test_one_of_several_sensors_in_a_capture_is_chosen_and_the_others_are_named(path):
+    alone = len(list(open_stream(path)))
+    of_two(path)
+    stream = open_stream(path)
+    assert len(list(stream)) == alone
+    assert any("--capture host=192.0.2.9" in note for note in stream.info.notes)
+    other = open_stream(path, capture={"host": "192.0.2.9"})
+    assert 0 < len(list(other)) < alone
+    with pytest.raises(MisuseError, match="no packets of host=192.0.2.7"):
+        open_stream(path, capture={"host": "192.0.2.7"})
+
+
+def test_packets_of_a_maker_that_is_not_decoded_are_named(tmp_path):
+    msop = bytes.fromhex("55aa050a5aa550a0") + bytes(1240)
+    write_capture(tmp_path / "a.pcap", [(1.0, msop)] * 5, 6699)
+    with pytest.raises(MisuseError, match="packets of a RoboSense.*ros2://"):
+        open_stream(tmp_path / "a.pcap")
