@@ -68,10 +68,12 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
         cells->entries[c] = 0;
         table[cell[last]] = c;
     }
+    float *low = cells->low, *high = cells->high;
     for (i64 i = 0; i < n; i++) {
         i64 c = cell[i] = table[cell[i]];
-        cells->low[c] = minf(height[i], cells->low[c]);
-        cells->high[c] = maxf(height[i], cells->high[c]);
+        float here = height[i];
+        low[c] = minf(here, low[c]);
+        high[c] = maxf(here, high[c]);
         cells->entries[c]++;
     }
     for (i32 c = 0; c < count; c++) {
@@ -199,7 +201,7 @@ typedef struct {
     i32 *latest;                    /* (side,) latest span of each column, see find_components */
     Place *by_rank, *by_column;     /* (n,) places in the order of cells and of columns */
     Place *by_row;                  /* (n,) and of the grid: by row, then column, then cell */
-    Span *spans;                    /* (n + 1,) */
+    Span *spans;                    /* (n + 2,) room for an empty one */
     i32 *parent;                    /* (n + 1,) a span of the same component, not after it */
     i32 *last_rank;                 /* (n + 1,) rank of the last cell of each span */
     i32 *span_of_rank;              /* (n,) */
@@ -232,7 +234,7 @@ static i64 place_scratch(i64 n, i32 side, void *memory, ClusterScratch *s)
     TAKE(&end, s->by_rank, n);
     TAKE(&end, s->by_column, n);
     TAKE(&end, s->by_row, n);
-    TAKE(&end, s->spans, n + 1);
+    TAKE(&end, s->spans, n + 2);
     TAKE(&end, s->parent, n + 1);
     TAKE(&end, s->last_rank, n + 1);
     TAKE(&end, s->span_of_rank, n);
@@ -298,21 +300,24 @@ static void sort_places(const Cells *cells, i64 n_used, int shift, i32 side, con
  * spans there are. */
 static i32 unite_cells(const Cells *cells, i64 n_used, i32 side, const ClusterScratch *s)
 {
-    const f4 none = spread(INFINITY);
-    f4 ends = none; /* least height, and the greatest negated */
-    i32 n = 0;
-    s->spans[0] = (Span){-3 * side, INFINITY, -INFINITY, 0.0f}; /* no neighbour of any */
+    const Span empty = {0, INFINITY, -INFINITY, 0.0f};
+    const float *low = cells->low, *high = cells->high, *max_gap_m = s->max_gap_m;
+    const Place *by_row = s->by_row;
+    const i32 *used = s->used;
+    i32 *last_rank = s->last_rank, *span_of_rank = s->span_of_rank, n = 0;
+    s->spans[0] = s->spans[1] = empty;
+    s->spans[0].place = -3 * side; /* no neighbour of any */
     for (i64 k = 0; k < n_used; k++) {
-        i32 rank = s->by_row[k].rank, i = s->used[rank], place = s->by_row[k].row * side + s->by_row[k].column;
-        i32 begins = place != s->spans[n].place; /* 1 if a span begins with this cell, else 0 */
-        i32 mask = -begins;                      /* all bits set if a span begins, else none */
-        i4 anew = {mask, mask, mask, mask};
-        f4 so_far = (f4)(((i4)none & anew) | ((i4)ends & ~anew)); /* `none` where a span begins, without a branch */
-        ends = min4((f4){cells->low[i], -cells->high[i]}, so_far);
-        n += begins;
-        s->spans[n] = (Span){place, ends[0], -ends[1], s->max_gap_m[i]};
-        s->last_rank[n] = rank;
-        s->span_of_rank[rank] = n;
+        i32 rank = by_row[k].rank, i = used[rank], place = by_row[k].row * side + by_row[k].column;
+        n += place != s->spans[n].place; /* without a branch, as what follows */
+        Span *span = &s->spans[n];
+        span[1] = empty;
+        span->place = place;
+        span->low = minf(low[i], span->low);
+        span->high = maxf(high[i], span->high);
+        span->max_gap_m = max_gap_m[i];
+        last_rank[n] = rank;
+        span_of_rank[rank] = n;
     }
     return n;
 }
@@ -381,16 +386,17 @@ static void find_components(const Span *spans, i32 n, i32 side, i32 *latest, i32
 static i64 number_components(i64 n_used, i32 n, const ClusterScratch *s, i64 *component)
 {
     i32 *const number = s->component_of_root;
+    const i32 *span_of_rank = s->span_of_rank, *last_rank = s->last_rank, *parent = s->parent;
     i32 count = 0;
     for (i32 k = 0; k <= n; k++)
         number[k] = NONE;
     for (i64 k = 0; k < n_used; k++) {
-        i32 span = s->span_of_rank[k], *of_root = &number[s->parent[span]];
-        if (s->last_rank[span] == k && *of_root == NONE)
+        i32 span = span_of_rank[k], *of_root = &number[parent[span]];
+        if (last_rank[span] == k && *of_root == NONE)
             *of_root = count++;
     }
     for (i64 k = 0; k < n_used; k++)
-        component[k] = number[s->parent[s->span_of_rank[k]]];
+        component[k] = number[parent[span_of_rank[k]]];
     return count;
 }
 

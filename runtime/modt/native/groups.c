@@ -97,10 +97,12 @@ static void count_members(const Clusters *clusters, i64 *count)
 static ALWAYS_INLINE void place_members(const Clusters *clusters, const i64 *places, const i64 *index, i64 *next,
                                         i64 *place_of_member, int8_t *kind)
 {
-    for (i64 i = 0; i < clusters->n_points; i++) {
-        i64 c = clusters->cell_of_point[i], place = places ? places[i] : i;
+    const i64 *cell_of_point = clusters->cell_of_point, *cluster_of_cell = clusters->cluster_of_cell;
+    const i64 n_points = clusters->n_points;
+    for (i64 i = 0; i < n_points; i++) {
+        i64 c = cell_of_point[i], place = places ? places[i] : i;
         PROVEN(c >= 0 && c < clusters->n_cells);
-        i64 g = clusters->cluster_of_cell[c];
+        i64 g = cluster_of_cell[c];
         PROVEN(g >= NONE && g < clusters->n);
         if (g == NONE)
             kind[index[place]] = clusters->kind_of_cell[c];
@@ -131,15 +133,17 @@ EXPORT void modt_members(const Clusters *tall, const Clusters *low, const i64 *p
      * go in order. */
     place_members(tall, 0, index, next, members->index, kind);
     place_members(low, places, index, next + tall->n, members->index, kind);
+    i64 *const rows = members->index;
+    const float *xyz[] = {points->x, points->y, points->z};
     float *x = members->columns, *y = x + total, *z = y + total, *ground_z = z + total;
     for (i64 m = 0; m < total; m++) {
-        i64 i = members->index[m];
-        members->index[m] = index[i];
+        i64 i = rows[m];
+        rows[m] = index[i];
         kind[index[i]] = MEMBER_KIND;
-        x[m] = points->x[i];
-        y[m] = points->y[i];
-        z[m] = points->z[i];
-        ground_z[m] = points->z[i] - height[i];
+        x[m] = xyz[0][i];
+        y[m] = xyz[1][i];
+        z[m] = xyz[2][i];
+        ground_z[m] = xyz[2][i] - height[i];
     }
 }
 
