@@ -28,10 +28,10 @@ def free_ends(bounded: Bool, sight: Float64) -> Bool:
     ahead = sight / np.maximum(np.hypot(sight[:, 0], sight[:, 1]), 1e-6)[:, None]
     left = np.column_stack([-ahead[:, 1], ahead[:, 0]])
     along_left = left @ DIRECTIONS
-    near: Bool = ahead @ DIRECTIONS < 0
-    free: Bool = np.where(along_left > SIDEWAYS, ~bounded[:, 1:], near)
-    free = np.where(along_left < -SIDEWAYS, ~bounded[:, :1], free)
-    return free.T
+    near = ahead @ DIRECTIONS < 0  # what ends an object far from the sensor is hidden by itself
+    sides = [along_left > SIDEWAYS, along_left < -SIDEWAYS]
+    free: Bool = np.select(sides, [~bounded[:, 1:], ~bounded[:, :1]], near).T
+    return free
 
 
 def further_shift(before: Float64, after: Float64, free: Bool, tuning: ShapeTuning) -> tuple[Float64, Bool]:
@@ -50,8 +50,7 @@ def further_shift(before: Float64, after: Float64, free: Bool, tuning: ShapeTuni
     behind = free[4:] & ~free[:4] & (both < 0)
     comes = (ahead | behind) & (growth > 0)
     shift: Float64 = np.where(comes, disagreement * np.copysign(growth, both), 0.0)
-    any_axis: Bool = comes.any(axis=0)
-    return shift, any_axis
+    return shift, np.logical_or.reduce(comes, axis=0)
 
 
 def corrected(covariance: Float64, weight: Float64, shift: Float64) -> Float64:

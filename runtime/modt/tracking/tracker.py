@@ -83,9 +83,10 @@ class Tracker:
             [
                 [1.0, evidence.one_side_weight, 0.0],
                 [1.0, evidence.compact_one_side_weight, evidence.compact_two_sides_weight],
+                [1.0, evidence.object_weight, evidence.object_weight],
             ]
         )
-        """(2, 3) weight of evidence of motion, by whether a proposal is compact and its number of bounded sides."""
+        """(3, 3) weight of evidence of motion by bounded sides, of any proposal, of a compact one, of a known object."""
         self._rest = tuning.rest
         self._live = LiveTracks() if live is None else live
 
@@ -278,8 +279,10 @@ class Tracker:
         if points is None or not len(claims):
             return weighed
         compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)
+        known = self.tracks.object_class[frame.matches.rows] != ObjectClass.BACKGROUND.value
+        kind = np.where(known, 2, compact)[claims]
         sides = self._sight.bounded_sides(points, frame.proposals, frame.matches.proposals[claims])
-        weighed[claims] *= self._weight_by_sides[compact[claims].astype(np.int64), sides.sum(axis=1)]
+        weighed[claims] *= self._weight_by_sides[kind, sides.sum(axis=1)]
         return weighed
 
     def _keep_top(self, frame: Associated, box_before: Float64) -> Proposals:

@@ -110,6 +110,10 @@ class MotionEvidenceTuning:
     """The same of a compact proposal that is bounded on both sides.
     Chosen on: simulated streets and aisles, by static things that were reported as moving."""
 
+    object_weight: float = 0.5
+    """The same of a track whose class is not background, bounded on one side or both.
+    Chosen on: simulated streets, by the error of velocities."""
+
     max_compact_m: float = 1.2
     """Greatest length of a compact proposal [m]. Greater: parts of shelves seem to move.
     Chosen on: simulated aisles, by static things that were reported as moving."""
