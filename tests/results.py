@@ -127,6 +127,12 @@ def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
         "source": "a\x1b[2Jb",
         "mode": "accurate",
         "profile": "vlp-16",
+        "trust": {
+            "level": "blind",
+            "since_s": 1.5,
+            "reasons": [{"check": "returns", "level": "blind", "since_s": 1.5, "cause": "no returns"}],
+            "frames": {"good": 15, "degraded": 0, "blind": 5},
+        },
         "counts": {
             **totals,
             "rate_hz": rate_hz,

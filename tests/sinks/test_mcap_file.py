@@ -89,6 +89,7 @@ def test_obstacles_and_ground_are_recorded_by_request(tmp_path):
             "/modt/detections",
             "/modt/markers",
             "/modt/odometry",
+            "/modt/diagnostics",
             "/tf",
             *extra,
         }

@@ -22,6 +22,7 @@ def test_a_frame_is_published_to_its_subscribers(loopback):
         "/robot/detections",
         "/robot/markers",
         "/robot/odometry",
+        "/robot/diagnostics",
         "/tf",
         "/robot/obstacles",
         "/robot/ground",

@@ -35,7 +35,7 @@ def detections(frame, **options):
 
 
 def test_topics_are_named_by_the_prefix_and_tf_and_points_are_asked_for():
-    always = {"/robot/detections", "/robot/markers", "/robot/odometry"}
+    always = {"/robot/detections", "/robot/markers", "/robot/odometry", "/robot/diagnostics"}
     assert {topic.name for topic in topics(TopicOptions(prefix="robot"))} == always
     more = topics(TopicOptions(prefix="robot", world_frame_id="map", points=True, obstacles=True))
     assert {topic.name for topic in more} == {*always, "/tf", "/robot/points", "/robot/obstacles", "/robot/ground"}

@@ -187,7 +187,8 @@ class Loop:
         frame = received.frame
         budget = self.deadlines.budget(stages.budget, received.arrived_s, frame.index)
         result = stages.step(frame, budget, reduced=self.deadlines.reduced)
-        withheld = stages.config.trust.results == UNLESS_BLIND and result.trust.level is TrustLevel.BLIND
+        blind = result.trust.level is TrustLevel.BLIND
+        withheld = blind and stages.config.trust.results == UNLESS_BLIND
         for name, writer in ({RECORDING: self.recording} if withheld else self._writers).items():
             self.failures.contain(name, stages.ledger.run, SINK, writer.write, result)
         line = stages.ledger.close_frame(frame.index)

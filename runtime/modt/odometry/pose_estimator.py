@@ -44,6 +44,7 @@ class PoseEstimator:
         self._T_world_before = np.eye(4)  # pose two frames ago
         self._T_world_last = np.eye(4)  # pose one frame ago
         self._T_world_odometry: Float64 | None = None
+        self._posed = False  # whether the last frame had a pose
         self._restarts = 0
 
     def adopt(self, other: PoseEstimator) -> None:
@@ -76,6 +77,9 @@ class PoseEstimator:
         if self._time_s is None and T_odometry_sensor is not None:
             self._begin(T_odometry_sensor)
         sweep = self._sweep(frame, proposals)
+        if T_odometry_sensor is None and self._posed:
+            self._landmarks.clear()  # a drift of the poses before does not snap back
+        self._posed = T_odometry_sensor is not None
         landmarks = self._landmarks.update(static_tracks(frame.time_s))
         if T_odometry_sensor is not None and self._T_world_odometry is not None:
             located = self._checked(frame.time_s, sweep, landmarks, T_odometry_sensor)

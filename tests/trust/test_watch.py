@@ -1,0 +1,128 @@
+"""The trust on simulated drives: good while nothing is wrong, and not good soon after each fault of the sweeps."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from modt.geometry import rotation_zyx
+from modt.profile import load
+from modt.trust.watch import Finding, TrustWatch
+from modt.types import Frame, TrustLevel
+from modt_simulation.synthetic_stream import SyntheticStream
+
+SENSOR = "vlp-16"
+ONSET, END = 40, 70
+SECONDS = 10.0
+
+
+@cache
+def drive(scene):
+    frames = SyntheticStream(scene, SENSOR, SECONDS, seed=11)
+    return [replace(frame, points=frame.points[::3]) for frame in frames]
+
+
+def judged(scene, fault=None, others=lambda k: {}):
+    """Trust after each frame of a drive with a fault from ONSET up to END."""
+    watch = TrustWatch(load(SENSOR).sensor)
+    trusts = []
+    for k, frame in enumerate(drive(scene)):
+        points = fault(frame.points, k) if fault and ONSET <= k < END else frame.points
+        trusts.append(watch.add(replace(frame, points=points), frame.T_world_sensor, others(k)))
+    return trusts
+
+
+def turned(matrix):
+    matrix = np.asarray(matrix, np.float32)
+    return lambda points, k: np.column_stack([points[:, :3] @ matrix.T, points[:, 3]]).astype(np.float32)
+
+
+def rotation(roll=0.0, pitch=0.0, yaw=0.0):
+    return turned(rotation_zyx(*np.deg2rad([roll, pitch, yaw])))
+
+
+def bearing(points):
+    return np.arctan2(points[:, 1], points[:, 0])
+
+
+def tangent(points):
+    return points[:, 2] / np.hypot(points[:, 0], points[:, 1])
+
+
+def covered(points, k):
+    near = points.copy()
+    ahead = points[:, 0] > 0
+    near[ahead, :3] *= 0.5 / np.linalg.norm(points[ahead, :3], axis=1, keepdims=True)
+    return near
+
+
+FAULTS = {
+    "all distances zero": lambda points, k: np.zeros_like(points),
+    "empty": lambda points, k: points[:0],
+    "frozen": lambda points, k: drive("street")[ONSET].points,
+    "half the view": lambda points, k: points[points[:, 0] < 0],
+    "a quarter of the view": lambda points, k: points[np.abs(bearing(points)) > np.pi / 4],
+    "two quadrants": lambda points, k: points[points[:, 0] * points[:, 1] > 0],
+    "a cover": covered,
+    "upper beams dead": lambda points, k: points[tangent(points) < -0.01],
+    "lower beams dead": lambda points, k: points[tangent(points) > -0.06],
+    "every second point": lambda points, k: points[::2],
+    "in millimetres": turned(1000 * np.eye(3)),
+    "twice as far": turned(2 * np.eye(3)),
+    "half as far": turned(0.5 * np.eye(3)),
+    "a fifth farther": turned(1.2 * np.eye(3)),
+    "a fifth nearer": turned(0.8 * np.eye(3)),
+    "mirrored": turned(np.diag([1, -1, 1])),
+    "upside down": turned(np.diag([1, -1, -1])),
+    "turned by 90 deg": rotation(yaw=90),
+    "turned by 45 deg": rotation(yaw=45),
+    "rolled by 15 deg": rotation(roll=15),
+    "pitched by -8 deg": rotation(pitch=-8),
+}
+
+
+@pytest.mark.parametrize("scene", ["street", "hall"])
+def test_a_drive_without_a_fault_is_trusted(scene):
+    assert {trust.level for trust in judged(scene)} == {TrustLevel.GOOD}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_reported_within_two_seconds_and_withdrawn_within_three(name):
+    levels = np.array([trust.level for trust in judged("street", FAULTS[name])])
+    assert (levels[:ONSET] == TrustLevel.GOOD).all()
+    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
+    assert levels[-1] == TrustLevel.GOOD
+
+
+def test_reflectance_is_no_matter_of_trust():
+    def garbage(points, k):
+        return np.column_stack([points[:, :3], np.random.default_rng(k).random(len(points))]).astype(np.float32)
+
+    assert {trust.level for trust in judged("street", garbage)} == {TrustLevel.GOOD}
+
+
+def test_a_reason_has_cause_remedy_and_the_time_of_its_begin():
+    trusts = judged("street", FAULTS["mirrored"])
+    begin = next(k for k, trust in enumerate(trusts) if trust.level)
+    (reason,) = trusts[begin + 5].reasons
+    assert (reason.key, reason.level) == ("scene", TrustLevel.BLIND)
+    assert "mirrored" in reason.cause
+    assert reason.remedy
+    assert reason.since_s == trusts[begin + 5].since_s == pytest.approx(0.1 * begin)
+
+
+def test_findings_of_other_checks_are_reported_with_their_level():
+    poses = {"poses": Finding(TrustLevel.DEGRADED, "poses are wrong", "check them")}
+    trusts = judged("street", others=lambda k: poses if ONSET <= k < END else {})
+    assert trusts[ONSET + 15].record()["level"] == "degraded"
+    assert trusts[ONSET + 15].keys == ("poses",)
+    assert trusts[-1].level == TrustLevel.GOOD
+
+
+@pytest.mark.parametrize("times_s", [(0.0, 0.0), (5.0, 1.0), (0.0, 100.0)], ids=["same", "back", "gap"])
+def test_any_order_of_times_is_taken(times_s):
+    watch = TrustWatch(load(SENSOR).sensor)
+    points = drive("street")[0].points
+    for k, time_s in enumerate(times_s * 5):
+        assert watch.add(Frame(k, time_s, points), np.eye(4)).level == TrustLevel.GOOD
