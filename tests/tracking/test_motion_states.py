@@ -5,7 +5,7 @@ import pytest
 
 from modt.config import TrackingConfig
 from modt.types import MotionState, PointKind
-from tests.tracking.test_sight import HEIGHT_M, scene, wall
+from tests.tracking.test_sight import scene, wall
 from tests.tracking.tracking_scenes import Follower, box, driving, frame_of
 
 PERIOD_S = 0.1
@@ -106,21 +106,3 @@ def test_the_papers_filter_tells_the_velocity_alone():
     assert tracks.motion[0] == MotionState.UNKNOWN
     np.testing.assert_allclose(tracks.velocity[0], [1.5, 0.0], atol=0.3)
     assert np.linalg.eigvalsh(tracks.velocity_covariance[0]).min() > 0
-
-
-def test_what_comes_into_view_is_as_fast_as_its_front():
-    """A car drives out from behind a wall: its front moves at 6 m/s, and the end at the wall stays."""
-    speeds = []
-    follower = Follower()
-    for index in range(8):
-        front = 1.0 + 0.6 * index
-        boxes = [
-            box(10, (front - 0.5) / 2, front + 0.5, 1.8, HEIGHT_M, yaw=np.pi / 2, z=0.0),
-            wall(-4.0, -0.25, x=5.0),
-        ]
-        _, proposals = scene(boxes, [PointKind.MEMBER, PointKind.STRUCTURE])
-        frame, _ = frame_of(boxes, index, points=3000)
-        tracks = follower.follow(frame, proposals)
-        follower.confirm([], [])
-        speeds.append(float(np.hypot(*tracks.velocity[0])))
-    assert speeds[4] == pytest.approx(6.0, abs=1.5)

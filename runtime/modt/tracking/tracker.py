@@ -9,12 +9,10 @@ import numpy as np
 from modt.class_sizes import IS_PERSON
 from modt.classes import PERSON_M, ObjectClass
 from modt.config import TrackingConfig
-from modt.geometry.kdop import DIRECTIONS
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.background_map import CAPACITY, BackgroundMap
-from modt.tracking.entering import corrected, free_ends, further_shift
 from modt.tracking.extent import extent_update_of
 from modt.tracking.kalman import SPEED, filter_of, velocity_of
 from modt.tracking.kdop_association import KdopAssociation
@@ -76,8 +74,6 @@ class Tracker:
         self._P_new = np.diag(np.square(sigma))
         self._motion_filter = motion_filter_of(kernels, tuning.motion_filter)
         self._sight = sight_of(kernels, tuning.sight)
-        self._shape = kernels.shape_tuning
-        self._position_variance = tuning.kdop_association.position_sigma_m**2
         self._evidence = evidence = tuning.motion_evidence
         self._weight_by_sides = np.array(
             [
@@ -86,7 +82,7 @@ class Tracker:
                 [1.0, evidence.object_weight, evidence.object_weight],
             ]
         )
-        """(3, 3) weight of evidence of motion by bounded sides, of any proposal, of a compact one, of a known object."""
+        """(3, 3) weight of evidence of motion by bounded sides: of any proposal, a compact one, a known object."""
         self._rest = tuning.rest
         self._live = LiveTracks() if live is None else live
 
@@ -231,39 +227,13 @@ class Tracker:
         t = self.tracks
         matches = frame.matches
         rows = matches.rows
-        position = matches.position
         if self._extended:
-            position = self._entered(frame, points)
-            log_ratio = self._motion_filter.update(t, rows, position, matches.covariance)
+            log_ratio = self._motion_filter.update(t, rows, matches.position, matches.covariance)
             self._motion_filter.believe(t, rows, self._weighed(log_ratio, frame, points))
         else:
-            self._filter.update(t.x, t.P, rows, position, matches.covariance)
+            self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         t.end_variance[rows] = matches.end_variance
-        self._update_extent(t, rows, matches.proposals, frame.observations, position, dt_s)
-
-    def _entered(self, frame: Associated, points: Float32 | None) -> Float64:
-        """Positions (R, 2) of the matched proposals [m, world], of new tracks that come into view by the leading end.
-
-        The positions that were matched are by the end that moved less. That is the one at which an object comes into
-        view, so its velocity would be seen late.
-        """
-        t = self.tracks
-        matches = frame.matches
-        young = (t.hits[matches.rows] <= self._evidence.young_hits).nonzero()[0]
-        if points is None or not len(young):
-            return matches.position
-        rows = matches.rows[young]
-        proposals = matches.proposals[young]
-        expected = t.x.take(rows, axis=0)[:, :2]
-        before = t.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ expected.T
-        after = frame.observations.kdop.take(proposals, axis=1)
-        bounded = self._sight.bounded_sides(points, frame.proposals, proposals)
-        free = free_ends(bounded, expected - frame.observations.sensor_xy)
-        shift, comes = further_shift(before, after, free, self._shape)
-        weight = 0.5 / (self._position_variance + matches.end_variance[young].T)  # as in GeometryKernels.measured
-        position = matches.position.copy()
-        position[young[comes]] += corrected(matches.covariance[young], weight, shift)[comes]
-        return position
+        self._update_extent(t, rows, matches.proposals, frame.observations, matches.position, dt_s)
 
     def _weighed(self, log_ratio: Float64, frame: Associated, points: Float32 | None) -> Float64:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.

@@ -122,11 +122,6 @@ class MotionEvidenceTuning:
     """Least width of a compact proposal, relative to its length. Less: parts of walls seem to move.
     Chosen on: simulated aisles, by static things that were reported as moving."""
 
-    young_hits: int = 5
-    """Frames with a proposal up to which a track that comes into view goes as far as its leading end. Greater: parts
-    of surfaces move.
-    Chosen on: simulated streets, by the error of velocities of new tracks."""
-
     moving: float = 0.95
     """A track moves from this probability on. Greater: fewer static things move, and starts are reported later.
     Chosen on: simulated scenes, by static things that were reported as moving."""
