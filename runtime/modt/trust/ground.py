@@ -63,12 +63,13 @@ class GroundCheck:
         self._height_m = height_m
         self.usual: Float64 | None = None
         self._points = 0.0  # usual number of sampled points on it
+        self._last: tuple[Sample, Float64, Plane | None] | None = None  # the last fit, and to what
         self.lost = False  # whether the usual plane has few points in the last look
 
     def learn(self, sample: Sample, elapsed_s: float) -> None:
         """Follow the plane of a sweep."""
         if self.usual is None:
-            found = self._search(sample, np.array([-(self._height_m or 1.0), 0.0, 0.0]))
+            found = self._search(sample, self.plane)
             if found is not None and found.height_m > 0:
                 self.usual = found.plane
                 self._points = found.points
@@ -80,11 +81,10 @@ class GroundCheck:
         self.usual = np.asarray(self.usual + gain * (found.plane - self.usual))
         self._points += gain * (found.points - self._points)
 
-    def heights(self, sample: Sample) -> Float64:
-        """(k,) heights of the sampled points above the usual plane [m]."""
-        plane = np.array([-(self._height_m or 1.0), 0.0, 0.0]) if self.usual is None else self.usual
-        x, y, z = sample.xyz
-        return np.asarray(z - (plane[0] + plane[1] * x + plane[2] * y))
+    @property
+    def plane(self) -> Float64:
+        """(3,) the usual plane, that of the profile before any is known."""
+        return np.array([-(self._height_m or 1.0), 0.0, 0.0]) if self.usual is None else self.usual
 
     def change(self, sample: Sample, share: float = 1.0) -> str:
         """Phrase for another plane than the usual one, empty if there is none within a share of the limits."""
@@ -132,8 +132,10 @@ class GroundCheck:
 
     def _fit(self, sample: Sample, plane: Float64) -> Plane | None:
         """Plane by least squares from a first guess; None if too few points lie on it."""
-        columns, z = self._near(sample, plane)
-        return _fitted(columns, z, plane)
+        if self._last is None or self._last[0] is not sample or self._last[1] is not plane:
+            columns, z = self._near(sample, plane)
+            self._last = sample, plane, _fitted(columns, z, plane)
+        return self._last[2]
 
     def _search(self, sample: Sample, usual: Float64) -> Plane | None:
         """The plane with the most points among tilts and heights around the usual one."""

@@ -50,6 +50,7 @@ class ReturnsCheck:
         self._tuning = tuning
         self._edges: Float64 | None = None  # (BANDS - 1,) tangents between the bands
         self._usual = np.zeros((SECTORS, BANDS))
+        self._last: tuple[Sample, Float64] | None = None  # the last count, and of what
         self._dead: Bool = np.zeros(BANDS, np.bool_)
 
     def learn(self, sample: Sample, elapsed_s: float) -> None:
@@ -108,10 +109,15 @@ class ReturnsCheck:
 
     def _count(self, sample: Sample) -> Float64:
         """(SECTORS, BANDS) returns of a sweep."""
+        if self._last is None or self._last[0] is not sample:
+            self._last = sample, self._counted(sample)
+        return self._last[1]
+
+    def _counted(self, sample: Sample) -> Float64:
         assert self._edges is not None
-        x, y, _ = sample.xyz
-        bearing = np.arctan2(y, x).take(sample.counted)
-        sector = ((bearing + np.pi) * (SECTORS / (2 * np.pi))).astype(np.int64) % SECTORS
+        x, y, _ = sample.xyz.take(sample.counted, axis=1)
+        bearing = (np.arctan2(y, x) + np.float32(np.pi)) * np.float32(SECTORS / (2 * np.pi))
+        sector = bearing.astype(np.int64) % SECTORS
         band = np.searchsorted(self._edges, _tangents(sample))
         count = np.bincount(sector * BANDS + band, minlength=SECTORS * BANDS)
         return np.asarray(sample.weight * count).reshape(SECTORS, BANDS)

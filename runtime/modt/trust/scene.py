@@ -11,19 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import inverse, rotation_zyx, se3
-from modt.trust.ground import GroundCheck
 from modt.trust.sample import Sample
-from modt.types import Float64, Int
+from modt.types import Bool, Float64, Int
 
 BEARINGS = 72
 LOG_STEP = 0.08
 """Width of a cell in the logarithm of the range."""
 NEAREST_M = 1.0
+"""Range of the first cell [m]."""
 RANGES = 50
 """Cells along the range, up to 54 m."""
-OBSTACLE_M = (0.35, 1.8)
-"""Heights above the ground between which a point belongs to an obstacle, and not to the ground
-or to a ceiling [m]."""
 MIN_POINTS = 40
 UNSCALED_FAVOUR = 0.02
 """Share of the points by which a scale has to be better for each of its steps, as places are several steps wide."""
@@ -73,42 +70,43 @@ class Change:
 SAME = Change(False, 0, 0)
 
 
-def places(sample: Sample, ground: GroundCheck, T: Float64 | None = None) -> Int:
-    """(k,) cells of the obstacle points, brought into another sensor frame by T (4, 4)."""
-    height_m = ground.heights(sample).take(sample.counted)
-    rows = sample.counted[(height_m > OBSTACLE_M[0]) & (height_m < OBSTACLE_M[1])]
-    x, y, z = sample.xyz.take(rows, axis=1)
+def places(sample: Sample, plane: Float64, T: Float64 | None = None) -> Int:
+    """(k,) cells of the obstacle points above a ground (3,), brought into another sensor frame by T (4, 4)."""
+    x, y, z = sample.obstacles(plane)
     if T is not None:
-        x, y = (T[k, 0] * x + T[k, 1] * y + T[k, 2] * z + T[k, 3] for k in (0, 1))
-    bearing = ((np.arctan2(y, x) + np.pi) * (BEARINGS / (2 * np.pi))).astype(np.int64) % BEARINGS
-    far = (np.log(np.maximum(np.hypot(x, y), NEAREST_M)) / LOG_STEP).astype(np.int64)
-    return np.asarray((bearing * RANGES + far)[far < RANGES])
+        a = T.astype(np.float32)
+        x, y = (a[k, 0] * x + a[k, 1] * y + a[k, 2] * z + a[k, 3] for k in (0, 1))
+    bearing = ((np.arctan2(y, x) + np.float32(np.pi)) * np.float32(BEARINGS / (2 * np.pi))).astype(np.int64)
+    far = (np.log(np.maximum(x * x + y * y, NEAREST_M)) * np.float32(0.5 / LOG_STEP)).astype(np.int64)
+    return np.asarray((bearing % BEARINGS * RANGES + far)[far < RANGES])
 
 
-def _grown(cells: Int) -> Float64:
-    """(BEARINGS, RANGES) 1 in occupied cells and beside them."""
-    grid = np.zeros((BEARINGS, RANGES))
-    grid.flat[cells] = 1.0
-    grid = np.maximum(grid, np.maximum(np.roll(grid, 1, axis=0), np.roll(grid, -1, axis=0)))
-    wide = grid.copy()
-    wide[:, 1:] = np.maximum(wide[:, 1:], grid[:, :-1])
-    wide[:, :-1] = np.maximum(wide[:, :-1], grid[:, 1:])
-    return wide
+def _grown(cells: Int) -> Bool:
+    """(BEARINGS, RANGES) occupied cells, and those beside them."""
+    grid = np.zeros((BEARINGS + 2, RANGES), np.bool_)
+    grid[1:-1].flat[cells] = True
+    grid[0] = grid[-2]
+    grid[-1] = grid[1]
+    wide: Bool = grid[1:-1] | grid[:-2] | grid[2:]
+    grown = wide.copy()
+    grown[:, 1:] |= wide[:, :-1]
+    grown[:, :-1] |= wide[:, 1:]
+    return grown
 
 
-def agreement(before: Sample, after: Sample, ground: GroundCheck, T_after_before: Float64) -> float:
+def agreement(before: Sample, after: Sample, plane: Float64, T_after_before: Float64) -> float:
     """Share of the obstacle points of a sweep that stand where the one before had some; 1 with too few points."""
-    known = places(before, ground, T_after_before)
-    cells = places(after, ground)
+    known = places(before, plane, T_after_before)
+    cells = places(after, plane)
     if min(len(known), len(cells)) < MIN_POINTS:
         return 1.0
     return float(_grown(known).ravel().take(cells).mean())
 
 
-def explain(before: Sample, after: Sample, ground: GroundCheck, T_after_before: Float64) -> tuple[Change, float]:
+def explain(before: Sample, after: Sample, plane: Float64, T_after_before: Float64) -> tuple[Change, float]:
     """The change that brings most of the points of a sweep to known places, and their share."""
-    known = places(before, ground, T_after_before)
-    cells = places(after, ground)
+    known = places(before, plane, T_after_before)
+    cells = places(after, plane)
     n = RANGES + 20
     wide = np.zeros((BEARINGS, n))
     wide[:, :RANGES] = _grown(known)

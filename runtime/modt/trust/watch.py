@@ -175,7 +175,7 @@ class TrustWatch:
                 self._explain(*pair, least)
         if self._change.is_none or self._before is None:
             return
-        is_back = agreement(self._before, seen, self._ground, SAME.motion(self._before, seen)) >= scene.back
+        is_back = agreement(self._before, seen, self._ground.plane, SAME.motion(self._before, seen)) >= scene.back
         self._scene_looks = self._scene_looks + 1 if is_back else 0
         if self._scene_looks >= self._tuning.back_looks:
             self._change = SAME
@@ -187,12 +187,12 @@ class TrustWatch:
 
     def _agreement(self, before: Sample, after: Sample) -> float:
         """Agreement of two sweeps in the scene as it is changed."""
-        return agreement(before, after, self._ground, self._change.motion(before, after))
+        return agreement(before, after, self._ground.plane, self._change.motion(before, after))
 
     def _explain(self, before: Sample, after: Sample, least: float) -> None:
         """Write how the scene changed from one frame to the next."""
         scene = self._tuning.scene
-        change, share = explain(before, after, self._ground, self._change.motion(before, after))
+        change, share = explain(before, after, self._ground.plane, self._change.motion(before, after))
         if change.is_none and least >= scene.same:
             return
         another = least < scene.same
