@@ -253,7 +253,8 @@ class Pipeline:
                 x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
             T_world_sensor: (4, 4) pose at the stamp. None estimates the motion of the sensor from the proposals.
-            turn_s, mid_rad: as in modt.types.Frame, for sweeps that are not compensated for the motion of the sensor.
+            turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
+            mid_rad: as modt.types.Frame.mid_rad.
 
         Raises:
             MisuseError: an argument has another shape, a stamp goes back, or a matrix is no pose.

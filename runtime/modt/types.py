@@ -37,7 +37,7 @@ N_REFLECTANCE = 5
 
 DESKEWED = "by the times of the turn"
 COMPENSATED = "without times of points"
-"""Kinds of the times of sweeps: those of a turn, by which they are deskewed, and none, as if all were seen at the stamp."""
+"""Kinds of the times of sweeps: those of a turn, by which they are deskewed, and none, as if seen at the stamp."""
 
 
 @dataclass(frozen=True, slots=True)

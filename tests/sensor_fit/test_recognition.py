@@ -94,6 +94,8 @@ def test_no_profile_is_recommended_in_place_of_itself():
 
 def test_a_head_that_turns_twice_as_fast_is_the_same_sensor():
     sweep = recording("hdl-32e").sweeps[0]
-    bearing = np.round(np.rad2deg(np.arctan2(sweep[:, 1], sweep[:, 0])) / profile.load("hdl-32e").sensor.azimuth_step_deg)
+    bearing = np.round(
+        np.rad2deg(np.arctan2(sweep[:, 1], sweep[:, 0])) / profile.load("hdl-32e").sensor.azimuth_step_deg
+    )
     found = recognise(sweep[bearing % 2 == 0], profile.load())
     assert found.nearest == "hdl-32e"

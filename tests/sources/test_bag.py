@@ -219,7 +219,9 @@ def moving(topic, *, with_mount=False):
         edges = [("odom", "base_link", [10.0 + recorded_s - 0.001 - BEGAN_S, 0.0, 0.0], UP)]
         message = messages.transforms(*edges, *([MOUNT] if with_mount else []))
         for transform in message.transforms:
-            transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(round((recorded_s - 0.001) * 1e9), 10**9)
+            transform.header.stamp.sec, transform.header.stamp.nanosec = divmod(
+                round((recorded_s - 0.001) * 1e9), 10**9
+            )
         recorded.append((topic, TF, recorded_s, messages.encode(message)))
     return recorded
 

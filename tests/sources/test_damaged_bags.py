@@ -79,7 +79,9 @@ def test_a_damaged_chunk_costs_its_own_messages(tmp_path, closed, compression):
     with path.open("rb") as file:
         chunks = make_reader(file).get_summary().chunk_indexes
     raw = bytearray(path.read_bytes())
-    at = chunks[2].chunk_start_offset + 9 + 40 + len(compression)  # its first message, or the begin of its compressed data
+    at = (
+        chunks[2].chunk_start_offset + 9 + 40 + len(compression)
+    )  # its first message, or the begin of its compressed data
     raw[at : at + 30] = b"\xff" * 30
     path.write_bytes(raw if closed else raw[: chunks[-1].chunk_start_offset + chunks[-1].chunk_length])
     stream, frames = read(path)
@@ -139,7 +141,7 @@ def big(n):
 def test_a_damaged_database_gives_all_rows_that_its_pages_hold(tmp_path, what):
     (path,) = write_rosbag2(tmp_path / "drive", by_time(big(N), poses())).glob("*.db3")
     with closing(sqlite3.connect(path)) as database:
-        root = {name: page for name, page in database.execute("SELECT name, rootpage FROM sqlite_master")}
+        root = dict(database.execute("SELECT name, rootpage FROM sqlite_master"))
     raw = bytearray(path.read_bytes())
     pages = pages_of(raw)
     leaves = [k for k, page in enumerate(pages) if page[0] == 13 and k and k + 1 != root["topics"]]
@@ -153,7 +155,7 @@ def test_a_damaged_database_gives_all_rows_that_its_pages_hold(tmp_path, what):
         raw[4096 * page : 4096 * page + 64] = b"\xa5" * 64
     copy = tmp_path / "copy.db3"
     copy.write_bytes(raw)
-    stream, frames = read(copy)
+    _, frames = read(copy)
     if what in ("index", "root of the table"):
         assert frames == list(range(N))
     elif what == "end":

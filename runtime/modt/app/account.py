@@ -1,4 +1,4 @@
-"""The account of what was read: how much of it was used, what was left out and why, and what the points and poses are."""
+"""The account of what was read: how much was used, what was left out and why, and what the points and poses are."""
 
 from __future__ import annotations
 
@@ -74,6 +74,9 @@ def closing_lines(read: Mapping[str, Any]) -> list[str]:
     kinds = read["not_deskewed"]
     if kinds and read["shift_in_a_sweep_m"] >= SEEN_M:
         why = ", ".join(kinds)
-        cost = f"at {read['mean_speed_mps']:.1f} m/s, things at rest shift by up to {read['shift_in_a_sweep_m']:.2f} m in one"
-        lines.append(f"{sum(kinds.values())} sweeps are not deskewed ({why}): unless their driver has done so, {cost}")
+        speed = f"at {read['mean_speed_mps']:.1f} m/s"
+        cost = f"{speed}, things at rest shift by up to {read['shift_in_a_sweep_m']:.2f} m within one"
+        lines.append(
+            f"{sum(kinds.values())} sweeps are not deskewed ({why}): unless their driver has done so, {cost}"
+        )
     return lines

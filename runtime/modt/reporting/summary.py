@@ -209,10 +209,8 @@ def _read_lines(read: dict[str, Any]) -> list[str]:
     joined = f", {read['joined']} of them parts of turns" if read["joined"] else ""
     frame = f"; points in {read['frame_id']}" if read["frame_id"] else ""
     skewed = f"{read['deskewed']} of {read['sweeps']} deskewed"
-    return [
-        f"  read: {read['messages']} messages{joined}, {read['sweeps']} sweeps, {read['used']} used, {skewed}{frame}; "
-        f"poses: {read['poses']}"
-    ]
+    counts = f"{read['messages']} messages{joined}, {read['sweeps']} sweeps, {read['used']} used, {skewed}"
+    return [f"  read: {counts}{frame}; poses: {read['poses']}"]
 
 
 def _stage_line(name: str, stage: dict[str, Any]) -> str:

@@ -117,7 +117,8 @@ def _cloud(stamp_s: float, frame: str, stride: int, fields: list[tuple[str, int,
     names = dict.fromkeys(name for name, _, _ in within)
     if len(names) < len(within) or not 0 < stride <= len(data):
         raise MessageError("malformed", "fields of one name, or a stride that fits no point")
-    forms = {"names": [*names], "formats": [kind for _, kind, _ in within], "offsets": [at for _, _, at in within]}
-    row = np.dtype({**forms, "itemsize": stride})
+    formats = [kind for _, kind, _ in within]
+    offsets = [at for _, _, at in within]
+    row = np.dtype({"names": [*names], "formats": formats, "offsets": offsets, "itemsize": stride})
     rows = np.frombuffer(data, row, len(data) // stride).reshape(1, -1)
     return cloud_of(stamp_s, frame, Table(rows))

@@ -148,8 +148,8 @@ def _fields(cdr: CdrReader) -> dict[str, tuple[str, int]]:
 def _table(cdr: CdrReader, height: int, width: int, kinds: dict[str, tuple[str, int]]) -> Table:
     """(height, width) records of the points, which are not copied; fields beyond the size of a point are left out.
 
-    Drivers are known to state another size of a row than that of their dense rows, and another order of bytes than the
-    one in which coordinates make sense.
+    Drivers are known to state another size of a row than that of their dense rows, and another order of bytes than
+    the one in which coordinates make sense.
 
     Raises:
         MessageError: `empty`, or `malformed`: the data are too few for the points.
@@ -260,7 +260,7 @@ AHEAD_RAD = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A turn of a head: turn_s and mid_rad as in Frame, times of its first point and of mid_rad by the points' clock."""
+    """A turn of a head: turn_s, mid_rad as in Frame, times of its first point and of mid_rad by the points' clock."""
 
     turn_s: float
     mid_rad: float
@@ -299,7 +299,7 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | str:
 
 
 def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None, float]:
-    """Turn of a head that turns clockwise (way 1) or not (-1), and its residual as a share; None if times do not fit."""
+    """Turn of a head that turns clockwise (way 1) or not (-1), None if times do not fit; its residual as a share."""
     first = bearing[since_s <= np.quantile(since_s, FIRST_SHARE)]
     begin_rad = float(np.angle(np.exp(1j * first).mean()))
     turned = np.mod(way * (begin_rad - bearing) + MARGIN_RAD, 2 * np.pi) - MARGIN_RAD

@@ -283,7 +283,7 @@ def azimuth_ratio_at_any_speed(a: SensorConfig, b: SensorConfig) -> float:
 
 
 def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
-    """Name of the shipped profile with the same beams; of those that fit best the one whose mount is nearest in height.
+    """Name of the shipped profile with the same beams; of those that fit best, the one nearest in height.
 
     A head may turn at half or twice the speed of the profile, with other steps of azimuth.
     """
@@ -298,7 +298,9 @@ def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
             away_m = abs((sensor.height_m or 0.0) - (found.height_m or 0.0))
             likely.append((spacing, away_m, path.stem))
     least = min((spacing for spacing, _, _ in likely), default=0.0)
-    return min(((away_m, name) for spacing, away_m, name in likely if spacing < least * SAME_RATIO), default=("", None))[1]
+    return min(
+        ((away_m, name) for spacing, away_m, name in likely if spacing < least * SAME_RATIO), default=("", None)
+    )[1]
 
 
 MAX_SPACING_DEG = 10.0

@@ -64,7 +64,9 @@ class Recognition:
         """Yield a warning of the differences from the named profile, with the remedy, and a warning of the tilt."""
         if self.differences:
             done = "used instead: what the first sweep shows" if replaced else "used all the same"
-            known = f"--profile {self.nearest}, or " if self.nearest and self.nearest != name.partition(" ")[0] else ""
+            known = (
+                f"--profile {self.nearest}, or " if self.nearest and self.nearest != name.partition(" ")[0] else ""
+            )
             remedy = f"better: {known}a profile by modt profile fit"
             what = "has another mount than this sensor's" if self.same_sensor else "is not of this sensor"
             yield f"profile {name} {what} ({'; '.join(self.differences)}); {done}; {remedy}"

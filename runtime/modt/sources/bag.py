@@ -37,7 +37,7 @@ class BagStream:
     """Frames of a recording; stamps count from its first usable sweep.
 
     A frame is held back until a pose at least as late or the next sweep is read, so that its pose is interpolated.
-    Messages that are parts of a turn are joined. Unusable messages are counted and skipped, the first ones are logged.
+    Messages that are parts of a turn are joined. Unusable ones are counted and skipped, the first ones are logged.
     """
 
     def __init__(
@@ -95,7 +95,9 @@ class BagStream:
         if not used and self.reading.messages:
             first = f" ({self.faults.first[0].cause})" if self.faults.first else ""
             cause = f"none of its {self.reading.messages} messages of {self._topic} can be used{first}"
-            raise ModtError(self.info.name, cause, "have the driver write x, y, z [m] as float32 in the sensor's frame")
+            raise ModtError(
+                self.info.name, cause, "have the driver write x, y, z [m] as float32 in the sensor's frame"
+            )
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; others are not decoded, unless they come in parts."""
@@ -146,7 +148,9 @@ class BagStream:
             self.faults.leave_out(self.reading.messages, self.info.name, flaw)
         for topic, number in self._bag.missing.items():
             if number:
-                self.faults.leave_out(self.reading.messages, self.info.name, f"messages of {topic} are missing", number)
+                self.faults.leave_out(
+                    self.reading.messages, self.info.name, f"messages of {topic} are missing", number
+                )
 
     def _cloud(self, index: int, message: BagMessage) -> PointCloud | None:
         """The points of a message; None if it cannot be read."""

@@ -119,6 +119,14 @@ class BagFile(ABC):
                     self.spend(len(message))
                 yield BagMessage(topic, 1e-9 * recorded_ns, message, flaw)
 
+    def lost_names(self) -> dict[str, str]:
+        """Provisional name and type of each topic whose name is lost."""
+        return {}
+
+    def rename(self, provisional: str, name: str) -> None:
+        """Give such a topic its name."""
+        raise KeyError(provisional)
+
     @abstractmethod
     def _topics(self) -> dict[str, BagTopic]:
         """Topics by name."""

@@ -50,6 +50,7 @@ class Bag:
                 self._unread.append(f"{file.name} {refusal.cause}")
         if not self.files:
             raise error
+        self._name_topics()
         self.flaws = [*self._unread]
 
     def topics(self) -> dict[str, BagTopic]:
@@ -84,10 +85,23 @@ class Bag:
         if not path.is_file():
             raise ModtError(path, "is not there", "copy the whole folder")
         file = KINDS[kind_of(path)](path)
-        for name, topic in file.topics().items():
-            before = self._topics[name].count if name in self._topics else 0
-            self._topics[name] = BagTopic(topic.type, before + topic.count, topic.encoding)
+        file.topics()
         self.files.append(file)
+
+    def _name_topics(self) -> None:
+        """Sum up the topics. One whose name is lost is the only other one of its type, if there is one."""
+        lost = {name for file in self.files for name in file.lost_names()}
+        named = {
+            (name, topic.type) for file in self.files for name, topic in file.topics().items() if name not in lost
+        }
+        for file in self.files:
+            for provisional, kind in file.lost_names().items():
+                names = {name for name, other in named if other == kind}
+                if len(names) == 1:
+                    file.rename(provisional, names.pop())
+            for name, topic in file.topics().items():
+                before = self._topics[name].count if name in self._topics else 0
+                self._topics[name] = BagTopic(topic.type, before + topic.count, topic.encoding)
 
 
 def bag_in(folder: Path) -> list[Path]:

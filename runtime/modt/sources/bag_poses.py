@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -107,7 +107,7 @@ def _of_odometry(bag: Bag, topic: str, sensor: str, tree: Transforms) -> tuple[P
 def _of_transforms(topics: list[str], sensor: str, tree: Transforms) -> tuple[PoseTopic | None, tuple[str, ...]]:
     """Poses by the transform into the odometry's frame, else by the topmost one that moves."""
     chain = tree.chain(sensor)
-    edges = [(parent, child) for child, parent in zip(chain, chain[1:], strict=False) if tree.moves(child)]
+    edges = [(parent, child) for child, parent in pairwise(chain) if tree.moves(child)]
     edge = next((edge for edge in edges if edge[0].rpartition("/")[2] == CONTINUOUS), edges[-1] if edges else None)
     if edge is None or not topics:
         return None, ("no nav_msgs/Odometry: no poses, and no transform moves the sensor",)

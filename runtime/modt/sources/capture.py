@@ -16,7 +16,6 @@ from modt.sources.stamp_check import StampCheck
 from modt.sources.stream import Faults, Reading, StreamInfo, Sweep
 from modt.types import COMPENSATED, DESKEWED, Frame, Self
 
-
 CHOICES = frozenset({"host", "port"})
 """Options that choose one of several sensors in a capture."""
 PEEKED = 50
@@ -86,8 +85,8 @@ class PacketStream:
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     """Stream of the sensor whose packets come first in a PCAP file.
 
-    `options` are those of the sensor's driver, and `host` and `port`, which choose one of several sensors by the address
-    that its packets come from and the port that they go to. Options of a driver default to files with the name of the
+    `options` are those of the sensor's driver, and `host` and `port`, which choose one of several sensors by the
+    address that its packets come from and the port that they go to. Options of a driver default to files with the name of the
     capture.
 
     Raises:
@@ -128,7 +127,9 @@ def _asked(capture: PcapFile, options: Mapping[str, str]) -> tuple[str, int] | N
     sensors = [flow for flow in chosen if _sends_points(capture, flow)]
     if not chosen:
         there = ", ".join(f"host={source} port={number}" for source, number in flows) or "none"
-        raise MisuseError(capture.path, f"no packets of host={host or 'any'} port={port or 'any'}", f"there are {there}")
+        raise MisuseError(
+            capture.path, f"no packets of host={host or 'any'} port={port or 'any'}", f"there are {there}"
+        )
     return (sensors or chosen)[0]
 
 

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import weakref
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,13 +17,24 @@ from typing import Any
 from urllib.parse import quote
 
 from modt.errors import ModtError
+from modt.ros2 import odometry, point_cloud2
+from modt.ros2.cdr import MessageError
 from modt.sources.bag_file import DAMAGED, MAX_RECORD_BYTES, REMEDY, BagFile, BagTopic, Stored
 from modt.sources.sqlite_pages import Pages
 
+PROVISIONAL = "/name_lost_"
+"""Begin of the name of a topic whose name is lost."""
+MOST_APART_NS = 2 * 10**8
+"""Greatest difference of the times of messages that were written one after the other [ns]."""
 STEPS = 10_000
 """Instructions of a database between two checks of their number. Their limit is that of the unpacked bytes."""
 BESIDE = ("-wal", "-journal")
 """Suffixes of files in which a recorder that was killed leaves what is not in its database yet, or must be undone."""
+KINDS: dict[str, Callable[[bytes], object]] = {
+    point_cloud2.TYPE: point_cloud2.read_cloud,
+    odometry.TYPE: odometry.read_odometry,
+}
+"""Readers by which messages are recognised whose topic is lost."""
 TABLES = "SELECT name FROM sqlite_master WHERE type != 'index' AND (type != 'table' OR sql NOT LIKE 'CREATE TABLE%')"
 """Names of what is no plain table; views and triggers are programs."""
 
@@ -35,16 +46,28 @@ class Listing:
     Attributes:
         topics: name, type and encoding of each topic by its number.
         messages: time [ns], number, and number of the topic of each message, ordered.
+        dropped: number of rows that are no messages.
         pages: the pages of a database that SQLite cannot read; None if it can.
     """
 
     topics: dict[int, tuple[str, str, str]]
     messages: list[tuple[int, int, int]]
+    dropped: int
     pages: Pages | None = None
 
 
 class DatabaseFile(BagFile):
     """A .db3 file. Messages are listed first and then read one by one, so that a damage costs those it lies in."""
+
+    def lost_names(self) -> dict[str, str]:
+        """Provisional name and type of each topic whose name is lost."""
+        return {name: kind for name, kind, _ in self._listing.topics.values() if name.startswith(PROVISIONAL)}
+
+    def rename(self, provisional: str, name: str) -> None:
+        """Give such a topic its name."""
+        for number, (known, kind, form) in self._listing.topics.items():
+            if known == provisional:
+                self._listing.topics[number] = (name, kind, form)
 
     def _topics(self) -> dict[str, BagTopic]:
         listing = self._listing
@@ -57,6 +80,8 @@ class DatabaseFile(BagFile):
         names = {number: name for number, (name, _, _) in listing.topics.items() if name in topics}
         if listing.pages is not None:
             self.flaws.append("damaged: its pages are read one by one")
+        if listing.dropped:
+            self.flaws.append(f"{listing.dropped} of its rows are no messages")
         with closing(self._database()) as database:
             for recorded_ns, number, topic in listing.messages:
                 if topic in names:
@@ -65,12 +90,15 @@ class DatabaseFile(BagFile):
 
     def _data(self, database: sqlite3.Connection, pages: Pages | None, number: int) -> bytes | None:
         """Bytes of a message, None if they cannot be read."""
-        if pages is not None:
-            return pages.blob(number)
-        with suppress(sqlite3.Error):
-            (data,) = self._run(database, "SELECT data FROM messages WHERE id = ?", number).fetchone()
-            return data if isinstance(data, bytes) else None
-        return None
+        if pages is None:
+            with suppress(sqlite3.Error):
+                for (data,) in self._run(database, "SELECT data FROM messages WHERE id = ?", number):
+                    return data if isinstance(data, bytes) else None
+        return self._pages.blob(number)
+
+    @cached_property
+    def _pages(self) -> Pages:
+        return Pages(self._merged)
 
     @cached_property
     def _listing(self) -> Listing:
@@ -79,14 +107,27 @@ class DatabaseFile(BagFile):
         try:
             topics, messages = self._tables()
         except sqlite3.Error as error:
-            pages = Pages(self._merged)
+            pages = self._pages
             topics = pages.topics
             messages = pages.messages
-            if not topics or not messages:
+            if not messages:
                 raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
         known = {number: (name, kind, form) for number, name, kind, form in topics if _are(str, name, kind, form)}
-        listed = {row[1]: row for row in messages if _are(int, *row) and row[2] in known}
-        return Listing(known, sorted(listed.values()), pages)
+        listed = {row[1]: row for row in messages if _are(int, *row)}
+        for _, number, topic in listed.values():
+            if topic not in known and (kind := self._kind_of(number)):
+                known[topic] = (f"{PROVISIONAL}{topic}", kind, "cdr")
+        rows = [row for _, row in sorted(listed.items()) if row[2] in known]
+        return Listing(known, _by_time(rows), len(messages) - len(rows), pages)
+
+    def _kind_of(self, number: int) -> str:
+        """Type of a message whose topic is lost, by its content; empty if it is none that is read."""
+        data = self._pages.blob(number) or b""
+        for kind, read in KINDS.items():
+            with suppress(MessageError):
+                read(data)
+                return kind
+        return ""
 
     def _tables(self) -> tuple[list[Any], list[Any]]:
         """Rows of the topics and of the messages.
@@ -162,6 +203,16 @@ class DatabaseFile(BagFile):
         """Files that a killed recorder has left."""
         beside = (self.plain.with_name(self.plain.name + suffix) for suffix in BESIDE)
         return [file for file in beside if file.is_file() and file.stat().st_size]
+
+
+def _by_time(rows: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+    """Rows, given in the order of their numbers, by their times; a time far from those around it is damaged."""
+    times = [row[0] for row in rows]
+    for k in range(1, len(times) - 1):
+        before, now, after = times[k - 1 : k + 2]
+        if 0 <= after - before < MOST_APART_NS and min(abs(now - before), abs(after - now)) > MOST_APART_NS:
+            times[k] = before
+    return sorted((time, number, topic) for time, (_, number, topic) in zip(times, rows, strict=True))
 
 
 def _are(kind: type, *values: Any) -> bool:

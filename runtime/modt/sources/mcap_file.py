@@ -1,4 +1,4 @@
-"""MCAP files. Their records are found by the index, or by a scan of the file where the index is missing or damaged."""
+"""MCAP files. Their records are found by the index, or by a scan of the file where the index is damaged."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import zlib
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from heapq import heappop, heappush
 from io import BytesIO
@@ -124,6 +124,7 @@ class McapFile(BagFile):
         waiting: list[tuple[int, int, Stored]] = []
         order = count()
         seen = Counter[str]()
+        promised = contents.counts
         for piece, until_ns in zip(pieces, next_ns, strict=False):
             for message in self._stored(contents, piece, wanted):
                 heappush(waiting, (message.recorded_ns, next(order), message))
@@ -133,9 +134,10 @@ class McapFile(BagFile):
                 yield message
         for at in contents.gaps:
             self.flaws.append(f"the bytes from {at} on are damaged up to the next record")
-        for number in wanted if contents.counts else ():
-            self.missing[contents.channels[number].topic] += (contents.counts or seen)[number]
-        self.missing -= seen
+        if promised is not None:
+            for number in wanted:
+                self.missing[contents.channels[number].topic] += promised[number]
+            self.missing -= seen
 
     def _stored(self, contents: Contents, piece: Piece, wanted: Collection[int]) -> Iterator[Stored]:
         """Messages of a piece, and those that its index names and its bytes no longer hold."""
@@ -147,16 +149,18 @@ class McapFile(BagFile):
         if whole:
             return
         indexed = self._indexed(piece)
-        if not indexed and piece.channel in wanted:
+        if not indexed and piece.channel is not None and piece.channel in wanted:
             yield Stored(channels[piece.channel].topic, piece.start_ns, b"", DAMAGED)
         elif not indexed:
-            self.flaws.append(f"the chunk at byte {piece.at} is damaged; how many of its messages are lost is not known")
+            self.flaws.append(
+                f"the chunk at byte {piece.at} is damaged; how many of its messages are lost is not known"
+            )
         for at, (number, time_ns) in indexed.items():
             if number in wanted and at not in found:
                 yield Stored(channels[number].topic, time_ns, b"", DAMAGED)
 
     def _found(self, contents: Contents, piece: Piece) -> tuple[dict[int, Any], bool]:
-        """Messages of a piece by their offsets in it, and whether the piece is undamaged; its channels are registered."""
+        """Messages of a piece by their offsets in it, and whether it is undamaged; its channels are registered."""
         from mcap.records import Message
 
         data, whole = self._unpacked(piece)
@@ -193,7 +197,9 @@ class McapFile(BagFile):
         data = unpacked(piece.compression, packed, piece.unpacked_bytes)
         whole = len(data) == piece.unpacked_bytes
         if whole and crc and zlib.crc32(data) != crc:
-            self.flaws.append(f"the checksum of the chunk at byte {piece.at} differs; its messages are read as they are")
+            self.flaws.append(
+                f"the checksum of the chunk at byte {piece.at} differs; its messages are read as they are"
+            )
         return data, whole
 
     def _indexed(self, piece: Piece) -> dict[int, tuple[int, int]]:
@@ -260,8 +266,8 @@ def _summary(view: View) -> Contents:
 
 
 def _scanned(view: View) -> Contents:
-    """Contents by a walk from record to record. After bytes that are no record it goes on at the next chunk or message."""
-    from mcap.records import ChunkIndex, Statistics
+    """Contents by a walk from record to record. Behind damaged bytes it goes on at the next chunk or message."""
+    from mcap.records import ChunkIndex
 
     contents = Contents()
     at = MAGIC_BYTES
@@ -271,14 +277,16 @@ def _scanned(view: View) -> Contents:
         end = at + HEAD_BYTES + _length(view, at)
         try:
             if opcode == CHUNK:
-                contents.pieces.append(_chunk_at(view, at))
+                piece = _chunk_at(view, at)
+                contents.pieces.append(piece)
+                end = piece.at + piece.size
             elif opcode == MESSAGE:
                 contents.pieces.append(_message_at(view, at))
             else:
                 record, _ = record_at(view, at)
                 if opcode == MESSAGE_INDEX and contents.pieces:
                     _add_index(contents.pieces, record.channel_id, at)
-                elif not isinstance(record, (ChunkIndex, Statistics)):
+                elif not isinstance(record, ChunkIndex) and _consistent(record):
                     contents.register(record)
         except Exception:  # its bytes may be anything
             contents.gaps.append(at)
@@ -286,7 +294,23 @@ def _scanned(view: View) -> Contents:
         else:
             before = at
         at = end
+    contents.pieces = _in_order(contents.pieces)
     return contents
+
+
+def _consistent(record: Any) -> bool:
+    """Whether statistics, which may be damaged, agree with themselves."""
+    counts = getattr(record, "channel_message_counts", None)
+    return counts is None or sum(counts.values()) == record.message_count
+
+
+def _in_order(pieces: list[Piece]) -> list[Piece]:
+    """Pieces whose begins are damaged begin with the piece before."""
+    begins = [piece.start_ns for piece in pieces]
+    for k in range(1, len(begins) - 1):
+        if begins[k - 1] <= begins[k + 1] and not begins[k - 1] <= begins[k] <= begins[k + 1]:
+            begins[k] = begins[k - 1]
+    return [replace(piece, start_ns=begin) for piece, begin in zip(pieces, begins, strict=True)]
 
 
 def _next_begin(view: View, at: int) -> int:
@@ -310,13 +334,18 @@ def _chunk_at(view: View, at: int) -> Piece:
         ValueError: there is none.
     """
     body = at + HEAD_BYTES
-    start_ns, end_ns, unpacked_bytes, _, name_bytes = struct.unpack_from("<3Q2I", view, body)
+    start_ns, _, unpacked_bytes, _, name_bytes = struct.unpack_from("<3Q2I", view, body)
     if name_bytes > 4:
         raise ValueError("no chunk")
     compression = bytes(view[body + 32 : body + 32 + name_bytes]).decode()
     size = _u64(view, body + 32 + name_bytes)
-    whole = _length(view, at) == CHUNK_BYTES + name_bytes + size
-    if not whole or compression not in COMPRESSIONS or start_ns > end_ns or not unpacked_bytes:
+    end = body + CHUNK_BYTES + name_bytes + size
+    agree = end - body == _length(view, at)
+    if not agree and compression:  # one of its two sizes is damaged: that of the records counts if a record follows
+        agree = (
+            end + HEAD_BYTES <= len(view) and 0 < view[end] <= LAST_OPCODE and _length(view, end) < len(view) - end
+        )
+    if not agree or compression not in COMPRESSIONS or not unpacked_bytes:
         raise ValueError("no chunk")
     return Piece(start_ns, body + CHUNK_BYTES + name_bytes, size, compression, unpacked_bytes)
 
@@ -343,9 +372,7 @@ MOST_APART_NS = 10**9 * 86_400 * 365
 
 def _add_index(pieces: list[Piece], number: int, at: int) -> None:
     """Add the index at an offset to the last piece."""
-    last = pieces[-1]
-    indices = {**last.indices, number: at}
-    pieces[-1] = Piece(last.start_ns, last.at, last.size, last.compression, last.unpacked_bytes, indices)
+    pieces[-1] = replace(pieces[-1], indices={**pieces[-1].indices, number: at})
 
 
 def record_at(view: View, at: int) -> tuple[Any, int]:

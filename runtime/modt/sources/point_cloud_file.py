@@ -41,12 +41,12 @@ def viewpoint_of(raw: bytes) -> Float64 | None:
     """(4, 4) pose of the sensor by the line VIEWPOINT of a PCD file; None without one, or if it is the identity."""
     line = re.search(rb"^VIEWPOINT[ \t]+([^\r\n]+)", raw[:MAX_HEADER_BYTES], re.MULTILINE)
     try:
-        x, y, z, qw, qx, qy, qz = map(float, line[1].split()) if line else ()
+        x, y, z, qw, qx, qy, qz = map(float, line[1].split() if line else [])
     except ValueError:
         return None
     if not 0.9 < math.hypot(qw, qx, qy, qz) < 1.1 or not math.isfinite(x + y + z):
         return None
-    T = se3(rotation_of(np.array([qx, qy, qz, qw])), [x, y, z])
+    T = se3(rotation_of(np.array([qx, qy, qz, qw])), np.array([x, y, z]))
     return None if np.allclose(T, np.eye(4), atol=1e-6) else T
 
 

@@ -120,7 +120,7 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
 
 
 def _is_bag(path: Path) -> bool:
-    """Whether a path is a recording: a file, or a folder of the files of one recording and of nothing else to read."""
+    """Whether a path is a recording: a file, or a folder of the files of one recording without scans."""
     if not path.is_dir():
         return path.is_file() and path.name.endswith(BAGS)
     from modt.sources.bag_files import METADATA, bag_in

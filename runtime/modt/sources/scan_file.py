@@ -64,7 +64,8 @@ def _read_rows(path: Path, raw: bytes) -> Float32:
         raise ScanError(path, cause, "the frame is skipped; copy it again, or convert it to x, y, z, reflectance")
     points = np.frombuffer(raw, np.float32).reshape(-1, columns)[:, :COLUMNS].copy()
     if columns == NUSCENES_COLUMNS:
-        points[:, :2] = points[:, 1::-1] * np.float32([1, -1])
+        points[:, :2] = points[:, 1::-1]
+        points[:, 1] *= -1
     return points
 
 

@@ -1,18 +1,20 @@
 """Rows of a rosbag2 database by its pages, where SQLite cannot find its way to them.
 
-The format is that of https://www.sqlite.org/fileformat2.html. A row of `messages` is told by its shape: no number of its
-own (the row has it), two whole numbers, and bytes. A row of `topics` has texts instead.
+The format is that of https://www.sqlite.org/fileformat2.html. A row of `messages` is told by its shape: no number of
+its own (the row has it), two whole numbers, and bytes. A row of `topics` has texts instead.
 """
 
 from __future__ import annotations
 
 import mmap
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-PAGE_BYTES = 4096
-"""Size of a page where the header of the file does not tell."""
-HEADER = b"SQLite format 3\0"
+PAGE_BYTES = (4096, 1024, 2048, 8192, 16_384, 32_768, 65_536)
+"""Sizes of a page that are tried where the header of the file is damaged."""
+RESERVED_AT = 20
+"""Offset in the file of the number of bytes of each page that are not used."""
 FILE_HEADER_BYTES = 100
 LEAF = 13
 """Kind of a page that holds rows of a table."""
@@ -38,18 +40,21 @@ class Pages:
     def __init__(self, path: Path) -> None:
         with path.open("rb") as file:
             self._view = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        size = int.from_bytes(self._view[16:18], "big")
-        size = MAX_PAGE_BYTES if size == 1 else size
-        sane = self._view[:16] == HEADER and MIN_PAGE_BYTES <= size and not size & (size - 1)
-        self._page_bytes = size if sane else PAGE_BYTES
-        self._usable = self._page_bytes - (self._view[20] if sane else 0)
         self.topics: list[tuple[Any, ...]] = []
         self.messages: list[tuple[int, int, int]] = []
         self._cells: dict[int, tuple[int, int]] = {}  # place of the row of each message, and offset of its bytes
-        self._read()
+        stated = int.from_bytes(self._view[16:18], "big")
+        for page_bytes in dict.fromkeys((MAX_PAGE_BYTES if stated == 1 else stated, *PAGE_BYTES)):
+            if page_bytes >= MIN_PAGE_BYTES and not page_bytes & (page_bytes - 1) and not self.messages:
+                self._page_bytes = page_bytes
+                self._usable = page_bytes - self._view[RESERVED_AT]
+                self.topics.clear()
+                self._read()
 
     def blob(self, number: int) -> bytes | None:
         """Bytes of a message; None if their pages are not all there."""
+        if number not in self._cells:
+            return None
         place, offset = self._cells[number]
         payload = self._payload(place)
         return None if payload is None else payload[offset:]
@@ -74,7 +79,7 @@ class Pages:
         size, at = self._varint(place)
         number, at = self._varint(at)
         header_bytes, types_at = self._varint(at)
-        types = []
+        types: list[int] = []
         while types_at < at + header_bytes and len(types) < MAX_COLUMNS:
             kind, types_at = self._varint(types_at)
             types.append(kind)
@@ -90,8 +95,10 @@ class Pages:
             self._cells[number] = (place, header_bytes + sizes[1] + sizes[2])
         elif shapes == [2, 2, 2]:
             ends = [values_at + sum(sizes[:k]) for k in range(1, 5)]
-            name, kind, form = (self._view[a:b].decode() for a, b in zip(ends, ends[1:], strict=False))
-            if "/" in kind and len(form) <= MAX_FORM_CHARACTERS:  # a row of the definitions of messages has a text there
+            name, kind, form = (self._view[a:b].decode() for a, b in pairwise(ends))
+            if (
+                "/" in kind and len(form) <= MAX_FORM_CHARACTERS
+            ):  # a row of the definitions of messages has a text there
                 self.topics.append((number, name, kind, form))
 
     def _payload(self, place: int) -> bytes | None:

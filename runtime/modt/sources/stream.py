@@ -111,7 +111,9 @@ class Reading:
     sweeps: int = 0  # sweeps that they hold, usable or not
     joined: int = 0  # messages that are parts of a turn, and were joined
     times: Counter[str] = field(default_factory=Counter)  # sweeps by what the times of their points are
-    corrected: Counter[str] = field(default_factory=Counter)  # messages by what they say of their layout and is not so
+    corrected: Counter[str] = field(
+        default_factory=Counter
+    )  # messages by what they say of their layout and is not so
     frame_id: str = ""  # frame of the points, where messages name it
     poses: str = ""  # where the poses are from
 
@@ -147,7 +149,8 @@ class Sweep:
     """One turn of a sensor.
 
     Attributes:
-        stamp_s, points, turn_s, mid_rad, frame_id: as in modt.types.Frame; points may hold values that are not finite.
+        stamp_s, points, turn_s, mid_rad, frame_id: as in modt.types.Frame; points may hold values that are not
+            finite.
         complete: no message of the turn is known to be missing.
         index: index of the frame in its recording; None numbers the sweeps as they come.
         waited_s: time for which its last message lay in the kernel before it was read [s].

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -83,7 +84,7 @@ class TurnParts:
     @staticmethod
     def may_be(clouds: Sequence[PointCloud]) -> bool:
         """Whether the first messages of a source may be parts of turns."""
-        return float(np.median([arc_of(cloud.points).extent_rad for cloud in clouds])) < WHOLE_RAD
+        return bool(np.median([arc_of(cloud.points).extent_rad for cloud in clouds]) < WHOLE_RAD)
 
     @classmethod
     def of(cls, messages: Sequence[tuple[PointCloud, float]]) -> TurnParts | None:
@@ -109,7 +110,8 @@ class TurnParts:
 
     def note(self) -> str:
         """Line for the user."""
-        return f"its messages are parts of a turn of {abs(self.turn_s):.3f} s: about {self.n_parts:.3g} are joined to a sweep"
+        what = f"its messages are parts of a turn of {abs(self.turn_s):.3f} s"
+        return f"{what}: about {self.n_parts:.3g} are joined to a sweep"
 
     def add(self, cloud: PointCloud, arrived_s: float) -> PointCloud | None:
         """The turn that a message completes; None if it completes none."""
@@ -157,7 +159,7 @@ def _continued(arcs: Sequence[Arc], way: float) -> float:
     fitting = [
         abs(np.angle(np.exp(1j * (b.begin_rad(way) - a.end_rad(way)))))
         <= max(TOLERANCE_RAD, TOLERANCE_SHARE * min(a.extent_rad, b.extent_rad))
-        for a, b in zip(arcs, arcs[1:], strict=False)
+        for a, b in pairwise(arcs)
     ]
     return float(np.mean(fitting))
 

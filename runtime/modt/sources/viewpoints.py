@@ -15,7 +15,7 @@ from modt.types import Float64
 JUDGED = 3
 """Number of files, those farthest from the origin, by which it is judged in which frame the points are."""
 FAR_M = 2.0
-"""Distance from the origin beyond which points around the sensor and points around the origin can be told apart [m]."""
+"""Distance from the origin beyond which points around the sensor and around the origin can be told apart [m]."""
 SAME_M = 1e-3
 """Poses that differ by less are the same: the place of the sensor on its carrier [m]."""
 

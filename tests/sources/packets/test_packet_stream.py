@@ -113,12 +113,12 @@ def test_one_of_several_sensors_in_a_capture_is_chosen_and_the_others_are_named(
     assert any("--capture host=192.0.2.9" in note for note in stream.info.notes)
     other = open_stream(path, capture={"host": "192.0.2.9"})
     assert 0 < len(list(other)) < alone
-    with pytest.raises(MisuseError, match="no packets of host=192.0.2.7"):
+    with pytest.raises(MisuseError, match=r"no packets of host=192\.0\.2\.7"):
         open_stream(path, capture={"host": "192.0.2.7"})
 
 
 def test_packets_of_a_maker_that_is_not_decoded_are_named(tmp_path):
     msop = bytes.fromhex("55aa050a5aa550a0") + bytes(1240)
     write_capture(tmp_path / "a.pcap", [(1.0, msop)] * 5, 6699)
-    with pytest.raises(MisuseError, match="packets of a RoboSense.*ros2://"):
+    with pytest.raises(MisuseError, match=r"packets of a RoboSense.*ros2://"):
         open_stream(tmp_path / "a.pcap")

@@ -65,7 +65,9 @@ class PointCloudReader:
         self._subscription: Subscription | None = subscription
         self._name = name
         self._missing = MissingSweeps()
-        self._first: list[tuple[PointCloud, float]] | None = []  # until it is known whether messages are parts of turns
+        self._first: (
+            list[tuple[PointCloud, float]] | None
+        ) = []  # until it is known whether messages are parts of turns
         self._parts: TurnParts | None = None
 
     def read(self, timeout_s: float) -> list[Sweep]:

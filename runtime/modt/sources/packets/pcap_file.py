@@ -1,7 +1,7 @@
 """UDP datagrams in PCAP files.
 
-Files of either byte order with stamps in µs or ns are read; IPv4 and IPv6 over Ethernet, Linux cooked, loopback or raw
-IP. Behind damaged bytes reading goes on at the next record.
+Files of either byte order with stamps in µs or ns are read; IPv4 and IPv6 over Ethernet, Linux cooked, loopback or
+raw IP. Behind damaged bytes reading goes on at the next record.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ COOKED_2 = 276
 LINK_HEADERS = {ETHERNET: (12, 14), COOKED: (14, 16), COOKED_2: (0, 20)}
 """Offsets of the protocol and of the payload by link type."""
 IP_AT = {RAW_IP: 0, 12: 0, 14: 0, 228: 0, 229: 0, 0: 4, 108: 4}
-"""Offset of the IP packet by link type: raw IP by its numbers on several systems, IPv4, IPv6, loopback in both orders."""
+"""Offset of the IP packet by link type: raw IP by its numbers on several systems, IPv4, IPv6, loopback."""
 IP_PROTOCOLS = (0x0800, 0x86DD)
 """Protocols of IPv4 and IPv6 in the header of the link."""
 VLAN_TAGS = (0x8100, 0x88A8, 0x9100)
