@@ -122,11 +122,18 @@ def test_misuse_is_one_line_and_status_2(tmp_path, monkeypatch, capsys, argument
 def test_bad_scans_are_counted_and_the_rest_goes_on(tmp_path, capsys, caplog):
     folder = layouts.bare(tmp_path)
     (folder / "000001.bin").write_bytes(b"cut")
-    assert here("replay", folder, "--out", tmp_path / "run") == 0
+    assert here("replay", folder, "--out", tmp_path / "run") == 3
     assert [f["frame"] for f in tracks(tmp_path / "run")] == [0, 2]
-    assert json.loads((tmp_path / "run" / "summary.json").read_text())["faults"]["skipped"] == 1
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["faults"]["skipped"] == 1
     assert "truncated" in caplog.text
-    assert "1 of them skipped" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "1 of them skipped" in said.out
+    assert "not all was read: 2 frames of 3 messages; left out: 1 x truncated" in said.err
+    read = summary["read"]
+    assert (read["messages"], read["sweeps"], read["used"], read["poses"]) == (3, 3, 2, "registration")
+    assert list(read["left_out"].values()) == [1]
+    assert yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())["stream"]["read"] == read
 
 
 @pytest.mark.parametrize(("scale", "unlit"), [("hdl-64e", 2), ("none", 0)])

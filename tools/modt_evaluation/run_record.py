@@ -19,7 +19,7 @@ from modt.placement import Mount
 from modt.sinks.records import BROKEN
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
-from modt.sources.stream import Stream
+from modt.sources.stream import Reading, Stream
 from modt.types import Float32, Frame, Int, Self
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.recorded_result import recorded_result
@@ -37,6 +37,11 @@ class LevelStream:
         camera = stream.info.camera
         self.info = replace(stream.info, camera=camera and mount.camera(camera))
         self.faults = stream.faults
+
+    @property
+    def reading(self) -> Reading:
+        """What was read."""
+        return self._stream.reading
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames."""

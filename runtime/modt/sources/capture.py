@@ -86,8 +86,8 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     """Stream of the sensor whose packets come first in a PCAP file.
 
     `options` are those of the sensor's driver, and `host` and `port`, which choose one of several sensors by the
-    address that its packets come from and the port that they go to. Options of a driver default to files with the name of the
-    capture.
+    address that its packets come from and the port that they go to. Options of a driver default to files with the
+    name of the capture.
 
     Raises:
         MisuseError: no PCAP file, no packets of a sensor, no whole sweep; an invalid option, a missing extra.

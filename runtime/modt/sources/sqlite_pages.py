@@ -95,11 +95,9 @@ class Pages:
             self._cells[number] = (place, header_bytes + sizes[1] + sizes[2])
         elif shapes == [2, 2, 2]:
             ends = [values_at + sum(sizes[:k]) for k in range(1, 5)]
-            name, kind, form = (self._view[a:b].decode() for a, b in pairwise(ends))
-            if (
-                "/" in kind and len(form) <= MAX_FORM_CHARACTERS
-            ):  # a row of the definitions of messages has a text there
-                self.topics.append((number, name, kind, form))
+            name, of, form = (self._view[a:b].decode() for a, b in pairwise(ends))
+            if "/" in of and len(form) <= MAX_FORM_CHARACTERS:  # a definition of messages has a long text there
+                self.topics.append((number, name, of, form))
 
     def _payload(self, place: int) -> bytes | None:
         """Record of the row at a place of the file, with what overflows its page; None if that is not all there."""
