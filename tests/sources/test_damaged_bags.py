@@ -163,3 +163,21 @@ def test_a_damaged_database_gives_all_rows_that_its_pages_hold(tmp_path, what):
     else:
         lost = N - len(frames)
         assert lost <= 4
+
+
+def test_a_file_that_is_missing_by_the_numbers_of_the_others_is_named(tmp_path):
+    for k in (0, 1, 3):
+        write_mcap(tmp_path / f"drive_{k}", clouds(N)[3 * k : 3 * k + 3])
+    stream, frames = read(tmp_path)
+    assert len(frames) == 9
+    assert stream.faults.left_out == {"file number 2 is not there": 1}
+
+
+def test_a_damaged_summary_loses_nothing(tmp_path):
+    path = write_mcap(tmp_path / "drive", clouds(N))
+    raw = bytearray(path.read_bytes())
+    raw[-60:] = b"\xaa" * 60
+    path.write_bytes(raw)
+    stream, frames = read(path)
+    assert frames == list(range(N))
+    assert not stream.faults.count

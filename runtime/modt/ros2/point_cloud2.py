@@ -24,6 +24,8 @@ REFLECTANCES = ("reflectivity", "reflectance", "remission", "remissions", "inten
 _PREFIX = re.compile(r"^(?:(?:scalar|field|vertex|lidar)[_ .])+")
 """Prefixes of CloudCompare and others, as in `scalar_Intensity` and `Scalar_field_intensity`."""
 TIMES = ("time", "t", "timestamp", "offset_time", "time_stamp")
+FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint"})
+"""Conventional names of frames that do not belong to a sensor (REP 105)."""
 MAX_FIELDS = 64
 MAX_DELAY_S = 1.0
 """Greatest difference of the times of points from the header's stamp [s]. Beyond it they count from that stamp."""

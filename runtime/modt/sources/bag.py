@@ -213,11 +213,18 @@ def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingPr
         n_frames=count if parts is None else None,
         period_s=next(steps_s, period_s) if parts is None else round(abs(parts.turn_s), 3),
         has_poses=poses is not None,
-        notes=() if parts is None else (parts.note(),),
+        notes=(*_frame_note(began[0][0].frame_id), *(() if parts is None else (parts.note(),))),
         pose_notes=notes,
         end=count if parts is None else None,
     )
     return BagStream(info, bag, chosen, first, poses, parts)
+
+
+def _frame_note(frame_id: str) -> tuple[str, ...]:
+    """A line about points that are not in the frame of a sensor."""
+    if frame_id.rpartition("/")[2] not in point_cloud2.FOREIGN_FRAMES:
+        return ()
+    return (f"points are in the frame {frame_id!r}, not in the sensor's: record what its driver publishes",)
 
 
 def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:

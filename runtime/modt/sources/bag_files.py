@@ -17,6 +17,8 @@ KINDS: dict[str, type[BagFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
 METADATA = "metadata.yaml"
 _PART = re.compile(r"^(.*?)[_-]?\d*$")
 """Name of the recording in the name of one of its files without its suffix."""
+_NUMBER = re.compile(r"_(\d{1,6})$")
+"""Number of a file of a split recording in its name without its suffix."""
 
 
 class Bag:
@@ -36,9 +38,9 @@ class Bag:
         self.flaws: list[str] = []
         self.missing: Counter[str] = Counter()
         self.files: list[BagFile] = []
-        self._unread: list[str] = []  # flaws of files that cannot be opened
         self._topics: dict[str, BagTopic] = {}
         paths, self._promised = _listed(path)
+        self._unread = [f"file number {number} is not there" for number in _missing(paths)]  # flaws of files
         error = ModtError(path, "none of its files is there", "copy the whole folder")
         for file in paths:
             try:
@@ -113,6 +115,13 @@ def bag_in(folder: Path) -> list[Path]:
     if len({_stem(file) for file in files}) > 1 and not (folder / METADATA).is_file():
         return []
     return sorted(files, key=lambda file: (len(file.name), file.name))
+
+
+def _missing(paths: list[Path]) -> list[int]:
+    """Numbers that are missing between those of the files of a recording."""
+    numbers = {int(match[1]) for path in paths if (match := _NUMBER.search(path.name.partition(".")[0]))}
+    within = range(min(numbers), max(numbers)) if len(numbers) == len(paths) > 1 else ()
+    return [number for number in within if number not in numbers]
 
 
 def _stem(file: Path) -> str:

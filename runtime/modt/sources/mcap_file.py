@@ -30,7 +30,7 @@ CRC_AT = 25
 MESSAGE = 5
 CHUNK = 6
 MESSAGE_INDEX = 7
-LAST_OPCODE = 15
+LAST_OPCODE = DATA_END = 15
 CHUNK_BYTES = 40
 """Size of a chunk without the name of its compression and without its records."""
 COMPRESSIONS = ("", "zstd", "lz4")
@@ -272,6 +272,7 @@ def _scanned(view: View) -> Contents:
     contents = Contents()
     at = MAGIC_BYTES
     before = at
+    ended = False
     while at + HEAD_BYTES <= len(view):
         opcode = view[at]
         end = at + HEAD_BYTES + _length(view, at)
@@ -289,10 +290,12 @@ def _scanned(view: View) -> Contents:
                 elif not isinstance(record, ChunkIndex) and _consistent(record):
                     contents.register(record)
         except Exception:  # its bytes may be anything
-            contents.gaps.append(at)
+            if not ended:  # behind the end of the data there is but a summary
+                contents.gaps.append(at)
             end = _next_begin(view, before + 1 if view[before] == MESSAGE else at + 1)
         else:
             before = at
+            ended = ended or opcode == DATA_END
         at = end
     contents.pieces = _in_order(contents.pieces)
     return contents

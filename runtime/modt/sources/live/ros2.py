@@ -11,7 +11,7 @@ from modt.address import Address
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
-from modt.ros2.point_cloud2 import TYPE, PointCloud, read_cloud
+from modt.ros2.point_cloud2 import FOREIGN_FRAMES, TYPE, PointCloud, read_cloud
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.stream import Reception, StreamInfo, Sweep
 from modt.sources.turn_parts import TurnParts
@@ -51,8 +51,6 @@ WATCHED = 8
 """Number of messages by which it is known whether they are parts of turns."""
 DEPTH = 5
 """Number of sweeps that wait to be read, as in ROS 2's QoS for sensors."""
-FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint"})
-"""Conventional names of frames that do not belong to a sensor (REP 105)."""
 
 
 class PointCloudReader:
