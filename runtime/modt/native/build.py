@@ -72,6 +72,7 @@ def compile_library(out: Path, instructions: str, target: str | None = None, fla
     command = [*compiler(target), *flags, f'-DMODT_SOURCES="{source_hash()}"']
     if instructions == X86_64_V3:
         command.append("-march=x86-64-v3" if target is None else "-mcpu=x86_64_v3")
+        command.append("-mno-fma")  # GCC 12 contracts a difference beside a sum of products despite -ffp-contract
     sources = [path.name for path in sorted(FOLDER.glob("*.c"))]
     try:
         command += ["-o", str(out.resolve()), *sources]
