@@ -14,7 +14,7 @@ from modt.types import Budget
 from modt_simulation.synthetic_stream import SyntheticStream
 
 FRAMES = list(SyntheticStream("street", "vlp-16", 0.4, seed=3))
-BOOKED = {SEGMENTATION: 1, ODOMETRY: 1, TRACKING: 2, FUSION: 4, SCHEDULING: 1, CLASSIFICATION: 1}
+BOOKED = {SEGMENTATION: 1, ODOMETRY: 1, TRACKING: 3, FUSION: 4, SCHEDULING: 1, CLASSIFICATION: 1}
 """Calls of a step that classifies."""
 
 

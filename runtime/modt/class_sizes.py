@@ -11,6 +11,10 @@ from modt.types import NONE, Bool, Cut, Float32, Float64, FrameResult
 
 MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
 """(4, 2) greatest length and width of each class."""
+USUAL_SIZE_M: Float64 = np.array([spec.usual_m for spec in CLASSES.values()])
+"""(4, 3) usual length, width and height of each class."""
+USUAL_SPREAD_M: Float64 = np.array([spec.spread_m for spec in CLASSES.values()])
+"""(4, 3) their deviations."""
 MAX_CAR_M = CLASSES[ObjectClass.CAR].max_length_m
 """Length of the longest car."""
 MAX_PERSON_M = CLASSES[ObjectClass.PEDESTRIAN].max_length_m

@@ -27,6 +27,7 @@ class ClassSpec:
         missed_cost: cost of a missed object, relative to a false one.
         point_change: relative change of the number of points that makes a view independent (alpha of Equation 4).
         colour: in pictures and pages.
+        usual_m, spread_m: mean and deviation of length, width and height [m]; of a pedestrian while standing.
     """
 
     kitti: tuple[str, ...]
@@ -37,6 +38,8 @@ class ClassSpec:
     missed_cost: float
     point_change: float
     colour: str
+    usual_m: tuple[float, float, float] = (4.2, 1.8, 1.6)
+    spread_m: tuple[float, float, float] = (0.45, 0.13, 0.13)
 
 
 CLASSES: dict[ObjectClass, ClassSpec] = {
@@ -44,9 +47,20 @@ CLASSES: dict[ObjectClass, ClassSpec] = {
     ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, False, 0.0, 0.5, "#8a8f98"),
     ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 1.5, 0.2, "#2f6fde"),
     ObjectClass.PEDESTRIAN: ClassSpec(
-        ("Pedestrian", "Person", "Person_sitting"), (30, 254), 1.1, 1.1, True, 1.0, 0.16, "#d9480f"
+        ("Pedestrian", "Person", "Person_sitting"),
+        (30, 254),
+        1.1,
+        1.1,
+        True,
+        1.0,
+        0.16,
+        "#d9480f",
+        (0.65, 0.68, 1.75),
+        (0.2, 0.12, 0.1),
     ),
-    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 1.0, 0.22, "#2b8a3e"),
+    ObjectClass.CYCLIST: ClassSpec(
+        ("Cyclist",), (31, 253), 2.2, 1.1, True, 1.0, 0.22, "#2b8a3e", (1.8, 0.65, 1.75), (0.25, 0.12, 0.1)
+    ),
 }
 """The classes in the order of their values."""
 

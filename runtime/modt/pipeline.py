@@ -12,6 +12,7 @@ from modt.classification.decision import LikeliestClass
 from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import STAGES as LEDGER_STAGES
 from modt.energy.ledger import Ledger
+from modt.object_box.estimator import SeenBoxes
 from modt.observations import Located, StaticTracks
 from modt.placement import LEVEL, Mount
 from modt.types import (
@@ -104,6 +105,7 @@ class Pipeline:
     scheduler: Scheduler
     classifier: ClassificationStage
     decision: LikeliestClass
+    boxes: SeenBoxes
     ledger: Ledger
     mount: Mount = LEVEL
 
@@ -126,6 +128,7 @@ class Pipeline:
             likelihood = self._classify(frame.points, proposals, motion.proposal[rows], budget)
             confirmed = run(FUSION, self.fusion.fuse, tracked.own_evidence, motion, proposals, rows, likelihood)
         run(FUSION, self.decision.decide, tracked.decisions, evidence, motion)
+        run(TRACKING, self.boxes.estimate, tracked.boxes, motion, tracked.decisions, proposals, located.placement)
         # Last, since it takes the snapshot of all columns, the reported class among them.
         tracks = run(TRACKING, self.tracker.confirm, rows, confirmed)
         placement = located.placement

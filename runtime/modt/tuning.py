@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from modt.classification.tuning import ClassificationTuning
 from modt.geometry.tuning import ShapeTuning
+from modt.object_box.tuning import ObjectBoxTuning
 from modt.odometry.tuning import OdometryTuning
 from modt.segmentation.tuning import SegmentationTuning
 from modt.tracking.tuning import TrackingTuning
@@ -23,3 +24,4 @@ class MethodTuning:
     odometry: OdometryTuning = OdometryTuning()
     tracking: TrackingTuning = TrackingTuning()
     classification: ClassificationTuning = ClassificationTuning()
+    object_box: ObjectBoxTuning = ObjectBoxTuning()

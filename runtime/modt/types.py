@@ -327,8 +327,6 @@ class Motion(Columns):
     moving_probability: Float64 = column(float, fill=0.5)  # probability that it moves
     velocity: Float64 = column(float, 2)  # velocity, about 0 of what is still [m/s, world]
     velocity_covariance: Float64 = column(float, 2, 2)  # its covariance [m2/s2]
-    whole_box: Float64 = column(float, 7)  # box of the whole object: x, y, z, l, w, h [m], yaw [rad], world frame
-    heading_known: Bool = column(bool)  # whether the yaw of `whole_box` is that of its front
 
     @property
     def observed(self) -> Bool:
@@ -382,7 +380,21 @@ class Decisions(Columns):
 
 
 @dataclass(frozen=True)
-class Tracks(Decisions, Requests, Evidence, Motion):
+class ObjectBoxes(Columns):
+    """Columns of the boxes of whole objects."""
+
+    whole_box: Float64 = column(float, 7)  # box of the whole object: x, y, z, l, w, h [m], yaw [rad], world frame
+    heading_known: Bool = column(bool)  # whether the yaw of `whole_box` is that of its front
+    estimated: Bool = column(bool)  # the columns below have been written
+    heading: Float64 = column(float, 2)  # unit vector [world]
+    heading_variance: Float64 = column(float)  # variance of its angle [rad2]
+    axis_evidence: Float64 = column(float)  # log-likelihood ratio of the heading over those across it
+    known_m: Float64 = column(float, 3)  # length, width and height known from the views [m]
+    centre_offset: Float64 = column(float, 2)  # from the position of the track to the centre of the box [m, world]
+
+
+@dataclass(frozen=True)
+class Tracks(ObjectBoxes, Decisions, Requests, Evidence, Motion):
     """All columns side by side, in the order of the parts from right to left."""
 
     @property
@@ -401,6 +413,7 @@ class TrackedFrame:
     own_evidence: Evidence  # the same arrays, written by the fusion
     requests: Requests  # written by the scheduler
     decisions: Decisions  # written by the decision
+    boxes: ObjectBoxes  # written by the stage of the object boxes
     proposals: Proposals  # proposals of the frame after regrouping; each belongs to one track
     wants_class: Bool  # (M,) tracks with a proposal whose state asks for a class
 

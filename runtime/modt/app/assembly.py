@@ -29,6 +29,8 @@ from modt.geometry.kernels import GeometryKernels
 from modt.geometry.tuning import ShapeTuning
 from modt.model_file import ModelFile
 from modt.native.library import NotAvailableError, load
+from modt.object_box.estimator import SeenBoxes
+from modt.object_box.native_estimator import whole_boxes_of
 from modt.odometry.pose_estimator import PoseEstimator
 from modt.pipeline import ClassificationStage, FusionStage, Pipeline, SegmentationStage
 from modt.placement import Mount
@@ -226,6 +228,7 @@ def stages(
         decision = LikeliestClass(profile.decision, network.class_frequency)
     else:
         decision = Decision(profile.decision, network.class_frequency, chosen.decision)
+    boxes = whole_boxes_of(kernels, tuning.object_box) if profile.tracking.extensions == "all" else SeenBoxes()
     return Pipeline(
         segmenter=segmenter,
         odometry=odometry,
@@ -241,6 +244,7 @@ def stages(
         scheduler=Scheduler(cost, profile.sensor.period_s, chosen.worth),
         classifier=classifier,
         decision=decision,
+        boxes=boxes,
         ledger=ledger,
         mount=Mount.of(profile.sensor.roll_deg, profile.sensor.pitch_deg),
     )

@@ -53,6 +53,15 @@ static ALWAYS_INLINE void extent_along(const float *const xyz[3], i64 begin, i64
     }
 }
 
+/* Least and greatest coordinates of the points from `begin` to before `end` along a heading, and to the left of it. */
+void extent_at(const float *const xyz[3], i64 begin, i64 end, double cosine, double sine, float least[2],
+               float greatest[2])
+{
+    float c = (float)cosine, s = (float)sine;
+    float axes[3][AXES] = {{c, -s}, {s, c}, {0.0f, 0.0f}};
+    extent_along(xyz, begin, end, axes, 2, least, greatest);
+}
+
 /* kdop_ends: k-DOPs (8, n_groups) of groups of points, given the axes (3, 4). */
 EXPORT void modt_kdop_ends(const float *x, const float *y, const float *z, const i64 *offsets, i64 n_groups,
                            const float axes[3][AXES], float *kdop)

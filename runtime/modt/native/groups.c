@@ -191,7 +191,7 @@ typedef struct {
 } Extent;
 
 /* best_headings: index of the best heading of each of n groups, by at most `limit` of the points at its rows, at a
- * constant stride. Cosines and sines are those of the headings, then of what lies across them.
+ * constant stride; without rows, of the points themselves. Cosines and sines are those of the headings, then of what lies across them.
  *
  * A first pass over the points of a group finds its sides at every heading, a second one the closeness of the
  * points to them. Headings are padded to a multiple of LANES with directions of no length, so that both loops are
@@ -216,7 +216,8 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
         }
         i64 stride = (offsets[g + 1] - offsets[g] + limit - 1) / limit;
         for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
-            float here_x = x[rows[i]], here_y = y[rows[i]];
+            i64 row = rows ? rows[i] : i;
+            float here_x = x[row], here_y = y[row];
             for (int v = 0; v < 2; v++)
                 for (i32 a = 0; a < padded; a++) {
                     float along = c[v][a] * here_x + s[v][a] * here_y;
@@ -225,7 +226,8 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
                 }
         }
         for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride) {
-            float here_x = x[rows[i]], here_y = y[rows[i]];
+            i64 row = rows ? rows[i] : i;
+            float here_x = x[row], here_y = y[row];
             for (i32 a = 0; a < padded; a++) {
                 float u = c[0][a] * here_x + s[0][a] * here_y, v = c[1][a] * here_x + s[1][a] * here_y;
                 float to_u = minf(u - e.low[0][a], e.high[0][a] - u);

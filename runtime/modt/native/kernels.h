@@ -7,6 +7,7 @@
 #ifndef MODT_KERNELS_H
 #define MODT_KERNELS_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #ifdef MODT_CHECKED
@@ -133,5 +134,10 @@ void place_surface_scratch(i64 n, uintptr_t *end, SurfaceScratch *s);
 /* find_surfaces of structure.py, for n > 0 cells. Returns how many of them are on a surface. */
 i64 find_surfaces(const StructureRules *r, const double *x, const double *y, const double *width_m, i64 n,
                   const SurfaceScratch *s, uint8_t *on_surface, double *before_m);
+
+EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, const i64 *offsets, i64 n, i64 limit,
+                               const float *cosines, const float *sines, i32 headings, float noise_m, i64 *best);
+void extent_at(const float *const xyz[3], i64 begin, i64 end, double cosine, double sine, float least[2],
+               float greatest[2]);
 
 #endif

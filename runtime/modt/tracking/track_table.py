@@ -14,6 +14,7 @@ from modt.types import (
     Float64,
     Int,
     Motion,
+    ObjectBoxes,
     Proposals,
     Requests,
     TrackedFrame,
@@ -74,7 +75,8 @@ class LiveTracks:
         self._evidence = Evidence.of(table)
         self._requests = Requests.of(table)
         self._decisions = Decisions.of(table)
-        self.table = table.read_only(Evidence, Requests, Decisions)
+        self._boxes = ObjectBoxes.of(table)
+        self.table = table.read_only(Evidence, Requests, Decisions, ObjectBoxes)
 
     def renew(self, kept: Int, n_new: int) -> Int:
         """Keep these rows, in their order, and add blank ones with new identities, whose rows are returned."""
@@ -91,6 +93,7 @@ class LiveTracks:
             own_evidence=self._evidence,
             requests=self._requests,
             decisions=self._decisions,
+            boxes=self._boxes,
             proposals=proposals.lock(),
             wants_class=wants_class,
         )

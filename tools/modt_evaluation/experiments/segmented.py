@@ -33,6 +33,7 @@ from modt.types import (
     Frame,
     Int,
     Motion,
+    ObjectBoxes,
     Proposals,
     Requests,
     TrackedFrame,
@@ -230,6 +231,7 @@ class IdealTracking(PlayedBack):
             own_evidence=Evidence.of(t),
             requests=Requests.of(t),
             decisions=Decisions.of(t),
+            boxes=ObjectBoxes.of(t),
             proposals=proposals,
             wants_class=t.observed & ~t.final,
         )
