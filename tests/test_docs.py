@@ -12,8 +12,10 @@ import yaml
 from modt.classes import CLASS_NAMES
 from modt.reporting.summary import Summary
 from modt.sinks.topics import TopicOptions, topics
+from modt_evaluation.box_score import BoxScore
 from modt_evaluation.class_score import ClassScore
 from modt_evaluation.evaluation import Evaluation, RangeScore, SegmentationScore
+from modt_evaluation.reaction import Reaction
 from modt_evaluation.track_score import TrackScore
 from modt_simulation.synthetic_stream import SyntheticStream
 from tests import results
@@ -93,7 +95,7 @@ def test_the_costmap_of_nav2_reads_topics_of_modt_and_drops_no_point_by_its_defa
 
 def test_the_formats_name_every_field():
     record = results.frame_record(results.result(0, [5], {0: 0}))
-    scores = (Evaluation, RangeScore, SegmentationScore, ClassScore, TrackScore)
+    scores = (Evaluation, RangeScore, SegmentationScore, ClassScore, TrackScore, BoxScore, Reaction)
     fields = {f.name for score in scores for f in dataclasses.fields(score)}
     fields |= record.keys() | record["tracks"][0].keys() | Summary().result().keys()
     text = (DOCS / "formats.md").read_text()

@@ -10,9 +10,11 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES
 from modt.types import NONE
+from modt_evaluation.box_score import BoxScore, box_scores
 from modt_evaluation.class_score import ClassScore, class_scores, top_calibration_error
 from modt_evaluation.frame import JudgedFrame
-from modt_evaluation.matching import judge
+from modt_evaluation.matching import judged_rows
+from modt_evaluation.reaction import Reaction, reactions
 from modt_evaluation.rows import Association, Outcome, Rows, kinds, ratio
 from modt_evaluation.rules import Rules
 from modt_evaluation.track_score import TrackScore, track_metrics, track_scores
@@ -53,7 +55,7 @@ RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0)
 
 @dataclass(frozen=True, slots=True)
 class DriveRows:
-    """Judged rows of one drive: its tables of objects and proposals, and its associations by class and frame."""
+    """Judged rows of one drive: tables of its objects, proposals and reported objects, and associations by class."""
 
     rules: Rules
     frames: int
@@ -61,6 +63,7 @@ class DriveRows:
     classified: int
     objects: Rows
     proposals: Rows
+    reported: Rows
     associations: tuple[tuple[Association, ...], ...]
 
 
@@ -87,6 +90,8 @@ class Evaluation:
     ranges: dict[str, RangeScore]  # scores by band of range
     tracks: dict[str, TrackScore]  # scores of all objects, by class and by labelled type
     metrics: dict[str, dict[str, float]] | None  # metrics of all classes and of each; None without trackeval
+    boxes: dict[str, BoxScore]  # scores of boxes and velocities, by class
+    reaction: dict[str, Reaction]  # frames until objects are reported, by class
     calibration_error: float | None  # expected, of the most probable class, over all judged proposals
     calibration_error_of_objects: float | None  # the same over the proposals that stand for an object
 
@@ -100,14 +105,14 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Driv
     judged = []
     n_proposals = classified = 0
     for frame in frames:
-        judged.append(judge(frame, rules, drive))
+        judged.append(judged_rows(frame, rules, drive))
         n_proposals += frame.n_proposals
         classified += frame.classified
     if not judged:
         raise ValueError("no frames")
-    objects, proposals, associations = zip(*judged, strict=True)
+    objects, proposals, associations, reported = zip(*judged, strict=True)
     by_class = tuple(zip(*associations, strict=True))
-    rows = np.concatenate(objects), np.concatenate(proposals)
+    rows = np.concatenate(objects), np.concatenate(proposals), np.concatenate(reported)
     return DriveRows(rules, len(judged), n_proposals, classified, *rows, by_class)
 
 
@@ -131,6 +136,8 @@ def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
         ranges={name: _in_range(objects, proposals, *band) for name, band in RANGES_M.items()},
         tracks=track_scores(objects, proposals),
         metrics=_metrics(drives) if (objects["id"] != NONE).any() else None,
+        boxes=box_scores(objects, np.concatenate([drive.reported for drive in drives])),
+        reaction=reactions(objects),
         calibration_error=top_calibration_error(judged["posterior"], judged["label"]),
         calibration_error_of_objects=top_calibration_error(on_objects["posterior"], on_objects["label"]),
     )

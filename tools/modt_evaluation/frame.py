@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.geometry import FieldOfView
+from modt.geometry import FieldOfView, inverse, transform_boxes
 from modt.types import NONE, Float32, Float64, FrameResult, Int, Self
 from modt_evaluation.truth import FrameTruth
 
@@ -27,6 +27,10 @@ class JudgedFrame:
     posterior: Float64  # (M, 4)
     truth: FrameTruth
     fov: FieldOfView = field(default_factory=FieldOfView)
+    box: Float64 | None = None  # (M, 7) whole boxes, sensor frame
+    velocity: Float64 | None = None  # (M, 2) [m/s, world]
+    T_world_sensor: Float64 = field(default_factory=lambda: np.eye(4))
+    stamp_s: float = 0.0
 
     @classmethod
     def of_result(cls, result: FrameResult, truth: FrameTruth, fov: FieldOfView | None = None) -> Self:
@@ -45,6 +49,10 @@ class JudgedFrame:
             posterior=tracks.posterior[seen],
             truth=truth,
             fov=FieldOfView() if fov is None else fov,
+            box=transform_boxes(inverse(result.T_world_sensor), tracks.whole_box[seen]),
+            velocity=tracks.velocity[seen],
+            T_world_sensor=result.T_world_sensor,
+            stamp_s=result.frame.stamp_s,
         )
 
     @classmethod

@@ -5,10 +5,14 @@ docs/evaluation.md states the rules.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from modt.classes import N_CLASSES
+from modt.geometry import inverse, transform
 from modt.types import NONE, Bool, Float32, Int
+from modt_evaluation.boxes import reported_rows
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
 from modt_evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
@@ -19,6 +23,15 @@ PARKED_PAD_M = 0.4
 """Margin of the box of a parked car [m]. A proposal mostly within it is part of that car."""
 
 
+class JudgedRows(NamedTuple):
+    """Tables of a frame's objects, tracked proposals and reported objects, and the associations of each class."""
+
+    objects: Rows
+    proposals: Rows
+    associations: tuple[Association, ...]
+    reported: Rows
+
+
 def judge(
     frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None
 ) -> tuple[Rows, Rows, tuple[Association, ...]]:
@@ -26,6 +39,11 @@ def judge(
 
     `points` are the points of the labelled objects, where they are known.
     """
+    return judged_rows(frame, rules, drive, points)[:3]
+
+
+def judged_rows(frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None) -> JudgedRows:
+    """All rows of a frame; `points` are the points of the labelled objects, where they are known."""
     overlap = Overlap.of(frame, points)
     objects = _objects(frame, overlap, rules)
     # (n,) whether the best proposal of each object stands for it
@@ -42,8 +60,10 @@ def judge(
     objects["reported"] = np.where(objects["outcome"] == Outcome.DETECTED, best["reported"], NONE)
     objects["reported_by_match"] = np.where(pairs, best["reported"], NONE)
     objects["track"] = np.where(overlap.most > 0, best["track"], NONE)
+    objects["reported_by_best"] = np.where(overlap.most_of_proposal & (overlap.most > 0), best["reported"], NONE)
     tracked = np.isin(np.arange(len(proposals)), frame.of_track)
-    return objects, proposals[tracked], _associations(overlap, objects, proposals)
+    reported = reported_rows(frame, objects, proposals["to_report"], drive)
+    return JudgedRows(objects, proposals[tracked], _associations(overlap, objects, proposals), reported)
 
 
 def _associations(overlap: Overlap, objects: Rows, proposals: Rows) -> tuple[Association, ...]:
@@ -81,6 +101,9 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
         to_classify=of_class & (cut_counts | (in_view & in_sector)) & near & np.isin(truth.role, CLASSIFIED),
         to_follow=of_class & wanted,
         outcome=_outcome(overlap),
+        stamp_s=frame.stamp_s,
+        position=transform(frame.T_world_sensor @ inverse(truth.T_box_sensor), truth.box[:, :3])[:, :2],
+        points=overlap.count,
     )
 
 

@@ -20,6 +20,11 @@ FAILURES = ("merged", "split", "partial", "missed", "cut")
 TRACKS = ["objects", "length", "ideal", "ratio", "as seen", "its ideal", "labelled", "breaks", "taken", "mixed"]
 METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")
 EVENTS = ("id_switches", "fragmentations")
+BOXES = (
+    *("matched", "centre [m]", "shape", "heading [rad]", "axis [rad]", "velocity [m/s]", "moving", "theirs [m/s]"),
+    *("IoU .7/.5/.5", "IoU .5/.25/.25"),
+)
+REACTION = ("entered", "median", "p90", "never", "at start", "median", "p90", "never")
 LEGEND = "  Rows car, pedestrian, cyclist: classes (vans as cars, unless --classes paper); others: types of labels."
 
 COMPLETE = "labels are taken for complete"
@@ -39,6 +44,8 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
     yield from _segmentation(e)
     yield from _classes(e)
     yield from _tracks(e)
+    yield from _boxes(e)
+    yield from _reaction(e)
 
 
 def _segmentation(e: Evaluation) -> Iterator[str]:
@@ -82,6 +89,40 @@ def _tracks(e: Evaluation) -> Iterator[str]:
         measured = e.metrics.items()
         rows = [[k, *(_percent(m[n]) for n in METRICS), *(_number(m[n], 0) for n in EVENTS)] for k, m in measured]
         yield from _table("metrics [%], and counts", [*METRICS, *EVENTS], rows)
+
+
+def _boxes(e: Evaluation) -> Iterator[str]:
+    rows = []
+    for name, box in e.boxes.items():
+        errors = (box.translation_m, box.scale, box.orientation_rad, box.axis_rad)
+        velocities = (box.velocity_mps, box.moving, box.velocity_moving_mps)
+        numbers = [_number(error, 3) if error is None or isinstance(error, float) else error for error in velocities]
+        rows.append(
+            [
+                name,
+                box.matched,
+                *(_number(error, 3) for error in errors),
+                *numbers,
+                _percent(box.strict_ap),
+                _percent(box.loose_ap),
+            ]
+        )
+    title = (
+        "boxes and velocities: mean errors of the objects reported with their class, and average precision in 3D [%]"
+    )
+    yield from _table(title, BOXES, rows)
+
+
+def _reaction(e: Evaluation) -> Iterator[str]:
+    rows = []
+    for name, r in e.reaction.items():
+        entered = (r.entered, _number(r.median_frames), _number(r.p90_frames), r.never)
+        at_start = (r.at_start, _number(r.at_start_median_frames), _number(r.at_start_p90_frames), r.at_start_never)
+        rows.append([name, *entered, *at_start])
+    title = (
+        "reaction: frames from 20 points within 30 m until reported, of what enters and of what is there at the start"
+    )
+    yield from _table(title, REACTION, rows)
 
 
 def _sector(e: Evaluation) -> str:

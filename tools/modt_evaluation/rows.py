@@ -14,7 +14,8 @@ from modt.types import Bool, Float64, Int
 from modt_evaluation.truth import Role
 
 Rows = NDArray[np.void]
-"""Structured array: OBJECT has a row for each object and frame, PROPOSAL for each tracked proposal and frame."""
+"""Structured array: OBJECT has a row for each object and frame, PROPOSAL for each tracked proposal and frame, and
+REPORTED for each reported object and frame."""
 
 
 class Outcome(IntEnum):
@@ -44,6 +45,10 @@ OBJECT = np.dtype(
         ("reported", int),  # reported class of the proposal that detects it, NONE without one
         ("reported_by_match", int),  # reported class of the proposal that stands for it, NONE without one
         ("track", int),  # track of its best proposal, NONE without one
+        ("stamp_s", float),
+        ("position", float, 2),  # centre of the box [m, world of the run]
+        ("points", int),  # points clear of the ground
+        ("reported_by_best", int),  # reported class of its best proposal if most of that lies on it, else NONE
     ]
 )
 PROPOSAL = np.dtype(
@@ -59,6 +64,23 @@ PROPOSAL = np.dtype(
         ("to_classify", bool),  # judged for average precision
         ("to_report", bool),  # judged for the reported class
         ("to_associate", bool),  # judged for HOTA, CLEAR and Identity
+    ]
+)
+REPORTED = np.dtype(
+    [
+        ("drive", int),
+        ("frame", int),
+        ("track", int),
+        ("class", int),  # reported class
+        ("score", float),  # its posterior
+        ("to_report", bool),  # judged where it stands for nothing labelled
+        ("velocity", float, 2),  # [m/s, world of the run]
+        ("object", int),  # object of the class whose centre is nearest, NONE without identity
+        ("centre_m", float),  # distance of their centres in the ground plane, NaN without such an object
+        ("shape", float),  # 1 - intersection over union of both, aligned
+        ("heading_rad", float),  # difference of their headings
+        ("iou", float),  # intersection over union with the object of the class that it overlaps, 0 without one
+        ("iou_judged", bool),  # whether that object is judged for average precision
     ]
 )
 
