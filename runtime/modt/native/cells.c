@@ -47,12 +47,11 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
         float scale = grid->cells_per_unit / points->sqrt_range[i];
         cell[i] = place_in_table(line_of(points->x[i], scale, centre), line_of(points->y[i], scale, centre), side);
     }
-    for (i64 i = 0, ahead = n < AHEAD ? n : n - AHEAD; i < n; ahead = n)
-        for (; i < ahead; i++) {
-            PROVEN(cell[i] >= 0 && cell[i] < side * side);
-            __builtin_prefetch(&table[cell[i + AHEAD]], 1);
-            table[cell[i]] = (i32)i;
-        }
+    for (i64 i = 0; i < n; i++) {
+        PROVEN(cell[i] >= 0 && cell[i] < side * side);
+        __builtin_prefetch(&table[cell[i + AHEAD < n ? i + AHEAD : i]], 1);
+        table[cell[i]] = (i32)i;
+    }
     for (i64 i = 0; i < n; i++) {
         sample[count] = i; /* overwritten by the next, unless it is the last one of its cell */
         count += table[cell[i]] == i;
