@@ -70,6 +70,10 @@ class SceneTuning:
     Greater: more comparisons.
     Chosen on: simulated drives."""
 
+    fall: float = 0.05
+    """Fall of that share since the look before from which they are, too. Less: more comparisons.
+    Chosen on: simulated drives."""
+
     same: float = 0.6
     """Share of the obstacle points at known places below which two frames in a row show different scenes.
     Chosen on: simulated drives, in which the least is 0.82."""

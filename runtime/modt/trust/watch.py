@@ -74,6 +74,7 @@ class TrustWatch:
         self._began_s: float | None = None
         self._change = Change(False, 0, 0)  # of the scene, since it was last believed
         self._before: Sample | None = None  # the last frame before that change
+        self._agreed = 1.0  # share of the obstacle points that stood still at the last look
         self._scene_looks = 0  # in a row in which the scene is as it was in that frame
         self._moved = ""  # how the ground moved at once, while it is not back
         self._step = np.zeros(3)  # plane by which it moved
@@ -168,7 +169,10 @@ class TrustWatch:
     def _follow_scene(self, seen: Sample) -> None:
         """Notice a scene that changes at once, between two frames, and one that is back."""
         scene = self._tuning.scene
-        if self._agreement(self._samples[0], seen) < scene.suspected or not self._change.is_none:
+        agreed = self._agreement(self._samples[0], seen)
+        fell = agreed < min(scene.suspected, self._agreed - scene.fall)
+        self._agreed = agreed
+        if fell or agreed < scene.same or not self._change.is_none:
             agreements = [(self._agreement(*pair), pair) for pair in self._pairs()]
             least, pair = min(agreements, key=lambda each: each[0], default=(1.0, None))
             if pair is not None and least < scene.suspected:
