@@ -68,37 +68,49 @@ class ReturnsCheck:
         """What is missing in the last of the sweeps since the last look; None if nothing is, or nothing is known."""
         if self._edges is None:
             return None
-        tuning = self._tuning
         sample = samples[-1]
         least = MIN_POINTS * sample.weight
         count = self._count(sample)
+        return self._lost_sectors(count, least) or self._dead_bands(count, samples) or self._thinned(count, least)
+
+    def _lost_sectors(self, count: Float64, least: float) -> Loss | None:
+        """Sectors with hardly a return, of those that usually have at least some."""
+        tuning = self._tuning
         usual = self._usual.sum(axis=1)
         expected = usual > np.maximum(tuning.usual_share * np.median(usual), least)
         lost = expected & (count.sum(axis=1) < tuning.lost_share * usual)
         n_lost = int(np.count_nonzero(lost))
-        if n_lost >= tuning.degraded_sectors:
-            blind = bool(n_lost >= tuning.blind_share * np.count_nonzero(expected))
-            where = "any direction" if n_lost >= 0.9 * np.count_nonzero(expected) else sides(lost)
-            return Loss(blind, True, f"no returns from {where} ({360 // SECTORS * n_lost} deg)")
-        usual_of_band = self._usual.sum(axis=0)
-        around = (self._usual > sample.weight).sum(axis=0) >= AROUND
-        dead = around & (usual_of_band > BAND_POINTS * sample.weight)
-        dead &= count.sum(axis=0) < tuning.beam_share * usual_of_band
-        self._dead = dead & (self._dead | self._ended(samples, usual_of_band)) if dead.any() else dead
-        share = usual_of_band[self._dead].sum() / max(usual.sum(), 1.0)
-        if np.count_nonzero(self._dead) >= MIN_DEAD or share > DEAD_SHARE:
-            dead = self._dead
-            return Loss(
-                bool(dead.sum() * 3 >= BANDS), False, f"no returns from {_bands(dead)} beams, in any direction"
-            )
+        if n_lost < tuning.degraded_sectors:
+            return None
+        n_expected = int(np.count_nonzero(expected))
+        where = "any direction" if n_lost >= 0.9 * n_expected else sides(lost)
+        what = f"no returns from {where} ({360 // SECTORS * n_lost} deg)"
+        return Loss(n_lost >= tuning.blind_share * n_expected, True, what)
+
+    def _dead_bands(self, count: Float64, samples: Sequence[Sample]) -> Loss | None:
+        """Bands whose returns ended at once, and are gone all around."""
+        weight = samples[-1].weight
+        usual = self._usual.sum(axis=0)
+        around = (self._usual > weight).sum(axis=0) >= AROUND
+        dead = around & (usual > BAND_POINTS * weight) & (count.sum(axis=0) < self._tuning.beam_share * usual)
+        self._dead = dead & (self._dead | self._ended(samples, usual)) if dead.any() else dead
+        n_dead = int(np.count_nonzero(self._dead))
+        share = usual[self._dead].sum() / max(usual.sum(), 1.0)
+        if n_dead < MIN_DEAD and share <= DEAD_SHARE:
+            return None
+        return Loss(n_dead * 3 >= BANDS, False, f"no returns from {_bands(self._dead)} beams, in any direction")
+
+    def _thinned(self, count: Float64, least: float) -> Loss | None:
+        """Returns that are missing everywhere alike."""
         in_thirds = SECTORS, THIRDS, BANDS // THIRDS
-        usual_in_thirds = self._usual.reshape(in_thirds).sum(axis=2)
-        full = usual_in_thirds > 2 * least
-        if np.count_nonzero(full) >= SECTORS:
-            ratio = np.quantile(count.reshape(in_thirds).sum(axis=2)[full] / usual_in_thirds[full], 0.8)
-            if ratio < tuning.thin_ratio:
-                return Loss(False, False, f"{100 * (1 - ratio):.0f} % of the returns are missing, in all directions")
-        return None
+        usual = self._usual.reshape(in_thirds).sum(axis=2)
+        full = usual > 2 * least
+        if np.count_nonzero(full) < SECTORS:
+            return None
+        ratio = float(np.quantile(count.reshape(in_thirds).sum(axis=2)[full] / usual[full], 0.8))
+        if ratio >= self._tuning.thin_ratio:
+            return None
+        return Loss(False, False, f"{100 * (1 - ratio):.0f} % of the returns are missing, in all directions")
 
     def _ended(self, samples: Sequence[Sample], usual_of_band: Float64) -> Bool:
         """(BANDS,) whether the returns of each band ended at once, from one of the sweeps to the next."""
