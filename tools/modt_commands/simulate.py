@@ -19,10 +19,22 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory in which the drive is written")
     p.add_argument("--all-around", action="store_true", help="annotate objects on all sides, not only in the camera")
     p.add_argument("--distort", action="store_true", help="keep the distortion of scans by the motion of the sensor")
+    weather = "rain:25, snow:2.5 [mm/h], fog:50 [m] or dust:1.5; fog:50@10 begins after 10 s, and so does a fault"
+    p.add_argument("--weather", metavar="KIND:STRENGTH", help=weather)
+    p.add_argument("--gait", metavar="DEG[:HZ]", help="amplitude of roll and pitch of a robot with legs (2 Hz)")
+    p.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="KIND:VALUE",
+        help="beam:7, sector:20:30 [deg], dropout:0.3, noise:0.1 [m] or range:0.5; repeatable",
+    )
     options.add_examples(
         p,
         "modt simulate --sensor vlp-16 --out sim                              a street, ten seconds",
         "modt simulate --scene corridor --sensor mid-360 --seed 3 --out sim   indoors",
+        "modt simulate --sensor vlp-16 --weather fog:50@5 --fault beam:7 --out sim    fog after 5 s, a dead laser",
+        "modt simulate --scene yard --sensor vlp-16 --gait 6 --distort --out sim      a robot that walks",
     )
     p.set_defaults(run=run)
 
@@ -31,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate.
 
     Raises:
-        MisuseError: no such scene or sensor, or there is a drive already.
+        MisuseError: no such scene, sensor or condition, or there is a drive already.
         ModtError: the drive cannot be written.
     """
     from modt_simulation.kitti_raw import DATE, DriveWriter
@@ -41,7 +53,14 @@ def run(arguments: argparse.Namespace) -> int:
     if (out / DATE).exists() or (out / "sequences").exists():
         raise MisuseError(out, "contains a drive already", "give another --out")
     stream = SyntheticStream(
-        arguments.scene, arguments.sensor, arguments.seconds, arguments.seed, distort=arguments.distort
+        arguments.scene,
+        arguments.sensor,
+        arguments.seconds,
+        arguments.seed,
+        distort=arguments.distort,
+        weather=arguments.weather,
+        gait=arguments.gait,
+        faults=arguments.fault,
     )
     try:
         writer = DriveWriter(out, CAMERA, all_around=arguments.all_around)

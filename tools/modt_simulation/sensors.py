@@ -65,6 +65,7 @@ class SensorModel:
     edge_delay_m: float = 0.06  # mean range error of a return from an edge that splits the beam
     period_s: float = 0.1  # time of a sweep
     response: Response = Response()  # reported intensity
+    blind: Bool | None = None  # (B, A) rays that give no return, of dead lasers and covered sectors
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -77,9 +78,10 @@ class SensorModel:
         return np.tan(self.elevation_rad).astype(np.float32)
 
     def fires(self, row: Int, column: Int, sweep: int) -> Bool:
-        """(n,) whether the rays at (n,) beams and columns are fired in a sweep."""
+        """(n,) whether the rays at (n,) beams and columns are fired in a sweep, and not blind."""
         offset = np.floor((COLUMN_STEP * column + SWEEP_STEP * sweep) % 1 * self.sweeps_a_ray)
-        return np.asarray(row % self.sweeps_a_ray == offset)
+        fired = np.asarray(row % self.sweeps_a_ray == offset)
+        return fired if self.blind is None else fired & ~self.blind[row, column]
 
 
 def _beams(top_deg: float, bottom_deg: float, n: int) -> Float64:

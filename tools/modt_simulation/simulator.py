@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
 
-from modt.geometry import inverse, transform, transform_boxes
-from modt.types import NONE, Bool, Float32, Float64, Frame, Int
+from modt.geometry import inverse, transform_boxes
+from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Self
+from modt_simulation.faults import faulty
 from modt_simulation.kinds import Kind
 from modt_simulation.materials import (
     BODY_SIGMA,
@@ -19,13 +22,85 @@ from modt_simulation.materials import (
     REFLECTIVITY,
     SEMANTIC,
 )
+from modt_simulation.options import Condition
 from modt_simulation.raycast import NO_SOLID, Int32, RayCaster
 from modt_simulation.sensors import SensorModel
 from modt_simulation.terrain import UInt8
+from modt_simulation.weather import Air, View, weather
 from modt_simulation.world import MOVING_MPS, World
+
+N_SECTORS = 32
+"""Number of sectors of a distorted sweep. Nothing moves while one is measured."""
+
+
+def sector_delay_s(part: int, period_s: float) -> float:
+    """Time after the stamp at which a sector is measured [s]; sectors go counter-clockwise from straight ahead."""
+    share = (part + 0.5) / N_SECTORS
+    return (float(share > 0.5) - share) * period_s
+
+
+@dataclass(frozen=True, slots=True)
+class Sector:
+    """Neighbouring columns of a sensor that are measured at one time."""
+
+    columns: slice
+    delay_s: float  # time after the stamp
+    caster: RayCaster
+
+    @classmethod
+    def of(cls, sensor: SensorModel, *, turning: bool) -> list[Self]:
+        """The sectors of a head that turns clockwise and points straight ahead at the stamp, else a single one.
+
+        The sweep of a turning head begins and ends behind the sensor, in the sensor's own azimuth.
+        """
+        if not turning:
+            return [cls(slice(0, sensor.shape[1]), 0.0, RayCaster(sensor))]
+        edges = np.linspace(0, sensor.shape[1], N_SECTORS + 1).round().astype(int).tolist()
+        sectors = []
+        for part, (first, end) in enumerate(pairwise(edges)):
+            columns = slice(first, end)
+            caster = RayCaster(replace(sensor, azimuth_rad=sensor.azimuth_rad[columns]))
+            sectors.append(cls(columns, sector_delay_s(part, sensor.period_s), caster))
+        return sectors
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """What the rays of a sweep, or of a sector of it, meet first."""
+
+    distance: Float32  # (B, A) true horizontal distance [m]; infinite without a surface
+    material: UInt8  # (B, A) its material
+    solid: Int32  # (B, A) index of the solid hit, negative for the ground
+    body: Int  # (P,) body of each solid
+    offset: Float32  # (P,) intensity of each solid relative to its material
+
+    @classmethod
+    def join(cls, sectors: Sequence[Self]) -> Self:
+        """The sweep of neighbouring sectors, whose solids are numbered on."""
+        before = np.cumsum([0, *(len(sector.body) for sector in sectors)])[:-1]
+        solid = [np.where(s.solid < 0, s.solid, s.solid + n) for s, n in zip(sectors, before.tolist(), strict=True)]
+        return cls(
+            distance=np.concatenate([sector.distance for sector in sectors], axis=1),
+            material=np.concatenate([sector.material for sector in sectors], axis=1),
+            solid=np.concatenate(solid, axis=1).astype(np.int32),
+            body=np.concatenate([sector.body for sector in sectors]),
+            offset=np.concatenate([sector.offset for sector in sectors]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """What a receiver makes of the rays of a sweep."""
+
+    distance: Float32  # (B, A) measured horizontal distance [m]
+    signal: Float32  # (B, A) strength of the return, as in View; 0 for none
+    intensity: Float32  # (B, A) reported intensity [0, 1]
+
 
 GLOSSY = np.float32(0.25)
 """Grazing loss above which the slope between beams counts as well, as on roofs and bonnets."""
+AIR_SEMANTIC = 1
+"""SemanticKITTI label of an outlier, which every return of rain, snow, fog and dust has."""
 
 
 class Receiver:
@@ -37,19 +112,12 @@ class Receiver:
         self.gain = rng.normal(1.0, 0.08, (sensor.shape[0], 1)).astype(np.float32)
         self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
 
-    def receive(
-        self, distance: Float32, material: UInt8, solid: Int32, offset: Float32, rng: Generator
-    ) -> tuple[Float32, Float32, Int, Int]:
-        """Noisy returns of a sweep.
-
-        Distance, material and solid are (B, A): the true horizontal distance [m] is infinite without a surface, the
-        solid negative for the ground. `offset` (P + 1,) is the intensity of each surface relative to its material;
-        the last is the ground's.
-
-        Returns:
-            (B, A) measured horizontal distances [m], and (n,) intensities [0, 1], rows and columns of the n returns.
-        """
+    def receive(self, seen: Surfaces, rng: Generator, extinction_per_m: float = 0.0) -> Returns:
+        """Noisy returns of the surfaces of a sweep, through air in which light is lost."""
         sensor = self.sensor
+        distance = seen.distance
+        material = seen.material
+        solid = seen.solid
         chance = rng.random(distance.shape, dtype=np.float32)
         noise = rng.standard_normal(distance.shape, dtype=np.float32)
         hit = np.isfinite(distance)
@@ -59,6 +127,8 @@ class Receiver:
         reflectivity = REFLECTIVITY.take(material) * self.gain * (1 + np.float32(0.15) * grain)
         slant = near * self.secant
         signal = reflectivity * cosine * np.float32(10 * sensor.detect_m**2) / (slant * slant)
+        if extinction_per_m:
+            signal *= np.exp(np.float32(-2 * extinction_per_m) * slant)
         lost = DROPOUT.take(material) + np.float32(sensor.dropout)
         detected = hit & (chance > lost + (1 - lost) / (1 + signal * signal))
         detected &= (slant > sensor.min_range_m) & (slant < sensor.max_range_m)
@@ -66,12 +136,26 @@ class Receiver:
         measured: Float32 = near + error / self.secant
         self._mix_edges(measured, near, detected, chance)
         intensity: Float32 = INTENSITY.take(material) * self.gain
-        intensity += offset.take(solid, mode="wrap")
+        intensity += np.append(seen.offset, np.float32(0)).take(solid, mode="wrap")  # the last is the ground's
         loss = GRAZING_LOSS.take(material)
         intensity -= loss * (1 - self._cos_glossy(near, solid, cosine, loss > GLOSSY))
         intensity += POINT_SIGMA.take(material) * grain
-        row, column = np.nonzero(detected)
-        return measured, sensor.response.report(intensity[detected], slant[detected]), row, column
+        intensity[detected] = sensor.response.report(intensity[detected], slant[detected])
+        return Returns(measured, np.where(detected, signal, np.float32(0)), intensity)
+
+    def receive_air(self, returns: Returns, air: Air, view: View, rng: Generator) -> Bool:
+        """Put the echoes from the air in the place of weaker returns; (B, A) whether the return is one of the air."""
+        echoes = air.echoes(view, rng)
+        signal = echoes.signal
+        square = np.square(signal)
+        wins: Bool = (signal > returns.signal) & (rng.random(signal.shape, np.float32) * (1 + square) < square)
+        wins &= echoes.range_m > self.sensor.min_range_m
+        error = np.float32(self.sensor.range_sigma_m) * rng.standard_normal(signal.shape, np.float32)
+        intensity = np.float32(echoes.most_intensity) * rng.random(signal.shape, np.float32)
+        np.copyto(returns.distance, (echoes.range_m + error) / self.secant, where=wins)
+        np.copyto(returns.signal, signal, where=wins)
+        np.copyto(returns.intensity, intensity * bool(self.sensor.response.most), where=wins)
+        return wins
 
     def _cos_incidence(self, near: Float32, solid: Int32) -> Float32:
         """(B, A) cosine of the angle of incidence, by the slope of the range image along a beam."""
@@ -113,16 +197,6 @@ class Receiver:
         measured[row, front] += np.float32(self.sensor.edge_delay_m) * delay
 
 
-N_SLICES = 64
-"""Number of sectors of a sweep. Nothing moves while one is measured."""
-
-
-def slice_delay_s(part: int, period_s: float) -> float:
-    """Time after the stamp at which a sector is measured [s]; sectors go counter-clockwise from straight ahead."""
-    share = (part + 0.5) / N_SLICES
-    return (float(share > 0.5) - share) * period_s
-
-
 @dataclass(frozen=True, slots=True)
 class Truth:
     """Ground truth of a sweep."""
@@ -138,17 +212,30 @@ class Truth:
 class Simulator:
     """Renders sweeps, in any order, each reproducibly by the seed of the noise.
 
-    `distort` leaves the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor; else
-    they are as after deskewing.
+    `distort` leaves the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor: every
+    sector is seen from the pose at its own time. Else they are as after deskewing. Weather and faults of the sensor
+    change the sweeps from the time on at which they begin.
     """
 
-    def __init__(self, world: World, sensor: SensorModel, seed: int, *, distort: bool = False) -> None:
+    def __init__(
+        self,
+        world: World,
+        sensor: SensorModel,
+        seed: int,
+        *,
+        distort: bool = False,
+        weather: Condition | None = None,
+        faults: Sequence[Condition] = (),
+    ) -> None:
         self.world = world
         self.sensor = sensor
         self.seed = seed
         self.distort = distort and sensor.rotating
         self.caster = RayCaster(sensor)
-        self.receiver = Receiver(sensor, np.random.default_rng([seed, 1]))
+        self._sectors = Sector.of(sensor, turning=self.distort)
+        self._weather = weather
+        self._faults = faults
+        faulty(sensor, faults, np.inf)  # refuses what this sensor cannot have
         normal = np.random.default_rng([seed, 3]).standard_normal((len(world.bodies), len(BODY_SIGMA)), np.float32)
         self._intensity_offset = normal * BODY_SIGMA
         kinds = [body.kind for body in world.bodies]
@@ -160,27 +247,48 @@ class Simulator:
         """Frame number index and its ground truth."""
         rng = np.random.default_rng([self.seed, 2, index])
         time_s = index * self.sensor.period_s
+        depth = rng.standard_exponential(self.sensor.shape, np.float32)
+        seen = Surfaces.join([self._surfaces(sector, time_s, depth) for sector in self._sectors])
+        sensor = faulty(self.sensor, self._faults, time_s)
+        receiver = Receiver(sensor, np.random.default_rng([self.seed, 1]))
         T_world_sensor = self.world.ego_pose(time_s)
-        solids = self.world.solids(time_s, T_world_sensor, self.sensor.max_range_m)
-        solids = solids.widened_by_beam(self.sensor.beam_radius_m, self.sensor.divergence_rad)
-        ground, ground_material = self.world.terrain.cast(self.caster, T_world_sensor)
-        image = self.caster.cast(solids, ground, rng.standard_exponential(self.sensor.shape, np.float32))
-        of_solid = np.append(solids.material, 0).astype(np.uint8)
-        material = np.where(image.solid != NO_SOLID, of_solid[image.solid], ground_material)
-        offset = np.append(self._intensity_offset[solids.body, solids.material], np.float32(0))
-        distance, intensity, row, column = self.receiver.receive(image.distance, material, image.solid, offset, rng)
-        fired = self.sensor.fires(row, column, index)
+        air = self._air(time_s)
+        returns = receiver.receive(seen, rng, air.extinction_per_m if air else 0.0)
+        of_air = np.zeros(sensor.shape, np.bool_)
+        if air is not None:
+            view = View(seen.distance * receiver.secant, sensor.detect_m, self.caster, T_world_sensor, time_s)
+            of_air = receiver.receive_air(returns, air, view, np.random.default_rng([self.seed, 5, index]))
+        row, column = np.nonzero(returns.signal)
+        fired = sensor.fires(row, column, index)
         row = row[fired]
         column = column[fired]
-        points = self._points(distance[row, column], row, column, rng)
-        points[:, 3] = intensity[fired]
+        points = self._points(returns.distance[row, column], row, column, rng)
+        points[:, 3] = returns.intensity[row, column]
         # the last solid stands for the ground, whose index is NO_SOLID
-        instance = np.append(solids.body, NONE)[image.solid[row, column]]
-        if self.distort:
-            self._distort(points, column, instance, time_s)
+        instance = np.where(of_air, NONE, np.append(seen.body, NONE)[seen.solid])[row, column]
         turn_s = self.sensor.period_s if self.distort else 0.0
         frame = Frame(index, time_s, points, T_world_sensor, turn_s=turn_s)
-        return frame, self._truth(time_s, T_world_sensor, instance, material[row, column])
+        truth = self._truth(time_s, T_world_sensor, instance, seen.material[row, column])
+        truth.semantic[of_air[row, column]] = AIR_SEMANTIC
+        return frame, truth
+
+    def _air(self, time_s: float) -> Air | None:
+        """What is in the air at a time, None while it is clear."""
+        if self._weather is None or time_s < self._weather.from_s:
+            return None
+        return weather(self._weather, self.world, self.seed)
+
+    def _surfaces(self, sector: Sector, time_s: float, depth: Float32) -> Surfaces:
+        """What the rays of a sector meet in a sweep; `depth` (B, A) is that of all columns, as in RayCaster.cast."""
+        T_world_sensor = self._ego_pose(time_s, sector.delay_s)
+        solids = self.world.solids(time_s + sector.delay_s, T_world_sensor, self.sensor.max_range_m)
+        solids = solids.widened_by_beam(self.sensor.beam_radius_m, self.sensor.divergence_rad)
+        ground, ground_material = self.world.terrain.cast(sector.caster, T_world_sensor)
+        image = sector.caster.cast(solids, ground, depth[:, sector.columns])
+        of_solid = np.append(solids.material, 0).astype(np.uint8)
+        material = np.where(image.solid != NO_SOLID, of_solid[image.solid], ground_material)
+        offset = self._intensity_offset[solids.body, solids.material]
+        return Surfaces(image.distance, material, image.solid, solids.body, offset)
 
     def _points(self, distance: Float32, row: Int, column: Int, rng: Generator) -> Float32:
         """(n, 4) points, whose intensities are blank, at (n,) horizontal distances along (n,) jittered rays."""
@@ -195,23 +303,6 @@ class Simulator:
         points[:, 2] = distance * (self.caster.tangent[row, 0] + rise) + self.caster.origin[row, 0]
         return points
 
-    def _distort(self, points: Float32, column: Int, instance: Int, time_s: float) -> None:
-        """Move the points of each sector to the sensor frame at the time of its measurement.
-
-        The sensor rotates clockwise, as Velodyne's and Ouster's do, and points straight ahead at the stamp.
-        """
-        T_world_start = self.world.ego_pose(time_s)
-        pose = np.vstack([self.world.poses(time_s), np.zeros(5)])  # the ground, instance NONE, is the last and rests
-        heading = pose[instance, 3]
-        direction = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
-        velocity = pose[instance, 4, None] * direction
-        part = column * N_SLICES // self.sensor.shape[1]
-        for k in range(N_SLICES):
-            rows = np.flatnonzero(part == k)
-            delay_s = slice_delay_s(k, self.sensor.period_s)
-            world = transform(T_world_start, points[rows, :3].astype(np.float64)) + delay_s * velocity[rows]
-            points[rows, :3] = transform(inverse(self._ego_pose(time_s, delay_s)), world)
-
     def _ego_pose(self, time_s: float, delay_s: float) -> Float64:
         """(4, 4) T_world_sensor after a delay, extrapolated before the start of the drive."""
         if time_s + delay_s >= 0.0:
@@ -219,7 +310,7 @@ class Simulator:
         T = self.world.ego_pose(time_s)
         return T @ inverse(self.world.ego_pose(time_s - delay_s)) @ T
 
-    def _truth(self, time_s: float, T_world_sensor: Float64, instance: Int, material: Int) -> Truth:
+    def _truth(self, time_s: float, T_world_sensor: Float64, instance: Int, material: UInt8) -> Truth:
         moving = self.world.poses(time_s)[:, 4] > MOVING_MPS
         label = np.append(np.where(moving, self._labels[:, 1], self._labels[:, 0]), 0)[instance]
         points = np.bincount(instance + 1, minlength=len(moving) + 1)[1:]

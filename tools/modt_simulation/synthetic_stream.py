@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +12,14 @@ from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Faults, Reading, StreamInfo
 from modt.types import Frame, Self
+from modt_simulation.faults import read_faults
+from modt_simulation.gait import Gait
 from modt_simulation.indoors import carpark, corridor, hall, lift, lobby, warehouse
 from modt_simulation.obstacles import grass, heaps, hedges, hills, lying, movers, stairs, wall
 from modt_simulation.sensors import sensor as sensor_model
 from modt_simulation.simulator import Simulator, Truth
 from modt_simulation.street import crossing, street
+from modt_simulation.weather import read_weather
 from modt_simulation.yard import crowd, dock, ramp, yard
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
@@ -39,10 +42,10 @@ class SyntheticStream:
 
     `seed` is that of the scene, its traffic and the noise; `distort` leaves the motion during a sweep in the scans.
     The sensor is mounted as usual, or at `height_m`; `mount_deg`, its roll and pitch, adds to what is left of them
-    after it was levelled.
+    after it was levelled. Weather, gait and faults are texts, as those of `modt simulate`.
 
     Raises:
-        MisuseError: an unknown scene or sensor, or an invalid duration or seed.
+        MisuseError: an unknown scene, sensor, weather, gait or fault, or an invalid duration or seed.
     """
 
     def __init__(
@@ -55,6 +58,9 @@ class SyntheticStream:
         distort: bool = False,
         height_m: float | None = None,
         mount_deg: tuple[float, float] = (0.0, 0.0),
+        weather: str | None = None,
+        gait: str | None = None,
+        faults: Sequence[str] = (),
     ) -> None:
         if scene not in SCENES:
             raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
@@ -65,7 +71,15 @@ class SyntheticStream:
         model = sensor_model(sensor)
         world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, height_m or model.height_m)
         roll, pitch = (np.deg2rad(mount_deg) + world.mount_rad).tolist()
-        self.simulator = Simulator(replace(world, mount_rad=(roll, pitch)), model, seed, distort=distort)
+        walk = Gait.of(gait, np.random.default_rng([seed, 4])) if gait else None
+        self.simulator = Simulator(
+            replace(world, mount_rad=(roll, pitch), gait=walk),
+            model,
+            seed,
+            distort=distort,
+            weather=read_weather(weather) if weather else None,
+            faults=read_faults(faults),
+        )
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults = Faults()
         self.reading = Reading()

@@ -8,6 +8,7 @@ import numpy as np
 
 from modt.geometry import inverse, rotation_zyx, se3
 from modt.types import Float64
+from modt_simulation.gait import Gait
 from modt_simulation.kinds import Kind
 from modt_simulation.motion import Path
 from modt_simulation.people import People, people_solids
@@ -40,6 +41,7 @@ class World:
     height_m: float  # height of the sensor above the ground
     sway_rad: float  # amplitude of the carrier's roll and pitch
     mount_rad: Pair  # roll and pitch of the sensor on its carrier
+    gait: Gait | None = None  # gait of the carrier; None for wheels
 
     def __post_init__(self) -> None:
         at_rest = np.array([body.path.at_rest for body in self.bodies], np.bool_)
@@ -60,7 +62,8 @@ class World:
         bank = self._smooth(x - 0.8 * s, y + 0.8 * c) - self._smooth(x + 0.8 * s, y - 0.8 * c)
         pitch = self.mount_rad[1] - np.arctan2(rise, 2.6) + self.sway_rad * np.sin(2.9 * time_s)
         roll = self.mount_rad[0] + np.arctan2(bank, 1.6) + self.sway_rad * np.sin(2.1 * time_s + 1.0)
-        return se3(rotation_zyx(float(roll), float(pitch), yaw), np.array([x, y, self._smooth(x, y) + self.height_m]))
+        T = se3(rotation_zyx(float(roll), float(pitch), yaw), np.array([x, y, self._smooth(x, y) + self.height_m]))
+        return T if self.gait is None else T @ self.gait.pose(time_s)
 
     def poses(self, time_s: float) -> Float64:
         """(n, 5) of each body x, y, z on the ground [m, world], heading [rad], speed [m/s]."""
