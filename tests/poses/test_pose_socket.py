@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from modt.address import parse_address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.geometry import rotation_zyx, se3
+from modt.geometry import quaternion_of, rotation_zyx, se3
 from modt.poses.pose_socket import PoseSocket, open_socket, read_datagram
 from modt.ros2.cdr import MessageError
 from modt.schemes import POSES, open_poses
@@ -103,10 +103,23 @@ def test_both_forms_give_the_same_pose():
         np.testing.assert_allclose(read, T, atol=1e-12)
 
 
+def test_an_orientation_gives_roll_and_pitch():
+    T = se3(rotation_zyx(0.05, -0.1, 0.5), np.array([1.0, 2.0, 0.0]))
+    raw = json.dumps({"stamp": 1.5, "x": 1, "y": 2, "orientation": quaternion_of(T).tolist()}).encode()
+    stamp_s, read = read_datagram(raw)
+    assert stamp_s == 1.5
+    np.testing.assert_allclose(read, T, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("raw", "reason", "cause"),
     [
         (b"", "malformed", "no JSON"),
+        (b'{"stamp": 1, "x": 0, "orientation": [0, 0, 0, 1]}', "malformed", "no y"),
+        (b'{"stamp": 1, "x": 0, "y": 0, "yaw": 0, "orientation": [0, 0, 0, 1]}', "malformed", "several"),
+        (b'{"stamp": 1, "x": 0, "y": 0, "orientation": [0, 0, 1]}', "malformed", "list of 4"),
+        (b'{"stamp": 1, "x": 0, "y": 0, "orientation": [0, 0, 0, 0]}', "malformed", "no rotation"),
+        (b'{"stamp": 1, "x": 0, "y": 0, "orientation": [0, 0, 0, NaN]}', "non_finite", "orientation is not finite"),
         (b'{"stamp": 1}', "malformed", "neither"),
         (b'{"stamp": 1, "x": 0, "yaw": 0}', "malformed", "no y"),
         (b'{"stamp": 1, "x": NaN, "y": 0, "yaw": 0}', "non_finite", "x is not finite"),

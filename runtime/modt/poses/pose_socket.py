@@ -1,6 +1,7 @@
 """Poses received in datagrams of a socket.
 
-A datagram is JSON: {"stamp": s, "x": m, "y": m, "yaw": rad}, or {"stamp": s, "pose": [...]} with the 16 elements of
+A datagram is JSON: {"stamp": s, "x": m, "y": m, "yaw": rad}, or "orientation": [x, y, z, w] instead of the yaw, the
+quaternion of the sensor, as an inertial unit gives it; or {"stamp": s, "pose": [...]} with the 16 elements of
 T_world_sensor in row-major order, or the first 12 of them. Other keys are ignored.
 """
 
@@ -23,7 +24,7 @@ import numpy as np
 from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.geometry import rotation_zyx, se3
+from modt.geometry import rotation_of, rotation_zyx, se3
 from modt.poses.received_poses import ReceivedPoses
 from modt.ros2.cdr import MessageError
 from modt.sources.pose_buffer import CAPACITY
@@ -31,6 +32,7 @@ from modt.types import Float64
 
 MAX_BYTES = 4096
 PLANAR = ("x", "y", "yaw")
+ORIENTATION = "orientation"
 _BUFFER_BYTES = 1 << 20
 _READ_AT_ONCE = 4096  # bounds the time of a frame in a flood; the kernel holds about as many
 _EMPTIED_S = 0.01
@@ -52,17 +54,23 @@ def read_datagram(raw: bytes) -> tuple[float, Float64]:
         raise MessageError("malformed", "no JSON") from None
     if not isinstance(message, dict):
         raise MessageError("malformed", "no JSON object")
-    if ("pose" in message) == any(key in message for key in PLANAR):
-        raise MessageError("malformed", "neither x, y, yaw nor pose, or both")
-    missing = [key for key in ("stamp", *(() if "pose" in message else PLANAR)) if key not in message]
+    turned = ORIENTATION in message
+    placed = ("x", "y", ORIENTATION) if turned else PLANAR
+    if ("pose" in message) == any(key in message for key in (*PLANAR, ORIENTATION)) or (turned and "yaw" in message):
+        raise MessageError("malformed", "neither x, y with yaw or orientation nor pose, or several")
+    missing = [key for key in ("stamp", *(() if "pose" in message else placed)) if key not in message]
     if missing:
         raise MessageError("malformed", f"no {missing[0]}")
     stamp = _number(message["stamp"], "stamp")
     if "pose" in message:
         T = _matrix(message["pose"])
     else:
-        x, y, yaw = (_number(message[key], key) for key in PLANAR)
-        T = se3(rotation_zyx(0.0, 0.0, yaw), np.array([x, y, 0.0]))
+        x, y = (_number(message[key], key) for key in ("x", "y"))
+        if turned:
+            R = rotation_of(_quaternion(message[ORIENTATION]))
+        else:
+            R = rotation_zyx(0.0, 0.0, _number(message["yaw"], "yaw"))
+        T = se3(R, np.array([x, y, 0.0]))
     return stamp, T
 
 
@@ -72,6 +80,16 @@ def _number(value: object, key: str) -> float:
     if not math.isfinite(value):
         raise MessageError("non_finite", f"{key} is not finite")
     return value
+
+
+def _quaternion(values: object) -> Float64:
+    """(4,) x, y, z, w, about of length 1."""
+    if not isinstance(values, list) or len(values) != 4:
+        raise MessageError("malformed", f"{ORIENTATION} is no list of 4 numbers")
+    quaternion = np.array([_number(value, ORIENTATION) for value in values])
+    if not 0.9 < math.hypot(*quaternion) < 1.1:
+        raise MessageError("malformed", f"{ORIENTATION} is no rotation")
+    return quaternion
 
 
 def _matrix(values: object) -> Float64:
