@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +14,8 @@ from modt.energy.ledger import STAGES as LEDGER_STAGES
 from modt.energy.ledger import Ledger
 from modt.object_box.estimator import SeenBoxes
 from modt.observations import Located, StaticTracks
-from modt.placement import LEVEL, Mount
+from modt.placement import Mount
+from modt.sensor_fit.levelling import Leveller
 from modt.types import (
     UNLIMITED,
     Bool,
@@ -107,12 +108,17 @@ class Pipeline:
     decision: LikeliestClass
     boxes: SeenBoxes
     ledger: Ledger
-    mount: Mount = LEVEL
+    leveller: Leveller = field(default_factory=Leveller)
+
+    @property
+    def mount(self) -> Mount:
+        """Attitude of the sensor in the last sweep."""
+        return self.leveller.attitude
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
         """Process a frame within a budget of classifications (Figs. 2 and 5)."""
         run = self.ledger.run
-        frame = self.mount.level(frame)
+        frame = self.leveller.level(frame)
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
         tracked = run(TRACKING, self.tracker.track, frame.time_s, proposals, located, frame.points)

@@ -26,6 +26,12 @@ class Mount:
         roll, pitch = np.deg2rad([roll_deg or 0.0, pitch_deg or 0.0]).tolist()
         return cls(rotation_zyx(roll, pitch, 0.0) if roll or pitch else None)
 
+    @classmethod
+    def upright(cls, up: Float64) -> Mount:
+        """The mount of a sensor in whose frame (3,) is the upward unit vector; its heading stays."""
+        x, y, z = up.tolist()
+        return cls(rotation_zyx(float(np.arctan2(y, z)), float(-np.arcsin(x)), 0.0))
+
     def turn(self, points: Float32) -> Float32:
         """(N, 4) or wider points in the level frame."""
         if self.R_level_sensor is None:

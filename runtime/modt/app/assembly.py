@@ -38,6 +38,7 @@ from modt.segmentation.kernels import Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.tuning import SegmentationTuning
+from modt.sensor_fit.levelling import Leveller
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
 from modt.tracking.track_table import LiveTracks
 from modt.tracking.tracker import Tracker
@@ -246,5 +247,9 @@ def stages(
         decision=decision,
         boxes=boxes,
         ledger=ledger,
-        mount=Mount.of(profile.sensor.roll_deg, profile.sensor.pitch_deg),
+        leveller=Leveller(
+            Mount.of(profile.sensor.roll_deg, profile.sensor.pitch_deg),
+            profile.sensor.height_m,
+            profile.sensor.min_range_m,
+        ),
     )
