@@ -221,8 +221,9 @@ class Stages:
         }
 
     def _recognise_again(self, frame: Frame) -> None:
-        """Choose a profile anew if a changed sweep does not fit the present one."""
-        if recognise(frame.points, self.config).differences:
+        """Choose a profile anew if a changed sweep has other beams than the present one."""
+        found = recognise(frame.points, self.config)
+        if found.differences and not found.same_sensor:
             self._first = frame
             self._recognised.append(self._choose())
 

@@ -104,6 +104,9 @@ MAX_ASPECT = 8.0
 """Greatest azimuth step over the spacing of beams; beyond it the peaks are chance."""
 CELL_DEG = (2.0, 4.0)
 """Size in elevation and azimuth of a cell in which returns are counted [deg]."""
+FULL_QUANTILE = 0.75
+"""Quantile of those counts that is the count of a cell in which every firing returns. Skies are emptier, and fog,
+snow and dust fill them in part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,14 +237,14 @@ def _azimuth_step_deg(sweeps: Sequence[Float32], rings: _Rings) -> float:
 
 
 def _without_beams(sweeps: Sequence[Float32]) -> BeamPattern:
-    """Pattern without beams: its spacing is the root of the solid angle of a return, where the sweep has returns."""
+    """Pattern without beams: its spacing is the root of the solid angle of a firing."""
     spacings = []
     for points in sweeps:
         elevation = np.rad2deg(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))) + 90
         azimuth = np.rad2deg(np.arctan2(points[:, 1], points[:, 0])) + 180
         cell = (elevation // CELL_DEG[0]).astype(np.int64) * 91 + (azimuth // CELL_DEG[1]).astype(np.int64)
         count = np.bincount(cell)
-        spacings.append(np.sqrt(np.prod(CELL_DEG) / np.median(count[count > 0])))
+        spacings.append(np.sqrt(np.prod(CELL_DEG) / np.quantile(count[count > 0], FULL_QUANTILE)))
     spacing_deg = float(np.median(spacings))
     return BeamPattern(np.zeros(0), spacing_deg, spacing_deg)
 

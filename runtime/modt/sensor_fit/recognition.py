@@ -20,14 +20,22 @@ from modt.sensor_fit.beams import (
     spacing_ratio,
     tangents,
 )
+from modt.sensor_fit.floor_slope import floor_slope
+from modt.sensor_fit.levelling import delays_s, untwisted
 from modt.sensor_fit.reflectance import NONE, reflectance_scale, usable_scale
 from modt.sensor_fit.tilt import LEVEL_UP, MIN_TILT_DEG, Floor, find_floor, mount_height_m
-from modt.types import Float32
+from modt.types import Float32, Frame
 
 MAX_SPACING_RATIO = 1.35
 """Greatest ratio of the beam spacings, median over the points."""
 MAX_AZIMUTH_RATIO = 1.6
 """Greatest ratio of the spacings along a beam: a head may turn faster."""
+CLEAR_CONTRAST = 0.98
+"""Contrast of the beams below which a sweep may be twisted by roll and pitch during it."""
+MIN_TWIST = np.deg2rad(1.0)
+"""Least change of the slope of a floor during a sweep that is undone."""
+FLOOR_SAMPLE = 4000
+"""Number of points by which this change is measured."""
 MAX_HEIGHT_M = 0.15
 """Greatest difference of the height [m]."""
 MAX_HEIGHT_SHARE = 0.2
@@ -81,6 +89,8 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     """Compare (N, 4) points of a sweep with a profile; a sweep of few points fits every profile."""
     points = points[(points[:, 0] != 0) | (points[:, 1] != 0)]
     pattern = find_beams([points], COARSE_ORIGINS_M)
+    if pattern is not None and pattern.contrast < CLEAR_CONTRAST:
+        pattern = _untwisted_pattern(points) or pattern
     if pattern is None:
         return Recognition((), None, config)
     expected = config.sensor
@@ -104,6 +114,27 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     nearest = nearest_profile(found, tangent) if of_sensor else None
     recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg, not of_sensor)
     return replace(recognition, fitted=recognition.mounted(fitted))
+
+
+def _untwisted_pattern(points: Float32) -> BeamPattern | None:
+    """Beams of (N, 4) points of a sensor that rolls and pitches during its sweep; None if it does not.
+
+    The points of a beam lie on a cone in the sensor's own frame. Where a driver has moved them by another motion they
+    do not, and the floor is twisted as they are.
+    """
+    floor = find_floor(points)
+    if floor is None:
+        return None
+    mount = Mount.upright(floor.up)
+    level = mount.level(Frame(0, 0.0, points, turn_s=1.0))  # a turn is the unit of time
+    some = slice(None, None, 1 + len(points) // FLOOR_SAMPLE)
+    xyz = level.points[some].T[:3].astype(np.float64)
+    twisted = floor_slope(xyz, delays_s(level)[some], np.zeros(2), floor.depth_m)
+    if twisted is None or np.abs(twisted.rate).max() < MIN_TWIST:
+        return None
+    back = Mount(None if mount.R_level_sensor is None else mount.R_level_sensor.T)
+    pattern = find_beams([back.turn(untwisted(level, twisted.rate).points)], COARSE_ORIGINS_M)
+    return pattern if pattern is not None and len(pattern.elevations_deg) else None
 
 
 def _measured_profile(found: SensorConfig, pattern: BeamPattern) -> ProfileConfig:
