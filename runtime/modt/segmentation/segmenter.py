@@ -134,7 +134,8 @@ class Segmenter:
         x = clusters.sampled.x
         y = clusters.sampled.y
         best = self.kernels.best_headings(x, y, cells_of_cluster, tuning.max_cells, tuning.side_noise_m)
-        return HEADINGS[best]
+        headings: Float64 = HEADINGS[best]
+        return headings
 
     def _reach_end_of_margin(self, clusters: Clusters) -> Bool:
         """(n,) clusters that the margin of the field of view cuts."""

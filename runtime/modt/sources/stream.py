@@ -123,7 +123,10 @@ class Stream(Protocol):
 
     info: StreamInfo
     faults: Faults
-    reading: Reading
+
+    @property
+    def reading(self) -> Reading:
+        """What was read so far."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames; faults are added to `faults` on the way."""
