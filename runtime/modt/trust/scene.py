@@ -22,6 +22,9 @@ NEAREST_M = 1.0
 RANGES = 50
 """Cells along the range, up to 54 m."""
 MIN_POINTS = 40
+"""Fewest obstacle points in which a scene is compared."""
+VANISHED = 3
+"""Obstacles that were so many times MIN_POINTS, and are below it, have vanished."""
 UNSCALED_FAVOUR = 0.02
 """Share of the points by which a scale has to be better for each of its steps, as places are several steps wide."""
 
@@ -95,9 +98,11 @@ def _grown(cells: Int) -> Bool:
 
 
 def agreement(before: Sample, after: Sample, plane: Float64, T_after_before: Float64) -> float:
-    """Share of the obstacle points of a sweep that stand where the one before had some; 1 with too few points."""
+    """Share of the obstacle points of a sweep that stand where the one before had some; 1 with too few."""
     known = places(before, plane, T_after_before)
     cells = places(after, plane)
+    if len(known) > VANISHED * MIN_POINTS > VANISHED * len(cells):
+        return 0.0
     if min(len(known), len(cells)) < MIN_POINTS:
         return 1.0
     return float(_grown(known).ravel().take(cells).mean())
