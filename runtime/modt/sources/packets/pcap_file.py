@@ -52,6 +52,15 @@ SEARCHED_BYTES = 1 << 22
 """Bytes behind a damage in which the next record is searched."""
 
 
+def _flaw(numbers: tuple[int, ...] | None, at: int, found: int | None, *, sound: bool) -> str:
+    """What is wrong with the record at an offset, after which one was found or none."""
+    if found is None and (numbers is None or sound):
+        return "truncated within the header of a record" if numbers is None else "truncated within a record"
+    absurd = numbers is not None and numbers[2] > MAX_RECORD_BYTES
+    cause = f"a record promises {numbers[2]} bytes" if numbers is not None and absurd else "damaged"
+    return f"{cause} at byte {at}" if found else f"{cause} from byte {at} on"
+
+
 @dataclass(frozen=True, slots=True)
 class Datagram:
     """A UDP datagram.
@@ -123,33 +132,25 @@ class PcapFile:
         at = HEADER_BYTES
         before = at  # begin of the last whole record, whose length may be wrong
         second: int | None = None
-        while head := file.read(header.size):
-            if len(head) < header.size:
-                self.flaws.append("truncated within the header of a record")
+        while True:
+            file.seek(at)
+            head = file.read(header.size)
+            if not head:
                 return
-            if not self._is_header(header.unpack(head), second):
-                found = self._next_record(file, header, max(before + 1, HEADER_BYTES), second, at)
-                length = header.unpack(head)[2]
-                cause = f"a record promises {length} bytes" if length > MAX_RECORD_BYTES else "damaged"
-                self.flaws.append(f"{cause} at byte {at}" if found else f"{cause} from byte {at} on")
-                if found is None:
-                    return
-                before = at = found
-                file.seek(at)
+            numbers = header.unpack(head) if len(head) == header.size else None
+            sound = numbers is not None and self._is_header(numbers, second)
+            frame = file.read(numbers[2]) if numbers is not None and sound else b""
+            if numbers is not None and sound and len(frame) == numbers[2]:
+                second = numbers[0]
+                yield second + numbers[1] * self._unit_s, frame
+                before = at
+                at += header.size + len(frame)
                 continue
-            second, fraction, length, _ = header.unpack(head)
-            frame = file.read(length)
-            if len(frame) < length:
-                found = self._next_record(file, header, at + 1, second, at)
-                self.flaws.append("truncated within a record" if found is None else f"damaged at byte {at}")
-                if found is None:
-                    return
-                before = at = found
-                file.seek(at)
-                continue
-            yield second + fraction * self._unit_s, frame
-            before = at
-            at += header.size + length
+            found = self._next_record(file, header, at + 1 if sound else before + 1, second, at)
+            self.flaws.append(_flaw(numbers, at, found, sound=sound))
+            if found is None:
+                return
+            before = at = found
 
     def _is_header(self, numbers: tuple[int, ...], second: int | None) -> bool:
         """Whether numbers can be the header of the record after one of a second."""
