@@ -73,23 +73,39 @@ def floor_slope(xyz: Float64, delay_s: Float64, expected: Float64, depth_m: floa
     plane[0] = depth_m
     few = slice(None, None, 1 + len(x) // MAX_TRIED)
     plane[1:3] = _tried(rows[1:3, few], fall[few] - depth_m, TRIED_M + TRIED_SLOPE * range_m[few], expected)
+    return _fitted(rows, fall, range_m, plane)
+
+
+def _fitted(rows: Float64, fall: Float64, range_m: Float64, plane: Float64) -> FloorSlope | None:
+    """The floor by least squares, from a tried plane (5,); None if too few points lie on it, or too many below.
+
+    Args:
+        rows: (5, n) of the points: 1, x, y, and x and y times the delay.
+        fall: (n,) depth of the points, which is plane . rows on the floor.
+        range_m: (n,) range of the points.
+        plane: depth, slopes along x and y, and their changes.
+    """
     prior = np.full(5, NOISE_M**2)  # of slopes of 1; it holds what the points leave open
     prior[3:] /= MAX_RATE_PER_S**2
     normal = np.diag(prior)
     near: Bool = np.zeros(len(fall), np.bool_)
     for growth in NEAR_SLOPES:
-        off_m = np.abs(np.einsum("i,in->n", plane, rows) - fall)
-        near = off_m < NEAR_M + growth * range_m
+        near = np.abs(_below_m(rows, fall, plane)) < NEAR_M + growth * range_m
         if np.count_nonzero(near) < MIN_POINTS:
             return None
         used = rows[:, near]
         normal = np.einsum("in,jn->ij", used, used) + np.diag(prior)  # without BLAS, which would start threads
         plane = np.linalg.solve(normal, np.einsum("in,n->i", used, fall[near]))
     error = NOISE_M * np.sqrt(np.diag(np.linalg.inv(normal))[1:3])
-    below = fall - np.einsum("i,in->n", plane, rows) > 3 * (NEAR_M + NEAR_SLOPES[-1] * range_m)
+    below = _below_m(rows, fall, plane) > 3 * (NEAR_M + NEAR_SLOPES[-1] * range_m)
     if error.max() > MAX_ERROR or np.count_nonzero(below) > MAX_BELOW_SHARE * np.count_nonzero(near):
         return None
     return FloorSlope(plane[1:3], plane[3:], float(plane[0]))
+
+
+def _below_m(rows: Float64, fall: Float64, plane: Float64) -> Float64:
+    """(n,) distance of the points below a plane [m]."""
+    return np.asarray(fall - np.einsum("i,in->n", plane, rows))
 
 
 def _tried(across: Float64, fall: Float64, tolerance_m: Float64, expected: Float64) -> Float64:
