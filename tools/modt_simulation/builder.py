@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.random import Generator
@@ -165,6 +165,30 @@ class SceneBuilder:
         """Add a person in a posture near the ground."""
         height = clipped_normal(self.rng, 1.74, 0.08, 1.5, 1.95)
         self._person(kinds.PEDESTRIAN, LOW_M[posture], path, height, Solids.none(), posture=posture, role=role)
+
+    def posed(
+        self,
+        posture: Posture,
+        path: Path,
+        size: Triple,
+        height: float,
+        things: Solids,
+        joints: Mapping[str, float],
+        role: str = "",
+    ) -> None:
+        """Add a pedestrian with what belongs to them.
+
+        Args:
+            posture: the posture.
+            path: the way.
+            size: length, width and height with all things.
+            height: standing height of the person [m].
+            things: what they carry, wear or sit on, body frame.
+            joints: fields of Person, differences of the joints from those of the posture.
+            role: for the evaluation.
+        """
+        self._person(kinds.PEDESTRIAN, size, path, height, things, posture=posture, role=role)
+        self._people[-1] = self._people[-1]._replace(**joints)
 
     def rider(self, kind: Kind, size: Triple, path: Path, vehicle: Solids, posture: Posture, role: str) -> None:
         """Add a person on a vehicle, both as one body."""

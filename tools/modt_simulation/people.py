@@ -30,6 +30,8 @@ class Posture(IntEnum):
 
 LEAN_RAD = np.array([0.02, 0.06, 0.55, 0.02, -0.1, 0.5, 0.1, -1.55])
 """Lean of the trunk in each posture."""
+BENT_RAD = 0.9
+"""Lean of the trunk above which the head is in line with it; below, it is upright."""
 SADDLE_M = 0.93
 """Height of the saddle of a bicycle."""
 CRANK_M = np.array([0.08, 0.0, 0.3])
@@ -49,6 +51,14 @@ class Person(NamedTuple):
     coat: float  # breadth of a coat or skirt at the hips [m]; about zero for none
     pack: float  # depth of a backpack [m]; about zero for none
     strip: float  # height of a retroreflective strip around the chest [m]; zero for none
+    # Differences from the joints of the posture.
+    lean: float = 0.0  # of the trunk [rad]
+    hips_x: float = 0.0  # [m]
+    hips_z: float = 0.0
+    hands_x: float = 0.0
+    hands_z: float = 0.0
+    feet_x: float = 0.0
+    feet_apart: float = 0.0  # of each foot from the middle [m]
 
 
 PERSON = np.dtype([(name, int if name in ("body", "posture") else float) for name in Person._fields])
@@ -104,7 +114,7 @@ class _Figures:
         ride = self.posture == Posture.RIDE
         sit = self.posture == Posture.SIT
         self.seated = ride | sit
-        lean = LEAN_RAD[self.posture]
+        lean = LEAN_RAD[self.posture] + people["lean"]
         self.spine = 0.30 * self.height
         upright = _points(0.0, 0.0, 0.52 * self.height)
         self.hips = self._of_posture(
@@ -116,11 +126,11 @@ class _Figures:
             crouch=_points(-0.1, 0.0, 0.32),
             kneel=_points(0.0, 0.0, 0.48),
             lie=_points(-0.1, 0.0, 0.13),
-        )
+        ) + _points(people["hips_x"], 0.0, people["hips_z"])
         self.neck = self.hips + _points(self.spine * np.sin(lean), 0.0, self.spine * np.cos(lean))
         raised = _points(0.02 + 0.3 * lean * 0.2, 0.0, 0.115 * self.height)
         in_line = 0.4 * (self.neck - self.hips)
-        self.head = self.neck + np.where((self.posture == Posture.LIE)[:, None], in_line, raised)
+        self.head = self.neck + np.where((np.abs(lean) > BENT_RAD)[:, None], in_line, raised)
 
     def leg(self, side: float, turn: Float64) -> list[_Bar]:
         """Thigh, shank and foot of the left (1) or right (-1) leg, at (n,) phases of the gait [rad]."""
@@ -134,8 +144,8 @@ class _Figures:
             crouch=_points(0.05, 0.0, 0.06),
             kneel=_points(-0.42, 0.0, 0.06),
             lie=_points(0.75, 0.0, 0.1),
-        )
-        foot[:, 1] = side * 0.09 * self.girth
+        ) + _points(self.people["feet_x"], 0.0, 0.0)
+        foot[:, 1] = side * (0.09 * self.girth + self.people["feet_apart"])
         knee, foot = _bend(hip, foot, 0.245 * self.height, 0.245 * self.height, +1.0)
         toe = foot + _points(0.17, 0.0, -0.01)
         thigh = 0.085 * self.girth
@@ -160,7 +170,7 @@ class _Figures:
             crouch=_points(0.35, 0.0, 0.45),
             kneel=_points(0.3, 0.0, 0.7),
             lie=_points(-0.2, 0.0, 0.08),
-        )
+        ) + _points(self.people["hands_x"], 0.0, self.people["hands_z"])
         hand[:, 1] = side * np.where(self.seated, 0.24, 0.25 * self.girth)
         elbow, hand = _bend(shoulder, hand, 0.175 * self.height, 0.16 * self.height, -1.0)
         upper = 0.052 * self.girth
