@@ -145,7 +145,7 @@ class ClassificationConfig(StageConfig):
 class SchedulerConfig(StageConfig):
     """Budget of classification. Null means no limit, and the limit that is reached first applies."""
 
-    calls_per_frame: int | None = number(16, 0, 10000, "", "Greatest number of proposals classified in a frame.")
+    calls_per_frame: int | None = number(24, 0, 10000, "", "Greatest number of proposals classified in a frame.")
     cpu_ms_per_frame: float | None = number(
         None, 0.0, 10000.0, "ms", "CPU time of classification in a frame, on average over a second."
     )

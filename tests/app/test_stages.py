@@ -97,7 +97,7 @@ def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
     for frame in frames()[:8]:
         before = stages.step(frame, UNLIMITED, reduced=False)
     text = own.read_text()
-    own.write_text(text.replace("calls_per_frame: 16", "calls_per_frame: 0"))
+    own.write_text(text.replace("calls_per_frame: 24", "calls_per_frame: 0"))
     stages.reload()
     assert stages.budget.calls == 0
     after = stages.step(frames()[8], stages.budget, reduced=False)
