@@ -78,8 +78,18 @@ def test_every_frame_requests_all_tracks_with_a_proposal():
     [(2.5, 0.6, 1.7, True), (3.5, 0.6, 1.7, False), (2.5, 1.5, 1.7, False), (2.5, 0.6, 0.6, False)],
 )
 def test_a_possible_person_near_by_is_classified_whatever_its_box_says(x, length_m, height_m, asked):
-    subject = Fused(FurtherViews(CONFIG, FixedPrior(WALL, WALL)), 50, 50, frames=3)
+    subject = Fused(FurtherViews(CONFIG, FixedPrior(WALL, WALL)), 15, 15, frames=3)
     subject.proposals.box[:, :6] = [x, 0.0, 0.0, length_m, 0.4, height_m]
+    assert subject.asks() == [asked] * 2
+
+
+@pytest.mark.parametrize(
+    ("x", "points", "frames", "asked"),
+    [(14.0, 20, 2, True), (16.0, 20, 2, False), (14.0, 19, 2, False), (14.0, 20, 1, False)],
+)
+def test_what_shows_enough_points_nearby_gets_one_view_whatever_its_box_says(x, points, frames, asked):
+    subject = Fused(FurtherViews(CONFIG, FixedPrior(WALL, WALL)), points, points, frames=frames)
+    subject.proposals.box[:, :6] = [x, 0.0, 0.0, 3.0, 0.4, 0.5]
     assert subject.asks() == [asked] * 2
 
 
@@ -140,6 +150,7 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
 def test_what_is_hardly_an_object_is_not_classified(make):
     """Mode accurate does classify a person by the box who stands still, if there are points enough to tell."""
     subject = Fused(make(CONFIG, FixedPrior(WALL, UNLIKELY, CAR, *[PERHAPS_A_PERSON] * 2)), *[50] * 4, 10, frames=3)
+    subject.proposals.box[:, 0] = 20.0  # far enough for the box to decide
     subject.tracks.observed_s[3:] = 5.0
     subject.tracks.size_m[3:] = 0.6
     assert subject.asks() == [False, False, True, make is FurtherViews, False]

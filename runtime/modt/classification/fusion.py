@@ -235,11 +235,11 @@ class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is confirmed, and where something changes (Table II).
 
     A track, at a remembered place too, has its first view as soon as box and motion, a box of many points alone, or a
-    nearby box of a person's size allow an object. The last condition is there because the box prior takes tall people
-    who stand for background. An unconfirmed track is classified again when it shows more points, at growing
-    intervals, and every few frames if it may be a person. A confirmed object is classified again at longer intervals.
-    Confirmed background is classified again only with far more points, if it may be an object. A person whose upper
-    half is cut off is not classified.
+    nearby box of a person's size allow an object. A track of many points within some distance has it whatever its box
+    is, at no remembered place: the box prior takes people in rare postures for background. An unconfirmed track is
+    classified again when it shows more points, at growing intervals, and every few frames if it may be a person. A
+    confirmed object is classified again at longer intervals. Confirmed background is classified again only with far
+    more points, if it may be an object. A person whose upper half is cut off is not classified.
     """
 
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
@@ -255,6 +255,7 @@ class FurtherViews(FusedTracks):
         many_points = proposals.count[proposal_of_row] >= conditions.first_view_points
         may_be_object = evidence.may_be_object[rows] | (many_points & self._may_be_object(evidence.prior[rows]))
         may_be_object |= self._may_be_near_person(proposals)[proposal_of_row]
+        first = may_be_object | (many_points & self._is_unseen_nearby(motion, proposals, rows))
         # Views of a confirmed class: of an object at growing intervals, of background with far more points.
         review = (background < 0.5) & (age >= conditions.review_age_ratio * key_age + conditions.review_frames)
         review |= may_be_object & self._shows_more(evidence, motion, rows, conditions.far_more_points_ratio)
@@ -266,8 +267,16 @@ class FurtherViews(FusedTracks):
         unconfirmed |= self._is_person_due(evidence, motion, rows, posterior)
         further = np.where(self._is_confirmed(posterior), review, unconfirmed)
         asks = np.zeros(len(motion), np.bool_)
-        asks[rows] = ~motion.hidden[rows] & np.where(evidence.viewed[rows], further, may_be_object)
+        asks[rows] = ~motion.hidden[rows] & np.where(evidence.viewed[rows], further, first)
         return asks
+
+    def _is_unseen_nearby(self, motion: Motion, proposals: Proposals, rows: Int) -> Bool:
+        """(R,) tracks that are near and seen in some frames, at no remembered place."""
+        conditions = self._conditions
+        x, y = proposals.box[motion.proposal[rows], :2].T
+        is_near: Bool = x * x + y * y < conditions.unseen_m**2
+        is_near &= (motion.hits[rows] >= conditions.unseen_hits) & ~motion.final[rows]
+        return is_near
 
     def _may_be_near_person(self, proposals: Proposals) -> Bool:
         """(P,) proposals that are near, at most as long as a person, and at least half as high."""
