@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from modt.classes import CLASS_NAMES
+from modt.geometry import wrap
 from modt.viewer import theme
 from modt_profiling.reporting.run_report import run_tree
 from modt_viewer.recorded_run import RecordedRun
@@ -62,7 +63,9 @@ def test_the_page_holds_the_run(run, records):
         assert len(record["classified"]) == record["classifications"]
         seen = [(track["box"]["x"], track["box"]["yaw"]) for track in tracks if track["box"]]
         drawn = np.stack([page.column("x") / 100, page.column("yaw") / 1000], axis=1)
-        np.testing.assert_allclose(drawn[rows & (page.column("seen") > 0)], seen, atol=0.0051)
+        shift = drawn[rows & (page.column("seen") > 0)] - seen
+        shift[:, 1] = wrap(shift[:, 1])  # pi and -pi are one yaw
+        np.testing.assert_allclose(shift, 0.0, atol=0.0051)
     assert [len(cell) > 1000 for cell, _ in page.points] == [True] * FRAMES
     code = re.sub(r'<script type="text[^<]*', "", page.text)
     assert not re.search(r"https?:|<link|\bsrc=|\bimport\b|fetch\(", code), "it needs nothing from outside"
@@ -70,7 +73,8 @@ def test_the_page_holds_the_run(run, records):
 
 def test_the_page_opens_where_there_is_an_object(run, records, tmp_path):
     late = shutil.copytree(run, tmp_path / "late")
-    background = [record | {"tracks": [t | {"class": "background"} for t in record["tracks"]]} for record in records]
+    unpublished = {"class": "background", "motion": "unknown"}
+    background = [record | {"tracks": [t | unpublished for t in record["tracks"]]} for record in records]
     for first, options, begins in ((5, (), 5), (5, ("--frame", 3), 3), (len(records), (), 0)):
         lines = [*background[:first], *records[first:]]
         (late / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
@@ -165,12 +169,13 @@ def test_what_is_left_out_can_be_coloured(run, tmp_path):
         assert here("view", run, "--frame", 9, *more, "--out", tmp_path / "frame.png") == 0
         with image.open(tmp_path / "frame.png") as picture:
             pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
-        coloured.append(np.count_nonzero((pixels == structure).all(axis=1)))
+        coloured.append((pixels == structure).all(axis=1))
         assert here("view", run, *more, "--out", tmp_path / "view.html") == 0
         page = Page(tmp_path / "view.html")
         assert page.run["left_out"] == bool(more)
         assert page.run["kinds"] == theme.kinds()
-    assert coloured[1] > 2 * coloured[0]
+    plain, left_out = coloured  # tracks may have the colour of structure too
+    assert np.count_nonzero(left_out & ~plain) > 200
 
 
 def test_the_key_k_colours_what_is_left_out(run, chromium):

@@ -5,7 +5,7 @@ import threading
 from collections import defaultdict
 from types import ModuleType, SimpleNamespace
 
-PACKAGES = ("sensor_msgs", "nav_msgs", "vision_msgs", "visualization_msgs", "tf2_msgs")
+PACKAGES = ("sensor_msgs", "nav_msgs", "vision_msgs", "visualization_msgs", "tf2_msgs", "diagnostic_msgs")
 
 
 class Types(ModuleType):

@@ -96,8 +96,8 @@ def topics(options: TopicOptions = TopicOptions()) -> list[Topic]:
     made = [
         topic(f"/{prefix}/{name}", kind, encode, options.background),
         topic(f"/{prefix}/markers", markers.TYPE, markers.markers),
-        topic(f"/{prefix}/diagnostics", diagnostics.TYPE, diagnostics.diagnostics),
         topic(f"/{prefix}/odometry", odometry.TYPE, poses.pose, options.world_frame_id or WORLD_FRAME_ID),
+        topic(f"/{prefix}/diagnostics", diagnostics.TYPE, diagnostics.diagnostics),
     ]
     if options.world_frame_id:
         made.append(topic("/tf", odometry.TF, poses.transform, options.world_frame_id))

@@ -58,7 +58,7 @@ def test_the_labels_give_table_iii(kitti_root):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hdl-64e", "paper"])
-def test_a_replay_of_the_points_that_matter_is_judged_as_the_whole_sweeps_are(name):
+def test_a_replay_of_segmented_sweeps_is_judged_as_the_sweeps_are(name):
     config = load(name)
     found = NetworkReplay(config).judged(DRIVE)
     mode = assembly.MODES["accurate"]

@@ -42,14 +42,14 @@ from modt.types import (
 )
 from modt_evaluation.experiments.drives import Drive
 from modt_evaluation.frame import JudgedFrame
-from modt_evaluation.overlap import PAD_M, ObjectPoints, Overlap, in_box_frame, inside
+from modt_evaluation.overlap import ObjectPoints, Overlap
 from modt_evaluation.rules import Rules
 from modt_evaluation.truth import FrameTruth
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentedFrame:
-    """A sweep with the points that matter, proposals, their likelihoods, labels, and the points of objects."""
+    """A sweep with its proposals, their likelihoods, labels, and the points of objects."""
 
     frame: Frame
     proposals: Proposals
@@ -90,24 +90,9 @@ def _network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
 def _frames(drive: Drive, config: ProfileConfig, network: PointNet) -> Iterator[SegmentedFrame]:
     segmenter = assembly.segmenter(config, drive.fov(), assembly.chosen_kernels(config.segmentation.kernels))
     for frame, truth in drive.sweeps():
-        whole = segmenter.segment(frame.points)
-        kept = _of_objects(frame.points, truth)
-        kept[whole.members] = True
-        points = frame.points[kept]
-        row = np.cumsum(kept) - 1  # of each point that is kept, among these
-        proposals = replace(whole, members=row[whole.members])
-        likelihood = network.classify(points, proposals, np.arange(len(proposals)))
-        objects = ObjectPoints.of(points, truth)
-        yield SegmentedFrame(replace(frame, points=points), proposals, likelihood, truth, objects)
-
-
-def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
-    """(N,) points in or near the box of a labelled object."""
-    kept = np.zeros(len(points), np.bool_)
-    moved = in_box_frame(points, truth)
-    for box in truth.box:
-        kept |= inside(moved, box, pad_m=2 * PAD_M, foot_m=-2 * PAD_M)
-    return kept
+        proposals = segmenter.segment(frame.points)
+        likelihood = network.classify(frame.points, proposals, np.arange(len(proposals)))
+        yield SegmentedFrame(frame, proposals, likelihood, truth, ObjectPoints.of(frame.points, truth))
 
 
 def within(proposals: Proposals, range_m: float) -> Bool:
