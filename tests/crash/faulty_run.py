@@ -24,6 +24,7 @@ from modt.app.loop import Service
 from modt.app.status import STALE_S
 from modt.app.stop import Stop
 from modt.app.systemd import Notifier
+from modt.app.trust_report import TrustReport
 from modt.cli.status import read
 from modt.config import ProfileConfig, RecordingConfig
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
@@ -108,6 +109,7 @@ def stages_with(odometry: PoseSocket) -> Mock:
     pipeline = SimpleNamespace(segmenter=SimpleNamespace(facts=dict), decision=decision)
     stages = Mock(info=INFO, request=request, chosen=chosen, config=config, misfits=0, budget=UNLIMITED, step=step)
     stages.configure_mock(odometry=odometry, ledger=Ledger(), pipeline=pipeline)
+    stages.configure_mock(run_id="", trust=TrustReport(config.sensor), source_findings={})
     stages.recover.side_effect = AssertionError("a frame failed")
     return stages
 
