@@ -1,5 +1,6 @@
 """The frames of a live source or a recording, on a clock that only working and waiting move."""
 
+import dataclasses
 import logging
 import os
 import signal
@@ -18,7 +19,7 @@ from modt.app.stop import NAP_S, Stop
 from modt.energy.ledger import Ledger, StageWork
 from modt.errors import MisuseError, ModtError
 from modt.sources.stream import Received, StreamEndedError
-from modt.types import Budget, Frame
+from modt.types import Budget, Frame, Trust, TrustLevel
 from tests.results import Kept, ledger_line, result
 
 POINTS = np.zeros((1, 4), np.float32)
@@ -130,6 +131,23 @@ class Live:
     def run(self):
         self.service.process_frames(self.notifier)
         return self
+
+
+@pytest.mark.parametrize(("results", "shown"), [("always", 20), ("unless_blind", 10)])
+def test_sinks_get_no_result_of_a_blind_sensor_where_the_profile_says_so(results, shown):
+    sink = Kept()
+    live = Live(2.0, sinks=[sink])
+    live.stages.config = SimpleNamespace(trust=SimpleNamespace(results=results))
+    step = live.stages.step
+
+    def half_blind(frame, budget, *, reduced):
+        level = TrustLevel.BLIND if frame.index > 10 else TrustLevel.GOOD
+        return dataclasses.replace(step(frame, budget, reduced=reduced), trust=Trust(level))
+
+    live.stages.step = half_blind
+    live.run()
+    assert len(sink.indices) == shown
+    assert live.service.recording.write.call_count == len(live.seen) == 20, "the records go on"
 
 
 def test_every_sweep_in_time_goes_through():

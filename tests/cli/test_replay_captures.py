@@ -41,7 +41,10 @@ def test_a_capture_is_replayed(tmp_path, capture, options, frames):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["--capture", "colour=red"], "colour does not apply; --capture takes calibration, metadata, model here"),
+        (
+            ["--capture", "colour=red"],
+            "colour does not apply; --capture takes calibration, host, metadata, model, port here",
+        ),
         (["--capture", "model"], "write KEY=VALUE"),
         (["--capture", "model=vlp-17"], "use one of vlp-16"),
         (["--capture", "calibration=nowhere.yaml"], "no calibration"),

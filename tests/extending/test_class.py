@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 VALUE = "    CYCLIST = 3\n"
-ROW = '    ObjectClass.CYCLIST: ClassSpec(("Cyclist",)'
+ROW = "    ObjectClass.CYCLIST: ClassSpec("
 
 
 @pytest.fixture(name="source")

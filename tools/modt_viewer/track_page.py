@@ -9,6 +9,7 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES, CLASSES
 from modt.errors import MisuseError
+from modt.publication import KIND_NAMES
 from modt.sinks.tracks import BOX_KEYS
 from modt.sources.stream import Stream
 from modt.types import Float32
@@ -60,7 +61,7 @@ def _facts(run: RecordedRun, rows: list[Row]) -> list[tuple[str, str, str]]:
     spent_mJ = sum(_call_mJ(run, row) for row in classified)
     settled = settled_from(rows)
     return [
-        ("reported at the end", CLASS_NAMES[int(last["class"])], f"posterior {_reported(last)}"),
+        ("reported at the end", KIND_NAMES[int(last["class"])], f"posterior {_reported(last)}"),
         ("tracked", f"{len(rows)} frames", f"{numbers[0]} to {numbers[-1]}"),
         ("classifications", f"{len(classified)}", f"{sum(r['seen'] > 0 for r in rows)} by tracking by detection"),
         ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated"),
@@ -153,6 +154,8 @@ def _changes(run: RecordedRun, row: Row, before: Row | None) -> Iterator[str]:
 
 def _reported(row: Row) -> str:
     """The class that is reported, with its own probability; with a question mark below one half."""
-    name = CLASS_NAMES[int(row["class"])]
+    name = KIND_NAMES[int(row["class"])]
+    if name not in CLASS_NAMES:
+        return name.replace("_", " ")
     doubt = "?" if row["class"] and row[f"p_{name}"] < 0.5 else ""
     return f"{name}{doubt} {100 * row[f'p_{name}']:.1f} %"

@@ -75,9 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
             loop = service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, refusals)
         loop.writers["log"] = output.writer
         status = loop.run(notifier)["status"]
-        output.say(f"modt: {_last_words(status, loop.recording.health(), arguments.out)}")
         for line in closing_lines(loop.summary["read"]):
             output.say(f"modt: {line}")
+        output.say(f"modt: {_last_words(status, loop.recording.health(), arguments.out)}")
     return INTERRUPTED if loop.stop.signal == "SIGINT" else 0
 
 

@@ -21,7 +21,6 @@ from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_file import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
-from modt.sources.viewpoints import Viewpoints, viewpoints_of
 from modt.types import Float64
 
 MAX_NUMBER_DIGITS = 10
@@ -107,11 +106,18 @@ def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") 
     stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(scans)}
     notes = [f"folder of scans: no calibration, frames {apart}"]
     info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
-    viewpoints = viewpoints_of(scans) if suffix == ".pcd" else Viewpoints()
-    notes += viewpoints.notes
-    pose_notes = [] if viewpoints.poses else [f"folder of scans: {NO_POSES}"]
-    stream = _stream(info, scans, notes, pose_notes, viewpoints.poses, stamps, {})
-    stream.scans = [replace(scan, T_sensor_file=viewpoints.T_sensor_file.get(scan.index)) for scan in stream.scans]
+    poses: dict[int, Float64] = {}
+    T_sensor_file: dict[int, Float64] = {}
+    if suffix == ".pcd":
+        from modt.sources.viewpoints import viewpoints_of
+
+        viewpoints = viewpoints_of(scans)
+        poses = viewpoints.poses
+        T_sensor_file = viewpoints.T_sensor_file
+        notes += viewpoints.notes
+    pose_notes = [] if poses else [f"folder of scans: {NO_POSES}"]
+    stream = _stream(info, scans, notes, pose_notes, poses, stamps, {})
+    stream.scans = [replace(scan, T_sensor_file=T_sensor_file.get(scan.index)) for scan in stream.scans]
     return stream
 
 

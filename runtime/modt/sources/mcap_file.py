@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from heapq import heappop, heappush
 from io import BytesIO
 from itertools import chain, count, repeat
@@ -378,13 +378,32 @@ def _add_index(pieces: list[Piece], number: int, at: int) -> None:
     pieces[-1] = replace(pieces[-1], indices={**pieces[-1].indices, number: at})
 
 
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+"""Channel, sequence number, and times of recording and of publication of a message [ns]."""
+
+
+@cache
+def _record_kinds() -> dict[int, Any]:
+    """Kinds of records that are read, by their numbers."""
+    from mcap import records
+
+    return {
+        2: records.Footer,
+        3: records.Schema,
+        4: records.Channel,
+        MESSAGE: records.Message,
+        7: records.MessageIndex,
+        8: records.ChunkIndex,
+        11: records.Statistics,
+    }
+
+
 def record_at(view: View, at: int) -> tuple[Any, int]:
     """Record at an offset, None for a kind that is not read, and the offset of its end.
 
     Raises:
         Exception: the bytes are no record.
     """
-    from mcap import records
     from mcap.data_stream import ReadDataStream
 
     opcode = view[at]
@@ -392,19 +411,16 @@ def record_at(view: View, at: int) -> tuple[Any, int]:
     end = at + HEAD_BYTES + length
     if not 0 < opcode <= LAST_OPCODE or end > len(view):
         raise ValueError("no record")
-    kinds: dict[int, Any] = {
-        2: records.Footer,
-        3: records.Schema,
-        4: records.Channel,
-        7: records.MessageIndex,
-        8: records.ChunkIndex,
-        11: records.Statistics,
-    }
-    if opcode != MESSAGE and opcode not in kinds:
+    kinds = _record_kinds()
+    if opcode == MESSAGE:  # of which there may be hundreds of thousands
+        if length < MESSAGE_HEAD.size:
+            raise ValueError("no record")
+        channel, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(view, at + HEAD_BYTES)
+        data = bytes(view[at + HEAD_BYTES + MESSAGE_HEAD.size : end])
+        return kinds[MESSAGE](channel, log_time, data, publish_time, sequence), end
+    if opcode not in kinds:
         return None, end
     stream = ReadDataStream(BytesIO(view[at + HEAD_BYTES : end]))
-    if opcode == MESSAGE:
-        return records.Message.read(stream, length), end
     record = kinds[opcode].read(stream)
     if stream.count > length:
         raise ValueError("no record")

@@ -108,9 +108,9 @@ SCENARIOS: dict[str, Scenario] = {
     "energy.meter": lambda config, _folder: yaml.safe_dump(profile.dump(config)),
 }
 """Scenario of each key, by the longest beginning of its path."""
-TESTED_BESIDE = ("segmentation.kernels", "odometry.max_speed_mps", "loop.power_W", "recording.")
+TESTED_BESIDE = ("segmentation.kernels", "odometry.max_speed_mps", "loop.power_W", "recording.", "trust.results")
 """Keys that no scenario of perception or energy shows, by the beginning of their paths. Their tests are
-app/test_assembly.py, poses/test_pose_socket.py, cli/test_run.py and sinks/test_recording.py.
+app/test_assembly.py, poses/test_pose_socket.py, cli/test_run.py, sinks/test_recording.py and app/test_loop.py.
 """
 
 
