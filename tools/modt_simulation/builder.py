@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -173,7 +174,7 @@ class SceneBuilder:
         size: Triple,
         height: float,
         things: Solids,
-        joints: Mapping[str, float],
+        joints: Mapping[str, Any],
         role: str = "",
     ) -> None:
         """Add a pedestrian with what belongs to them.

@@ -28,6 +28,8 @@ FOOTER_BYTES = 37
 CRC_AT = 25
 """Offset in the footer of the checksum of the summary, which covers the footer up to there."""
 MESSAGE = 5
+KEPT_BYTES = 32 << 20
+"""Longest piece whose messages are kept for the next reading [bytes]."""
 CHUNK = 6
 MESSAGE_INDEX = 7
 LAST_OPCODE = DATA_END = 15
@@ -101,6 +103,9 @@ class Contents:
 class McapFile(BagFile):
     """An .mcap file. Damaged stretches are left out, and what lies behind them is read."""
 
+    _latest: tuple[int, dict[int, Any]] = (-1, {})
+    """Offset of the undamaged piece that was read last, and its messages: a short file is read several times."""
+
     def _topics(self) -> dict[str, BagTopic]:
         contents = self._contents
         counts = contents.counts or self._counted(contents)
@@ -163,6 +168,10 @@ class McapFile(BagFile):
         """Messages of a piece by their offsets in it, and whether it is undamaged; its channels are registered."""
         from mcap.records import Message
 
+        at_before, before = self._latest
+        if piece.at == at_before:
+            return before, True
+        n_flaws = len(self.flaws)
         data, whole = self._unpacked(piece)
         resume = self._indexed(piece) if not whole else {}
         found = {}
@@ -176,10 +185,13 @@ class McapFile(BagFile):
                     resume = self._indexed(piece)
                 at = min((place for place in resume if place > at), default=len(data))
                 continue
-            contents.register(record)
-            if isinstance(record, Message) and record.channel_id in contents.channels:
+            if not isinstance(record, Message):
+                contents.register(record)
+            elif record.channel_id in contents.channels:
                 found[at] = record
             at = end
+        if whole and len(self.flaws) == n_flaws and len(data) <= KEPT_BYTES:
+            self._latest = piece.at, found
         return found, whole
 
     def _unpacked(self, piece: Piece) -> tuple[bytes, bool]:
@@ -378,6 +390,8 @@ def _add_index(pieces: list[Piece], number: int, at: int) -> None:
     pieces[-1] = replace(pieces[-1], indices={**pieces[-1].indices, number: at})
 
 
+RECORD_HEAD = struct.Struct("<BQ")
+"""Kind of a record, and its length."""
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence number, and times of recording and of publication of a message [ns]."""
 
@@ -404,10 +418,7 @@ def record_at(view: View, at: int) -> tuple[Any, int]:
     Raises:
         Exception: the bytes are no record.
     """
-    from mcap.data_stream import ReadDataStream
-
-    opcode = view[at]
-    length = _length(view, at)
+    opcode, length = RECORD_HEAD.unpack_from(view, at)
     end = at + HEAD_BYTES + length
     if not 0 < opcode <= LAST_OPCODE or end > len(view):
         raise ValueError("no record")
@@ -420,6 +431,8 @@ def record_at(view: View, at: int) -> tuple[Any, int]:
         return kinds[MESSAGE](channel, log_time, data, publish_time, sequence), end
     if opcode not in kinds:
         return None, end
+    from mcap.data_stream import ReadDataStream
+
     stream = ReadDataStream(BytesIO(view[at + HEAD_BYTES : end]))
     record = kinds[opcode].read(stream)
     if stream.count > length:

@@ -123,10 +123,12 @@ def _is_bag(path: Path) -> bool:
     """Whether a path is a recording: a file, or a folder of the files of one recording without scans."""
     if not path.is_dir():
         return path.is_file() and path.name.endswith(BAGS)
+    if not any(file.name.endswith(BAGS) for file in path.iterdir()):
+        return False
     from modt.sources.bag_files import METADATA, bag_in
 
     if (path / METADATA).is_file():
-        return any(file.name.endswith(BAGS) for file in path.iterdir())
+        return True
     return bool(bag_in(path)) and not any(_has_scans(path, suffix) for suffix in SUFFIXES)
 
 
