@@ -16,8 +16,8 @@ MOVING_MPS = 1.0
 """Speed from which an object counts as moving."""
 VELOCITY_FRAMES = 2
 """The true velocity is the displacement from so many frames before to so many frames after, over that time."""
-STRICT_IOU = {ObjectClass.CAR: 0.7, ObjectClass.PEDESTRIAN: 0.5, ObjectClass.CYCLIST: 0.5}
-LOOSE_IOU = {ObjectClass.CAR: 0.5, ObjectClass.PEDESTRIAN: 0.25, ObjectClass.CYCLIST: 0.25}
+STRICT_IOU = [0.7 if c is ObjectClass.CAR else 0.5 for c in ObjectClass]
+LOOSE_IOU = [0.5 if c is ObjectClass.CAR else 0.25 for c in ObjectClass]
 """Intersection over union from which a box is right, as KITTI."""
 RECALLS = np.arange(1, 41) / 40
 """Recalls over which precision is averaged, as KITTI."""
@@ -62,8 +62,8 @@ def box_scores(objects: Rows, reported: Rows) -> dict[str, BoxScore]:
             velocity_mps=_mean(error),
             moving=int(moving.sum()),
             velocity_moving_mps=_mean(error[moving]),
-            strict_ap=average_precision(of_class, STRICT_IOU[ObjectClass(c)], n),
-            loose_ap=average_precision(of_class, LOOSE_IOU[ObjectClass(c)], n),
+            strict_ap=average_precision(of_class, STRICT_IOU[c], n),
+            loose_ap=average_precision(of_class, LOOSE_IOU[c], n),
         )
     return scores
 
