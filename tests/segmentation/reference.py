@@ -62,8 +62,7 @@ def trace(lowest, spread, estimator, height_m, max_slope_deg):
                 bound = 0.0 if spread[ring, ray] > flat_m else min(gap, near) * max_slope
                 if -gap * max_slope - ground.noise_m < off < bound + ground.noise_m:
                     is_ground[ring, ray] = True
-                    gain = ground.slope_gain / max(gap, ground.slope_gap_m)
-                    slope += gain * (here - height - slope * gap)
+                    slope += (here - height - slope * gap) / (gap + ground.slope_length_m)
                     slope = float(np.clip(slope, -hill_slope, hill_slope))
                     last[ray] = here, range_m[ring, ray], slope
             steep[ring, ray] = abs(slope) > ramp_slope

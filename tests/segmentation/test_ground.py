@@ -73,7 +73,7 @@ def test_heights_of_a_person_on_a_ramp_are_above_the_ramp(elevation, step_deg, h
     on = (person < hit)[np.isfinite(nearest)]
     height = heights(points, ground(height_m=height_m, min_range_m=0.4), height_m)
     assert on.sum() > 50
-    assert np.abs(np.median(height[on] - (points[on, 2] - foot_m))) < 0.25
+    assert np.abs(np.median(height[on] - (points[on, 2] - foot_m))) < 0.15
 
 
 def test_a_kerb_is_ground_and_a_wall_is_not():

@@ -21,7 +21,7 @@ typedef struct {
     i32 rings, sectors, flank_sectors, bonnet_ring; /* sectors are a power of two */
     float far_m;                                    /* points as far away have no position */
     float rings_per_unit, ring_step;                /* of the square root of range */
-    float max_slope, hill_slope, ramp_slope, near_m, slope_gain, slope_gap_m, noise_m, max_gap_m, flank_m;
+    float max_slope, hill_slope, ramp_slope, near_m, slope_length_m, noise_m, max_gap_m, flank_m;
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
     const i32 *low_sectors; /* (near_rings,) sectors to the left and right that a low thing does not reach */
     i32 near_rings, quarters;
@@ -221,7 +221,7 @@ static void trace_ring(const Ground *g, i32 ring, float (*restrict ends)[2], flo
         float flat = -ends[k][1] - lowest[k] <= flat_m + maxf(slope[k], 0.0f) * depth_m ? 1.0f : 0.0f;
         float bound = minf(gap, rise_range_m[k]) * c.max_slope * flat + c.noise_m;
         int found = (residual < bound) & (residual > -(gap * c.max_slope + c.noise_m));
-        float newest = slope[k] + c.slope_gain / maxf(gap, c.slope_gap_m) * (rise - slope[k] * gap);
+        float newest = slope[k] + (rise - slope[k] * gap) / (gap + c.slope_length_m);
         newest = minf(maxf(newest, -c.hill_slope), c.hill_slope);
         surface[k] = height[k];
         range_before[k] = range[k];

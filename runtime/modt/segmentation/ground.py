@@ -264,8 +264,7 @@ class _Rays:
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
         found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * flat + tuning.noise_m
         found &= residual > -(gap * max_slope + tuning.noise_m)
-        gain = tuning.slope_gain / np.maximum(gap, tuning.slope_gap_m)
-        slope = self.slope + gain * (rise - self.slope * gap)
+        slope = self.slope + (rise - self.slope * gap) / (gap + np.float32(tuning.slope_length_m))
         steepest = self.ground.hill_slope
         np.copyto(self.slope, np.minimum(np.maximum(slope, -steepest), steepest), where=found)
         np.copyto(self.height_m, lowest, where=found)

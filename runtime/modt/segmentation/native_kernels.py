@@ -52,7 +52,7 @@ GROUND = Layout(
     **_members(Array(_f32, "rings"), "flat_m", "depth_m"),
     **_members(Number(_i32), "rings", "sectors", "flank_sectors", "bonnet_ring"),
     **_members(Number(_f32), "far_m", "rings_per_unit", "ring_step", "max_slope", "hill_slope", "ramp_slope"),
-    **_members(Number(_f32), "near_m", "slope_gain", "slope_gap_m", "noise_m", "max_gap_m", "flank_m"),
+    **_members(Number(_f32), "near_m", "slope_length_m", "noise_m", "max_gap_m", "flank_m"),
     **_members(Number(_f32), *Bounds._fields),
     low_sectors=Array(_i32, "near_rings"),
     **_members(Number(_i32), "near_rings", "quarters"),

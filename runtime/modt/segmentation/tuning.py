@@ -61,11 +61,10 @@ class GroundTuning:
     Chosen on: simulated ramps."""
     ramp_share: float = 0.27
     """Share of `max_slope_deg` above which the running slope of a ray is a ramp. Chosen on: simulated ramps."""
-    slope_gain: float = 0.2
-    """Weight of the newest slope in the running slope of a ray. Chosen on: KITTI scans."""
-    slope_gap_m: float = 0.5
-    """Distance between two ground cells below which that weight shrinks in proportion [m]. Less lets the noise of
-    close returns into the slope. Chosen on: KITTI scans and simulated hills."""
+    slope_length_m: float = 3.0
+    """Length over which the running slope of a ray is a mean [m]: the slope between two ground cells at this distance
+    weighs as much as all before. Less lets the noise of close returns into the slope, more is late on ramps.
+    Chosen on: KITTI scans, simulated hills and ramps."""
     bonnet_range_m: float = 11.0
     """Range from which the next ring is looked at for what stands behind a low return [m]: cells are as deep as a
     bonnet, 1 m, there. Chosen on: sensor study (far cars of a VLP-16)."""
