@@ -81,6 +81,14 @@ def test_flicker_does_not_move():
     assert moving < 0.05 * n_frames * n_things
 
 
+@pytest.mark.parametrize(("steady_frames", "state"), [(0, "UNKNOWN"), (10, "MOVING")])
+def test_no_track_starts_to_move_as_it_reappears_and_one_that_moves_goes_on(steady_frames, state):
+    seen = [index < steady_frames or index % 2 == 0 for index in range(24)]
+    scenes = [[box(8 + 0.15 * index, 2, 0.6, 0.5)] if is_seen else [] for index, is_seen in enumerate(seen)]
+    motion, _ = follow(Follower(), scenes)
+    assert {motion[index] for index in range(12, 24) if seen[index]} == {state}
+
+
 @pytest.mark.parametrize(("hidden", "moves"), [(True, False), (False, True)])
 def test_a_surface_between_what_hides_it_does_not_move(hidden, moves):
     follower = Follower()

@@ -38,6 +38,7 @@ class TrackTable(Tracks):
     kdop_position: Float64 = column(float, 2)  # measured position when `kdop` was observed [m, world]
     rest_position: Float64 = column(float, 2)  # position at which the track was last known to rest [m, world]
     stationary: Bool = column(bool)  # the track is at rest
+    reappears: Bool = column(bool)  # the track has a proposal after a frame without one
     moving_mean: Float64 = column(float, 4)  # x, y [m] and their velocities [m/s] if the track moves, world frame
     moving_covariance: Float64 = column(float, 4, 4)  # its covariance
     resting_mean: Float64 = column(float, 2)  # position if the track rests [m, world]

@@ -217,6 +217,7 @@ class Tracker:
         t.final[:] = self.machine.final[t.state]
         t.age[:] += 1
         t.hits[rows] += 1
+        t.reappears[rows] = t.missed[rows] > 0
         t.missed[:] += 1
         t.missed[rows] = 0
         t.unseen_s[rows] = 0.0
@@ -297,11 +298,15 @@ class Tracker:
         t.rest_position[rows] = position + (rest.gain * near)[:, None] * step
 
     def _decide_motion(self) -> None:
-        """Write which tracks move and which are still, by the probability of moving and the distance gone."""
+        """Write which tracks move and which are still, by the probability of moving and the distance gone.
+
+        What flickers seems to move from one place to another, so no track starts to move as it reappears.
+        """
         t = self.tracks
         evidence = self._evidence
         went = self._from_rest_m() > evidence.min_distance_m
-        moves = (t.moving_probability > evidence.moving) & went
+        may_move = ~t.reappears | (t.motion == MotionState.MOVING.value)
+        moves = (t.moving_probability > evidence.moving) & went & may_move
         known = (moves | (t.moving_probability < 0.5)) & (t.hits >= evidence.min_hits)
         t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
         t.motion[~known] = MotionState.UNKNOWN.value

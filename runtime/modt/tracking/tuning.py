@@ -122,7 +122,7 @@ class MotionEvidenceTuning:
     """Least width of a compact proposal, relative to its length. Less: parts of walls seem to move.
     Chosen on: simulated aisles, by static things that were reported as moving."""
 
-    moving: float = 0.95
+    moving: float = 0.97
     """A track moves from this probability on. Greater: fewer static things move, and starts are reported later.
     Chosen on: simulated scenes, by static things that were reported as moving."""
 
@@ -131,10 +131,10 @@ class MotionEvidenceTuning:
     starts are reported later.
     Chosen on: judgement."""
 
-    min_hits: int = 4
+    min_hits: int = 5
     """Frames with a proposal from which the motion of a track is known. Less: movers are reported earlier, and what
     flickers moves.
-    Chosen on: simulated snow."""
+    Chosen on: simulated snow and streets."""
 
 
 @dataclass(frozen=True, slots=True)
