@@ -12,12 +12,14 @@ from modt.ros2.point_cloud2 import read_cloud, write_cloud
 from modt.sources.drivers.hesai import HesaiDecoder, read_angles
 from modt.sources.drivers.livox import LivoxDecoder
 from modt.sources.drivers.ouster import OusterDecoder
+from modt.sources.drivers.robosense import RobosenseDecoder
 from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.recognise import open_stream
 from tests.fuzz.target import of_file, target, targets_of_files
 from tests.ros2 import messages
 from tests.sources import bags, layouts
+from tests.sources.packets.robosense_packets import WRITTEN
 from tests.sources.packets.simulated import packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
@@ -63,6 +65,28 @@ def hesai_packets(folder):
 @target()
 def livox_packets(folder):
     return _of_packets(LivoxDecoder("sensor"), _framed(packets("mid-360", 3)[150:450]))
+
+
+@target()
+def robosense_packets(folder):
+    decoder = RobosenseDecoder("sensor")
+    decoder.describe(WRITTEN["bpearl"].difop())
+    return _of_packets(decoder, _framed(WRITTEN["bpearl"].turns(1.7)[:300]))
+
+
+@target()
+def robosense_difop(folder):
+    model = WRITTEN["airy"]
+
+    def call(raw):
+        decoder = RobosenseDecoder("sensor")
+        decoder.describe(raw)
+        for at_s, payload in model.turns(1.2)[::8]:
+            decoder.decode(at_s, payload)
+            decoder.describe(raw)
+        decoder.finish()
+
+    return [model.difop()], call
 
 
 @target()

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from modt.sources.drivers import hesai, livox, velodyne
+from modt.sources.drivers import hesai, livox, robosense, velodyne
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.packets.turn_decoder import RECOGNISED_BY, TurnDecoder
+from tests.sources.packets.robosense_packets import WRITTEN
 from tests.sources.packets.simulated import packets
 from tools.send.loops import HesaiStamps, VelodyneStamps
 
@@ -57,11 +58,11 @@ def _of_wire(wire: VelodyneStamps | HesaiStamps) -> Callable[[bytes, float], byt
     return lambda payload, at_s: wire.stamped(payload, round(at_s * 1e6) % wire.wrap_us)
 
 
-def _azimuths(first: int, step: int) -> Callable[[bytes, Sequence[int]], bytes]:
+def _azimuths(first: int, step: int, form: str = "<H") -> Callable[[bytes, Sequence[int]], bytes]:
     def turned(payload: bytes, azimuths: Sequence[int]) -> bytes:
         changed = bytearray(payload)
         for block, azimuth in enumerate(azimuths[: (len(payload) - first) // step]):
-            struct.pack_into("<H", changed, first + step * block, azimuth)
+            struct.pack_into(form, changed, first + step * block, azimuth)
         return bytes(changed)
 
     return turned
@@ -74,6 +75,13 @@ def xt_16(payload: bytes) -> bytes:
     """The packet of a model with half the channels."""
     blocks = b"".join(payload[k : k + 66] for k in range(12, 1052, 130))
     return payload[:6] + b"\x10" + payload[7:12] + blocks + payload[1052:]
+
+
+def _robosense_turn(name: str) -> tuple[bytes, ...]:
+    """Packets of one turn, which begins behind the sensor."""
+    timed = WRITTEN[name].turns(1.6)
+    first = len(timed) * 5 // 16
+    return tuple(payload for _, payload in timed[first : first + len(timed) * 10 // 16])
 
 
 def _livox_stamped(payload: bytes, at_s: float) -> bytes:
@@ -142,6 +150,13 @@ MAKERS = {
         _of_wire(HesaiStamps(_XT_32)),
         (0, 2, 6, 7, 9, _XT_32.tail + _XT_32.layout.mode),
         _azimuths(12, 130),
+    ),
+    "robosense": Maker(
+        lambda: robosense.RobosenseDecoder("sensor"),
+        lambda: (_robosense_turn("rs-16"), _robosense_turn("bpearl")),
+        lambda payload, at_s: payload[:20] + WRITTEN["rs-16"].header(at_s % 86_400)[20:30] + payload[30:],
+        (0, 2, 30, 31, 32, 42),
+        _azimuths(44, 100, ">H"),
     ),
     "livox": Maker(
         lambda: livox.LivoxDecoder("sensor"),

@@ -62,9 +62,9 @@ def bounded(kind: type[N], low: N, high: N, what: str) -> Callable[[str], N]:
 _REPEATABLE: dict[str, Any] = {"action": "append", "default": []}
 _PROFILES = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
 _CAPTURE = (
-    "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai, metadata=FILE of "
-    "an Ouster, host=ADDRESS and port=N of one of several sensors; of a ROS 2 recording: topic=NAME of the point "
-    "clouds, odometry=NAME of a topic of odometry or transforms; repeatable"
+    "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai or RoboSense, "
+    "metadata=FILE of an Ouster, host=ADDRESS and port=N of one of several sensors; of a ROS 2 recording: topic=NAME "
+    "of the point clouds, odometry=NAME of a topic of odometry or transforms; repeatable"
 )
 _ODOMETRY = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
 _SINKS = f"send tracks to {', '.join(scheme.form for scheme in SINKS.values())}; repeatable"

@@ -39,6 +39,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "modt run ouster://os-122250001234.local --view     an Ouster, shown to a browser on this machine",
         "modt run hesai://192.168.1.201                     the Hesai at an address, asked for its calibration",
         "modt run livox://                                  a Livox Mid-360 that sends to port 56301",
+        "modt run robosense://                              a RoboSense that sends to port 6699",
         "modt run ros2:///points --odometry ros2:///odom    topics of ROS 2",
         "modt run 'DRIVE?loop=yes' --sink foxglove://       a recording as if it were live",
     )

@@ -22,8 +22,8 @@ PEEKED = 50
 """Number of packets of a flow by which a sensor is recognised."""
 SEARCHED = 20_000
 """Number of packets among which other sensors are searched, some seconds of two."""
-FOREIGN = {b"\x55\xaa\x05\x0a": "RoboSense", b"\x55\xaa\x05\x5a": "RoboSense", b"\xa5\xff\x00\x5a": "RoboSense"}
-"""Makers whose packets are not decoded, by the first bytes of a packet."""
+FOREIGN = {b"\x55\xaa\x5a\xa5": "RoboSense M or E"}
+"""Sensors whose packets are not decoded, by the first bytes of a packet."""
 
 
 class PacketStream:
@@ -100,6 +100,9 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     capture.flow = capture.flow or next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
     if capture.flow is None:
         raise _without_packets(capture, driver.maker, f"give the {driver.identified_by} of the sensor that sent them")
+    if driver.described_at:
+        everything = PcapFile(path)
+        any(d.source == capture.flow[0] and decoder.describe(d.payload) for d in everything)
     _, first = next(_decoded(capture, decoder), (0.0, None))
     if first is None:
         refused = decoder.reception.refused

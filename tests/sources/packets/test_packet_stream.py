@@ -62,7 +62,7 @@ def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(
 @pytest.mark.parametrize(
     ("timed", "cause"),
     [
-        ([], "no packets of a Hesai or Livox or Ouster or Velodyne"),
+        ([], "no packets of a Hesai or Livox or Ouster or RoboSense or Velodyne"),
         ([(0.0, b"x")], "give metadata=FILE"),
         (packets()[:50], "no whole sweep"),
     ],
@@ -117,8 +117,8 @@ def test_one_of_several_sensors_in_a_capture_is_chosen_and_the_others_are_named(
         open_stream(path, capture={"host": "192.0.2.7"})
 
 
-def test_packets_of_a_maker_that_is_not_decoded_are_named(tmp_path):
-    msop = bytes.fromhex("55aa050a5aa550a0") + bytes(1240)
+def test_packets_of_a_sensor_that_is_not_decoded_are_named(tmp_path):
+    msop = bytes.fromhex("55aa5aa5") + bytes(1206)
     write_capture(tmp_path / "a.pcap", [(1.0, msop)] * 5, 6699)
-    with pytest.raises(MisuseError, match=r"packets of a RoboSense.*ros2://"):
+    with pytest.raises(MisuseError, match=r"packets of a RoboSense M or E.*ros2://"):
         open_stream(tmp_path / "a.pcap")

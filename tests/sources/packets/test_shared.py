@@ -12,11 +12,13 @@ from modt.errors import MisuseError
 from modt.sources.drivers.hesai import HesaiDecoder, read_angles
 from modt.sources.drivers.livox import LivoxDecoder
 from modt.sources.drivers.ouster import OusterDecoder
+from modt.sources.drivers.robosense import RobosenseDecoder
 from modt.sources.drivers.velodyne import VelodyneDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.point_cloud_file import read_pcd
 from tests.sequences import makers
+from tests.sources.packets.robosense_packets import WRITTEN
 from tests.sources.packets.simulated import BEGAN_S, decoded, equal, packets, scene
 from tools.send.faults import Timed
 from tools.send.packet_bag import packets_of_bag
@@ -70,6 +72,14 @@ MAKERS = {
         edited(10, b"\0"),
         None,
         {"no packet of points of a Livox": 4},
+    ),
+    "robosense": Maker(
+        lambda: RobosenseDecoder("sensor"),
+        lambda: WRITTEN["rs-16"].turns(4.7),
+        (120, 121, 140),
+        edited(44, b"\xff\xff"),
+        lambda _: WRITTEN["bpearl"].packet(1.0),
+        {"no packet of a RoboSense": 4, OTHER: 1},
     ),
     "ouster": Maker(
         lambda: OusterDecoder("sensor", makers.OUSTER_METADATA),
@@ -166,7 +176,7 @@ def test_garbage_and_foreign_packets_are_counted_and_change_nothing(maker, caplo
     assert sum("only counted" in r.message for r in caplog.records) == len(maker.refused)  # one line a reason
 
 
-@pytest.mark.parametrize("name", ["velodyne", "hesai", "livox"])
+@pytest.mark.parametrize("name", ["velodyne", "hesai", "livox", "robosense"])
 def test_a_sweep_holds_no_more_packets_than_a_sensor_sends(name):
     stamped = makers.MAKERS[name].stamped
     decoder = MAKERS[name].decoder()

@@ -14,6 +14,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
 from modt.address import Address, Scheme
+from modt.errors import MisuseError
 
 if TYPE_CHECKING:
     from modt.sources.live.live_stream import LiveStream
@@ -35,6 +36,8 @@ class Driver:
         identified_by: option that only sensors of this maker have.
         beside: suffix of the file with the name of a capture that an option defaults to, by option.
         extra: extra of modt that the decoder needs.
+        described_at: UDP port to which the sensors send what they tell of themselves, 0 for none. The option `difop`
+            overrules it.
     """
 
     maker: str
@@ -45,6 +48,7 @@ class Driver:
     identified_by: str = ""
     beside: Mapping[str, str] = field(default_factory=dict)
     extra: str = ""
+    described_at: int = 0
 
     def scheme(self, name: str) -> Scheme:
         """Scheme of the addresses of these sensors."""
@@ -59,13 +63,21 @@ class Driver:
         to which it sends them.
         """
         from modt.sources.live.live_stream import LiveStream
-        from modt.sources.live.packets import PacketReader, address_of, bound_socket
+        from modt.sources.live.packets import PacketReader, address_of, bound_socket, port_of
 
         name = address.text
         decoder = self.decoder(name, address.options, address.host)
         source = address_of(name, address.host)
         bound = bound_socket(name, address.port or self.port, address.option("group"))
-        return LiveStream(decoder.info(name, address.scheme), PacketReader(bound, decoder, source), cores=cores)
+        reader = PacketReader(bound, decoder, source)
+        if self.described_at:
+            try:
+                port = port_of(name, address.option("difop", str(self.described_at)))
+                reader.descriptions = bound_socket(name, port, address.option("group"))
+            except MisuseError:
+                reader.close()
+                raise
+        return LiveStream(decoder.info(name, address.scheme), reader, cores=cores)
 
     def options_beside(self, capture: Path) -> dict[str, str]:
         """Options whose files have the name of a capture, where they exist."""

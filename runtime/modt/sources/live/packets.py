@@ -27,6 +27,9 @@ TIMESPEC = struct.Struct("@ll")
 PAUSE_S = 0.01
 """Time without a packet after which a sensor with a blind sector may have ended its sweep [s]."""
 
+MAX_DESCRIPTIONS = 10
+"""Greatest number of packets in which a sensor tells of itself that one read takes."""
+
 
 class PacketReader:
     """Receives and decodes the packets of one sensor.
@@ -34,7 +37,11 @@ class PacketReader:
     Attributes:
         reception: counts of packets, which are those of the decoder.
         decoder: decoder of the packets.
+        descriptions: bound socket of the packets in which the sensor tells of itself, which the reader closes; None
+            for a sensor without such packets.
     """
+
+    descriptions: socket.socket | None = None
 
     def __init__(
         self,
@@ -67,6 +74,7 @@ class PacketReader:
         """Receive until the timeout or the first finished sweep."""
         until_s = time.monotonic() + timeout_s
         self._socket.settimeout(min(timeout_s, PAUSE_S))
+        self._describe()
         while True:
             try:
                 payload, ancillary, _, address = self._socket.recvmsg(MAX_BYTES, socket.CMSG_SPACE(TIMESPEC.size))
@@ -78,6 +86,18 @@ class PacketReader:
             sweeps = self._decoded(payload, ancillary, address[0])
             if sweeps or time.monotonic() >= until_s:
                 return sweeps
+
+    def _describe(self) -> None:
+        """Hand over the waiting packets in which the sensor tells of itself, at most MAX_DESCRIPTIONS of them."""
+        if self.descriptions is None:
+            return
+        for _ in range(MAX_DESCRIPTIONS):
+            try:
+                payload, (sender, _) = self.descriptions.recvfrom(MAX_BYTES, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                return
+            if self._source in (None, sender):
+                self.decoder.describe(payload)
 
     def _decoded(self, payload: bytes, ancillary: Sequence[tuple[int, int, bytes]], sender: str) -> Sequence[Sweep]:
         """Sweeps completed by a packet, with the time of its reception, if the kernel tells it."""
@@ -100,6 +120,8 @@ class PacketReader:
     def close(self) -> None:
         """Release the socket; a thread that waits in `read` notices it within PAUSE_S."""
         self._socket.close()
+        if self.descriptions is not None:
+            self.descriptions.close()
 
 
 def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
@@ -128,6 +150,17 @@ def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
         remedy = f"sysctl -w net.core.rmem_max={BUFFER_BYTES}"
         log.warning("%s: receive buffer of %d bytes granted, %d asked; %s", name, granted, BUFFER_BYTES, remedy)
     return made
+
+
+def port_of(name: str, text: str) -> int:
+    """UDP port that an option names.
+
+    Raises:
+        MisuseError: it is none.
+    """
+    if not (text.isdecimal() and 0 < int(text) < 65_536):
+        raise MisuseError(name, f"{text!r} is no port", "write a number from 1 to 65535")
+    return int(text)
 
 
 def address_of(name: str, host: str) -> str | None:

@@ -76,6 +76,10 @@ class PacketDecoder(ABC):
     def decode(self, received_s: float, payload: bytes) -> Sequence[Sweep]:
         """Sweeps completed by a packet; unusable and missing packets are counted, never raised."""
 
+    def describe(self, payload: bytes) -> bool:
+        """Take what a sensor tells of itself in packets to another port; whether a payload is such a packet."""
+        return False
+
     def pause(self) -> Sequence[Sweep]:
         """Sweep that is complete because the sensor is blind in the rest of its turn; called in a pause."""
         return []
