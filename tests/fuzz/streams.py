@@ -68,6 +68,13 @@ def livox_packets(folder):
 
 
 @target()
+def avia_packets(folder):
+    row = struct.pack("<iiiBB", 1500, -2500, 250, 51, 0)
+    heads = [bytes((5, 0, 1, 0, 0, 0, 0, 0, 0, 4)) + struct.pack("<Q", 400_000 * k) for k in range(600)]
+    return _of_packets(LivoxDecoder("sensor"), _framed([(1.0, head + 96 * row) for head in heads]))
+
+
+@target()
 def robosense_packets(folder):
     decoder = RobosenseDecoder("sensor")
     decoder.describe(WRITTEN["bpearl"].difop())

@@ -22,8 +22,10 @@ def endless(payloads: Sequence[bytes]) -> Iterator[Timed]:
     """Repeat the packets of a Velodyne, a Hesai or a Livox as if the sensor went on.
 
     Raises:
-        MisuseError: the packets hold no whole turn of a head.
+        MisuseError: the packets hold no whole turn of a head, or are an Avia's.
     """
+    if livox.sender_of(payloads[0]) == livox.AVIA:
+        raise MisuseError("capture", "packets of an Avia are not repeated", "give --once")
     return livox_loop(payloads) if livox.is_packet(payloads[0]) else turn_loop(payloads)
 
 

@@ -69,3 +69,64 @@ def test_a_clock_that_is_set_or_a_silence_costs_the_sweep_under_way():
         assert len(sweeps) in (8, 9)
         assert all(s.complete for s in sweeps)
         assert reception.lost == 0
+
+
+MM = (1500, -2500, 250)
+SPHERICAL = (2926, 8510, 30096)  # mm, 0.01 deg
+
+
+def old_packet(at_s, kind, body, form=0):
+    """A packet of the first SDK: version 5, type of the time, data type, time, points."""
+    micros = round(at_s * 1e6)
+    stamp = struct.pack("<Q", micros * 1000)
+    if form == 3:
+        stamp = bytes((26, 11, 29, micros // 3_600_000_000)) + struct.pack("<I", micros % 3_600_000_000)
+    return bytes((5, 0, 1, 0, 0, 0, 0, 0, form, kind)) + stamp + body
+
+
+def echo(tag=0, bright=51):
+    return struct.pack("<iiiBB", *MM, bright, tag)
+
+
+@pytest.mark.parametrize("form", [0, 3])
+@pytest.mark.parametrize(
+    ("kind", "body"),
+    [
+        (0, struct.pack("<iiiB", *MM, 51) * 100),
+        (1, struct.pack("<IHHB", *SPHERICAL, 51) * 100),
+        (2, echo() * 96),
+        (3, struct.pack("<IHHBB", *SPHERICAL, 51, 0x20) * 96),
+        (4, (struct.pack("<iiiBB", 9, 9, 9, 7, 0x10) + echo(0x20)) * 48),
+        (5, (struct.pack("<HHIBB", *SPHERICAL[1:], 9, 7, 0) + struct.pack("<IBB", 2926, 51, 0)) * 48),
+        (7, (echo() + struct.pack("<iiiBB", 9, 9, 9, 7, 1) + bytes(14)) * 30),
+        (8, (struct.pack("<HHIBB", *SPHERICAL[1:], 2926, 51, 0) + bytes(12)) * 30),
+    ],
+)
+def test_each_data_type_of_an_avia_is_decoded(kind, body, form):
+    times_s = [3600.0 * 7 + 400e-6 * k for k in range(700)]
+    decoder = LivoxDecoder("sensor")
+    sweeps, reception = decoded(decoder, [(BEGAN_S + t, old_packet(t, kind, body, form)) for t in times_s])
+    assert (decoder.profile, len(sweeps), reception.lost, reception.refused) == ("avia", 1, 0, {})
+    assert sweeps[0].points[:, :3] == pytest.approx(np.tile([1.5, -2.5, 0.25], (len(sweeps[0].points), 1)), abs=2e-3)
+    assert sweeps[0].points[:, 3] == pytest.approx(0.2)
+
+
+def test_noise_of_an_avia_is_left_out_and_other_packets_are_refused():
+    body = (echo() + echo(0x01) + echo(0x04) + echo(0x33)) * 24
+    times_s = [400e-6 * k for k in range(700)]
+    timed_avia = [(BEGAN_S + t, old_packet(t, 2, body)) for t in times_s]
+    imu = old_packet(0.01, 6, bytes(24))
+    sweeps, reception = decoded(LivoxDecoder("sensor"), [*timed_avia, (BEGAN_S + 1, imu), (BEGAN_S + 1, body[:-1])])
+    assert len(sweeps[0].points) == 250 * 48
+    assert reception.refused == {"no packet of points of a Livox": 2}
+
+
+def test_a_hap_is_told_by_its_pace():
+    def hap(at_s):
+        whole = packet(at_s, [echo(0x20)] * 95 + [echo(0x01)])  # a second return, and noise
+        return whole[:3] + struct.pack("<H", 2102) + whole[5:]
+
+    decoder = LivoxDecoder("sensor")
+    sweeps, _ = decoded(decoder, [(BEGAN_S + t, hap(t)) for t in np.arange(1500) * 212.4e-6])
+    assert decoder.profile == "hap"
+    assert len(sweeps[0].points) == pytest.approx(0.1 / 212.4e-6 * 95, abs=95)
