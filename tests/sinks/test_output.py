@@ -3,11 +3,16 @@
 import os
 import stat
 import threading
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from modt.errors import MisuseError, ModtError
+from modt.schemes import open_sink
 from modt.sinks.frame_lines import RotatedFile
-from modt.sinks.output import close_together, replace_file
+from modt.sinks.kitti import PointLabels
+from modt.sinks.output import LineFile, close_together, replace_file
 
 
 def test_sinks_that_hang_are_closed_together():
@@ -56,3 +61,26 @@ def test_a_rotated_file_begins_anew_under_its_name(tmp_path, rotated):
     lines.write("c\n")
     assert path.read_text() == "c\n"
     lines.close()
+
+
+def test_no_output_follows_a_link_that_somebody_put_in_its_place(tmp_path, monkeypatch):
+    victim = tmp_path / "victim"
+    victim.write_text("kept\n")
+    link = tmp_path / "tracks.log"
+    lines = RotatedFile(link, mode="ab")
+    link.unlink()
+    link.symlink_to(victim)
+    with pytest.raises(ModtError, match="cannot be written"):
+        lines.write("a\n")
+    lines.close()
+    with pytest.raises(ModtError, match="cannot be written"):
+        LineFile(link)
+    with pytest.raises(MisuseError, match="is a symbolic link"):
+        open_sink(f"file://{link}")
+    labels = PointLabels(tmp_path)
+    (tmp_path / "000003.label").symlink_to(victim)
+    result = SimpleNamespace(frame=SimpleNamespace(index=3))
+    monkeypatch.setattr("modt.sinks.kitti.encode", lambda _: np.zeros(3, np.uint32))
+    with pytest.raises(ModtError, match="cannot be written"):
+        labels.write(result)
+    assert victim.read_text() == "kept\n"

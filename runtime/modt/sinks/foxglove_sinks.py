@@ -230,10 +230,10 @@ class McapRecorder:
     def _make_room(self, parts: list[Path]) -> None:
         """Delete the oldest parts until another one fits."""
         with writing(self._path):
-            excess = sum(path.stat().st_size for path in parts) - self._max_bytes * (1 - 1 / PARTS)
+            excess = sum(path.lstat().st_size for path in parts) - self._max_bytes * (1 - 1 / PARTS)
             for path in parts:
                 if excess > 0:
-                    excess -= path.stat().st_size
+                    excess -= path.lstat().st_size
                     path.unlink()
 
 

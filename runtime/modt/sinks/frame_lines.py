@@ -13,7 +13,7 @@ from typing import Any
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sinks.background import Background
-from modt.sinks.output import Health, LineFile, Writer, writing
+from modt.sinks.output import Health, LineFile, Writer, without_links, writing
 from modt.sinks.tracks import frame_line, frame_parts
 from modt.types import FrameResult
 
@@ -61,12 +61,14 @@ def open_file(address: Address) -> Background[str]:
     """A file, which is continued after its last whole line.
 
     Raises:
-        MisuseError: no path, or not that of a file.
+        MisuseError: no path, or not that of a file, or that of a link.
         ModtError: it cannot be written.
     """
     path = Path(address.path)
     if address.host or not address.path or (path.exists() and not path.is_file()):
         raise MisuseError(address.text, "names no file", "write file:///PATH")
+    if path.is_symlink():
+        raise MisuseError(address.text, "is a symbolic link, which is not followed", "give the file that it leads to")
     if path.exists():
         _end_with_a_line(path)
     return Background(address.text, RotatedFile(path, mode="ab"), DEPTH, encode=frame_line)
@@ -74,7 +76,7 @@ def open_file(address: Address) -> Background[str]:
 
 def _end_with_a_line(path: Path) -> None:
     """Cut off an incomplete last line, which a killed run leaves."""
-    with writing(path), path.open("r+b") as file:
+    with writing(path), open(path, "r+b", opener=without_links) as file:
         begin = max(file.seek(0, os.SEEK_END) - LONGEST_LINE, 0)
         file.seek(begin)
         end = file.read()

@@ -9,7 +9,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
 from modt.placement import Mount
-from modt.sinks.output import LineFile, Writer, writing
+from modt.sinks.output import LineFile, Writer, without_links, writing
 from modt.types import NONE, Cut, Float64, FrameResult
 
 KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
@@ -104,8 +104,8 @@ class PointLabels(Writer[FrameResult]):
             ModtError: the file cannot be written.
         """
         path = self._folder / f"{result.frame.index:06d}.label"
-        with writing(path):
-            path.write_bytes(encode(result).tobytes())
+        with writing(path), open(path, "wb", opener=without_links) as file:
+            file.write(encode(result).tobytes())
 
 
 def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:

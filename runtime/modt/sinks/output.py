@@ -6,8 +6,9 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO, Generic, Literal, Protocol, TypeVar, runtime_checkable
+from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from modt.energy.ledger import LedgerLine
 from modt.energy.windows import EnergyWindow
@@ -60,6 +61,11 @@ def writing(path: Path, remedy: str = WRITE_REMEDY) -> Iterator[None]:
         raise ModtError(path, f"cannot be written ({error.strerror or error})", remedy) from None
 
 
+def without_links(path: str, flags: int) -> int:
+    """Opener of files that follows no link at the end of a path, which somebody else may have put there."""
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+
+
 def replace_file(path: Path, text: str, *, lasting: bool = False, public: bool = False) -> None:
     """Write a file atomically through .NAME.part, without following links.
 
@@ -98,7 +104,7 @@ class LineFile(Generic[T]):
         self._encode = encode
         self._written = 0
         with writing(path):
-            self._file: BinaryIO = path.open(mode, buffering=0)
+            self._file = FileIO(path, mode, opener=without_links)
 
     def write(self, item: T, /) -> None:
         """Append the lines of an item. A partial line on a full disk is removed.
@@ -128,7 +134,7 @@ class LineFile(Generic[T]):
         """
         with writing(self.path):
             renamed = self._file
-            self._file = self.path.open("ab", buffering=0)
+            self._file = FileIO(self.path, "ab", opener=without_links)
             renamed.close()
 
     def sync(self) -> None:
