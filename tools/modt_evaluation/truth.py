@@ -104,6 +104,7 @@ class Truth:
     frames: Mapping[int, FrameTruth]  # truth of each labelled frame, by its index
     scans: ScanStream | None  # the recording itself, None if it cannot be found
     rules: Rules  # rules of its evaluation
+    key_frames: bool = False  # whether some frames have no labels, and are not judged
 
 
 def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Float64]) -> dict[int, Float64]:

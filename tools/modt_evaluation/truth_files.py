@@ -1,4 +1,4 @@
-"""Labels on disk: KITTI's layouts and tables of cuboids."""
+"""Labels on disk: KITTI's layouts, tables of cuboids, nuScenes and Argoverse 2."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
+from modt.sources import argoverse, nuscenes
 from modt.sources.file_names import files_in
 from modt.sources.kitti_calibration import camera_of_sequence
 from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import ScanStream
 from modt.types import NONE
+from modt_evaluation.dataset_labels import ANNOTATIONS, argoverse_labels, nuscenes_labels
 from modt_evaluation.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets
+from modt_evaluation.label_names import ARGOVERSE_TYPES, CUBOID_TYPES, KITTI_NAMES, NUSCENES_TYPES
 from modt_evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES
 from modt_evaluation.truth import (
     KITTI_TYPES,
-    PANDASET_TYPES,
     PAPER_TYPES,
     FrameTruth,
     Regions,
@@ -37,7 +39,10 @@ CUBOIDS = "truth.csv"
 POSES = "poses.txt"
 SCANS = "scans"
 BOX_COLUMNS = (("x",), ("y",), ("z",), ("l", "length"), ("w", "width"), ("h", "height"), ("yaw",))
-GIVE = "give a raw drive with tracklets, label_02/NNNN.txt, object/training, or a folder with truth.csv and poses.txt"
+GIVE = (
+    "give a raw drive with tracklets, label_02/NNNN.txt, object/training, a folder with truth.csv and poses.txt, a "
+    "scene of nuScenes or a log of Argoverse 2"
+)
 
 
 def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False) -> Truth:
@@ -68,11 +73,9 @@ def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False)
         files = [file for file in files_in(path / "label_2", ".txt") if re.fullmatch("[0-9]+", file.stem)]
         frames = {int(file.stem): _object_frame(file, types) for file in files}
         return Truth(frames, _scans(path / "velodyne", run_path), KITTI_RULES)
-    scans = _scans(path / SCANS, run_path)
-    if (path / CUBOIDS).is_file():
-        return Truth(_cuboids(path), scans, CUBOID_RULES)
-    if scans and (path / SCANS).is_dir():
-        return Truth(_tables_by_scan(path, scans), scans, CUBOID_RULES)
+    truth = _dataset(path) or _cuboid_folder(path, run_path)
+    if truth is not None:
+        return truth
     cause = "holds no labels that are recognised" if path.exists() else "no such file or directory"
     raise MisuseError(path, cause, GIVE)
 
@@ -84,7 +87,40 @@ def labels_beside(stream: Path) -> Path | None:
     sequence = stream.parent.parent / "label_02" / f"{stream.name}.txt"
     if sequence.is_file():
         return sequence
-    return stream.parent if (stream.parent / CUBOIDS).is_file() else None
+    if (stream.parent / CUBOIDS).is_file():
+        return stream.parent
+    named = (stream / CUBOIDS).is_file() or (stream / ANNOTATIONS).is_file() or nuscenes.tables_of(stream) is not None
+    return stream if named else None
+
+
+def _dataset(path: Path) -> Truth | None:
+    """Truth of a scene of nuScenes or a log of Argoverse 2; None where there is none."""
+    if (tables := nuscenes.tables_of(path.resolve())) is not None:
+        scans = nuscenes.open_scene(*tables)
+        scene = nuscenes.read_scene(*tables)
+        labels = nuscenes_labels(scene)
+        T_box_sensor = dict(enumerate(scene.poses))
+        types = NUSCENES_TYPES
+    elif (path / ANNOTATIONS).is_file():
+        scans = argoverse.open_log(path)
+        labels = argoverse_labels(path, {int(scan.path.stem): scan.index for scan in scans.scans})
+        T_vehicle_sensor = argoverse.sensor_in_vehicle(path)
+        T_box_sensor = dict.fromkeys(labels, np.eye(4) if T_vehicle_sensor is None else T_vehicle_sensor)
+        types = ARGOVERSE_TYPES
+    else:
+        return None
+    frames = {f: _frame(types, path, of_frame, T_box_sensor=T_box_sensor[f]) for f, of_frame in labels.items()}
+    return Truth(frames, scans, CUBOID_RULES, key_frames=len(frames) < len(scans.scans))
+
+
+def _cuboid_folder(path: Path, run_path: Path | None) -> Truth | None:
+    """Truth of a folder with tables of cuboids; None where there is none."""
+    scans = _scans(path / SCANS, run_path)
+    if (path / CUBOIDS).is_file():
+        return Truth(_cuboids(path, scans), scans, CUBOID_RULES)
+    if scans and (path / SCANS).is_dir():
+        return Truth(_tables_by_scan(path, scans), scans, CUBOID_RULES)
+    return None
 
 
 def _scans(beside: Path, run_path: Path | None) -> ScanStream | None:
@@ -104,9 +140,10 @@ def _followed(labels: list[Label], types: Types, scans: ScanStream | None, camer
     poses = {scan.index: scan.T_world_sensor for scan in recorded if scan.T_world_sensor is not None}
     parked = parked_outside(labels, types, poses)
     by_frame = _by_frame(labels)
+    place = scans.info.name if scans else "labels"
     end = max([*by_frame, *(scan.index for scan in recorded)], default=NONE) + 1
     none = np.zeros((0, 7))
-    frames = {f: _frame(types, by_frame[f], camera, parked=parked.get(f, none)) for f in range(end)}
+    frames = {f: _frame(types, place, by_frame[f], camera, parked=parked.get(f, none)) for f in range(end)}
     return Truth(frames, scans, KITTI_ALL_ROUND_RULES if any(map(_behind, labels)) else KITTI_RULES)
 
 
@@ -118,22 +155,33 @@ def _behind(label: Label) -> bool:
 
 def _object_frame(path: Path, types: Types) -> FrameTruth:
     camera = camera_of_sequence(path.parents[1] / "calib" / path.name)
-    return _frame(types, read_labels(path, camera, tracking=False), camera)
+    return _frame(types, path, read_labels(path, camera, tracking=False), camera)
 
 
-def _cuboids(folder: Path) -> Mapping[int, FrameTruth]:
-    """Cuboids in the world, and the sensor's poses in it, a line a frame."""
+def _cuboids(folder: Path, scans: ScanStream | None) -> Mapping[int, FrameTruth]:
+    """Cuboids in the world, and the sensor's poses in it, a line a frame.
+
+    Where the names of the scans are numbers that do not begin at 0, the first line is that of the first scan. Frames
+    of the table are these numbers, unless all are below the number of poses.
+    """
     poses = read_poses(folder / POSES)
     by_frame = _by_frame(_rows(folder / CUBOIDS))
-    if max(by_frame, default=0) >= len(poses):
-        raise MisuseError(folder / POSES, f"{len(poses)} poses, none for frame {max(by_frame)}", "give one a frame")
-    return {f: _frame(PANDASET_TYPES, by_frame[f], T_box_sensor=T) for f, T in enumerate(poses)}
+    numbers = [scan.index for scan in scans.scans] if scans else []
+    if len(numbers) != len(poses):
+        numbers = list(range(len(poses)))
+    if max(by_frame, default=0) < len(poses):
+        by_frame = defaultdict(list, {number: by_frame[i] for i, number in enumerate(numbers)})
+    elif strangers := by_frame.keys() - set(numbers):
+        cause = f"{len(poses)} poses, none for frame {max(strangers)}"
+        raise MisuseError(folder / POSES, cause, "give one a frame")
+    place = folder / CUBOIDS
+    return {f: _frame(CUBOID_TYPES, place, by_frame[f], T_box_sensor=T) for f, T in zip(numbers, poses, strict=True)}
 
 
 def _tables_by_scan(folder: Path, scans: ScanStream) -> Mapping[int, FrameTruth]:
     """Cuboids of the scans that have a table of their name."""
     tables = {scan.index: folder / f"{scan.path.stem}.csv" for scan in scans.scans}
-    return {frame: _frame(PANDASET_TYPES, _rows(table)) for frame, table in tables.items() if table.is_file()}
+    return {frame: _frame(CUBOID_TYPES, table, _rows(table)) for frame, table in tables.items() if table.is_file()}
 
 
 def _by_frame(labels: Iterable[Label]) -> dict[int, list[Label]]:
@@ -143,8 +191,19 @@ def _by_frame(labels: Iterable[Label]) -> dict[int, list[Label]]:
     return groups
 
 
-def _frame(types: Types, labels: Iterable[Label], camera: Camera | None = None, **more: Any) -> FrameTruth:
+def _frame(
+    types: Types, place: object, labels: Iterable[Label], camera: Camera | None = None, **more: Any
+) -> FrameTruth:
+    """Truth of a frame; `place` is where the labels are from.
+
+    Raises:
+        MisuseError: the name of a label is not known.
+    """
     labels = list(labels)
+    for label in labels:
+        if label.type_ not in types and label.type_ not in KITTI_NAMES:
+            known = ", ".join(sorted({*types, *KITTI_NAMES} - {DONT_CARE}))
+            raise MisuseError(place, f"label {label.type_!r} is unknown", f"write one of these names: {known}")
     objects = [label for label in labels if label.type_ != DONT_CARE]
     edges = [label.image_box for label in labels if label.type_ == DONT_CARE]
     return FrameTruth.of(

@@ -32,7 +32,10 @@ FOREIGN = {
 """Cause and remedy for well-known files that are not read, by suffix."""
 MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
-REMEDY = "give a KITTI drive, a sequence, a folder of .bin, .pcd or .ply scans, a PCAP file or a recording of ROS 2"
+REMEDY = (
+    "give a KITTI drive, a sequence, a scene of nuScenes, a log of Argoverse 2, a folder of .bin, .pcd or .ply "
+    "scans, a PCAP file or a recording of ROS 2"
+)
 
 
 def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, str] = MappingProxyType({})) -> Stream:
@@ -81,6 +84,8 @@ def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
     Raises:
         MisuseError: the path does not exist or holds no stream; the error names streams below it.
     """
+    if (dataset := _dataset(path)) is not None:
+        return dataset
     if not path.exists():
         raise MisuseError(path, "no such file or directory", REMEDY)
     _refuse_foreign(path)
@@ -97,6 +102,22 @@ def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
         remedy = f"give one: {', '.join(map(str, nearby[:MAX_LISTED]))}{more}"
         raise MisuseError(path, "holds several streams", remedy)
     raise MisuseError(path, "no stream of scans", REMEDY)
+
+
+def _dataset(path: Path) -> ScanStream | None:
+    """Stream of a scene of nuScenes or a log of Argoverse 2 at a path; None where there is none."""
+    path = path.resolve()
+    if any((data / "scene.json").is_file() or any(data.glob("v1.0-*/scene.json")) for data in (path, path.parent)):
+        from modt.sources import nuscenes
+
+        if (found := nuscenes.tables_of(path)) is not None:
+            return nuscenes.open_scene(*found)
+    if path.is_dir() and any((log / "sensors" / "lidar").is_dir() for log in (path, *list(path.parents)[:2])):
+        from modt.sources import argoverse
+
+        if (log := argoverse.log_of(path)) is not None:
+            return argoverse.open_log(log)
+    return None
 
 
 def _stream(path: Path, period_s: float) -> ScanStream | None:
@@ -116,6 +137,9 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
     if _has_scans(path / "velodyne"):
         return kitti.odometry_sequence(path)
     suffix = next((s for s in SUFFIXES if _has_scans(path, s)), None)
+    if suffix is None and (path / "truth.csv").is_file():
+        path /= "scans"
+        suffix = next((s for s in SUFFIXES if _has_scans(path, s)), None)
     return None if suffix is None else kitti.scan_folder(path, period_s, suffix)
 
 
@@ -144,4 +168,5 @@ def _nearby(path: Path) -> list[Path]:
     """Streams up to three levels below."""
     below = [p for depth in ("*", "*/*", "*/*/*") for p in sorted(path.glob(depth)) if p.is_dir()]
     odometry = {p for p in below if _has_scans(p / "velodyne") and not p.name.startswith("velodyne")}
-    return [p for p in below if (p / "velodyne_points").is_dir() or _is_tracking(p) or p in odometry]
+    logs = {p for p in below if (p / "sensors" / "lidar").is_dir()}
+    return [p for p in below if (p / "velodyne_points").is_dir() or _is_tracking(p) or p in odometry | logs]

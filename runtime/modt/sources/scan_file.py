@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.errors import ModtError, ScanError
+from modt.errors import MisuseError, ModtError, ScanError
 from modt.sources.stream import Faults, Reading, StreamInfo
 from modt.types import COMPENSATED, DESKEWED, UNRECORDED, Float32, Float64, Frame, Self
 
@@ -45,6 +45,8 @@ def read_scan(path: Path, T_sensor_file: Float64 | None = None) -> tuple[Float32
     if len(raw) > MAX_BYTES:
         cause = f"larger than {MAX_BYTES >> 20} MiB"
         raise ScanError(path, cause, "the frame is skipped; it is no sweep of a sensor")
+    if path.suffix == ".feather":
+        return sanitised(_read_feather(path, T_sensor_file), path)
     if path.suffix not in (".pcd", ".ply"):
         return sanitised(_read_rows(path, raw), path)
     from modt.sources.point_cloud_file import CloudError, read_pcd, read_ply
@@ -55,6 +57,18 @@ def read_scan(path: Path, T_sensor_file: Float64 | None = None) -> tuple[Float32
         remedy = "the frame is skipped; convert it to x, y, z [m] and reflectance"
         raise ScanError(path, str(error), remedy) from None
     return sanitised(points, path)
+
+
+def _read_feather(path: Path, T_sensor_file: Float64 | None) -> Float32:
+    from modt.sources.argoverse import read_sweep
+
+    try:
+        points = read_sweep(path)
+    except MisuseError as error:
+        raise ScanError(path, error.cause, "the frame is skipped; restore it") from None
+    if T_sensor_file is not None:
+        points[:, :3] = points[:, :3] @ T_sensor_file[:3, :3].T + T_sensor_file[:3, 3]
+    return points.astype(np.float32)
 
 
 def _read_rows(path: Path, raw: bytes) -> Float32:
