@@ -163,6 +163,18 @@ def test_a_car_in_two_parts_keeps_its_track_and_its_box(pose):
     np.testing.assert_allclose(follower.tracks.box[0], transform_boxes(T, np.array([WHOLE]))[0], atol=0.05)
 
 
+def test_who_leaves_a_parked_car_is_a_track_of_his_own_once_apart():
+    follower = Follower()
+    for i in range(KNOWN):
+        follow(follower, [WHOLE], i)
+    own = []
+    for i in range(KNOWN, KNOWN + 12):  # from within the flank to half a metre before it
+        driver = box(10, 2.1 - 0.08 * (i - KNOWN), 0.6, 0.6, 1.5)
+        own.append(follow(follower, [WHOLE, driver], i) != [0, 0])
+    assert not own[0]
+    assert own[-1]
+
+
 def test_without_extensions_the_tracker_takes_proposals_as_they_are():
     follower = Follower(TrackingConfig(extensions="none"))
     for i in range(KNOWN):

@@ -10,6 +10,7 @@ from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Float64, Int, Proposals
 
+NO_ROWS = np.zeros(0, np.int64)
 UNMEASURED_M2 = 100.0
 """Variance along either axis of a position that was not measured."""
 
@@ -57,6 +58,7 @@ class Associated(NamedTuple):
     proposals: Proposals
     observations: Observations  # the proposals in the world
     matches: Matches
+    joined: Int = NO_ROWS  # tracks whose proposal was joined from parts; a track may occur twice
 
 
 class Association(Protocol):

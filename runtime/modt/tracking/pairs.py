@@ -71,7 +71,7 @@ class Situation(NamedTuple):
         tuning: RegroupingTuning,
     ) -> Situation:
         """The situation of a frame, with its pairs."""
-        proposals, observations, matches = frame
+        proposals, observations, matches, _ = frame
         assignment = Assignment.of(matches, len(tracks), len(proposals))
         pairs = _listed(tracks, observations, assignment, kernels, tuning.min_coverage)
         return cls(tracks, proposals, observations, placement, assignment, pairs, kernels, tuning)

@@ -13,6 +13,9 @@ which are records. Takes are applied first. Joins and splits are found from the 
 The senior track has the greater product of hits and last points. Age would mislead: a fragment is as old as its car,
 and a bush is older than the car that passes it.
 
+What is joined does not extend the known extent of its track. Else each join would justify the next, and who leaves a
+parked car would be a part of it for metres.
+
 Limit: a person who steps close to a parked car, and is not classified yet, may become a part of it.
 """
 
@@ -130,6 +133,7 @@ class Regrouping:
             ),
             observations=after_takes.observations.regrouped(numbering.source, changed, observed),
             matches=matches._replace(proposals=number[matches.proposals]),
+            joined=rows_of_hosts,
         )
 
     def _regrouped(self, former: Proposals, splits: Splits, numbering: _Numbering) -> Proposals:

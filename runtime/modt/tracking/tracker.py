@@ -234,7 +234,9 @@ class Tracker:
         else:
             self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         t.end_variance[rows] = matches.end_variance
+        known = t.envelope.take(frame.joined, axis=0)
         self._update_extent(t, rows, matches.proposals, frame.observations, matches.position, dt_s)
+        t.envelope[frame.joined] = known  # what is joined justifies no further joins
 
     def _weighed(self, log_ratio: Float64, frame: Associated, points: Float32 | None) -> Float64:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
