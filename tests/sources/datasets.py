@@ -60,6 +60,8 @@ def write_nuscenes(root, scenes, version="v1.0-mini"):
         _write_scene(root, tables, name, sweeps)
     folder = root / version
     folder.mkdir(parents=True)
+    (root / "maps").mkdir(exist_ok=True)
+    (root / "maps" / "a.png").touch()
     for name, rows in tables.items():
         (folder / f"{name}.json").write_text(json.dumps(rows))
     return root

@@ -109,26 +109,35 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     import json
     from dataclasses import asdict
 
+    from modt.sources.nuscenes import read_scene, tables_of
     from modt_evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
+    from modt_evaluation.nuscenes_results import scores_of_runs as nuscenes_scores
     from modt_evaluation.report import report
 
     by_sensor: dict[str, list[DriveRows]] = {}
+    of_scenes = []
     for drive, pair in enumerate(zip(arguments.pairs[::2], arguments.pairs[1::2], strict=True)):
         record, truth = opened(arguments, *pair)
+        if (tables := tables_of(pair[1].resolve())) is not None:
+            of_scenes.append((read_scene(*tables), record))
         by_sensor.setdefault(record.sensor, []).append(collect(record.frames(truth), truth.rules, drive))
     sensors = {name: evaluation(drives) for name, drives in by_sensor.items()}
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
+    benchmark = nuscenes_scores(of_scenes) if of_scenes else {}
     if arguments.html is not None:
         from modt_profiling.reporting.view_extra import save
         from modt_viewer.evaluation_page import evaluation_page
 
         save(arguments.html, evaluation_page(sensors))
     if arguments.json:
-        text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(scores) for name, scores in sensors.items()}})
+        found = {"schema": SCHEMA, "sensors": {name: asdict(scores) for name, scores in sensors.items()}}
+        if benchmark:
+            found["nuscenes"] = {name: asdict(score) for name, score in benchmark.items()}
+        text = json.dumps(found)
         print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))
     else:
-        print(report(sensors))
+        print(report(sensors, benchmark))
 
 
 def list_unlabelled(arguments: argparse.Namespace) -> None:

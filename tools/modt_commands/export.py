@@ -20,6 +20,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     form.add_argument("--semantickitti", type=Path, metavar="DIR", help=labels)
     form.add_argument("--csv", type=Path, metavar="FILE", help="write a table with a row for each track and frame")
     form.add_argument("--parquet", type=Path, metavar="FILE", help="write the same table as Parquet")
+    for task in ("detection", "tracking"):
+        what = f"write nuScenes' results of {task} (of a run of one of its scenes)"
+        form.add_argument(f"--nuscenes-{task}", type=Path, metavar="FILE", help=what)
     options.add_frames_option(p)
     p.add_argument("--no-points", action="store_true", help="write MCAP without points, which needs no source")
     options.add(p, "capture")
@@ -28,6 +31,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "modt export RUN --mcap run.mcap    for Foxglove, with the points of the source",
         "modt export RUN --csv tracks.csv   a table for pandas",
         "modt export RUN --kitti 0005.txt   results for KITTI's tracking evaluation",
+        "modt export RUN --nuscenes-tracking results.json   for nuScenes' devkit",
     )
     p.set_defaults(run=run)
 

@@ -199,10 +199,27 @@ def _parquet(export: Export, target: Path) -> None:
         parquet.write_table(table, target)
 
 
+def _nuscenes(task: str) -> Callable[[Export, Path], None]:
+    """Writer of nuScenes' results of a task."""
+
+    def write(export: Export, target: Path) -> None:
+        import json
+
+        from modt_evaluation.nuscenes_results import results_of, scene_of, submission
+
+        results = results_of(scene_of(export.run.stream), export.run.mount, export.results())
+        with writing(target):
+            target.write_text(json.dumps(submission(results, task)), encoding="utf-8")
+
+    return write
+
+
 FORMS: dict[str, Callable[[Export, Path], None]] = {
     "mcap": _mcap,
     "kitti": _kitti,
     "semantickitti": _semantickitti,
     "csv": _csv,
     "parquet": _parquet,
+    "nuscenes_detection": _nuscenes("detection"),
+    "nuscenes_tracking": _nuscenes("tracking"),
 }

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from modt.classes import CLASS_NAMES
 from modt.errors import install
 from modt_evaluation.evaluation import ALL, Evaluation
+from modt_evaluation.nuscenes_results import ERRORS, NuscenesScore
 from modt_profiling.reporting.quantity import aligned
 
 CLASS_TABLES = (
@@ -24,6 +26,7 @@ BOXES = (
     *("matched", "centre [m]", "shape", "heading [rad]", "axis [rad]", "velocity [m/s]", "moving", "theirs [m/s]"),
     *("IoU .7/.5/.5", "IoU .5/.25/.25"),
 )
+NUSCENES = ("objects", "AP [%]", "ATE [m]", "ASE", "AOE [rad]", "AVE [m/s]")
 REACTION = ("entered", "median", "p90", "never", "at start", "median", "p90", "never")
 LEGEND = "  Rows car, pedestrian, cyclist: classes (vans as cars, unless --classes paper); others: types of labels."
 
@@ -31,9 +34,16 @@ COMPLETE = "labels are taken for complete"
 INCOMPLETE = "labels of KITTI, unlike simulated ones, leave out road users"
 
 
-def report(sensors: Mapping[str, Evaluation]) -> str:
-    """The evaluation of each sensor, one after the other."""
-    return "\n\n".join("\n".join(_lines(name, found)) for name, found in sensors.items())
+def report(sensors: Mapping[str, Evaluation], nuscenes: Mapping[str, NuscenesScore] = MappingProxyType({})) -> str:
+    """The evaluation of each sensor, one after the other, and the score of nuScenes' benchmark."""
+    parts = ["\n".join(_lines(name, found)) for name, found in sensors.items()]
+    rows = [
+        [name, s.objects, _percent(s.ap), *(f"{getattr(s, error):.3f}" for error in ERRORS)]
+        for name, s in nuscenes.items()
+    ]
+    if rows:
+        parts.append("\n".join(_table("nuScenes' detection benchmark", NUSCENES, rows)))
+    return "\n\n".join(parts)
 
 
 def _lines(name: str, e: Evaluation) -> Iterator[str]:

@@ -33,13 +33,14 @@ class Scene:
         tables: folder of the tables.
         name: name of the scene.
         sweeps: its rows of sample_data that are sweeps of LIDAR_TOP and whose files exist, by time.
-        poses: (4, 4) T_world_sensor of each sweep.
+        vehicles, poses: (4, 4) poses of the vehicle and T_world_sensor of each sweep.
         missing: number of its sweeps whose files do not exist.
     """
 
     tables: Path
     name: str
     sweeps: tuple[Row, ...]
+    vehicles: tuple[Float64, ...]
     poses: tuple[Float64, ...]
     missing: int
 
@@ -127,8 +128,10 @@ def _scene(tables: Path, name: str) -> Scene:
     poses = read_table(tables, "ego_pose", "token", "translation", "rotation")
     pose_of = {row["token"]: placement(row) for row in poses if row["token"] in used}
     mounts_of = {token: placement(row) @ T_LIDAR_SENSOR for token, row in mount_of.items()}
-    placed = tuple(pose_of[row["ego_pose_token"]] @ mounts_of[row["calibrated_sensor_token"]] for row in there)
-    return Scene(tables, scene["name"], tuple(there), placed, len(own) - len(there))
+    vehicles = tuple(pose_of[row["ego_pose_token"]] for row in there)
+    mounts_used = (mounts_of[row["calibrated_sensor_token"]] for row in there)
+    placed = tuple(vehicle @ mount for vehicle, mount in zip(vehicles, mounts_used, strict=True))
+    return Scene(tables, scene["name"], tuple(there), vehicles, placed, len(own) - len(there))
 
 
 def placement(row: Row) -> Float64:
