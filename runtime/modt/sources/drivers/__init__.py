@@ -37,7 +37,7 @@ class Driver:
         beside: suffix of the file with the name of a capture that an option defaults to, by option.
         extra: extra of modt that the decoder needs.
         described_at: UDP port to which the sensors send what they tell of themselves, 0 for none. The option `difop`
-            overrules it.
+            of an address overrules it.
     """
 
     maker: str
@@ -52,7 +52,8 @@ class Driver:
 
     def scheme(self, name: str) -> Scheme:
         """Scheme of the addresses of these sensors."""
-        options = {**self.options, "group": "ADDRESS"}
+        described = {"difop": "PORT"} if self.described_at else {}
+        options = {**self.options, **described, "group": "ADDRESS"}
         query = "&".join(f"{option}={value}" for option, value in options.items())
         return Scheme(f"{name}://[HOST][:PORT][?{query}]", self.open, frozenset(options), self.extra)
 

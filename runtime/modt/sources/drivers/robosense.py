@@ -17,13 +17,14 @@ from struct import Struct
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.errors import MisuseError
 from modt.sources.drivers import Driver
 from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, Turn, TurnDecoder
 from modt.sources.stream import Sweep
 from modt.sources.text_file import read_lines
-from modt.types import Float32, Float64
+from modt.types import Float32, Float64, Int
 
 log = logging.getLogger(__name__)
 
@@ -268,34 +269,51 @@ class RobosenseDecoder(TurnDecoder):
         if not entries:
             return np.zeros((0, 4), np.float32)
         model = self._model
-        beams = len(self._angles_deg)
         returns = self._returns(entries[0].packet)
-        slots = max(beams, model.channels // returns)  # of one return in a block, or in the blocks of a firing
+        slots = max(len(self._angles_deg), model.channels // returns)  # of a return, in a block or a firing's blocks
         raw = b"".join(entry.packet[HEADER_BYTES : HEADER_BYTES + model.table.itemsize] for entry in entries)
         blocks = np.frombuffer(raw, model.table.base)
         cells = blocks["cells"].reshape(-1, returns, slots)
-        azimuths = blocks["azimuth"][:: len(blocks) // len(cells)].astype(np.float32)
         best = cells["reflectance"].argmax(axis=1)[:, None]
         distance = np.take_along_axis(cells["distance"], best, axis=1)[:, 0]
         reflectance = np.take_along_axis(cells["reflectance"], best, axis=1)[:, 0]
         firing, slot = np.nonzero(distance)
-        fired_us = model.fired_us[:: max(model.beams) // beams] if model is AIRY else model.fired_us[:beams]
-        slot_us = np.tile(fired_us, slots // beams) + np.repeat(np.arange(slots // beams) * model.firing_us, beams)
-        share = (slot_us / (slots // beams * model.firing_us)).astype(np.float32)
-        step = np.diff(azimuths) % TURN if len(azimuths) > 1 else np.zeros(1, np.float32)
-        step = np.append(step, np.median(step))
-        step[step > 2 * np.median(step)] = np.median(step)  # a blind sector or a lost packet
-        head = np.deg2rad((azimuths[firing] + step[firing] * share[slot]) * np.float32(0.01))
-        elevation, aside = np.deg2rad(self._angles_deg[slot % beams].T).astype(np.float32)
+        begin, step = _turned(blocks["azimuth"][:: len(blocks) // len(cells)].astype(np.float32))
+        head = np.deg2rad((begin[firing] + step[firing] * self._shares(slots)[slot]) * np.float32(0.01))
         distance_m = distance[firing, slot] * np.float32(self._unit_m(entries[0].packet))
+        beam = slot % len(self._angles_deg)
+        return self._cartesian(beam, head, distance_m, reflectance[firing, slot])
+
+    def _shares(self, slots: int) -> Float32:
+        """(slots,) time of each slot since its block begins, as a share of that to the next block."""
+        model = self._model
+        beams = len(self._angles_deg)
+        fired_us = model.fired_us[:: max(model.beams) // beams] if model is AIRY else model.fired_us[:beams]
+        firings = slots // beams
+        slot_us = np.tile(fired_us, firings) + np.repeat(np.arange(firings) * model.firing_us, beams)
+        return (slot_us / (firings * model.firing_us)).astype(np.float32)
+
+    def _cartesian(self, beam: Int, head: Float32, distance_m: Float32, reflectance: NDArray[np.uint8]) -> Float32:
+        """(N, 4) points of (N,) returns, by beam, azimuth of the head [rad], distance and reflectance in bytes."""
+        model = self._model
+        elevation, aside = np.deg2rad(self._angles_deg[beam].T).astype(np.float32)
         across_m = distance_m * np.cos(elevation)
-        points = np.empty((len(firing), 4), np.float32)
+        points = np.empty((len(beam), 4), np.float32)
         points[:, 0] = across_m * np.cos(head + aside) + model.forward_m * np.cos(head)
         points[:, 1] = -across_m * np.sin(head + aside) - model.forward_m * np.sin(head)
         points[:, 2] = distance_m * np.sin(elevation) + model.up_m
-        points[:, 3] = reflectance[firing, slot]
+        points[:, 3] = reflectance
         points[:, 3] *= np.float32(1 / 255)
         return points
+
+
+def _turned(azimuths: Float32) -> tuple[Float32, Float32]:
+    """(n,) azimuth of each block, and angle by which the head turns until the next one [0.01 deg]."""
+    step = np.diff(azimuths) % TURN if len(azimuths) > 1 else np.zeros(1, np.float32)
+    usual = np.median(step)
+    step = np.append(step, usual)
+    step[step > 2 * usual] = usual  # a blind sector or a lost packet
+    return azimuths, step[: len(azimuths)]
 
 
 def _decoder(name: str, options: Mapping[str, str], _host: str) -> RobosenseDecoder:
@@ -307,7 +325,7 @@ DRIVER = Driver(
     port=6699,
     recognises=lambda payload: signature_of(payload) is not None,
     decoder=_decoder,
-    options={"calibration": "FILE", "difop": "PORT"},
+    options={"calibration": "FILE"},
     beside={"calibration": ".csv"},
     described_at=7788,
 )
