@@ -10,7 +10,7 @@ import pytest
 from modt import profile
 from modt.app.chosen_profile import FOUND, choose
 from modt.app.inputs import Request
-from modt.app.stages import RANGE_SHARE, SWEEPS, SensorWatch, Stages
+from modt.app.stages import RANGE_SHARE, Stages
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED, Frame
@@ -25,7 +25,7 @@ def frames():
 
 
 def stages_of(**request):
-    return Stages(Request(**{"profile": ("vlp-16",), **request}), INFO, Ledger(), SensorWatch())
+    return Stages(Request(**{"profile": ("vlp-16",), **request}), INFO, Ledger(), live=True)
 
 
 CALLS = ("segmenter.segment", "odometry.locate", "tracker.track", "fusion.observe", "fusion.asks", "scheduler.select")
@@ -135,21 +135,52 @@ def test_a_reduced_frame_holds_what_is_near():
     assert len(result.frame.points) == np.count_nonzero(np.hypot(*frame.points[:, :2].T) <= reach_m)
 
 
-@pytest.mark.slow
-def test_another_sensor_is_noticed_and_followed(caplog):
-    stages = stages_of(profile=None)
-    before = next(iter(SyntheticStream("street", "hdl-64e", 0.1, 0)))
-    stages.recognise(before)
-    stages.watch(before)
-    assert stages.chosen.name == "hdl-64e"
-    for frame in frames():
-        stages.step(frame, UNLIMITED, reduced=False)
+def followed(stages, sweeps):
+    """Trust after the last of some sweeps in a row, a comparison with the profile being awaited."""
+    for frame in sweeps:
+        trust = stages.step(frame, UNLIMITED, reduced=False).trust
         stages.watch(frame)
         if stages.recognising is not None:
             stages.recognising.join()
+    return trust
+
+
+def of_drive(sensor, first, n):
+    return [
+        dataclasses.replace(
+            frame, index=first + frame.index, stamp_s=0.1 * (first + frame.index), T_world_sensor=None
+        )
+        for frame in SyntheticStream("street", sensor, 0.1 * n, 0)
+    ]
+
+
+@pytest.mark.slow
+def test_another_sensor_is_noticed_and_followed_and_the_first_one_is_believed_again():
+    stages = stages_of(profile=None)
+    before, *_ = of_drive("hdl-64e", 0, 1)
+    stages.recognise(before)
+    assert stages.chosen.name == "hdl-64e"
+    assert followed(stages, of_drive("hdl-64e", 0, 30)).keys == ()
+    trust = followed(stages, of_drive("vlp-16", 30, 40))
     assert stages.misfits == 1
     assert stages.chosen.name == "as found"
     assert stages.config.sensor.elevation_step_deg > 1.0 or stages.config.sensor.elevations_deg
+    assert "profile" in trust.keys
+    followed(stages, of_drive("hdl-64e", 70, 40))
+    assert (stages.misfits, stages.chosen.name) == (2, "hdl-64e")
+
+
+def test_a_sensor_that_does_not_fit_the_requested_profile_is_named_until_it_does():
+    stages = stages_of(profile="vlp-16")
+    first = frames()[0]
+    stages.recognise(first)
+    stages._recognise_again(dataclasses.replace(first, points=first.points[::2]))
+    stages.watch(first)
+    assert [key for key in stages._findings()] == ["profile"]
+    stages._recognise_again(first)
+    stages.watch(first)
+    assert not stages._findings()
+    assert stages.misfits == 2
 
 
 def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatch):
@@ -162,33 +193,15 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
         may_end.wait(60)
 
     monkeypatch.setattr(stages, "_recognise_again", look)
-    for k in range(100):
-        few = frames()[0].points[:: 8 if k // 10 % 2 else 1]
-        stages.watch(Frame(k, 0.1 * k, few))
-    assert len(looks) == 1
+    for k in range(10):
+        stages.trust.watch.another_sensor = True
+        stages.watch(Frame(k, 0.1 * k, frames()[0].points))
+    assert looks == [0]
     may_end.set()
     stages.recognising.join()
-    stages.watch(Frame(100, 10.0, few))
+    stages.watch(Frame(10, 1.0, frames()[0].points))
     stages.recognising.join()
-    assert looks[1:] == [100]  # what it could not look at meanwhile
-
-
-@pytest.mark.parametrize(
-    ("sizes", "noticed"),
-    [
-        ([800] * 20 + [200] * 30, [20 + SWEEPS - 1]),
-        ([200] * 20 + [800] * 30, [20 + SWEEPS - 1]),
-        (([800] * 5 + [100] * (SWEEPS - 1)) * 5, []),
-        ([0] * 50, []),
-        (np.linspace(800, 500, 200).astype(int).tolist(), []),
-    ],
-    ids=["fewer", "more", "for a moment", "none", "gradual"],
-)
-def test_sweeps_of_another_size_are_noticed_once_when_they_stay(sizes, noticed):
-    watch = SensorWatch()
-    points = np.zeros((1000, 4), np.float32)
-    points[:, 0] = 5.0
-    assert [k for k, size in enumerate(sizes) if watch.changed(points[:size])] == noticed
+    assert looks == [0, 10]  # what it could not look at meanwhile
 
 
 BEAMS_DEG = (-15.1, *(float(v) for v in range(-13, 14, 2)), 15.2)

@@ -15,7 +15,7 @@ from modt.app.deadlines import Deadlines, NoDeadlines
 from modt.app.failures import Failures
 from modt.app.loop import Loop, Service
 from modt.app.playback import Playback
-from modt.app.stages import SensorWatch, Stages
+from modt.app.stages import Stages
 from modt.app.stop import Stop
 from modt.energy.ledger import Ledger
 from modt.energy.meters.discovery import discover
@@ -94,7 +94,7 @@ def service(
     """
     from modt.sinks.background import Background
 
-    stages = Stages(request, source.info, Ledger(), SensorWatch(), secrets.token_hex(8))
+    stages = Stages(request, source.info, Ledger(), live=True, run_id=secrets.token_hex(8))
     meter = discover(stages.config.energy).best
     if stages.config.loop.power_W is not None and meter.facts is not None and meter.facts.kind is Kind.ESTIMATED:
         log.warning("loop.power_W is kept by the %s: an estimate, as no meter can be read", meter.name)

@@ -40,6 +40,11 @@ class ChosenProfile:
         """Names of all profiles that were combined."""
         return " + ".join(self.names)
 
+    @property
+    def fits(self) -> bool:
+        """Whether the beams are those of the first sweep."""
+        return self.sensor == FOUND or self.recognition.fits
+
 
 def choose(requested: profile.Names | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:
     """Choose the profile of a stream by its first frame, and log the differences as warnings.

@@ -11,7 +11,7 @@ import numpy as np
 
 from modt import host, profile
 from modt.app import assembly, inputs
-from modt.app.chosen_profile import FOUND, ChosenProfile, choose
+from modt.app.chosen_profile import ChosenProfile, choose
 from modt.app.trust_report import TrustReport
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
@@ -21,41 +21,13 @@ from modt.poses.pose_source import PoseSource
 from modt.sensor_fit.recognition import recognise
 from modt.sources.stream import StreamInfo
 from modt.trust.watch import Finding, TrustWatch
-from modt.types import Budget, Float32, Frame, FrameResult, TrustLevel
+from modt.types import Budget, Frame, FrameResult, TrustLevel
 
-SWEEPS = 10
-"""Number of sweeps of another size in a row, after which the sensor is recognised anew."""
-RATIO = 2.0
-"""Ratio of the numbers of returns from which a sweep counts as one of another size."""
 DOUBTED_S = 0.5
 """Time for which given poses are doubted before it is reported [s]."""
 POSES_REMEDY = "check the odometry: its scale, units, frames, and whether it stands still"
 RANGE_SHARE = 0.6
 """Share of sensor.max_range_m that is kept while the range is reduced."""
-
-
-class SensorWatch:
-    """Compares the number of returns of each sweep with the usual one."""
-
-    def __init__(self) -> None:
-        self._usual: float | None = None
-        self._in_a_row = 0
-
-    def changed(self, points: Float32) -> bool:
-        """Whether this is the last of SWEEPS sweeps in a row of another size, which then becomes the usual one."""
-        returns = max(int(np.count_nonzero(points[:, 0])), 1)
-        if self._usual is None:
-            self._usual = returns
-        if max(returns / self._usual, self._usual / returns) < RATIO:
-            self._usual += 0.01 * (returns - self._usual)
-            self._in_a_row = 0
-            return False
-        self._in_a_row += 1
-        if self._in_a_row < SWEEPS:
-            return False
-        self._usual = returns
-        self._in_a_row = 0
-        return True
 
 
 class Stages:
@@ -65,7 +37,7 @@ class Stages:
         request: the options of the user.
         info: properties of the source before its first frame.
         ledger: ledger of the run.
-        watch: notices sweeps of another sensor; None for a recording, whose sensor is that of its first sweep.
+        live: whether the sensor may be exchanged meanwhile. That of a recording is the one of its first sweep.
         run_id: as in FrameResult.
 
     Attributes:
@@ -87,23 +59,24 @@ class Stages:
         request: inputs.Request,
         info: StreamInfo,
         ledger: Ledger,
-        watch: SensorWatch | None = None,
+        *,
+        live: bool = False,
         run_id: str = "",
     ) -> None:
         self.request = request
         self.ledger = ledger
         self.run_id = run_id
         self._info = info
-        self._watch = watch
+        self._live = live
         self._mode = assembly.MODES[request.mode]
         self._first: Frame | None = None  # identifies the sensor
         self.misfits = 0
         self.read: dict[str, Any] | None = None  # account of what was read, at the end
-        self._changed = False  # sweeps of another size wait for a comparison
         self.recognising: Thread | None = None
-        self._recognised: list[ChosenProfile] = []  # profile chosen by the thread `recognising`
+        self._recognised: list[tuple[Frame | None, ChosenProfile]] = []  # chosen by the thread `recognising`
         self._continuity = assembly.Continuity()
-        self.chosen = self._choose()
+        self.chosen = self._choose(None)
+        self._began_with: tuple[Frame | None, ChosenProfile] = None, self.chosen
         self.pipeline = self._new_pipeline(self.chosen.config)
         self.trust = TrustReport(self.chosen.config.sensor)
         self.source_findings: dict[str, Finding] = {}
@@ -128,7 +101,8 @@ class Stages:
         """Use the profile that fits the first sweep; `named` is the profile that the messages of the sensor name."""
         self._first = first
         self._info = replace(self._info, profile=named or self._info.profile)
-        chosen = self._choose()
+        chosen = self._choose(first)
+        self._began_with = first, chosen
         if chosen.config == self.config:
             self.chosen = chosen
         else:
@@ -148,9 +122,12 @@ class Stages:
         """What is held against source and profile, and what the odometry holds against its poses."""
         findings = dict(self.source_findings)
         recognition = self.chosen.recognition
-        if not recognition.same_sensor and recognition.differences and self.chosen.sensor != FOUND:
+        if not self.chosen.fits:
             cause = f"the sweeps do not fit the profile {self.chosen.sensor}: {', '.join(recognition.differences)}"
             findings["profile"] = Finding(TrustLevel.DEGRADED, cause, "give the profile of this sensor")
+        elif self.config.sensor != self._began_with[1].config.sensor:
+            cause = f"the sweeps are of another sensor than at first: {', '.join(recognition.differences)}"
+            findings["profile"] = Finding(TrustLevel.DEGRADED, cause, "reload, if the sensor was exchanged")
         doubted_s = self._continuity.odometry.pose_check.doubted_s if self._continuity.odometry else 0.0
         if doubted_s >= DOUBTED_S:
             cause = "what stands still moves by the given poses, which are left out: the sweeps tell the motion"
@@ -159,12 +136,13 @@ class Stages:
 
     def watch(self, frame: Frame) -> None:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it."""
-        self._changed |= self._watch is not None and self._watch.changed(frame.points)
+        trust = self.trust.watch
         if self._recognised:
             self.misfits += 1
-            self._use(self._recognised.pop())
-        elif self._changed and not (self.recognising and self.recognising.is_alive()):
-            self._changed = False
+            self._first, chosen = self._recognised.pop()
+            self._use(chosen)
+        elif self._live and trust.another_sensor and not (self.recognising and self.recognising.is_alive()):
+            trust.another_sensor = False
             self.recognising = Thread(target=self._recognise_again, args=(frame,), name="recognition", daemon=True)
             self.recognising.start()
 
@@ -183,7 +161,9 @@ class Stages:
         Raises:
             ModtError: it is not valid; nothing has changed.
         """
-        self._use(self._choose())
+        chosen = self._choose(self._first)
+        self._use(chosen)
+        self._began_with = self._first, chosen
 
     def facts(self, core: int | None, command: Sequence[str]) -> dict[str, Any]:
         """Content of run.yaml."""
@@ -221,14 +201,14 @@ class Stages:
         }
 
     def _recognise_again(self, frame: Frame) -> None:
-        """Choose a profile anew if a changed sweep has other beams than the present one."""
-        found = recognise(frame.points, self.config)
-        if found.differences and not found.same_sensor:
-            self._first = frame
-            self._recognised.append(self._choose())
+        """Choose a profile anew if a sweep has other beams than the present one, or fits it as none did before."""
+        if recognise(frame.points, self.config).fits == self.chosen.fits:
+            return
+        back = recognise(frame.points, self._began_with[1].config).fits and self._began_with[1].fits
+        self._recognised.append(self._began_with if back else (frame, self._choose(frame)))
 
-    def _choose(self) -> ChosenProfile:
-        return choose(self.request.profile, self._first, self._info)
+    def _choose(self, first: Frame | None) -> ChosenProfile:
+        return choose(self.request.profile, first, self._info)
 
     def _new_pipeline(self, config: ProfileConfig) -> Pipeline:
         mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)

@@ -60,6 +60,11 @@ class Recognition:
     tilt_deg: tuple[float, float] | None = None
     same_sensor: bool = False
 
+    @property
+    def fits(self) -> bool:
+        """Whether the beams are those of the profile, or too few points tell."""
+        return self.same_sensor or not self.differences
+
     def mounted(self, config: ProfileConfig) -> ProfileConfig:
         """The profile with the measured tilt, if it leaves the mount open."""
         sensor = config.sensor

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from modt.config import SensorConfig
-from modt.trust.returns import SECTORS, sides
+from modt.trust.returns import sides
+from modt.trust.sample import SECTORS
 from modt.types import Float32
 
 FEW_SHARE = 0.15

@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from modt.config import SensorConfig
-from modt.types import Float32, Float64, Frame, Int
+from modt.types import Bool, Float32, Float64, Frame, Int
 
 SAMPLE = 2003
 """Number of points looked at, a prime: no step between them is a multiple of the number of beams."""
@@ -18,6 +18,13 @@ OBSTACLE_M = (0.35, 1.8)
 """Heights above the ground between which a point belongs to an obstacle, not to ground or ceiling [m]."""
 NEAREST_M = 0.7
 """Greatest distance of what covers the sensor and is no return [m]."""
+SECTORS = 24
+"""Parts of a turn, counted from behind and counter-clockwise."""
+HEIGHTS = 8.0
+GROUND_M = (6.0, 15.0)
+"""Range within which the ground is near [heights of the sensor], and its limits [m]."""
+RINGS = 15
+"""Rings of a metre in which the lowest point of each sector is kept."""
 
 
 @lru_cache(maxsize=8)
@@ -32,49 +39,76 @@ class Sample:
 
     Attributes:
         time_s: time of the frame [s].
-        points: (k, 3) or wider points [m, level sensor frame].
-        reach_m: range within which they count.
+        raw: (k, 3) or wider points, all that are looked at [m, level sensor frame].
+        reach_m: range within which they are returns.
         weight: number of points for which one stands.
+        plane: (3,) ground z = plane @ (1, x, y) as it was known before.
         T_world_sensor: (4, 4) pose.
     """
 
     time_s: float
-    points: Float32
+    raw: Float32
     reach_m: float
     weight: float
+    plane: Float64
     T_world_sensor: Float64
 
     @cached_property
     def xyz(self) -> Float32:
-        """(3, k) coordinates [m]."""
-        return np.ascontiguousarray(self.points[:, :3].T)
+        """(3, c) returns: points that neither cover the sensor nor are out of reach."""
+        xyz = np.ascontiguousarray(self.raw[:, :3].T)
+        square = xyz[0] * xyz[0] + xyz[1] * xyz[1]
+        return np.asarray(xyz.compress((square > NEAREST_M**2) & (square < self.reach_m**2), axis=1))
 
     @cached_property
     def range_m(self) -> Float32:
-        """(k,) horizontal ranges."""
+        """(c,) horizontal ranges of the returns."""
         x, y, _ = self.xyz
         return np.asarray(np.sqrt(x * x + y * y))
 
     @cached_property
-    def counted(self) -> Int:
-        """(c,) rows of the returns that neither cover the sensor nor are out of reach."""
-        return np.flatnonzero((self.range_m > NEAREST_M) & (self.range_m < self.reach_m))
+    def turn(self) -> Float32:
+        """(c,) bearings of the returns [turns from behind, 0 to 1]."""
+        return turn_of(self.xyz[0], self.xyz[1])
 
-    def obstacles(self, plane: Float64) -> Float32:
-        """(3, m) counted points that stand above the ground (3,) as it was when this was first asked for."""
-        known: Float32 | None = vars(self).get("_obstacles")
-        if known is None:
-            x, y, z = found = self.xyz.take(self.counted, axis=1)
-            a, b, c = plane.astype(np.float32)
-            height_m = z - (a + b * x + c * y)
-            known = found.compress((height_m > OBSTACLE_M[0]) & (height_m < OBSTACLE_M[1]), axis=1)
-            vars(self)["_obstacles"] = known
-        return known
+    @cached_property
+    def sector(self) -> Int:
+        """(c,) sectors of the returns."""
+        return (self.turn * np.float32(SECTORS)).astype(np.int64) % SECTORS
+
+    @cached_property
+    def seen(self) -> Bool:
+        """(SECTORS,) whether a sector has any returns."""
+        return np.bincount(self.sector, minlength=SECTORS) > 0
+
+    @cached_property
+    def obstacles(self) -> Int:
+        """(m,) returns that stand above the ground."""
+        x, y, z = self.xyz
+        a, b, c = self.plane.astype(np.float32)
+        height_m = z - (a + b * x + c * y)
+        return np.flatnonzero((height_m > OBSTACLE_M[0]) & (height_m < OBSTACLE_M[1]))
+
+    @cached_property
+    def lowest_m(self) -> Float32:
+        """(SECTORS x RINGS,) height of the lowest return of each cell near the sensor [m], infinite without one."""
+        reach_m = np.clip(HEIGHTS * abs(self.plane[0]), *GROUND_M)
+        near = np.flatnonzero(self.range_m < reach_m)
+        cell = self.sector.take(near) * RINGS + self.range_m.take(near).astype(np.int64)
+        lowest_m = np.full(SECTORS * RINGS, np.inf, np.float32)
+        np.minimum.at(lowest_m, cell, self.xyz[2].take(near))
+        return lowest_m
 
 
-def sample(frame: Frame, T_world_sensor: Float64, sensor: SensorConfig) -> Sample:
-    """The sample of a level frame."""
+def sample(frame: Frame, T_world_sensor: Float64, sensor: SensorConfig, plane: Float64) -> Sample:
+    """The sample of a level frame over a ground (3,)."""
     n = len(frame.points)
     rows = _rows(n)
-    points = frame.points.take(rows, axis=0)
-    return Sample(frame.time_s, points, REACH_SHARE * sensor.max_range_m, n / max(len(rows), 1), T_world_sensor)
+    weight = n / max(len(rows), 1)
+    raw = frame.points.take(rows, axis=0)
+    return Sample(frame.time_s, raw, REACH_SHARE * sensor.max_range_m, weight, plane, T_world_sensor)
+
+
+def turn_of(x: Float32, y: Float32) -> Float32:
+    """(c,) bearings of points [turns from behind, 0 to 1]."""
+    return np.asarray(np.arctan2(y, x) * np.float32(0.5 / np.pi) + np.float32(0.5))

@@ -6,13 +6,15 @@ mirror reverses the bearing (Fourier-Mellin).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from modt.geometry import inverse, rotation_zyx, se3
-from modt.trust.sample import Sample
-from modt.types import Bool, Float64, Int
+from modt.trust.sample import SECTORS, Sample, turn_of
+from modt.trust.tuning import SceneTuning
+from modt.types import Bool, Float32, Float64, Int
 
 BEARINGS = 72
 LOG_STEP = 0.08
@@ -23,8 +25,6 @@ RANGES = 50
 """Cells along the range, up to 54 m."""
 MIN_POINTS = 40
 """Fewest obstacle points in which a scene is compared."""
-VANISHED = 3
-"""Obstacles that were so many times MIN_POINTS, and are below it, have vanished."""
 UNSCALED_FAVOUR = 0.02
 """Share of the points by which a scale has to be better for each of its steps, as places are several steps wide."""
 
@@ -73,15 +73,81 @@ class Change:
 SAME = Change(False, 0, 0)
 
 
-def places(sample: Sample, plane: Float64, T: Float64 | None = None) -> Int:
-    """(k,) cells of the obstacle points above a ground (3,), brought into another sensor frame by T (4, 4)."""
-    x, y, z = sample.obstacles(plane)
-    if T is not None:
-        a = T.astype(np.float32)
-        x, y = (a[k, 0] * x + a[k, 1] * y + a[k, 2] * z + a[k, 3] for k in (0, 1))
-    bearing = ((np.arctan2(y, x) + np.float32(np.pi)) * np.float32(BEARINGS / (2 * np.pi))).astype(np.int64)
+class SceneCheck:
+    """Changes of the scene between two sweeps, and whether it is back.
+
+    Args:
+        tuning: what counts as another scene.
+
+    Attributes:
+        change: how the scene is changed since it was last believed.
+    """
+
+    def __init__(self, tuning: SceneTuning) -> None:
+        self._tuning = tuning
+        self.change = SAME
+        self._before: Sample | None = None  # the last sweep before the change
+        self._agreed = 1.0  # share of the obstacle points that stood still at the last look
+        self._looks = 0  # in a row in which the scene is back
+
+    def look(self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int) -> None:
+        """Notice a scene that changes at once, and one that is back; arguments as those of the ground's check."""
+        if not pairs:
+            return
+        tuning = self._tuning
+        now = pairs[-1][1]
+        agreed = agreement(first, now, self.change)
+        fell = agreed < min(tuning.suspected, self._agreed - tuning.fall)
+        self._agreed = agreed
+        if fell or agreed < tuning.same or not self.change.is_none:
+            agreements = [(agreement(*pair, self.change), pair) for pair in pairs]
+            least, pair = min(agreements, key=lambda each: each[0])
+            if least < tuning.suspected:
+                self._explain(*pair, least)
+        if self._before is None:
+            return
+        is_back = agreement(self._before, now, SAME) >= tuning.back
+        self._looks = self._looks + 1 if is_back else 0
+        if self._looks >= back_looks or self.change.is_none:
+            self.change = SAME
+            self._before = None
+
+    def _explain(self, before: Sample, after: Sample, least: float) -> None:
+        """Note how the scene changed from one sweep to the next."""
+        tuning = self._tuning
+        change, share = explain(before, after, self.change)
+        needed = tuning.explained if least < tuning.same else tuning.surely_explained
+        if self.change.then(change).is_none:  # the way back
+            needed = 0.0
+        if share >= max(needed, least + tuning.better) and not change.is_none:
+            if self._before is None:
+                self._before = before
+                self._looks = 0
+            self.change = self.change.then(change)
+
+
+def _cells(x: Float32, y: Float32, turn: Float32) -> Int:
+    """(k,) cells of points, below 0 where they are beyond the grid."""
+    bearing = (turn * np.float32(BEARINGS)).astype(np.int64) % BEARINGS
     far = (np.log(np.maximum(x * x + y * y, NEAREST_M)) * np.float32(0.5 / LOG_STEP)).astype(np.int64)
-    return np.asarray((bearing % BEARINGS * RANGES + far)[far < RANGES])
+    return np.where(far < RANGES, bearing * RANGES + far, -1)
+
+
+def places(before: Sample, after: Sample, change: Change) -> tuple[Int, Int]:
+    """Cells of the obstacle points of two sweeps in the frame of the second one, where both have returns at all."""
+    a = change.motion(before, after).astype(np.float32)
+    x, y, z = before.xyz.take(before.obstacles, axis=1)
+    x, y = (a[k, 0] * x + a[k, 1] * y + a[k, 2] * z + a[k, 3] for k in (0, 1))
+    known = _cells(x, y, turn_of(x, y))
+    x, y, _ = after.xyz.take(after.obstacles, axis=1)
+    cells = _cells(x, y, after.turn.take(after.obstacles))
+    return _in(known, after.seen), _in(cells, before.seen)
+
+
+def _in(cells: Int, seen: Bool) -> Int:
+    """The cells of the grid that are in seen sectors (SECTORS,)."""
+    of_sector = RANGES * BEARINGS // SECTORS
+    return np.asarray(cells[(cells >= 0) & seen.take(cells // of_sector, mode="clip")])
 
 
 def _grown(cells: Int) -> Bool:
@@ -97,21 +163,17 @@ def _grown(cells: Int) -> Bool:
     return grown
 
 
-def agreement(before: Sample, after: Sample, plane: Float64, T_after_before: Float64) -> float:
+def agreement(before: Sample, after: Sample, change: Change) -> float:
     """Share of the obstacle points of a sweep that stand where the one before had some; 1 with too few."""
-    known = places(before, plane, T_after_before)
-    cells = places(after, plane)
-    if len(known) > VANISHED * MIN_POINTS > VANISHED * len(cells):
-        return 0.0
+    known, cells = places(before, after, change)
     if min(len(known), len(cells)) < MIN_POINTS:
         return 1.0
     return float(_grown(known).ravel().take(cells).mean())
 
 
-def explain(before: Sample, after: Sample, plane: Float64, T_after_before: Float64) -> tuple[Change, float]:
-    """The change that brings most of the points of a sweep to known places, and their share."""
-    known = places(before, plane, T_after_before)
-    cells = places(after, plane)
+def explain(before: Sample, after: Sample, known_change: Change) -> tuple[Change, float]:
+    """The further change that brings most of the points of a sweep to known places, and their share."""
+    known, cells = places(before, after, known_change)
     n = RANGES + 20
     wide = np.zeros((BEARINGS, n))
     wide[:, :RANGES] = _grown(known)

@@ -43,13 +43,18 @@ class ReturnsTuning:
     everywhere alike.
     Chosen on: simulated drives."""
 
+    gain_ratio: float = 1.5
+    """Share of its usual returns above which four fifths of the cells have more than this sensor gives. The sweep is
+    then compared with the profile.
+    Chosen on: simulated drives."""
+
 
 @dataclass(frozen=True, slots=True)
 class GroundTuning:
-    """Plane of the ground against the one before."""
+    """Steps of the ground."""
 
-    memory_s: float = 10.0
-    """Time over which the usual plane is averaged [s].
+    gain: float = 0.1
+    """Weight of the ground of a look in that which is known. Greater: obstacles on a slope are told from it earlier.
     Chosen on: judgement."""
 
     tilt_deg: float = 4.0
@@ -86,12 +91,12 @@ class SceneTuning:
     """Share of the obstacle points by which an explanation is better than none.
     Chosen on: simulated drives."""
 
-    explained: float = 0.6
+    explained: float = 0.75
     """Share of the obstacle points that a turn, a mirror or a scale has to bring to known places to explain another
     scene.
     Chosen on: simulated drives."""
 
-    surely_explained: float = 0.85
+    surely_explained: float = 0.95
     """The same share where the scene could be the one before, as between two like walls.
     Chosen on: simulated aisles."""
 
@@ -104,17 +109,13 @@ class TrustTuning:
     ground: GroundTuning = GroundTuning()
     scene: SceneTuning = SceneTuning()
 
-    look_s: float = 0.5
+    look_s: float = 0.6
     """Time between two looks [s]. Less: earlier alarms, at more cost.
     Chosen on: an alarm within 2 s."""
 
     looks: int = 2
     """Number of looks in a row after which a lasting finding is reported, or withdrawn.
     Chosen on: an alarm within 2 s."""
-
-    another_s: float = 3.0
-    """Time for which another scene, with no explanation, is reported [s].
-    Chosen on: good again within 5 s."""
 
     back_looks: int = 3
     """Number of looks in a row in which ground or scene are as they were, after which a change is withdrawn.

@@ -13,7 +13,7 @@ from modt.config import SensorConfig
 from modt.trust.ground import GroundCheck
 from modt.trust.returns import ReturnsCheck
 from modt.trust.sample import Sample, sample
-from modt.trust.scene import SAME, Change, agreement, explain
+from modt.trust.scene import SceneCheck
 from modt.trust.tuning import TrustTuning
 from modt.types import Float64, Frame, Reason, Trust, TrustLevel
 
@@ -61,6 +61,10 @@ class TrustWatch:
     Args:
         sensor: its range and mount.
         tuning: what is expected.
+
+    Attributes:
+        another_sensor: whether the sweeps may be of another sensor; to be reset by who has looked.
+        trust: the last verdict.
     """
 
     def __init__(self, sensor: SensorConfig, tuning: TrustTuning = TrustTuning()) -> None:
@@ -68,19 +72,14 @@ class TrustWatch:
         self._tuning = tuning
         self._returns = ReturnsCheck(tuning.returns)
         self._ground = GroundCheck(tuning.ground, sensor.height_m)
+        self._scene = SceneCheck(tuning.scene)
         self._samples: list[Sample] = []  # those since the last look, its own included
         self._debounced = Debounced(tuning.looks)
         self._looked_s = -np.inf
         self._began_s: float | None = None
-        self._change = Change(False, 0, 0)  # of the scene, since it was last believed
-        self._before: Sample | None = None  # the last frame before that change
-        self._agreed = 1.0  # share of the obstacle points that stood still at the last look
-        self._scene_looks = 0  # in a row in which the scene is as it was in that frame
-        self._moved = ""  # how the ground moved at once, while it is not back
-        self._step = np.zeros(3)  # plane by which it moved
-        self._ground_looks = 0  # in a row in which it is back
-        self._another_s = -np.inf  # when another scene was seen
-        self._comparable = True  # the last look showed a whole sweep
+        self._repeated = False  # the sweep of the last look was one before
+        self._own: frozenset[str] = frozenset()  # checks of the sweeps themselves that have a reason
+        self.another_sensor = False
         self.trust = Trust()
 
     def add(
@@ -93,7 +92,7 @@ class TrustWatch:
             T_world_sensor: (4, 4) its pose.
             others: findings of other checks by their names.
         """
-        seen = sample(frame, T_world_sensor, self._sensor)
+        seen = sample(frame, T_world_sensor, self._sensor, self._ground.plane)
         now_s = seen.time_s
         if self._began_s is None or now_s < self._samples[-1].time_s or now_s - self._samples[-1].time_s > GAP_S:
             self._began_s = now_s if self._began_s is None else self._began_s
@@ -105,13 +104,14 @@ class TrustWatch:
         if elapsed_s < self._tuning.look_s - 1e-3:
             return self.trust
         learning = now_s - self._began_s < self._tuning.learn_s
-        findings = dict(others)
-        found_here = {} if learning else dict(self._findings(seen))
-        findings |= found_here
-        self._debounced.update(findings, now_s, AT_ONCE)
-        if not found_here and not OWN & self._debounced.reasons.keys():
+        own = {} if learning else dict(self._findings(seen))
+        self._debounced.update({**others, **own}, now_s, AT_ONCE)
+        reasons = OWN & self._debounced.reasons.keys()
+        self.another_sensor |= reasons != self._own or self._returns.gained
+        self._own = reasons
+        if not own and not reasons:
             self._returns.learn(seen, elapsed_s)
-            self._ground.learn(seen, elapsed_s)
+            self._ground.learn(seen)
         self._samples = [seen]
         self._looked_s = now_s
         self.trust = self._judged(now_s)
@@ -132,91 +132,24 @@ class TrustWatch:
         if loss is not None:
             level = TrustLevel.BLIND if loss.blind else TrustLevel.DEGRADED
             yield "returns", Finding(level, loss.what, CLEAN)
-        comparable = not repeated and (loss is None or not loss.sectors)
-        if comparable and self._comparable:
-            was_moved = self._moved
-            self._follow_ground(seen)
-            if not was_moved and not self._moved:
-                self._follow_scene(seen)
-        self._comparable = comparable
-        if self._moved:
-            yield "ground", Finding(TrustLevel.BLIND, self._moved, MOUNT)
-        if not self._change.is_none:
-            yield "scene", Finding(TrustLevel.BLIND, f"the scene is {self._change} against the one before", MOUNT)
-        elif seen.time_s - self._another_s < self._tuning.another_s:
-            yield "scene", Finding(TrustLevel.DEGRADED, "another scene than a moment before", MOUNT)
+        if not repeated and not self._repeated:
+            self._follow()
+        self._repeated = repeated
+        change = self._scene.change
+        if self._ground.moved:
+            yield "ground", Finding(TrustLevel.BLIND, self._ground.moved, MOUNT)
+        if not change.is_none:
+            yield "scene", Finding(TrustLevel.BLIND, f"the scene is {change} against the one before", MOUNT)
 
-    def _follow_ground(self, seen: Sample) -> None:
-        """Notice a ground that moves at once, and one that is back."""
-        ground = self._ground
-        if not self._moved:
-            moved = ground.change(seen)
-            step = ground.step(self._pairs()) if moved else None
-            if step is not None:
-                self._moved = moved
-                self._step = step
-            return
-        step = ground.step(self._pairs())
-        if step is not None:
-            self._step = self._step + step
-        moved = ground.change(seen, BACK_SHARE)
-        is_back = not moved and not ground.lost
-        self._ground_looks = self._ground_looks + 1 if is_back else 0
-        self._moved = moved or self._moved
-        if self._ground_looks >= self._tuning.back_looks or not ground.is_step(self._step):
-            self._moved = ""
-
-    def _follow_scene(self, seen: Sample) -> None:
-        """Notice a scene that changes at once, between two frames, and one that is back."""
-        scene = self._tuning.scene
-        agreed = self._agreement(self._samples[0], seen)
-        fell = agreed < min(scene.suspected, self._agreed - scene.fall)
-        self._agreed = agreed
-        if fell or agreed < scene.same or not self._change.is_none:
-            agreements = [(self._agreement(*pair), pair) for pair in self._pairs()]
-            least, pair = min(agreements, key=lambda each: each[0], default=(1.0, None))
-            if pair is not None and least < scene.suspected:
-                self._explain(*pair, least)
-        if self._change.is_none or self._before is None:
-            return
-        is_back = agreement(self._before, seen, self._ground.plane, SAME.motion(self._before, seen)) >= scene.back
-        self._scene_looks = self._scene_looks + 1 if is_back else 0
-        if self._scene_looks >= self._tuning.back_looks:
-            self._change = SAME
-
-    def _pairs(self) -> list[tuple[Sample, Sample]]:
-        """Frames in a row since the last look, unless too much time lies between them."""
-        pairs = pairwise(self._samples)
-        return [(before, after) for before, after in pairs if after.time_s - before.time_s <= AT_ONCE_S]
-
-    def _agreement(self, before: Sample, after: Sample) -> float:
-        """Agreement of two sweeps in the scene as it is changed."""
-        return agreement(before, after, self._ground.plane, self._change.motion(before, after))
-
-    def _explain(self, before: Sample, after: Sample, least: float) -> None:
-        """Write how the scene changed from one frame to the next."""
-        scene = self._tuning.scene
-        change, share = explain(before, after, self._ground.plane, self._change.motion(before, after))
-        if change.is_none and least >= scene.same:
-            return
-        another = least < scene.same
-        if share < (scene.explained if another else scene.surely_explained) or share < least + scene.better:
-            if not another:
-                return
-            self._another_s = after.time_s
-            self._change = SAME
-            step = self._ground.step(self._pairs()) if self._ground.lost else None
-            if step is not None:
-                self._moved = "the ground is out of view at once"
-                self._step = step
-            return
-        if self._change.is_none:
-            self._before = before
-        self._change = self._change.then(change)
+    def _follow(self) -> None:
+        """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them."""
+        pairs = [(a, b) for a, b in pairwise(self._samples) if b.time_s - a.time_s <= AT_ONCE_S]
+        had_moved = self._ground.moved
+        self._ground.look(self._samples[0], pairs, self._tuning.back_looks)
+        if not had_moved and not self._ground.moved:
+            self._scene.look(self._samples[0], pairs, self._tuning.back_looks)
 
 
-BACK_SHARE = 0.7
-"""Share of the limits of the ground within which it is back."""
 GAP_S = 1.0
 """Longest time between two frames after which a look is made [s]."""
 AT_ONCE_S = 0.25
@@ -233,7 +166,9 @@ REPEATED_SHARE = 0.5
 
 def _repeated(before: Sample, now: Sample) -> bool:
     """Whether a sweep is the one before, to the last bit."""
-    if before.xyz.shape != now.xyz.shape or not len(now.counted):
+    if before.raw.shape != now.raw.shape:
         return False
-    same = (before.xyz == now.xyz).all(axis=0).take(now.counted)
-    return float(same.mean()) >= REPEATED_SHARE
+    x = now.raw[:, 0]
+    of_returns = x != 0
+    same = np.count_nonzero((before.raw[:, 0] == x) & of_returns)
+    return bool(same > REPEATED_SHARE * np.count_nonzero(of_returns))
