@@ -176,7 +176,7 @@ def test_a_sensor_that_does_not_fit_the_requested_profile_is_named_until_it_does
     stages.recognise(first)
     stages._recognise_again(dataclasses.replace(first, points=first.points[::2]))
     stages.watch(first)
-    assert [key for key in stages._findings()] == ["profile"]
+    assert list(stages._findings()) == ["profile"]
     stages._recognise_again(first)
     stages.watch(first)
     assert not stages._findings()
