@@ -102,6 +102,7 @@ class PointKind(IntEnum):
     OUT_OF_RANGE = -6  # too near, too far, in a blind sector, or no return
     OUT_OF_VIEW = -7  # outside the field of view
     FOOT = -8  # low, part of a proposal or a structure beside it
+    AIRBORNE = -9  # above the ground, where most rays pass: fog, dust, a flake, loose leaves
 
 
 class MotionState(IntEnum):
@@ -114,8 +115,8 @@ class MotionState(IntEnum):
 
 MOTION_NAMES = tuple(state.name.lower() for state in MotionState)
 
-OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE
-"""Kinds, besides members of proposals, of what stands above the ground and below the ceiling."""
+OBSTACLES = PointKind.STRUCTURE, PointKind.LOW, PointKind.SPARSE, PointKind.AIRBORNE
+"""Kinds, besides members of proposals, of what is above the ground and below the ceiling."""
 LEFT_OUT: tuple[PointKind, ...] = tuple(kind for kind in PointKind if kind not in (PointKind.MEMBER, PointKind.FOOT))
 """Kinds of the points that belong to no proposal."""
 

@@ -19,7 +19,7 @@ from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.observations import observe
 from modt.odometry.pose_estimator import PoseEstimator
-from modt.segmentation.cells import CellClusterer, Clusters
+from modt.segmentation.cells import AirOfCells, CellClusterer, Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
@@ -175,7 +175,7 @@ def test_cells_and_components(kernels, seed, n, sigma):
     n, used = len(kept), np.full(len(cells), len(kept))
     used[use] = own
     kind = np.zeros(len(cells), np.int8)
-    clusters = Clusters(points, height, cell, cells, sample, sampled, used, kind, n + 1)
+    clusters = Clusters(points, height, cell, cells, sample, sampled, used, kind, n + 1, AirOfCells.none(len(cells)))
     number = consecutive(np.append(rng.random(n) < 0.7, [False]))
     assert same(*(k.view_bounds(clusters, number, number.max() + 1) for k in (NUMPY, kernels)))
 

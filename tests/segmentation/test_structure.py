@@ -42,7 +42,8 @@ def person(x, y):
 def clustered(points, kernels=NUMPY):
     """Clusters of points whose heights above ground are their z."""
     columns = PointColumns.from_array(points.astype(np.float32))
-    return Clusterer(SENSOR, SegmentationConfig(), kernels).cluster(columns, columns.z)
+    clusters, _ = Clusterer(SENSOR, SegmentationConfig(), kernels).cluster(columns, columns.z)
+    return clusters
 
 
 def label(clusters):
@@ -145,7 +146,7 @@ def test_a_person_whose_hand_touches_a_wall_needs_its_surface_to_be_found(seed):
     without = replace(tuning, structure=replace(tuning.structure, max_lines=0))
     parted = []
     for each in (tuning, without):
-        clusters = Clusterer(SENSOR, SegmentationConfig(), NUMPY, each).cluster(columns, columns.z)
+        clusters, _ = Clusterer(SENSOR, SegmentationConfig(), NUMPY, each).cluster(columns, columns.z)
         on_wall, on_person = np.split(label(clusters) != NONE, [len(of_wall)])
         parted.append(on_person.mean() > 0.5 and on_wall.mean() < 0.2)
     assert parted == [True, False]

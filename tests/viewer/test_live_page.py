@@ -113,8 +113,8 @@ def test_a_frame_reaches_a_client_with_the_energy_of_the_last_window(live, read)
 
 
 def test_points_of_no_proposal_have_the_look_of_their_kind():
-    shown = results.with_kinds(results.result(0, [5], {0: 1}, n_points=12))
-    shown.frame.points[:, :2] = np.arange(12)[:, None] + 0.5
+    shown = results.with_kinds(results.result(0, [5], {0: 1}, n_points=13))
+    shown.frame.points[:, :2] = np.arange(13)[:, None] + 0.5
     cells = live_cells(shown)
     names = [*(entry["name"] for entry in theme.kinds()), "plain"]
     is_ground = (cells.level == 0).tolist()
@@ -128,6 +128,7 @@ def test_points_of_no_proposal_have_the_look_of_their_kind():
         "STRUCTURE": "structure",
         "LOW": "low or sparse",
         "SPARSE": "low or sparse",
+        "AIRBORNE": "low or sparse",
         "OVERHEAD": "overhead",
     }
 

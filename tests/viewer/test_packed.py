@@ -40,6 +40,7 @@ def test_every_kind_has_its_look_and_ground_is_below_everything():
         PointKind.OUT_OF_RANGE: "plain",
         PointKind.OUT_OF_VIEW: "plain",
         PointKind.FOOT: "plain",
+        PointKind.AIRBORNE: "low or sparse",
     }
 
 

@@ -83,6 +83,132 @@ EXPORT i64 modt_occupied_cells(const PointColumns *points, const float *height, 
     return count;
 }
 
+/* PorosityFinder: bounds on what is airborne. */
+typedef struct {
+    float min_solidity;         /* of a window that is solid */
+    float reach_m, reach_beams; /* of the window of a point, below and above it [m; beam spacings] */
+    float max_sqrt_range;       /* range within which cells are looked at [sqrt(m)] */
+    float point_sqrt_range;     /* the same of points */
+} PorosityRules;
+
+/* Cells of a grid, which are looked up by their places in the table. */
+typedef struct {
+    i32 *table, *place; /* (side * side,) cell at each place, among other numbers; (n,) place of each cell */
+    i32 side, n;
+} CellMap;
+
+static CellMap map_of(const Grid *grid, const Cells *cells, i32 n, i32 *place)
+{
+    CellMap map = {grid->table, place, grid->side, n};
+    for (i32 c = 0; c < n; c++) {
+        place[c] = cells->row[c] * map.side + cells->column[c];
+        PROVEN(place[c] > map.side && place[c] < map.side * map.side - map.side - 1);
+        map.table[place[c]] = c;
+    }
+    return map;
+}
+
+/* Cell at a place of the table, or NONE. Numbers of an earlier use name no cell, or one of another place. */
+static ALWAYS_INLINE i32 cell_at(const CellMap *map, i32 at)
+{
+    i32 c = map->table[at];
+    return c >= 0 && c < map->n && map->place[c] == at ? c : NONE;
+}
+
+/* PorosityFinder._columns */
+static ALWAYS_INLINE float columns_at(float window_rays, float sqrt_range)
+{
+    return maxf(window_rays / sqrt_range, 1.0f);
+}
+
+/* PorosityFinder.air of n cells: returns the number of returns in airborne cells, of the number looked at, which is
+ * written. Scratch: `place`, (n,). */
+EXPORT i64 modt_air(const PorosityRules *r, const Grid *grid, const Cells *cells, const float *sqrt_range,
+                    const float *beam_m, float window_rays, i32 n, i32 *place, float *solidity, uint8_t *airborne, i64 *looked_at)
+{
+    const CellMap map = map_of(grid, cells, n, place);
+    i64 of_air = 0;
+    *looked_at = 0;
+    for (i32 c = 0; c < n; c++) {
+        solidity[c] = 1.0f;
+        if (!(sqrt_range[c] < r->max_sqrt_range))
+            continue;
+        i64 returns = 0;
+        *looked_at += cells->entries[c];
+        float low = INFINITY, high = -INFINITY;
+        for (i32 row = -map.side; row <= map.side; row += map.side)
+            for (i32 column = -1; column <= 1; column++) {
+                i32 other = cell_at(&map, place[c] + row + column);
+                if (other == NONE)
+                    continue;
+                returns += cells->entries[other];
+                low = minf(low, cells->low[other]);
+                high = maxf(high, cells->high[other]);
+            }
+        float rays = columns_at(window_rays, sqrt_range[c]) * ((high - low) / beam_m[c] + 1.0f);
+        solidity[c] = returns > 1 ? (float)returns / rays : 0.0f;
+    }
+    for (i32 c = 0; c < n; c++) {
+        airborne[c] = solidity[c] < r->min_solidity;
+        for (i32 row = -map.side; airborne[c] && row <= map.side; row += map.side)
+            for (i32 column = -1; column <= 1; column++) {
+                i32 other = cell_at(&map, place[c] + row + column);
+                airborne[c] &= other == NONE || solidity[other] < r->min_solidity;
+            }
+        of_air += airborne[c] ? cells->entries[c] : 0;
+    }
+    return of_air;
+}
+
+/* mean_solidity of porosity.py, of n labels of n_cells cells. Scratch: `count`, (n,). */
+EXPORT void modt_mean_solidity(const i64 *entries, const float *solidity, const i64 *label, i64 n_cells, i64 n,
+                               double *count, double *mean)
+{
+    for (i64 k = 0; k < n; k++)
+        count[k] = mean[k] = 0.0;
+    for (i64 c = 0; c < n_cells; c++) {
+        PROVEN(label[c] >= 0 && label[c] < n);
+        double points = (double)entries[c];
+        count[label[c]] += points;
+        mean[label[c]] += points * (double)solidity[c];
+    }
+    for (i64 k = 0; k < n; k++)
+        mean[k] = count[k] > 0.0 ? mean[k] / count[k] : 1.0;
+}
+
+/* PorosityFinder.airborne_points: whether each point is airborne. `rows` are the points in the order of their
+ * cells, from `offsets` on. Scratch: `place`, (n,), and `height_of_row`, of all points. */
+EXPORT void modt_airborne_points(const PorosityRules *r, const Grid *grid, const Cells *cells, const float *sqrt_range,
+                                 const float *beam_m, const uint8_t *airborne, float window_rays, i32 n,
+                                 const i64 *rows, const i64 *offsets, const float *height, i32 *place,
+                                 float *height_of_row, uint8_t *is_air)
+{
+    const CellMap map = map_of(grid, cells, n, place);
+    for (i64 k = 0; k < offsets[n]; k++)
+        height_of_row[k] = height[rows[k]];
+    for (i32 c = 0; c < n; c++) {
+        for (i64 k = offsets[c]; airborne[c] && k < offsets[c + 1]; k++)
+            is_air[rows[k]] = 1;
+        if (airborne[c] || !(sqrt_range[c] < r->point_sqrt_range))
+            continue;
+        float reach_m = maxf(r->reach_m, r->reach_beams * beam_m[c]);
+        float enough = r->min_solidity * columns_at(window_rays, sqrt_range[c]) * (2.0f * reach_m / beam_m[c] + 1.0f);
+        i32 around[9], n_around = 0;
+        for (i32 row = -map.side; row <= map.side; row += map.side)
+            for (i32 column = -1; column <= 1; column++) {
+                around[n_around] = cell_at(&map, place[c] + row + column); /* overwritten by the next, if there is none */
+                n_around += around[n_around] != NONE;
+            }
+        for (i64 k = offsets[c]; k < offsets[c + 1]; k++) {
+            i32 count = 0;
+            for (i32 a = 0; a < n_around && (float)count < enough; a++)
+                for (i64 other = offsets[around[a]]; other < offsets[around[a] + 1]; other++)
+                    count += magnitude(height_of_row[k] - height_of_row[other]) <= reach_m;
+            is_air[rows[k]] = (float)count < enough;
+        }
+    }
+}
+
 /* low_points: places of what may be low things or feet, and of a tall point beside each, or NONE; returns how many
  * there are. `sqrt_range` and `sample` are those of the tall cells. Scratch: `is_left_over`, of these.
  *

@@ -150,6 +150,21 @@ class ClusterSizes:
 
 
 @dataclass(frozen=True, slots=True)
+class AirOfCells:
+    """How solid C cells are (`modt.segmentation.porosity`)."""
+
+    beam_m: Float32  # (C,) vertical distance of neighbouring beams [m]
+    solidity: Float32  # (C,) share of the rays there that end there; 1 where it was not looked for
+    airborne: Bool  # (C,) cells of returns from the air
+    share: float  # share of the returns in airborne cells, of all that were looked at
+
+    @classmethod
+    def none(cls, n: int) -> Self:
+        """No air in n cells."""
+        return cls(np.ones(n, np.float32), np.ones(n, np.float32), np.zeros(n, np.bool_), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Clusters:
     """K points above ground in C cells, and cells in n clusters."""
 
@@ -162,6 +177,7 @@ class Clusters:
     cluster_of_cell: Int  # (C,) NONE where it cannot be an object
     kind_of_cell: Int8  # (C,) PointKind of its points, MEMBER of a cluster
     n: int
+    air: AirOfCells
 
     def select(self, keep: Bool, kind: PointKind) -> Clusters:
         """The clusters of an (n,) mask, renumbered; the points of the others are of a kind."""

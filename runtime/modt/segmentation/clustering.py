@@ -11,9 +11,10 @@ from modt.segmentation.cells import CellClusterer, Clusters, ClusterSizes
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
+from modt.segmentation.porosity import PorosityFinder
 from modt.segmentation.strips import ELEVATION
 from modt.segmentation.tuning import SegmentationTuning
-from modt.types import Bool, Float32, Int, Int8, PointKind
+from modt.types import NONE, Bool, Float32, Int, Int8, PointKind
 
 
 class Clusterer:
@@ -43,25 +44,49 @@ class Clusterer:
         self.config = config
         self.beams = sensor.beams
         self.cells = CellClusterer(sensor, config, tuning.cells, tuning.split, tuning.structure, tuning.clusters)
+        self.porosity = PorosityFinder(sensor, self.cells.fine, tuning.porosity)
+        self.tuning = tuning.porosity
         self.valid = tuning.clusters
         max_diagonal_m = min(tuning.strips.max_diagonal_m, config.max_extent_m)
         self.strips = replace(tuning.strips, max_diagonal_m=max_diagonal_m)
 
-    def cluster(self, points: PointColumns, height: Float32) -> Clusters:
-        """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
+    def cluster(self, points: PointColumns, height: Float32) -> tuple[Clusters, Int | None]:
+        """Clusters of (K,) points, K > 0, with (K,) heights above ground [m].
+
+        In a sweep with much air, airborne points are left out and the others are clustered anew. Then the clusters
+        are those of the points at the places returned besides; else these are None.
+        """
+        found = self._cells(points, height)
+        if found.air.share <= self.tuning.max_sweep_share:
+            return self._clustered(found), None
+        solid = np.flatnonzero(~self.kernels.airborne_points(self.porosity, found))
+        return self._clustered(self._cells(points.take(solid), height.take(solid))), solid
+
+    def _cells(self, points: PointColumns, height: Float32) -> Clusters:
+        """Cells of (K,) points, in no cluster yet."""
         cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.cells.fine, points, height)
-        cluster, sizes = self.kernels.cluster(self.cells, cells, sampled, self._beam_m(sampled))
-        kind_of_cell = np.zeros(len(cells), np.int8)  # not known before strips are merged
-        clusters = Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, kind_of_cell, len(sizes))
+        air = self.kernels.air(self.porosity, cells, sampled.sqrt_range, self._beam_m(sampled))
+        cluster = np.full(len(cells), NONE)
+        kind = np.zeros(len(cells), np.int8)
+        return Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, kind, 0, air)
+
+    def _clustered(self, found: Clusters) -> Clusters:
+        """These cells in clusters that can be objects."""
+        cluster, sizes = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
+        found = replace(found, cluster_of_cell=cluster, n=len(sizes))
         strip = ((self._kind(sizes) == PointKind.MEMBER) | ~sizes.of_oversized) & self.may_be_strips(sizes)
-        target = self._merged(clusters, strip)
+        target = self._merged(found, strip)
         kind = self._kind(sizes.merged(target))
+        target_of_cell = target.take(cluster)
+        is_porous = self.kernels.mean_solidity(found, target_of_cell, len(kind)) < self.tuning.min_cluster_solidity
+        kind[is_porous] = PointKind.AIRBORNE
         valid = kind == PointKind.MEMBER
-        cluster_of_cell = consecutive(valid)[target].take(cluster)
-        kind_of_cell = kind[target].take(cluster)
-        n = int(np.count_nonzero(valid))
-        # `replace` of the three fields that differ takes longer.
-        return Clusters(points, height, cell_of_point, cells, sample, sampled, cluster_of_cell, kind_of_cell, n)
+        return replace(
+            found,
+            cluster_of_cell=consecutive(valid).take(target_of_cell),
+            kind_of_cell=kind.take(target_of_cell),
+            n=int(np.count_nonzero(valid)),
+        )
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""

@@ -11,6 +11,7 @@ from modt.segmentation.cells import CellClusterer, low_points, members_of, occup
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
+from modt.segmentation.porosity import PorosityFinder, mean_solidity
 from modt.segmentation.strips import merge_strips, view_bounds
 from modt.types import Bool, Float32, Int, Int8, PointKind
 
@@ -42,6 +43,17 @@ class Above(NamedTuple):
         """K."""
         return len(self.rows) - len(self.is_clear)
 
+    def without_air(self, solid: Int) -> Above:
+        """These points without those of the K that are airborne, given the places of the others."""
+        n_tall = self.n_tall
+        is_air = np.ones(n_tall, np.bool_)
+        is_air[solid] = False
+        self.kind[self.rows[:n_tall][is_air]] = PointKind.AIRBORNE
+        kept = np.concatenate([solid, np.arange(n_tall, len(self.rows))])
+        return self._replace(
+            rows=self.rows.take(kept), points=self.points.take(kept), height_m=self.height_m.take(kept)
+        )
+
 
 class Kernels(GeometryKernels):
     """The passes in NumPy: the reference. A subclass with compiled ones gives the same bytes."""
@@ -49,6 +61,9 @@ class Kernels(GeometryKernels):
     name = "numpy"
     occupied_cells = staticmethod(occupied_cells)
     cluster = staticmethod(CellClusterer.cluster)
+    air = staticmethod(PorosityFinder.air)
+    mean_solidity = staticmethod(mean_solidity)
+    airborne_points = staticmethod(PorosityFinder.airborne_points)
     view_bounds = staticmethod(view_bounds)
     merge_strips = staticmethod(merge_strips)
     group = staticmethod(Groups.from_labels)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import CellClusterer, Clusters, ClusterSizes
+from modt.segmentation.cells import AirOfCells, CellClusterer, Clusters, ClusterSizes
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Above, Kernels
 from modt.segmentation.tuning import CellTuning, LowTuning, SplitTuning
@@ -68,7 +68,16 @@ class LowFinder:
         is_thing = np.bincount(group_of_cell[kind_of_cell == PointKind.MEMBER], minlength=len(sizes)) > 0
         cluster_of_cell = np.where(is_foot, NONE, consecutive(is_thing).take(group_of_cell))
         clusters = Clusters(
-            points, height, cell_of_point, cells, sample, sampled, cluster_of_cell, kind_of_cell, int(is_thing.sum())
+            points,
+            height,
+            cell_of_point,
+            cells,
+            sample,
+            sampled,
+            cluster_of_cell,
+            kind_of_cell,
+            int(is_thing.sum()),
+            AirOfCells.none(len(cells)),
         )
         foot = is_foot.take(cell_of_point).nonzero()[0]
         feet = np.stack([places.take(foot), standing_of_cell.take(cell_of_point.take(foot))])

@@ -27,11 +27,12 @@ from modt.native.library import (
     Signatures,
     declare,
 )
-from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, Members
+from modt.segmentation.cells import AirOfCells, CellClusterer, Cells, Clusters, ClusterSizes, Members
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import QUARTERS, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Above, Bounds, Kernels
+from modt.segmentation.porosity import PorosityFinder
 from modt.segmentation.strips import DIRECTION, ViewBounds
 from modt.segmentation.tuning import StripTuning
 from modt.types import N_REFLECTANCE, Bool, Float32, Float64, Int, Int8
@@ -75,6 +76,10 @@ CELLS = Layout(
     **_members(Array(_i32, "n"), "row", "column"),
     **_members(Array(_f32, "n"), "low", "high"),
     entries=Array(_i64, "n"),
+)
+POROSITY_RULES = Layout(
+    "PorosityRules",
+    **_members(Number(_f32), "min_solidity", "reach_m", "reach_beams", "max_sqrt_range", "point_sqrt_range"),
 )
 PERSON_SIZE = Layout("PersonSize", **_members(Number(_f32), *(f.name for f in fields(PersonSize))))
 CLUSTER_RULES = Layout(
@@ -124,6 +129,25 @@ _SIGNATURES: Signatures = {
     "modt_occupied_cells": (
         _L,
         (POINT_COLUMNS, FLOAT32, _L, GRID, OutputArgument, POINT_COLUMNS, OutputArgument, CELLS),
+    ),
+    "modt_air": (_L, (POROSITY_RULES, GRID, CELLS, FLOAT32, FLOAT32, _F, _I, *[OutputArgument] * 4)),
+    "modt_mean_solidity": (None, (INT64, FLOAT32, INT64, _L, _L, OutputArgument, OutputArgument)),
+    "modt_airborne_points": (
+        None,
+        (
+            POROSITY_RULES,
+            GRID,
+            CELLS,
+            FLOAT32,
+            FLOAT32,
+            BOOL,
+            _F,
+            _I,
+            INT64,
+            INT64,
+            FLOAT32,
+            *[OutputArgument] * 3,
+        ),
     ),
     "modt_cluster_scratch": (_L, (_L, _I)),
     "modt_cluster": (
@@ -247,6 +271,56 @@ class NativeKernels(NativeGeometryKernels, Kernels):
             CELLS.of(cells),
         )
         return _first(cells, n), sample[:n], _first(sampled, n), cell_of_point
+
+    def air(self, finder: PorosityFinder, cells: Cells, sqrt_range: Float32, beam_m: Float32) -> AirOfCells:
+        """Solidity of C cells."""
+        n = len(cells)
+        solidity = np.empty(n, np.float32)
+        airborne = np.empty(n, np.bool_)
+        looked_at = np.empty(1, np.int64)
+        of_air = self.library.modt_air(
+            self._structure(POROSITY_RULES.of, finder),
+            self._structure(_grid, finder.grid),
+            CELLS.of(cells),
+            sqrt_range,
+            beam_m,
+            finder.window_rays,
+            n,
+            np.empty(n, np.int32),
+            solidity,
+            airborne,
+            looked_at,
+        )
+        return AirOfCells(beam_m, solidity, airborne, of_air / max(int(looked_at[0]), 1))
+
+    def mean_solidity(self, found: Clusters, label: Int, n: int) -> Float64:
+        """(n,) mean solidity of the points of each label, given (C,) the label of each cell; 1 without points."""
+        count, mean = np.empty((2, n))
+        self.library.modt_mean_solidity(found.cells.entries, found.air.solidity, label, len(label), n, count, mean)
+        return mean
+
+    def airborne_points(self, finder: PorosityFinder, found: Clusters) -> Bool:
+        """(K,) airborne points."""
+        n = len(found.cells)
+        points_of_cell = self.group(found.cell_of_point, n)
+        is_air = np.zeros(len(found.height), np.bool_)
+        self.library.modt_airborne_points(
+            self._structure(POROSITY_RULES.of, finder),
+            self._structure(_grid, finder.grid),
+            CELLS.of(found.cells),
+            found.sampled.sqrt_range,
+            found.air.beam_m,
+            found.air.airborne,
+            finder.window_rays,
+            n,
+            points_of_cell.rows,
+            points_of_cell.offsets,
+            found.height,
+            np.empty(n, np.int32),
+            np.empty(len(is_air), np.float32),
+            is_air,
+        )
+        return is_air
 
     def cluster(
         self, clusterer: CellClusterer, cells: Cells, sampled: PointColumns, beam_m: Float32

@@ -58,11 +58,15 @@ class Segmenter:
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""
+        self.clusterer.porosity.rays.update(points)
         above = self._above_ground_in_view(points)
         if not len(above.rows):
             return Proposals.empty(above.kind)
         n_tall = above.n_tall
-        tall = self._seen(self.clusterer.cluster(above.points.part(0, n_tall), above.height_m[:n_tall]))
+        tall, solid = self.clusterer.cluster(above.points.part(0, n_tall), above.height_m[:n_tall])
+        if solid is not None:
+            above = above.without_air(solid)
+        tall = self._seen(tall)
         low, places, feet = self.low.find(above, tall)
         low = self._seen(low)
         members = self.kernels.members_of(tall, low, places, above.points, above.height_m, above.rows, above.kind)

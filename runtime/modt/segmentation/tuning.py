@@ -131,6 +131,29 @@ class CellTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class PorosityTuning:
+    """Returns from the air. Chosen on: simulated crowds and yards in fog, dust and snow, and streets in clear air."""
+
+    min_solidity: float = 0.2
+    """Share of the rays through a window that end there, below which the window is not solid. More takes edges and
+    thin things for air, less leaves dense fog."""
+    reach_m: float = 0.15
+    """Least distance below and above a point up to which its window reaches [m]."""
+    reach_beams: float = 1.5
+    """The same, in beam spacings at the range of the point."""
+    point_range_m: float = 7.0
+    """Range up to which single points are looked at [m]. More takes people behind dust for dust, less leaves fog
+    above heads."""
+    max_sweep_share: float = 0.15
+    """Share of airborne returns among those above ground, above which all points are clustered anew without them.
+    Less takes time where hedges and woods are thin, more leaves dust on what it touches and flakes above heads."""
+    min_cluster_solidity: float = 0.24
+    """Mean solidity of its returns from which a cluster can be an object. More takes people in fog for fog."""
+    max_range_m: float = 15.0
+    """Range up to which returns of the air are looked for [m]; farther away, fog and flakes return too little."""
+
+
+@dataclass(frozen=True, slots=True)
 class SplitTuning:
     """Split of a person off a cluster that holds a person and more."""
 
@@ -313,6 +336,7 @@ class SegmentationTuning:
     ground: GroundTuning = GroundTuning()
     ceiling: CeilingTuning = CeilingTuning()
     cells: CellTuning = CellTuning()
+    porosity: PorosityTuning = PorosityTuning()
     split: SplitTuning = SplitTuning()
     clusters: ClusterTuning = ClusterTuning()
     low: LowTuning = LowTuning()

@@ -55,6 +55,7 @@ _GROUPS = {
     PointKind.OVERHEAD: 0,
     PointKind.LOW: 1,
     PointKind.SPARSE: 1,
+    PointKind.AIRBORNE: 1,
     PointKind.STRUCTURE: 2,
 }
 """Kinds that are drawn alike, as in `theme.kinds`; others are PLAIN. In a cell the greatest group is shown."""

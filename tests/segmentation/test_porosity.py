@@ -1,0 +1,75 @@
+"""Returns of the air are told from those of surfaces by the rays that pass."""
+
+import numpy as np
+import pytest
+
+from modt.config import SegmentationConfig, SensorConfig
+from modt.geometry import FieldOfView
+from modt.native import library
+from modt.segmentation.kernels import NUMPY
+from modt.segmentation.native_kernels import NativeKernels
+from modt.segmentation.porosity import RayDensity
+from modt.segmentation.segmenter import Segmenter
+from modt.types import PointKind
+from tests.segmentation import scans
+
+PERSON = (4.0, 0.0, 0.3, 0.5, 0.0, 1.75)
+STEP_DEG = 0.4
+SENSOR = SensorConfig(
+    min_range_m=1.0, azimuth_step_deg=STEP_DEG, elevation_step_deg=2.0, elevation_span_deg=(-15, 15)
+)
+AIR = -1
+
+
+def hazy(share, boxes=(PERSON,), reach_m=7.0, seed=0):
+    """A scan in which a share of the rays ends in the air on the way; what each point lies on, AIR of the air."""
+    rng = np.random.default_rng(seed)
+    points, on = scans.scan(boxes, elevation=scans.VLP_16, step_deg=STEP_DEG)
+    range_m = np.linalg.norm(points[:, :3], axis=1)
+    ends_m = rng.uniform(1.5, reach_m, len(points))
+    in_air = (rng.random(len(points)) < share) & (ends_m < range_m)
+    points[in_air, :3] *= (ends_m / range_m)[in_air, None]
+    return points, np.where(in_air, AIR, on)
+
+
+def segmented(points, kernels=NUMPY, sensor=SENSOR):
+    return Segmenter(SegmentationConfig(), sensor, FieldOfView(), kernels).segment(points)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.4])
+def test_a_person_in_haze_is_the_only_proposal(share):
+    points, on = hazy(share)
+    proposals = segmented(points)
+    is_high = points[:, 2] > -1.73 + 0.5
+    assert len(proposals) == 1
+    assert (on[proposals.members] == 1).mean() > 0.95
+    assert (proposals.kind[(on == 1) & is_high] == PointKind.MEMBER).mean() > 0.9
+    assert (proposals.kind[(on == AIR) & is_high] == PointKind.AIRBORNE).mean() > 0.9
+
+
+def test_clear_air_has_nothing_airborne():
+    points, _ = hazy(0.0)
+    assert not (segmented(points).kind == PointKind.AIRBORNE).any()
+
+
+def test_a_sweep_thinner_than_the_profile_is_not_air():
+    points, on = scans.scan((PERSON,), elevation=scans.VLP_16, step_deg=3 * STEP_DEG)
+    rays = RayDensity(SENSOR)
+    rays.update(points)
+    assert 0.28 < rays.density < 0.38
+    proposals = segmented(points)
+    assert (on[proposals.members] == 1).all()
+    assert not (proposals.kind == PointKind.AIRBORNE).any()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.6])
+def test_compiled_kernels_find_the_same_air(share):
+    try:
+        native = NativeKernels(*library.load())
+    except library.NotAvailableError as error:
+        pytest.skip(str(error))
+    points, _ = hazy(share, boxes=(PERSON, (6.0, 3.0, 4.0, 1.8, 0.3, 1.5)))
+    expected = segmented(points)
+    found = segmented(points, native)
+    assert np.array_equal(expected.kind, found.kind)
+    assert np.array_equal(expected.members, found.members)
