@@ -131,6 +131,7 @@ def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
             "level": "blind",
             "since_s": 1.5,
             "reasons": [{"check": "returns", "level": "blind", "since_s": 1.5, "cause": "no returns"}],
+            "visibility_m": 42,
             "frames": {"good": 15, "degraded": 0, "blind": 5},
         },
         "counts": {

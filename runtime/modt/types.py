@@ -464,6 +464,7 @@ class Trust:
     level: TrustLevel = TrustLevel.GOOD
     since_s: float = 0.0
     reasons: tuple[Reason, ...] = ()
+    visibility_m: float | None = None  # meteorological visibility, None where it is good or not known
 
     @property
     def word(self) -> str:
@@ -481,7 +482,13 @@ class Trust:
             {"check": r.key, "level": r.level.name.lower(), "since_s": round(r.since_s, 3), "cause": r.cause}
             for r in self.reasons
         ]
-        return {"level": self.word, "since_s": round(self.since_s, 3), "reasons": reasons}
+        visibility_m = None if self.visibility_m is None else round(self.visibility_m)
+        return {
+            "level": self.word,
+            "since_s": round(self.since_s, 3),
+            "reasons": reasons,
+            "visibility_m": visibility_m,
+        }
 
 
 TRUSTED = Trust()

@@ -26,6 +26,7 @@ def test_metrics_are_valid_lines_with_one_type_each():
     assert 'modt_loop_failures_total{kind="frame: \\"x\\""} 2' in lines
     assert {"modt_trust_level 2", 'modt_trust_reason{check="returns"} 2'} <= {*lines}
     assert 'modt_trust_frames_total{level="blind"} 5' in lines
+    assert "modt_trust_visibility_metres 42" in lines
     assert "# TYPE modt_sensor_lost_messages_total counter" in lines
     assert not [line for line in lines if "None" in line or "frame_J" in line]
 

@@ -20,7 +20,7 @@ def test_a_record_counts_what_was_done_in_its_frame():
     record = frame_record(result(3, [7, 5], {0: 11, 1: 12}, lost=(9,), classified=2))
     del record["tracks"], record["T_world_sensor"]
     counts = {"proposals": 2, "classifications": 2, "deferred": 0, "classified": [0, 1]}
-    good = {"level": "good", "since_s": 0.0, "reasons": []}
+    good = {"level": "good", "since_s": 0.0, "reasons": [], "visibility_m": None}
     assert record == {"schema": SCHEMA, "run": None, "frame": 3, "stamp_s": 0.3, "trust": good} | counts
 
 

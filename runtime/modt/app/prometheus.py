@@ -62,6 +62,8 @@ def _samples(status: Mapping[str, Any]) -> Iterator[Sample]:
         yield "modt_trust_reason", {"check": reason["check"]}, TrustLevel[reason["level"].upper()]
     for level, frames in status["trust"]["frames"].items():
         yield "modt_trust_frames_total", {"level": level}, frames
+    if status["trust"]["visibility_m"] is not None:
+        yield "modt_trust_visibility_metres", {}, status["trust"]["visibility_m"]
     for part in ("counts", "loop", "power", "sensor", "odometry", "recording", "host"):
         yield from _of_table(f"modt_{part}", status[part], {})
     for sink, health in status["sinks"].items():

@@ -20,6 +20,7 @@ from modt.placement import Mount
 from modt.poses.pose_source import PoseSource
 from modt.sensor_fit.recognition import recognise
 from modt.sources.stream import StreamInfo
+from modt.trust.visibility import VisibilityEstimate
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import Budget, Frame, FrameResult, TrustLevel
 
@@ -220,5 +221,6 @@ class Stages:
         self.pipeline = self._new_pipeline(chosen.config)
         if chosen.config.sensor != self.config.sensor:
             self.trust.watch = TrustWatch(chosen.config.sensor)
+            self.trust.visibility = VisibilityEstimate(chosen.config.sensor)
         self.chosen = chosen
         host.release_freed_pages()

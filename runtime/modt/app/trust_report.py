@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from modt.config import SensorConfig
 from modt.sources.packets.turn_decoder import OTHER_SENSOR
+from modt.trust.visibility import VisibilityEstimate
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import FrameResult, Trust, TrustLevel
 
@@ -25,6 +27,7 @@ class TrustReport:
 
     Attributes:
         watch: the checks; another sensor needs another one.
+        visibility: the estimate of the visibility; so does this.
         trust: that of the last frame.
         frames: number of frames by level.
     """
@@ -32,11 +35,15 @@ class TrustReport:
     def __init__(self, sensor: SensorConfig) -> None:
         self.watch = TrustWatch(sensor)
         self.trust = Trust()
+        self.visibility = VisibilityEstimate(sensor)
         self.frames: Counter[str] = Counter({level.name.lower(): 0 for level in TrustLevel})
 
     def judge(self, result: FrameResult, others: dict[str, Finding]) -> Trust:
         """The trust of a result; `others` are findings of other checks by their names."""
-        trust = self.watch.add(result.frame, result.T_world_sensor, others)
+        self.visibility.add(result.proposals.kind, result.frame.time_s)
+        findings = others | self.visibility.findings()
+        trust = self.watch.add(result.frame, result.T_world_sensor, findings)
+        trust = replace(trust, visibility_m=self.visibility.visibility_m)
         self.frames[trust.word] += 1
         if (trust.level, trust.keys) != (self.trust.level, self.trust.keys):
             _log_change(self.trust, trust)

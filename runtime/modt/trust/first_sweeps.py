@@ -29,7 +29,7 @@ def doubts(sweeps: Sequence[Float32], sensor: SensorConfig) -> Iterator[tuple[bo
     points = sweeps[-1]
     range_m = np.hypot(points[:, 0], points[:, 1])
     points = points[(range_m > 0) & (range_m < sensor.max_range_m)]
-    expected = _expected(sensor)
+    expected = n_rays(sensor)
     if len(points) < FEW_SHARE * expected:
         yield True, f"{len(points)} returns of about {expected:.0f}", "uncover and clean the sensor"
     if not len(points):
@@ -48,7 +48,7 @@ def doubts(sweeps: Sequence[Float32], sensor: SensorConfig) -> Iterator[tuple[bo
         yield False, f"nine tenths of the returns are within {reach_m:.1f} m", "look for fog, dust or a cover"
 
 
-def _expected(sensor: SensorConfig) -> float:
+def n_rays(sensor: SensorConfig) -> float:
     """Number of firings in a turn, by the beams of a profile."""
     if sensor.elevations_deg is not None:
         beams = float(len(sensor.elevations_deg))
