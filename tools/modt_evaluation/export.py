@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +27,14 @@ Frames = tuple[int, int | None]
 Capture = Sequence[tuple[str, str]]
 PLAIN = ("id", "state", "class", "viewed", "final", "proposal", "points", "age", "missed")
 """Columns that have their name from tracks.jsonl."""
+KINDS = {
+    **dict.fromkeys(("frame", "id", "proposal", "points", "age", "missed"), "int64"),
+    **dict.fromkeys(("state", "class"), "string"),
+    **dict.fromkeys(("viewed", "final"), "bool"),
+}
+"""Types of the columns in Parquet; the others are numbers of 64 bits."""
+BLOCK_BYTES = 1 << 26
+"""Size of the part of a table that is converted at once [bytes of CSV]."""
 UNITS = {"yaw": "rad", "heading": "rad", "speed_mps": ""}  # other columns: m
 NO_BOX = dict.fromkeys(BOX_KEYS)
 
@@ -186,17 +194,33 @@ def _csv(export: Export, target: Path) -> None:
 
 
 def _parquet(export: Export, target: Path) -> None:
-    """Write the table of --csv, read again by Arrow."""
+    write_parquet(export, target, {})
+
+
+def write_parquet(export: Export, target: Path, constants: Mapping[str, str]) -> None:
+    """Write the table of --csv as Parquet, by parts. Columns of constants stand in front.
+
+    Raises:
+        MisuseError: Arrow is not installed.
+        ModtError: the file cannot be written.
+    """
     try:
+        import pyarrow
         from pyarrow import csv as arrow
         from pyarrow import parquet
     except ModuleNotFoundError as error:
         raise MisuseError("--parquet", f"needs {error.name}", install("parquet")) from None
     text = target.with_suffix(".csv")
     _csv(export, text)
-    table = arrow.read_csv(text)
-    with writing(target):
-        parquet.write_table(table, target)
+    kinds = {name: KINDS.get(name, "float64") for name in COLUMNS}
+    named = {name: pyarrow.type_for_alias(kind) for name, kind in kinds.items()}
+    schema = pyarrow.schema([*((name, pyarrow.string()) for name in constants), *named.items()])
+    options = arrow.ConvertOptions(column_types=named)
+    with writing(target), parquet.ParquetWriter(target, schema) as file:
+        for part in arrow.open_csv(text, arrow.ReadOptions(block_size=BLOCK_BYTES), convert_options=options):
+            first = [pyarrow.repeat(value, len(part)) for value in constants.values()]
+            file.write_table(pyarrow.table([*first, *part.columns], schema))
+    text.unlink()
 
 
 def _nuscenes(task: str) -> Callable[[Export, Path], None]:

@@ -15,7 +15,20 @@ from modt_profiling.reporting.quantity import LEGEND, Quantity, aligned
 if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.axes import Axes
 
-Cell = str | Quantity
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """Text that leads to another file on a page."""
+
+    text: str
+    place: str  # relative to the page
+
+    def marked(self) -> str:
+        """The text, as a terminal shows it."""
+        return self.text
+
+
+Cell = str | Quantity | Link
 TERMS = (
     "E1, E2: energy of a frame, by tracking-by-detection (which classifies every proposal) and by modt",
     "gamma: E1 / E2, how many times less energy modt takes",
@@ -86,7 +99,7 @@ class Document:
             lines += _wrapped(f"{name}: {value.text()}; {note}")
         lines += ["", *(f"  {fact}" for fact in self.about)]
         for table in self.tables:
-            rows = [[c.marked() if isinstance(c, Quantity) else c for c in row] for row in (table.head, *table.rows)]
+            rows = [[c if isinstance(c, str) else c.marked() for c in row] for row in (table.head, *table.rows)]
             lines += ["", *aligned(rows)]
         return "\n".join([*lines, "", *_wrapped(self.test), "", *(f"  {term}" for term in TERMS)])
 

@@ -1,0 +1,1 @@
+"""Many recordings: one task a recording and mode, one Parquet dataset, one report."""
