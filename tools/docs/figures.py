@@ -17,6 +17,7 @@ import numpy as np
 
 from modt import host
 from modt.classes import CLASS_NAMES
+from modt_evaluation.engine import Engine
 from modt_evaluation.evaluation import ALL, Evaluation, collect, evaluation
 from modt_evaluation.experiments.catalogue import chosen
 from modt_evaluation.experiments.drives import Drive, KittiDrive, completed, kitti_drives, simulated_drives
@@ -111,7 +112,7 @@ def paper_page(drive: KittiDrive, further: Path | None) -> str:
     if further is not None:
         shown.insert(1, completed([drive], further))
     about = f"{sources(PROFILES)}; made by `python -m tools.docs.figures`."
-    return section(Study(chosen(NAMES), shown, PROFILES).rows(1, lambda name: None), about)
+    return section(Study(chosen(NAMES), shown, PROFILES).rows(Engine(), lambda name: None), about)
 
 
 def main() -> None:

@@ -36,6 +36,7 @@ def add_options(p: argparse.ArgumentParser) -> None:
     g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help=out)
     jobs = options.bounded(int, 1, 1024, "processes")
     g.add_argument("--jobs", type=jobs, default=1, metavar="N", help="number of processes (default: %(default)s)")
+    g.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler (extra batch)")
     g.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
@@ -47,6 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     host.pin_to_core(None)  # one thread a process: NumPy is imported from here on
     from modt.sinks.output import writing
+    from modt_evaluation.engine import Engine
     from modt_evaluation.experiments.catalogue import chosen
     from modt_evaluation.experiments.drives import Drive, completed, kitti_drives, simulated_drives
     from modt_evaluation.experiments.markdown import markdown, sources
@@ -64,8 +66,12 @@ def run(arguments: argparse.Namespace) -> int:
     base = tuple(arguments.profile)
     profiles = [base, *((*base, name) for name in arguments.beside)]
     study = Study(experiments, drives, profiles)
-    with bar(len(study.tasks()), "replay", shown=not arguments.quiet and sys.stderr.isatty()) as tick:
-        rows = study.rows(arguments.jobs, tick)
+    shown = not arguments.quiet and sys.stderr.isatty()
+    with (
+        Engine(arguments.jobs, arguments.scheduler) as engine,
+        bar(len(study.tasks()), "replay", shown=shown) as tick,
+    ):
+        rows = study.rows(engine, tick)
     if not rows:
         raise MisuseError(
             "--experiment", "none of the drives has the sweeps that it needs", "add them, or --simulated N"

@@ -6,6 +6,7 @@ import pytest
 from modt.app import assembly
 from modt.errors import MisuseError
 from modt.profile import load
+from modt_evaluation.engine import Engine
 from modt_evaluation.evaluation import collect
 from modt_evaluation.experiments.catalogue import EXPERIMENTS, chosen
 from modt_evaluation.experiments.drives import completed, kitti_drives, simulated_drives
@@ -47,7 +48,7 @@ def test_the_labels_give_table_iii(kitti_root):
     drives = kitti_drives(kitti_root)
     assert [drive.name for drive in drives if drive.scans] == ["0005"], "only those with their sweeps are replayed"
     study = Study(chosen(["table3", "fig8"]), drives, [()])
-    rows = study.rows(1, lambda name: None)
+    rows = study.rows(Engine(), lambda name: None)
     found = {row.streams: row for row in rows if row.experiment == "table3" and row.quantity == "N_go"}
     lives = {"0005, tracking 0000": 34.9, "0014, tracking 0004": 26.9, "0001": 33.1, "0059, tracking 0011": 63.3}
     assert {name: round(found[name].value, 1) for name in lives} == lives
@@ -112,7 +113,9 @@ def test_drives_and_profiles_have_tasks_of_their_own():
 
 @pytest.mark.slow
 def test_several_processes_give_the_same_rows():
+    pytest.importorskip("distributed")
     done = []
     study = Study(chosen(["table5"]), simulated_drives(2, 0.2), [(), ("paper",)])
-    assert study.rows(2, done.append) == study.rows(1, done.append)
+    with Engine(2) as engine:
+        assert study.rows(engine, done.append) == study.rows(Engine(), done.append)
     assert len(done) == 2 * len(study.tasks())

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 
 from modt import profile
+from modt_evaluation.engine import Engine
 from modt_evaluation.experiments import paper
 from modt_evaluation.experiments.catalogue import Experiment, Label
 from modt_evaluation.experiments.drives import Drive, KittiDrive
@@ -82,12 +81,16 @@ class Study:
         )
         return list(dict.fromkeys(needed))
 
-    def rows(self, jobs: int, tick: Callable[[str], None]) -> list[Row]:
+    def rows(self, engine: Engine, tick: Callable[[str], None]) -> list[Row]:
         """Figures of every experiment, streams of development last; tick is called with the drive of each replay."""
         outcomes: dict[Task, Judged] = {}
-        for task, judged in _replayed(self.tasks(), jobs):
-            outcomes[task] = judged
-            tick(task[0].name)
+        tasks = self.tasks()
+        together = 1 if engine.local else _CHUNK
+        parts = [tasks[first : first + together] for first in range(0, len(tasks), together)]
+        for part, judged in engine.results(_replay_all, parts):
+            outcomes |= zip(part, judged, strict=True)
+            for drive, _ in part:
+                tick(drive.name)
         return [
             _row(e, streams, drives, names, variant, figure)
             for e in self.experiments
@@ -136,18 +139,8 @@ def _replays(experiment: Experiment, drive: Drive, names: Profiles) -> Mapping[L
     return experiment.replays(profile.load((drive.sensor, *names)))
 
 
-def _replayed(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Judged]]:
-    """Each task with its outcome."""
-    if jobs == 1:
-        yield from zip(tasks, map(_replay, tasks), strict=True)
-        return
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        yield from zip(tasks, pool.map(_replay, tasks, chunksize=_CHUNK), strict=True)
-
-
-def _replay(task: Task) -> Judged:
-    drive, replay = task
-    return replay.judged(drive)
+def _replay_all(tasks: Sequence[Task]) -> list[Judged]:
+    return [replay.judged(drive) for drive, replay in tasks]
 
 
 def _row(
