@@ -19,9 +19,12 @@ from modt.app import assembly
 from modt.app.chosen_profile import choose
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
+from modt.classification.own_classifier import Classifier, OwnClassifier
+from modt.classification.pointnet import PointNet
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, transform_boxes
+from modt.pipeline import ClassificationStage
 from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
@@ -180,16 +183,18 @@ class Pipeline:
             for found in pipeline.step(frame).objects().as_dicts():
                 print(found["id"], found["object_class"], found["box"])
 
-    The mode is "conventional", "efficient" or "accurate".
+    The mode is "conventional", "efficient" or "accurate". `classifier` takes the place of the network
+    (modt.classification.own_classifier.Classifier).
 
     Raises:
-        MisuseError: the mode is unknown, or a model cannot be used.
+        MisuseError: the mode is unknown, a model cannot be used, or the classifier returns no likelihoods.
     """
 
-    def __init__(self, config: ProfileConfig, mode: str = "accurate") -> None:
+    def __init__(self, config: ProfileConfig, mode: str = "accurate", classifier: Classifier | None = None) -> None:
         if mode not in assembly.MODES:
             raise MisuseError(f"mode {mode!r}", "unknown", f"use one of {', '.join(assembly.MODES)}")
         self.mode = mode
+        self._classifier = classifier
         self._asked: profile.Names | ProfileConfig = config
         self._use(config)
         self._index = 0
@@ -202,11 +207,17 @@ class Pipeline:
     def _use(self, config: ProfileConfig) -> None:
         chosen = assembly.MODES[self.mode]
         self.config = config
-        self._pipeline = assembly.pipeline(chosen, config, FieldOfView())
+        self._pipeline = assembly.pipeline(chosen, config, FieldOfView(), substitute=self._substitute)
         self._budget = chosen.budget(config)
 
+    def _substitute(self, network: PointNet) -> ClassificationStage:
+        """The given classifier, or the network without one."""
+        return network if self._classifier is None else OwnClassifier(self._classifier, network.class_frequency)
+
     @classmethod
-    def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:
+    def from_profile(
+        cls, names: profile.Names = None, mode: str = "accurate", classifier: Classifier | None = None
+    ) -> Self:
         """Make a pipeline from profiles by name or file. Later ones win key by key.
 
         If no profile names the sensor, it is that of the default, or the one that the first sweep shows.
@@ -214,7 +225,7 @@ class Pipeline:
         Raises:
             MisuseError: the profile or mode does not exist, or a profile has an error, whose line is named.
         """
-        pipeline = cls(profile.load(names), mode)
+        pipeline = cls(profile.load(names), mode, classifier)
         pipeline._asked = names
         return pipeline
 

@@ -177,8 +177,11 @@ def pipeline(
     ledger: Ledger | None = None,
     continuity: Continuity | None = None,
     tuning: MethodTuning = MethodTuning(),
+    substitute: Callable[[PointNet], ClassificationStage] = lambda network: network,
 ) -> Pipeline:
     """The stages of a mode. Without a ledger they have one of their own; without a continuity they begin anew.
+
+    `substitute` gives the classifier that is used in place of the network.
 
     Raises:
         MisuseError: the model cannot be used.
@@ -187,14 +190,15 @@ def pipeline(
     kernels = chosen_kernels(profile.segmentation.kernels, tuning.shape)
     limits = profile.classification
     batching = tuning.classification.batching
-    classifier = network(limits, profile.sensor, batching)
+    model = network(limits, profile.sensor, batching)
+    classifier = substitute(model)
     cost = LinearCost(limits.max_points, padded_size(limits, batching), tuning.classification.call_cost)
     warm_up(classifier.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost, profile)
     return stages(
         mode,
         profile,
-        classifier,
+        model,
         segmenter(profile, fov, kernels, tuning.segmentation),
         classifier,
         cost,
