@@ -97,6 +97,19 @@ def test_the_lock_outlasts_the_removal_of_the_folder_around_the_run(tmp_path, fi
             other.locked().__enter__()
 
 
+def test_no_lock_stays_beside_a_run_that_has_ended_and_none_is_removed_from_another(tmp_path):
+    run = RunDirectory(tmp_path / "run")
+    with run.locked():
+        run.begin("schema: modt.run/1\n", 1e9)
+        other = RunDirectory(tmp_path / "run")
+        with pytest.raises(ModtError, match="another run"):
+            other.locked().__enter__()
+        assert (tmp_path / ".run.lock").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    with run.locked(), pytest.raises(ModtError, match="another run"):
+        other.locked().__enter__()
+
+
 def test_where_no_lock_can_be_written_the_service_goes_on_and_the_disk_is_to_blame(tmp_path):
     (tmp_path / "file").write_text("")
     directory = RunDirectory(tmp_path / "file" / "run")

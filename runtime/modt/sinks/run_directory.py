@@ -22,6 +22,8 @@ MARK = "service: true"
 """Line of run.yaml in the directories of a service. No other directory is ever deleted."""
 MEMORY = Path("/dev/shm")
 """Folder of the status while the disk of the records cannot be written."""
+LOCK_ATTEMPTS = 3
+"""Attempts to lock the file of the lock, which a run that ends may remove between opening and locking."""
 _KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) for form in ("{}", ".{}.part")}
 
 
@@ -76,6 +78,7 @@ class RunDirectory:
                 yield
             finally:
                 self.in_memory(None)
+                self._remove_lock()
 
     def begin(self, description: str, limit_bytes: float) -> None:
         """Rename the previous part, delete the oldest parts beyond a limit, and begin a new part.
@@ -138,25 +141,45 @@ class RunDirectory:
 
     def _take_lock(self) -> None:
         """Take the lock, or take it once more if its file was removed together with the folder around the run."""
-        path = self.path.with_name(f".{self.path.name}.lock")
-        with suppress(OSError):
-            if self._lock_file is not None and os.path.samestat(os.fstat(self._lock_file), os.stat(path)):
-                return
+        if self._holds_lock():
+            return
         self._lock.close()
         self._lock_file = None
         self._shut_out = False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            number = os.open(path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW)
-            self._lock.callback(os.close, number)
-            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._lock_file = number
+            for _ in range(LOCK_ATTEMPTS):
+                self._lock.close()
+                number = os.open(self._lock_path, os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW)
+                self._lock.callback(os.close, number)
+                fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._lock_file = number
+                if self._holds_lock():
+                    return
         except BlockingIOError:
             self._shut_out = True
             remedy = "end it, or give another --out"
             raise ModtError(self.path, "another run of modt records into it", remedy) from None
         except OSError:  # the recording reports it when it begins
             pass
+
+    @property
+    def _lock_path(self) -> Path:
+        """File of the lock. It lies beside the directory, which is renamed, and only while a run records."""
+        return self.path.with_name(f".{self.path.name}.lock")
+
+    def _holds_lock(self) -> bool:
+        """Whether this run has locked the file that is at the path."""
+        with suppress(OSError):
+            return self._lock_file is not None and os.path.samestat(
+                os.fstat(self._lock_file), os.stat(self._lock_path)
+            )
+        return False
+
+    def _remove_lock(self) -> None:
+        if self._holds_lock():
+            with suppress(OSError):
+                self._lock_path.unlink()
 
     def _numbered(self) -> Iterator[tuple[int, Path]]:
         for path in self.path.parent.glob("*~*"):
