@@ -354,7 +354,11 @@ class LoopConfig(StageConfig):
     """Limit of the live loop, in effect with `modt run`."""
 
     power_W: float | None = number(
-        None, 0.01, 1000.0, "W", "Power of the board above which the loop sheds load. Null: no limit."
+        None,
+        0.01,
+        1000.0,
+        "W",
+        "Power of the board, with its idle power, above which the loop sheds load. Null: no limit.",
     )
 
 
