@@ -32,11 +32,11 @@ def test_metrics_are_valid_lines_with_one_type_each():
 
 
 def test_the_file_of_metrics_is_replaced_as_a_whole(tmp_path):
-    write_metrics(tmp_path / "modt.prom", status())
-    write_metrics(tmp_path / "modt.prom", status())
+    write_metrics(tmp_path / "modt.prom", metrics_text(status()))
+    write_metrics(tmp_path / "modt.prom", metrics_text(status()))
     assert [p.name for p in tmp_path.iterdir()] == ["modt.prom"]
     with pytest.raises(ModtError, match="missing"):
-        write_metrics(tmp_path / "missing" / "modt.prom", status())
+        write_metrics(tmp_path / "missing" / "modt.prom", metrics_text(status()))
 
 
 def test_counts_are_of_what_is_seen_and_the_rate_of_the_time_since_the_last_report():

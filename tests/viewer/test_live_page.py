@@ -65,6 +65,27 @@ def read(live):
         yield lambda *path, **headers: readers.enter_context(closing(Reader(live, *path, **headers)))
 
 
+def test_metrics_are_served_beside_the_page(live, read):
+    assert read("/metrics").answer.read() == b""
+    live.status("a sensor: 10.0 Hz", "modt_up_s 2\n")
+    answer = read("/metrics").answer
+    assert answer.getheader("Content-Type").startswith("text/plain; version=0.0.4")
+    assert answer.read() == b"modt_up_s 2\n"
+
+
+def test_a_page_is_told_the_status_with_each_frame_and_by_itself_while_no_sweep_comes(live, read):
+    live.status("a sensor: 0.0 Hz, sensor silent", "")
+    reader = read()
+    live.status("a sensor: 0.0 Hz, sensor silent", "")
+    assert reader.event() == {"status": "a sensor: 0.0 Hz, sensor silent"}
+    show(live, 0, [5], {0: 0})
+    assert reader.event()["status"] == "a sensor: 0.0 Hz, sensor silent"
+    live.status("a sensor: 10.0 Hz", "")  # sent with the next frame
+    show(live, 1, [5], {0: 0})
+    event = reader.event()
+    assert (event["status"], event["frame"]["frame"]) == ("a sensor: 10.0 Hz", 1)
+
+
 def test_connections_are_bounded(monkeypatch, request):
     monkeypatch.setattr(live_server.LiveServer, "request_queue_size", 2 * MOST_CONNECTIONS)
     monkeypatch.setattr(live_server, "SEND_S", WAIT_S)

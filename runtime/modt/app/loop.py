@@ -29,7 +29,7 @@ from modt.energy.windows import Clocks, EnergyWindow, Windows
 from modt.errors import ModtError
 from modt.pipeline import SINK
 from modt.reporting.summary import Summary
-from modt.sinks.output import LedgerSink, Sink, Writer, close_together
+from modt.sinks.output import LedgerSink, Sink, StatusSink, Writer, close_together
 from modt.sinks.recording import AtOnce, Job, Recording
 from modt.sinks.records import fields_of
 from modt.sources.stream import Received, StreamEndedError
@@ -323,8 +323,15 @@ class Service(Loop):
         text = json.dumps(status, indent=1, default=fields_of) + "\n"
         self.recording.writer.write(lambda: self.recording.write_status(text))
         self.writers["status"].write(lambda: self.recording.keep_status(text))
-        if self.metrics is not None:
-            from modt.app.prometheus import write_metrics
+        showing = [sink for sink in self.sinks.values() if isinstance(sink, StatusSink)]
+        if self.metrics is None and not showing:
+            return
+        from modt.app.prometheus import metrics_text, write_metrics
 
+        metrics = metrics_text(asdict(status))
+        for shown in showing:
+            what = f"{status.source}, profile {status.profile}, mode {status.mode}"
+            shown.status(f"{what}: {one_line(status)}", metrics)
+        if self.metrics is not None:
             path = self.metrics
-            self.writers["metrics"].write(lambda: write_metrics(path, asdict(status)))
+            self.writers["metrics"].write(lambda: write_metrics(path, metrics))

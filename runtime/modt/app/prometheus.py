@@ -34,19 +34,20 @@ def metrics_text(status: Mapping[str, Any]) -> str:
     for name, labels, value in _samples(status):
         if name not in typed:
             typed.add(name)
+            lines.append(f"# HELP {name} {_help(name)}")
             lines.append(f"# TYPE {name} {'counter' if name.endswith('_total') else 'gauge'}")
         inside = ",".join(f'{key}="{_escaped(text)}"' for key, text in labels.items())
         lines.append(f"{name}{{{inside}}} {value:.15g}" if inside else f"{name} {value:.15g}")
     return "\n".join(lines) + "\n"
 
 
-def write_metrics(path: Path, status: Mapping[str, Any]) -> None:
-    """Replace a file by the metrics of a status, for every user to read.
+def write_metrics(path: Path, metrics: str) -> None:
+    """Replace a file by the text of the metrics, for every user to read.
 
     Raises:
         ModtError: it cannot be written; the file is left as it is.
     """
-    replace_file(path, metrics_text(status), public=True)
+    replace_file(path, metrics, public=True)
 
 
 Sample = tuple[str, dict[str, str], float]
@@ -81,6 +82,28 @@ def _of_table(prefix: str, table: Mapping[str, Any], labels: dict[str, str]) -> 
             for entry, number in value.items():
                 if isinstance(number, bool | int | float):
                     yield name, {**labels, label: str(entry)}, float(number)
+
+
+HELP = {
+    "modt_time_s": "time of this status [s since 1970]",
+    "modt_up_s": "time since the start [s]",
+    "modt_period_s": "time between two sweeps [s]",
+    "modt_loop_step": f"load given up: {', '.join(f'{step.value} {step.name.lower()}' for step in Step)}",
+    "modt_trust_level": f"trust: {', '.join(f'{level.value} {level.name.lower()}' for level in TrustLevel)}",
+    "modt_trust_reason": "level of what is held against the results, by check",
+    "modt_trust_frames_total": "frames by their trust",
+    "modt_power_watts": "power of the last window, with idle power [W]",
+    "modt_power_frame_J": "mean energy of a frame, with idle power [J]",
+    "modt_power_stages_J": "mean energy of a frame by stage [J]",
+    "modt_power_limit_W": "limit of the profile, loop.power_W [W]",
+}
+"""Meaning of metrics whose name does not say it."""
+
+
+def _help(name: str) -> str:
+    """Meaning of a metric; else the place of its field in the status."""
+    part, _, key = name.removeprefix("modt_").removesuffix("_total").partition("_")
+    return HELP.get(name, f"{key.replace('_', ' ')}, as {part}.{key} of status.json (docs/formats.md)")
 
 
 def _escaped(text: str) -> str:

@@ -48,6 +48,14 @@ class LedgerSink(Protocol):
         """Write the costs of a frame, or the energy of a window."""
 
 
+@runtime_checkable
+class StatusSink(Protocol):
+    """A sink that also shows the status of a service."""
+
+    def status(self, words: str, metrics: str, /) -> None:
+        """Replace the status, a line of words and metrics for Prometheus, without waiting."""
+
+
 @contextmanager
 def writing(path: Path, remedy: str = WRITE_REMEDY) -> Iterator[None]:
     """Convert a failure of the file system to an error with a remedy.

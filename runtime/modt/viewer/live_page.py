@@ -33,10 +33,21 @@ class LivePage(LiveServer):
         super().__init__(host, port, (head + tail).encode())
         self._result: FrameResult | None = None
         self._energy: dict[str, Any] = {}
+        self._status = ""
+        self._silent = True  # no frame since the last status
+
+    def status(self, words: str, metrics: str, /) -> None:
+        """Show the status in the head of the pages, with the next frame or, without one, by itself."""
+        self.metrics = metrics.encode()
+        self._status = words
+        if self._silent and self.watched:
+            self.publish(line({"status": words}))
+        self._silent = True
 
     def write(self, result: FrameResult, /) -> None:
         """Keep a frame until its line of the ledger arrives."""
         self._result = result if self.watched else None
+        self._silent = False
 
     def ledger(self, line: LedgerLine | EnergyWindow, /) -> None:
         """Take the line of a frame, or the energy of the frames of a window."""
@@ -48,7 +59,7 @@ class LivePage(LiveServer):
         self._result = None
         if result is not None and result.frame.index == line.frame:
             cpu_ms = {stage: round(1e-6 * work.cpu_ns, 3) for stage, work in line.stages.items()}
-            self.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}))
+            self.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}, self._status))
 
 
 def open_view(address: Address) -> LivePage:
@@ -75,8 +86,8 @@ FASTEST = 1
 """Level of the fastest compression."""
 
 
-def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
-    """Line of JSON for a frame."""
+def live_message(result: FrameResult, costs: dict[str, Any], status: str = "") -> str:
+    """Line of JSON for a frame, with the status of the run."""
     frame = {
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 3),
@@ -88,6 +99,7 @@ def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
         **costs,
     }
     content = {
+        "status": status,
         "frame": frame,
         "states": theme.states(result.state_names),
         "tracks": packed_table(scaled(result_rows(result)), FASTEST),

@@ -24,10 +24,11 @@ ALIVE_S = 10.0
 
 
 class LiveServer(ThreadingTCPServer):
-    """Serves a page at /, and events at /events, in threads of its own.
+    """Serves a page at /, events at /events, and metrics at /metrics, in threads of its own.
 
     Attributes:
         page: HTML.
+        metrics: text for Prometheus; empty before the first status.
         port: port that is bound.
         names: host names that a request may use, or None for all. On the loopback they are limited, because a page of
             another site could reach it by a name of its own.
@@ -40,6 +41,7 @@ class LiveServer(ThreadingTCPServer):
 
     def __init__(self, host: str, port: int, page: bytes) -> None:
         self.page = page
+        self.metrics = b""
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         self.address_family = family
         super().__init__((str(address[0]), int(address[1])), _Handler)
@@ -140,6 +142,9 @@ class _Handler(BaseHTTPRequestHandler):
         elif self.path == "/":
             self._head("text/html; charset=utf-8")
             self.wfile.write(self.server.page)
+        elif self.path == "/metrics":
+            self._head("text/plain; version=0.0.4; charset=utf-8")
+            self.wfile.write(self.server.metrics)
         elif self.path == "/events":
             self._events()
         elif self.path == "/favicon.ico":  # browsers ask for it by themselves

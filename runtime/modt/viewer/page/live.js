@@ -4,17 +4,26 @@ const HISTORY = 600; // frames
 const packedSweeps = [], notice = document.querySelector("header span");
 let waiting = 0, done = Promise.resolve(), lost = false;
 
+const stage = element("stage");
+stage.dataset.notice = "No sweep so far. modt check SOURCE names the cause.";
+
 const packedSweep = (at) => packedSweeps[at];
 const play = () => go(last);
 state.at = last = -1;
 element("play").textContent = "Newest";
 
-async function take({ frame, states, tracks, points }) {
+async function take({ status, frame, states, tracks, points }) {
+  if (status) notice.textContent = status;
+  if (!frame) {
+    stage.dataset.notice = "The sensor sends no sweep. modt check SOURCE names the cause.";
+    return;
+  }
+  delete stage.dataset.notice;
   const at = last + 1, follows = state.at === last;
   await addTracks(tracks, at);
   frames[at] = frame;
   packedSweeps[at] = points;
-  notice.textContent = frame.trust || "live";
+  notice.textContent = [status || "live", frame.trust].filter(Boolean).join("; ");
   last = slider.max = at;
   forget(at - HISTORY);
   if (run.states.length !== states.length) legend("states", (run.states = states), true);
