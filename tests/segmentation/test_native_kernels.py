@@ -38,6 +38,7 @@ from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs
 from tests.segmentation import scans
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_cells import cloud
+from tests.segmentation.test_heads import BICYCLE, TROLLEY, arguments, person
 from tests.tracking.test_motion_filter import begun
 from tests.tracking.test_motion_filter import step as filter_step
 from tests.tracking.test_sight import scene as sight_scene
@@ -370,3 +371,15 @@ def test_every_pass_is_compiled():
     passes = {name for kind in Kernels.__mro__[:-1] for name in vars(kind) if not name.startswith("_")} - {"library"}
     compiled = {name for kind in (NativeKernels, NativeGeometryKernels) for name in vars(kind)}
     assert passes - {"name"} <= compiled
+
+
+@given(SEEDS)
+def test_people_within_a_cluster_are_the_same(kernels, seed):
+    rng = np.random.default_rng(seed)
+    heads = [person(*rng.uniform(-1, 1, 2), rng.uniform(1.2, 2.0)) for _ in range(rng.integers(4))]
+    parts = [*heads, *[part for part in (TROLLEY - [5.5, 0, 0, 0, 0], *BICYCLE) if rng.random() < 0.4], person(0, 0)]
+    x, y, low, high, points, tuning = arguments(*parts)
+    seen = rng.random(len(x)) < rng.uniform(0.3, 1.0)
+    high = high + rng.choice([0.0, 0.1], len(x)).astype(np.float32)
+    columns = [v[seen] for v in (x, y, low, high, points)]
+    np.testing.assert_array_equal(kernels.find_people(*columns, tuning), NUMPY.find_people(*columns, tuning))

@@ -619,7 +619,7 @@ static ClusterSizes sizes_from(const ClusterSizes *s, i64 n)
                           .of_oversized = s->of_oversized + n};
 }
 
-/* _moved: the parts whose `cluster_of_part` is not NONE leave their clusters. A part that stays keeps its number, with
+/* moved: the parts whose `cluster_of_part` is not NONE leave their clusters. A part that stays keeps its number, with
  * no points. Of a cluster that parts leave, the number of points alone is corrected. `cluster` is read for all parts
  * before their cells are moved. */
 static void move_parts(const ClusterScratch *s, i64 n_used, i64 n_parts, i64 *cluster, const ClusterSizes *sizes,

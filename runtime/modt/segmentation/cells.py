@@ -244,13 +244,13 @@ class CellClusterer:
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         of_oversized = oversized.take(cluster.take(parts.cell))
         parts = replace(parts, of_oversized=of_oversized)
-        cluster, sizes = _moved(cluster, sizes, part, parts, of_oversized | self._may_be_person(parts))
+        cluster, sizes = moved(cluster, sizes, part, parts, of_oversized | self._may_be_person(parts))
 
         free, before_m = self._before_surfaces(cells, sampled, cluster, sizes)
         part = connect(self.fine, cells, max_gap_m, free)
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         extent_m = sizes.extent_m.take(cluster.take(parts.cell))
-        return _moved(cluster, sizes, part, parts, self._leaves_surface(parts, part, before_m, extent_m))
+        return moved(cluster, sizes, part, parts, self._leaves_surface(parts, part, before_m, extent_m))
 
     def _before_surfaces(
         self, cells: Cells, sampled: PointColumns, cluster: Int, sizes: ClusterSizes
@@ -327,7 +327,7 @@ class CellClusterer:
         return (sizes.points >= self.split.min_points) & fits
 
 
-def _moved(
+def moved(
     cluster: Int, sizes: ClusterSizes, part: Int, parts: ClusterSizes, leaves: Bool
 ) -> tuple[Int, ClusterSizes]:
     """(C,) cluster of each cell, and sizes, after some of the (C,) parts have left their clusters.
@@ -340,9 +340,9 @@ def _moved(
     points_left = sizes.points - np.bincount(whole, points, len(sizes)).astype(np.int64)
     in_part = np.flatnonzero(part != NONE)
     moving = in_part[leaves.take(part.take(in_part))]
-    moved = cluster.copy()
-    moved[moving] = len(sizes) + part[moving]
-    return moved, replace(sizes, points=points_left).followed_by(replace(parts, points=points))
+    after = cluster.copy()
+    after[moving] = len(sizes) + part[moving]
+    return after, replace(sizes, points=points_left).followed_by(replace(parts, points=points))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import CellClusterer, Clusters, ClusterSizes
+from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, moved
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import consecutive
 from modt.segmentation.kernels import NUMPY, Kernels
@@ -22,9 +23,9 @@ class Clusterer:
 
     A coarse grid connects objects with sparse returns. Clusters that it may have joined wrongly are clustered once
     more on a grid of half the spacing. An oversized cluster falls into its parts there. Parts that may be a person
-    are split off a cluster that may hold a person and more. What stands before the long surface of a wall, a hedge or
-    a vehicle leaves it. Of the rest, what is longer than any object, or a low part of an oversized cluster, is
-    structure.
+    are split off a cluster that may hold a person and more. So are people side by side, and who pushes something.
+    What stands before the long surface of a wall, a hedge or a vehicle leaves it. Of the rest, what is longer than
+    any object, or a low part of an oversized cluster, is structure.
 
     Args:
         sensor: range and beam spacing.
@@ -47,6 +48,7 @@ class Clusterer:
         self.porosity = PorosityFinder(sensor, self.cells.fine, tuning.porosity)
         self.tuning = tuning.porosity
         self.valid = tuning.clusters
+        self.heads = tuning.heads
         max_diagonal_m = min(tuning.strips.max_diagonal_m, config.max_extent_m)
         self.strips = replace(tuning.strips, max_diagonal_m=max_diagonal_m)
 
@@ -73,6 +75,7 @@ class Clusterer:
     def _clustered(self, found: Clusters) -> Clusters:
         """These cells in clusters that can be objects."""
         cluster, sizes = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
+        cluster, sizes = self._people_split_off(cluster, sizes, found.cells, found.sampled, found.air.beam_m)
         found = replace(found, cluster_of_cell=cluster, n=len(sizes))
         strip = ((self._kind(sizes) == PointKind.MEMBER) | ~sizes.of_oversized) & self.may_be_strips(sizes)
         target = self._merged(found, strip)
@@ -87,6 +90,29 @@ class Clusterer:
             kind_of_cell=kind.take(target_of_cell),
             n=int(np.count_nonzero(valid)),
         )
+
+    def _people_split_off(
+        self, cluster: Int, sizes: ClusterSizes, cells: Cells, sampled: PointColumns, beam_m: Float32
+    ) -> tuple[Int, ClusterSizes]:
+        """(C,) cluster of each cell and sizes, after people have left clusters of people and what they push."""
+        heads = self.heads
+        tried = (sizes.points >= heads.min_points) & (sizes.sqrt_range < math.sqrt(heads.max_range_m))
+        tried &= (sizes.extent_m > heads.min_extent_m) & (sizes.extent_m < heads.max_extent_m)
+        tried &= (sizes.top_m > heads.min_top_m) & (sizes.top_m < self.cells.split.person.max_top_m)
+        part = np.full(len(cells), NONE)
+        n = 0
+        for g in tried.nonzero()[0]:
+            rows = (cluster == g).nonzero()[0]
+            person = self.kernels.find_people(
+                sampled.x[rows], sampled.y[rows], cells.low[rows], cells.high[rows], cells.entries[rows], heads
+            )
+            found = person != NONE
+            part[rows[found]] = n + person[found]
+            n += int(person.max(initial=NONE)) + 1
+        if not n:
+            return cluster, sizes
+        parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
+        return moved(cluster, sizes, part, parts, np.ones(n, np.bool_))
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""

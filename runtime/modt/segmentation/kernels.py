@@ -11,6 +11,7 @@ from modt.segmentation.cells import CellClusterer, low_points, members_of, occup
 from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_statistics
+from modt.segmentation.heads import find_people
 from modt.segmentation.porosity import PorosityFinder, mean_solidity
 from modt.segmentation.strips import merge_strips, view_bounds
 from modt.types import Bool, Float32, Int, Int8, PointKind
@@ -64,6 +65,7 @@ class Kernels(GeometryKernels):
     air = staticmethod(PorosityFinder.air)
     mean_solidity = staticmethod(mean_solidity)
     airborne_points = staticmethod(PorosityFinder.airborne_points)
+    find_people = staticmethod(find_people)
     view_bounds = staticmethod(view_bounds)
     merge_strips = staticmethod(merge_strips)
     group = staticmethod(Groups.from_labels)

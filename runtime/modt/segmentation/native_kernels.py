@@ -34,7 +34,7 @@ from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
 from modt.segmentation.kernels import Above, Bounds, Kernels
 from modt.segmentation.porosity import PorosityFinder
 from modt.segmentation.strips import DIRECTION, ViewBounds
-from modt.segmentation.tuning import StripTuning
+from modt.segmentation.tuning import HeadTuning, StripTuning
 from modt.types import N_REFLECTANCE, Bool, Float32, Float64, Int, Int8
 
 T = TypeVar("T", Cells, PointColumns, ClusterSizes)
@@ -98,6 +98,12 @@ STRUCTURE_RULES = Layout(
     max_range_m=Number(_f32),
     min_part_points=Number(_i64),
     **_members(Number(_i32), "max_lines", "max_cells", "min_cells", "refinements"),
+)
+HEAD_TUNING = Layout(
+    "HeadTuning",
+    **_members(Number(_f64), "min_top_m", "reach_m", "max_apart_m", "min_dip_m", "head_height_m", "max_head_m"),
+    **_members(Number(_f64), "max_bottom_m", "load_m", "min_load_top_m"),
+    min_points=Number(_i64),
 )
 CLUSTER_SIZES = Layout(
     "ClusterSizes",
@@ -165,6 +171,7 @@ _SIGNATURES: Signatures = {
             CLUSTER_SIZES,
         ),
     ),
+    "modt_find_people": (None, (HEAD_TUNING, *[FLOAT32] * 4, INT64, _L, *[OutputArgument] * 3)),
     "modt_view_bounds": (None, (CELLS, POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, _L, VIEW_BOUNDS)),
     "modt_merge_strips": (
         None,
@@ -346,6 +353,16 @@ class NativeKernels(NativeGeometryKernels, Kernels):
             CLUSTER_SIZES.of(sizes),
         )
         return cluster, _first(sizes, g)
+
+    def find_people(
+        self, x: Float32, y: Float32, low: Float32, high: Float32, entries: Int, tuning: HeadTuning
+    ) -> Int:
+        """(m,) person to whom each cell of one cluster belongs, NONE where it is nobody's."""
+        m = len(x)
+        peaks, heads, person = np.empty((3, m), np.int64)
+        rules = self._structure(HEAD_TUNING.of, tuning)
+        self.library.modt_find_people(rules, x, y, low, high, entries, m, peaks, heads, person)
+        return person
 
     def view_bounds(self, clusters: Clusters, strip_of_cluster: Int, n: int) -> ViewBounds:
         """Bounds of n strips in the view, given (G,) the number of each cluster among them, or NONE."""

@@ -170,6 +170,42 @@ class SplitTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class HeadTuning:
+    """People side by side, or behind a load, in one cluster.
+
+    Chosen on: simulated pairs, groups, trolleys and pushchairs, with a check on simulated streets.
+    """
+
+    min_extent_m: float = 1.0
+    """Extent of a cluster from which heads are looked for [m]. Less divides people in stride."""
+    max_extent_m: float = 3.0
+    """Greatest extent of such a cluster [m]. More costs time, and divides hedges."""
+    max_range_m: float = 10.0
+    """Range of a cluster up to which heads are looked for [m]. More divides cars, whose roofs few points meet."""
+    min_top_m: float = 1.35
+    """Least height of a head [m]. Less takes handlebars for heads."""
+    reach_m: float = 0.43
+    """Distance to the head within which cells belong to a person [m]. More adds the handle of what is pushed, and the
+    person is taken for a cyclist."""
+    max_apart_m: float = 1.5
+    """Distance of two heads beyond which heights need not dip between them [m]."""
+    min_dip_m: float = 0.15
+    """Least dip between two heads [m]. More misses groups that few beams meet."""
+    head_height_m: float = 0.3
+    """Height of a head [m]: cells that reach into it are the head."""
+    max_head_m: float = 0.55
+    """Greatest extent of a head [m]. More takes roofs of cars for heads."""
+    max_bottom_m: float = 0.45
+    """Greatest height of the bottom of a person [m]. More divides treetops."""
+    min_points: int = 20
+    """Points below which a person, or a load, is not one. Less divides what is far away."""
+    load_m: float = 0.65
+    """Distance to the head from which something is a load [m]. Less takes the front of a bicycle for one."""
+    min_load_top_m: float = 0.85
+    """Least height of the top of a load [m]. Less takes the front wheel of a bicycle for one."""
+
+
+@dataclass(frozen=True, slots=True)
 class StructureTuning:
     """Long surfaces within clusters, and the parts before them that leave.
 
@@ -341,6 +377,7 @@ class SegmentationTuning:
     clusters: ClusterTuning = ClusterTuning()
     low: LowTuning = LowTuning()
     structure: StructureTuning = StructureTuning()
+    heads: HeadTuning = HeadTuning()
     strips: StripTuning = StripTuning()
     view: ViewTuning = ViewTuning()
     heading: HeadingTuning = HeadingTuning()

@@ -1,0 +1,156 @@
+/* People within a cluster: segmentation/heads.py. */
+
+#include "kernels.h"
+
+/* HeadTuning: values by the names that they have there. */
+typedef struct {
+    double min_top_m, reach_m, max_apart_m, min_dip_m, head_height_m, max_head_m, max_bottom_m, load_m,
+        min_load_top_m;
+    i64 min_points;
+} HeadTuning;
+
+/* One cluster: m cells by a point of each, heights above the ground, and numbers of points. */
+typedef struct {
+    const float *x, *y, *low, *high;
+    const i64 *entries;
+    i64 m;
+} Cluster;
+
+enum { BINS = 5 };
+static const double FIRST = 0.2, LAST = 0.8, HALF_WAY_M = 0.3;
+
+/* Square of the distance of two cells [m2] */
+static inline double square_m2(const Cluster *c, i64 a, i64 b)
+{
+    double dx = (double)c->x[a] - (double)c->x[b], dy = (double)c->y[a] - (double)c->y[b];
+    return dx * dx + dy * dy;
+}
+
+/* _dips */
+static int dips(const HeadTuning *r, const Cluster *c, i64 peak, i64 other)
+{
+    double x = c->x[other], y = c->y[other], dx = (double)c->x[peak] - x, dy = (double)c->y[peak] - y;
+    double square = dx * dx + dy * dy;
+    if (square > r->max_apart_m * r->max_apart_m)
+        return 1;
+    float top[BINS], lowest = INFINITY;
+    for (int k = 0; k < BINS; k++)
+        top[k] = -INFINITY;
+    for (i64 i = 0; i < c->m; i++) {
+        double off_x = (double)c->x[i] - x, off_y = (double)c->y[i] - y;
+        double share = (off_x * dx + off_y * dy) / square, aside = off_y * dx - off_x * dy;
+        if (!(share >= FIRST && share < LAST && aside * aside < HALF_WAY_M * HALF_WAY_M * square))
+            continue;
+        int part = (int)mind((share - FIRST) * (BINS / (LAST - FIRST)), BINS - 1);
+        top[part] = maxf(c->high[i], top[part]);
+    }
+    for (int k = 0; k < BINS; k++)
+        lowest = top[k] > -INFINITY ? minf(top[k], lowest) : lowest;
+    return lowest <= minf(c->high[peak], c->high[other]) - (float)r->min_dip_m;
+}
+
+/* _peaks: returns how many there are. A cell that is not left is marked with 0 in `left`. */
+static i64 find_peaks(const HeadTuning *r, const Cluster *c, i64 *left, i64 *peaks)
+{
+    i64 n = 0, n_left = 0;
+    for (i64 i = 0; i < c->m; i++)
+        n_left += left[i] = c->high[i] >= (float)r->min_top_m;
+    while (n_left) {
+        i64 peak = NONE;
+        for (i64 i = 0; i < c->m; i++)
+            if (left[i] && (peak == NONE || c->high[i] > c->high[peak]))
+                peak = i;
+        int separate = 1;
+        for (i64 k = 0; k < n && separate; k++)
+            separate = dips(r, c, peak, peaks[k]);
+        if (separate)
+            peaks[n++] = peak;
+        n_left = 0;
+        for (i64 i = 0; i < c->m; i++)
+            n_left += left[i] &= square_m2(c, i, peak) >= r->reach_m * r->reach_m;
+    }
+    return n;
+}
+
+/* Whether peak k of those nearest to each cell is the head of a person. */
+static int is_head(const HeadTuning *r, const Cluster *c, const i64 *nearest, i64 k, i64 peak)
+{
+    double least[2] = {INFINITY, INFINITY}, greatest[2] = {-INFINITY, -INFINITY};
+    float bottom = INFINITY, top_from = c->high[peak] - (float)r->head_height_m;
+    i64 points = 0;
+    for (i64 i = 0; i < c->m; i++) {
+        if (nearest[i] != k)
+            continue;
+        if (square_m2(c, i, peak) < r->reach_m * r->reach_m) {
+            bottom = minf(c->low[i], bottom);
+            points += c->entries[i];
+        }
+        if (c->high[i] > top_from) {
+            least[0] = mind(c->x[i], least[0]);
+            least[1] = mind(c->y[i], least[1]);
+            greatest[0] = maxd(c->x[i], greatest[0]);
+            greatest[1] = maxd(c->y[i], greatest[1]);
+        }
+    }
+    double width = greatest[0] - least[0], depth = greatest[1] - least[1];
+    return bottom < (float)r->max_bottom_m && points >= r->min_points &&
+           __builtin_sqrt(width * width + depth * depth) < r->max_head_m;
+}
+
+/* _pushes */
+static int pushes(const HeadTuning *r, const Cluster *c, i64 peak)
+{
+    float top = -INFINITY;
+    double most = -1.0, along = INFINITY;
+    i64 points = 0, farthest = 0;
+    for (i64 i = 0; i < c->m; i++) {
+        double square = square_m2(c, i, peak);
+        if (square > r->load_m * r->load_m) {
+            points += c->entries[i];
+            top = maxf(c->high[i], top);
+        }
+        if (square > most) {
+            most = square;
+            farthest = i;
+        }
+    }
+    if (points < r->min_points || top < (float)r->min_load_top_m ||
+        top > c->high[peak] - (float)r->head_height_m)
+        return 0;
+    double x = c->x[peak], y = c->y[peak], dx = (double)c->x[farthest] - x, dy = (double)c->y[farthest] - y;
+    for (i64 i = 0; i < c->m; i++)
+        along = mind(((double)c->x[i] - x) * dx + ((double)c->y[i] - y) * dy, along);
+    return along >= -r->reach_m * __builtin_sqrt(most);
+}
+
+/* Number of the peak nearest to cell i, the first of those alike */
+static i64 nearest_peak(const Cluster *c, i64 i, const i64 *peaks, i64 n)
+{
+    i64 nearest = 0;
+    for (i64 k = 1; k < n; k++)
+        nearest = square_m2(c, i, peaks[k]) < square_m2(c, i, peaks[nearest]) ? k : nearest;
+    return nearest;
+}
+
+/* find_people, given room for m peaks and m heads */
+EXPORT void modt_find_people(const HeadTuning *r, const float *x, const float *y, const float *low, const float *high,
+                             const i64 *entries, i64 m, i64 *peaks, i64 *heads, i64 *person)
+{
+    const Cluster cluster = {x, y, low, high, entries, m}, *c = &cluster;
+    i64 n = find_peaks(r, c, person, peaks), n_heads = 0;
+    for (i64 i = 0; i < m && n; i++)
+        person[i] = nearest_peak(c, i, peaks, n);
+    for (i64 k = 0; k < n; k++)
+        if (is_head(r, c, person, k, peaks[k]))
+            heads[n_heads++] = peaks[k];
+    if (n_heads == 1 && !pushes(r, c, heads[0]))
+        n_heads = 0;
+    for (i64 i = 0; i < m; i++) {
+        person[i] = NONE;
+        if (!n_heads)
+            continue;
+        i64 k = nearest_peak(c, i, heads, n_heads);
+        if (square_m2(c, i, heads[k]) < r->reach_m * r->reach_m)
+            person[i] = k;
+    }
+}

@@ -1,0 +1,114 @@
+"""People within a cluster that is more than one object: who stands beside another, or pushes something.
+
+From above, a head is a narrow peak of the heights of the cells. Between two heads the heights dip to the shoulders.
+The cells around a head are the person below it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.segmentation.tuning import HeadTuning
+from modt.types import NONE, Bool, Float32, Float64, Int
+
+BINS = 5
+"""Parts of the way between two peaks, each of which has a greatest height."""
+WAY = 0.2, 0.8
+"""First and last share of that way that is looked at."""
+HALF_WAY_M = 0.3
+"""Half the width of that way [m]."""
+
+
+def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: Int, tuning: HeadTuning) -> Int:
+    """(m,) person to whom each cell of one cluster belongs, NONE where it is nobody's.
+
+    There is nobody, or there are two or more people, or one with something to push. That lies to one side of the
+    person, is as high as a trolley, and ends below the shoulders. A rider has a wheel on each side, which is lower.
+
+    Args:
+        x: (m,) a point of each cell [m, sensor frame].
+        y: (m,) the same.
+        low: (m,) least height of its points above the ground [m].
+        high: (m,) their greatest height [m].
+        entries: (m,) number of its points.
+        tuning: heads, the people below, and what is pushed.
+    """
+    at = np.stack((x, y)).astype(np.float64)
+    person = np.full(len(x), NONE)
+    peaks = _peaks(at, high, tuning)
+    if not peaks:
+        return person
+    square_m2 = np.stack([_square_m2(at, peak) for peak in peaks])  # (peaks, m)
+    near = square_m2 < tuning.reach_m * tuning.reach_m
+    nearest = square_m2.argmin(axis=0)
+    heads = []
+    for k, peak in enumerate(peaks):
+        body = (nearest == k) & near[k]
+        top = (nearest == k) & (high > high[peak] - tuning.head_height_m)
+        stands = low[body].min() < tuning.max_bottom_m
+        if stands and entries[body].sum() >= tuning.min_points and _extent_m(at[:, top]) < tuning.max_head_m:
+            heads.append(k)
+    if not heads or (len(heads) == 1 and not _pushes(at, high, entries, peaks[heads[0]], tuning)):
+        return person
+    around = near[heads].any(axis=0)
+    person[around] = square_m2[heads].argmin(axis=0)[around]
+    return person
+
+
+def _square_m2(at: Float64, cell: int) -> Float64:
+    """(m,) square of the distance of each cell to one of them [m2]."""
+    x, y = at - at[:, cell, None]
+    square_m2: Float64 = x * x + y * y
+    return square_m2
+
+
+def _extent_m(at: Float64) -> float:
+    """Diagonal of the rectangle around points [m]."""
+    width_m, depth_m = at.max(axis=1) - at.min(axis=1)
+    return float(np.sqrt(width_m * width_m + depth_m * depth_m))
+
+
+def _peaks(at: Float64, high: Float32, tuning: HeadTuning) -> list[int]:
+    """Cells that are the highest around, and between which the heights dip, from the highest on."""
+    peaks: list[int] = []
+    left: Bool = high >= tuning.min_top_m
+    while left.any():
+        peak = int(np.where(left, high, -np.inf).argmax())
+        if all(_dips(at, high, peak, other, tuning) for other in peaks):
+            peaks.append(peak)
+        left &= _square_m2(at, peak) >= tuning.reach_m * tuning.reach_m
+    return peaks
+
+
+def _dips(at: Float64, high: Float32, peak: int, other: int, tuning: HeadTuning) -> bool:
+    """Whether the heights dip on the way between two peaks; a part of it without cells tells nothing."""
+    x, y = at - at[:, other, None]
+    dx = x[peak]
+    dy = y[peak]
+    square_m2 = dx * dx + dy * dy
+    if square_m2 > tuning.max_apart_m * tuning.max_apart_m:
+        return True
+    share = (x * dx + y * dy) / square_m2
+    aside = y * dx - x * dy
+    first, last = WAY
+    between = (share >= first) & (share < last) & (aside * aside < HALF_WAY_M * HALF_WAY_M * square_m2)
+    part = np.minimum((share[between] - first) * (BINS / (last - first)), BINS - 1).astype(np.int64)
+    top = np.full(BINS, -np.inf, np.float32)
+    np.maximum.at(top, part, high[between])
+    lowest = top[top > -np.inf].min(initial=np.inf)
+    return bool(lowest <= min(high[peak], high[other]) - np.float32(tuning.min_dip_m))
+
+
+def _pushes(at: Float64, high: Float32, entries: Int, peak: int, tuning: HeadTuning) -> bool:
+    """Whether a load lies to one side of the person below a peak."""
+    square_m2 = _square_m2(at, peak)
+    load: Bool = square_m2 > tuning.load_m * tuning.load_m
+    if entries[load].sum() < tuning.min_points:
+        return False
+    top_m = high[load].max()
+    if top_m < tuning.min_load_top_m or top_m > high[peak] - np.float32(tuning.head_height_m):
+        return False
+    x, y = at - at[:, peak, None]
+    farthest = square_m2.argmax()
+    along = x * x[farthest] + y * y[farthest]
+    return bool(along.min() >= -tuning.reach_m * np.sqrt(square_m2[farthest]))
