@@ -18,6 +18,8 @@ DEFAULT = "hdl-64e"
 """Profile of the sensor if none is asked for."""
 Names = str | Path | Sequence[str | Path] | None
 """Names or files of profiles; later ones win key by key."""
+MOUNT = frozenset({"height_m", "min_range_m", "max_range_m"})
+"""Keys of the section `sensor` that go with any sensor. A profile with no others names no sensor."""
 EXTENDS = "extends"
 """Key that names the profiles on which a profile is based."""
 MAX_CHARACTERS = 100_000
@@ -53,8 +55,8 @@ class Layer:
 
     @property
     def of_sensor(self) -> bool:
-        """Whether it sets a key of the sensor."""
-        return bool(self.settings.get("sensor"))
+        """Whether it sets a key of the sensor that is no key of its mount."""
+        return not MOUNT.issuperset(self.settings.get("sensor", ()))
 
 
 def read(text: str, origin: Path | str, name: str) -> Layer:
@@ -166,20 +168,20 @@ class Resolved:
 
     Attributes:
         layers: the profiles that are asked for, each after those that it extends; later ones win.
-        config: the resulting configuration, based on the DEFAULT if none of them sets a key of the sensor.
+        config: the resulting configuration, based on the DEFAULT if none of them is of a sensor.
     """
 
     layers: tuple[Layer, ...]
     config: ProfileConfig
 
     def used(self, default: str) -> tuple[str, ...]:
-        """Names of the profiles, after `default` if none of them sets a key of the sensor."""
+        """Names of the profiles, after `default` if none of them is of a sensor."""
         names = tuple(layer.name for layer in self.layers)
         return names if self.sensor else (default, *names)
 
     @property
     def sensor(self) -> str | None:
-        """Name of the last profile that sets a key of the sensor; None if none does."""
+        """Name of the last profile of a sensor; None if there is none."""
         return next((layer.name for layer in reversed(self.layers) if layer.of_sensor), None)
 
     def applied_to(self, base: ProfileConfig) -> ProfileConfig:

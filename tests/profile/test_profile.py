@@ -142,3 +142,11 @@ def test_a_shown_profile_can_be_read_and_says_who_set_each_key():
     assert "period_s: 0.1 # default" in lines
     assert "from 0.7 m on" in shown, "people are in view"
     assert "min_range_m: 2.0 # hdl-64e" in profile_group.shown(profile.resolve("raspberry-pi-5"))
+
+
+def test_a_mount_goes_with_any_sensor_and_with_one_that_is_recognised():
+    found = profile.resolve(["mid-360", "small-robot"])
+    livox = profile.load("mid-360").sensor
+    assert found.sensor == "mid-360"
+    assert found.config.sensor == replace(livox, height_m=0.3, min_range_m=0.2, max_range_m=30.0)
+    assert profile.resolve("small-robot").sensor is None
