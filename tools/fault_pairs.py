@@ -151,7 +151,7 @@ def _changed(frame: Frame, episode: Episode, frames: list[Frame]) -> Frame:
     assert before.T_world_sensor is not None
     points = before.points if episode.change.freezes else frame.points
     T = episode.change.pose(frame.T_world_sensor, before.T_world_sensor)
-    return replace(frame, points=episode.change.points(points), T_world_sensor=T)
+    return replace(frame, points=np.ascontiguousarray(episode.change.points(points)), T_world_sensor=T)
 
 
 def silent(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: float) -> list[str]:
