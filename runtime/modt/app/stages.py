@@ -220,7 +220,9 @@ class Stages:
         """Exchange the stages for those of another profile; the tracks are kept."""
         self.pipeline = self._new_pipeline(chosen.config)
         if chosen.config.sensor != self.config.sensor:
-            self.trust.watch = TrustWatch(chosen.config.sensor)
+            watch = TrustWatch(chosen.config.sensor)
+            watch.adopt(self.trust.watch)
+            self.trust.watch = watch
             self.trust.visibility = VisibilityEstimate(chosen.config.sensor)
         self.chosen = chosen
         host.release_freed_pages()

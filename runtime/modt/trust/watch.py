@@ -82,6 +82,11 @@ class TrustWatch:
         self.another_sensor = False
         self.trust = Trust()
 
+    def adopt(self, other: TrustWatch) -> None:
+        """Keep the reasons of another sensor's watch until looks of this one have confirmed or withdrawn them."""
+        self._debounced = other._debounced
+        self.trust = other.trust
+
     def add(
         self, frame: Frame, T_world_sensor: Float64, others: Mapping[str, Finding] = MappingProxyType({})
     ) -> Trust:
