@@ -59,7 +59,7 @@ def test_the_nearest_return_of_each_class_is_of_the_last_frame():
 def test_points_without_a_proposal_are_counted_by_kind():
     summary = Summary()
     for k in range(2 * COUNTED):
-        summary.add_result(with_kinds(result(k, [5, 1], {0: 1, 1: 2}, n_points=20 + k // COUNTED)))
+        summary.add_result(with_kinds(result(k, [5, 1], {0: 1, 1: 2}, n_points=22 + k // COUNTED)))
     figures = summary.result()
     assert figures["left_out"] == {
         "ground": 2,
@@ -69,6 +69,7 @@ def test_points_without_a_proposal_are_counted_by_kind():
         "overhead": 2,
         "out_of_range": 2,
         "out_of_view": 2.5,
+        "airborne": 2,
     }
     assert re.search(r"out of view +2\.5", summary_text(figures))
     assert "belong to no segment" not in summary_text(Summary().result())
