@@ -288,6 +288,7 @@ def azimuth_ratio_at_any_speed(a: SensorConfig, b: SensorConfig) -> float:
 def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
     """Name of the shipped profile with the same beams; of those that fit best, the one nearest in height.
 
+    A profile that extends another one comes after it, since a sweep cannot tell two sensors of the same beams.
     A head may turn at half or twice the speed of the profile, with other steps of azimuth.
     """
     likely = []
@@ -299,11 +300,10 @@ def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
         spacing = spacing_ratio(sensor, found, tangent)
         if max(spacing, azimuth_ratio_at_any_speed(sensor, found)) < MAX_LIKENESS_RATIO:
             away_m = abs((sensor.height_m or 0.0) - (found.height_m or 0.0))
-            likely.append((spacing, away_m, path.stem))
-    least = min((spacing for spacing, _, _ in likely), default=0.0)
-    return min(
-        ((away_m, name) for spacing, away_m, name in likely if spacing < least * SAME_RATIO), default=("", None)
-    )[1]
+            likely.append((spacing, (away_m, len(shipped.layers), path.stem)))
+    least = min((spacing for spacing, _ in likely), default=0.0)
+    alike = [order for spacing, order in likely if spacing < least * SAME_RATIO]
+    return min(alike)[-1] if alike else None
 
 
 MAX_SPACING_DEG = 10.0

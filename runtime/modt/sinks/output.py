@@ -74,6 +74,11 @@ def without_links(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
 
 
+def opened(path: Path, mode: Literal["wb", "ab"]) -> FileIO:
+    """An unbuffered file, opened without following a link."""
+    return open(path, mode, buffering=0, opener=without_links)
+
+
 def replace_file(path: Path, text: str, *, lasting: bool = False, public: bool = False) -> None:
     """Write a file atomically through .NAME.part, without following links.
 
@@ -112,7 +117,7 @@ class LineFile(Generic[T]):
         self._encode = encode
         self._written = 0
         with writing(path):
-            self._file = FileIO(path, mode, opener=without_links)
+            self._file = opened(path, mode)
 
     def write(self, item: T, /) -> None:
         """Append the lines of an item. A partial line on a full disk is removed.
@@ -142,7 +147,7 @@ class LineFile(Generic[T]):
         """
         with writing(self.path):
             renamed = self._file
-            self._file = FileIO(self.path, "ab", opener=without_links)
+            self._file = opened(self.path, "ab")
             renamed.close()
 
     def sync(self) -> None:
