@@ -247,8 +247,7 @@ class TrackingConfig(StageConfig):
     extensions: str = choice(
         "all",
         ("all", "none"),
-        "Additions to the paper: tracks split, merge and reunite proposals, can be at rest, and leave remembered "
-        "background. none: switched off.",
+        "Additions to the paper: tracks split, merge and reunite proposals, and can be at rest. none: switched off.",
     )
     max_missed: int = number(
         8, 0, 100, "frames", "Time without a proposal, in periods, after which a track is deleted (N of a9 and a14)."

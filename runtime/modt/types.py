@@ -398,12 +398,6 @@ class ObjectBoxes(Columns):
 class Tracks(ObjectBoxes, Decisions, Requests, Evidence, Motion):
     """All columns side by side, in the order of the parts from right to left."""
 
-    @property
-    def inherited(self) -> Bool:
-        """(M,) whether the class is confirmed without any view, by a remembered background place."""
-        inherited: Bool = self.final & ~self.viewed
-        return inherited
-
 
 @dataclass(frozen=True, slots=True)
 class TrackedFrame:

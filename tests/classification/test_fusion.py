@@ -229,14 +229,6 @@ def test_a_possible_person_is_classified_again_within_four_frames(make, moved_m,
     assert (waits.max() == 4) if person else (waits.max() > 10)
 
 
-def test_a_remembered_place_is_background_until_its_box_may_be_an_object():
-    for make, asked in ((FurtherViews, [False, True]), (FirstViews, [False, False])):
-        subject = Fused(make(CONFIG, FixedPrior(WALL, CAR)), 50, 50, frames=3)
-        subject.tracks.final[:] = True
-        assert subject.asks(False) == asked
-        assert subject.tracks.posterior.tolist() == [[1.0, 0.0, 0.0, 0.0]] * 2
-
-
 def test_lost_tracks_keep_their_posterior_and_ask_for_nothing():
     subject = Fused(FurtherViews(CONFIG, FixedPrior(CAR)), 50, frames=3)
     subject.asks()

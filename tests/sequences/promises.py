@@ -20,7 +20,6 @@ from modt.geometry import FieldOfView
 from modt.model_file import ModelFile
 from modt.sinks.records import line
 from modt.sinks.tracks import frame_line
-from modt.tracking.background_map import CAPACITY
 from modt.types import NONE, Budget, Frame, FrameResult, PointKind
 
 LONGEST_UNSEEN = 10
@@ -181,10 +180,8 @@ class Run:
         np.testing.assert_allclose(R @ R.T, np.eye(3), rtol=0, atol=1e-6)
 
     def _bounded(self, result: FrameResult) -> None:
-        """Nothing is remembered but what recent frames have shown, and a map of a fixed size."""
-        tracker: Any = self.pipeline.tracker
+        """Nothing is remembered but what recent frames have shown."""
         assert len(result.tracks) <= sum(self.proposals[-most_frames(self.config.tracking) :])
-        assert len(tracker.background_map._top) <= CAPACITY
         landmarks: Any = self.pipeline.odometry._landmarks  # type: ignore[attr-defined]
         assert set(landmarks._id.tolist()) <= self._before
 

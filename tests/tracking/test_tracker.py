@@ -76,7 +76,7 @@ def settled(pose=EYE, **parts):
 @pytest.mark.parametrize("gap_s", [1.0, 3600.0])
 @pytest.mark.parametrize("pose", [EYE, None], ids=["posed", "unposed"])
 @pytest.mark.parametrize("parts", [{}, {"machine": ACCURATE}, {"config": TrackingConfig(association="paper")}])
-def test_nothing_is_inherited_over_a_long_gap(gap_s, pose, parts):
+def test_no_track_outlives_a_long_gap(gap_s, pose, parts):
     assert len(settled(pose, **parts).follow(*at(0.5 + gap_s, [], pose))) == 0
     follower = settled(pose, **parts)
     tracks = follower.follow(*at(0.5 + gap_s, STREET, pose))
@@ -100,23 +100,12 @@ def test_tracks_go_on_over_missing_sweeps_and_over_as_long_a_gap_as_they_coast(s
         assert tracks.final.all()
 
 
-def test_a_remembered_place_is_forgotten_over_a_gap():
-    follower = settled()
-    for k in range(6, 20):
-        follower.follow(*at(0.1 * k, STREET[1:]))
-    assert follower.follow(*at(2.0, STREET)).final.all()  # recalled
-    for k in range(21, 35):
-        follower.follow(*at(0.1 * k, STREET[1:]))
-    assert not follower.follow(*at(20.0, STREET)).final.any()
-
-
 def test_a_track_whose_time_ran_out_in_a_short_gap_leaves_its_place():
     follower = settled()
     for k in range(6, 10):
         follower.follow(*at(0.1 * k, STREET[1:]))
     tracks = follower.follow(*at(1.7, STREET))  # unseen for 1.2 s, the others for 0.8
     assert tracks.id.tolist() == [*range(1, len(STREET)), len(STREET)]
-    assert tracks.inherited.tolist() == [False] * (len(STREET) - 1) + [True]
 
 
 @pytest.mark.parametrize(("period_s", "profile_s"), [(0.1, 0.1), (0.05, 0.1), (0.04, 0.1), (0.2, 0.1), (0.05, 0.05)])

@@ -165,8 +165,8 @@ class Loop:
     def _process(self, received: Received) -> None:
         """Process a frame. Its failure is contained: the tracks are those of the frame before.
 
-        The time of the last frame, remembered background, odometry, savings of the scheduler and class frequencies of
-        the decision are not rolled back. After RENEW_AFTER failures in a row new stages begin without tracks.
+        The time of the last frame, odometry, savings of the scheduler and class frequencies of the decision are not
+        rolled back. After RENEW_AFTER failures in a row new stages begin without tracks.
         """
         try:
             line = self._step(received)

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_PERSON_M
-from modt.classes import N_CLASSES, PERSON_M, ObjectClass
+from modt.classes import PERSON_M, ObjectClass
 from modt.classification.motion_likelihood import MotionLikelihood
 from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
@@ -33,7 +33,6 @@ MIN_PROBABILITY = 1e-4
 """Floor of every likelihood and posterior: no class is excluded for good."""
 _MAX_VIEWS = 1000
 """Number of views from which further ones add no weight."""
-_BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
 def normalise(probability: Float64) -> Float64:
@@ -146,10 +145,7 @@ class FusedTracks:
         evidence.box_evidence[rows] = box_evidence.T
         weighted = prior * np.exp(motion_evidence)
         evidence.may_be_object[rows] = self._may_be_object((weighted / weighted.sum(axis=0)).T)
-        posterior = self._posterior(evidence, rows, prior, box_evidence, motion_evidence)
-        is_remembered_place = motion.final[rows] & ~evidence.viewed[rows]
-        posterior.T[is_remembered_place] = _BACKGROUND
-        evidence.posterior[rows] = posterior.T
+        evidence.posterior[rows] = self._posterior(evidence, rows, prior, box_evidence, motion_evidence).T
 
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows (R,); returns (R,) whether the class is confirmed now.
@@ -234,9 +230,9 @@ class FirstViews(FusedTracks):
 class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is confirmed, and where something changes (Table II).
 
-    A track, at a remembered place too, has its first view as soon as box and motion, a box of many points alone, or a
+    A track has its first view as soon as box and motion, a box of many points alone, or a
     nearby box of a person's size allow an object. A track of many points within some distance has it whatever its box
-    is, at no remembered place: the box prior takes people in rare postures for background. An unconfirmed track is
+    is: the box prior takes people in rare postures for background. An unconfirmed track is
     classified again when it shows more points, at growing intervals, and every few frames if it may be a person. A
     confirmed object is classified again at longer intervals. Confirmed background is classified again only with far
     more points, if it may be an object. A person whose upper half is cut off is not classified.
@@ -271,11 +267,11 @@ class FurtherViews(FusedTracks):
         return asks
 
     def _is_unseen_nearby(self, motion: Motion, proposals: Proposals, rows: Int) -> Bool:
-        """(R,) tracks that are near and seen in some frames, at no remembered place."""
+        """(R,) tracks that are near and seen in some frames."""
         conditions = self._conditions
         x, y = proposals.box[motion.proposal[rows], :2].T
         is_near: Bool = x * x + y * y < conditions.unseen_m**2
-        is_near &= (motion.hits[rows] >= conditions.unseen_hits) & ~motion.final[rows]
+        is_near &= motion.hits[rows] >= conditions.unseen_hits
         return is_near
 
     def _may_be_near_person(self, proposals: Proposals) -> Bool:

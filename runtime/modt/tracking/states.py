@@ -2,8 +2,8 @@
 
 A row names an event, the state that it leaves and the state that it leads to. In each state an event has one row at
 most, so arrays of states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are
-extensions: the paper has no budget, so it has no object that waits for its first class, no review of a
-confirmed class, no background map.
+extensions: the paper has no budget, so it has no object that waits for its first class, and no review of a
+confirmed class.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class StateEvent(IntEnum):
     EXPIRED = 2
     """The track went without a proposal for more than N frames."""
     JOINS_FINAL = 3
-    """The proposal joins a track whose class is confirmed, or takes over the class of a remembered place."""
+    """The proposal joins a track whose class is confirmed."""
     JOINS_UNCERTAIN = 4
     """The proposal joins a track that was classified, but whose class is unconfirmed."""
     JOINS_WAITING = 5
@@ -40,8 +40,6 @@ class StateEvent(IntEnum):
     """A classification confirms the class."""
     UNDECIDED = 7
     """A classification leaves the class unconfirmed."""
-    WITHDRAWN = 8
-    """An inherited class does not hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +183,6 @@ EFFICIENT = StateMachine(
         Transition("lost", "a8", "lost", _E.UNASSOCIATED, "still no proposal"),
         Transition("lost", "a9", "deleted", _E.EXPIRED, "no proposal for N frames"),
         *_WAITING,
-        Transition("tracked", "e12", "unmatched", _E.WITHDRAWN, "leaves the place of its class"),
     ),
 )
 """Table I and Fig. 3: classify once, then track."""
@@ -195,7 +192,7 @@ CONVENTIONAL = replace(
     title="Table I, every frame classified",
     states=tuple(replace(state, final=False) for state in EFFICIENT.states),
     transitions=(
-        *(t for t in EFFICIENT.transitions if t.event not in {_E.WITHDRAWN, _E.UNDECIDED}),
+        *(t for t in EFFICIENT.transitions if t.event is not _E.UNDECIDED),
         Transition("tracked", "e7", "tracked", _E.CLASSIFIED, "classified in every frame"),
     ),
 )
@@ -236,7 +233,6 @@ ACCURATE = StateMachine(
         Transition("lost_unclassified", "e9", "lost_unclassified", _E.UNASSOCIATED, "still no proposal"),
         Transition("tracked_classified", "e10", "tracked_classified", _E.CLASSIFIED, "review confirms it"),
         Transition("tracked_classified", "e11", "tracked_unclassified", _E.UNDECIDED, "review leaves it unconfirmed"),
-        Transition("tracked_classified", "e12", "unmatched", _E.WITHDRAWN, "leaves the place of its class"),
     ),
 )
 """Table II and Fig. 6: classify until the class is confirmed.

@@ -12,7 +12,6 @@ from modt.config import TrackingConfig
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
-from modt.tracking.background_map import CAPACITY, BackgroundMap
 from modt.tracking.extent import extent_update_of
 from modt.tracking.kalman import SPEED, filter_of, velocity_of
 from modt.tracking.kdop_association import KdopAssociation
@@ -63,7 +62,6 @@ class Tracker:
         self.machine = machine
         self.association = association_of(config, kernels, tuning) if association is None else association
         self._extended = config.extensions == "all"
-        self.background_map = BackgroundMap(kernels, CAPACITY if self._extended else 0, tuning.background_map)
         self._period_s = period_s
         self._regrouping = Regrouping(kernels, tuning)
         self._update_extent = extent_update_of(kernels, tuning.extent)
@@ -137,11 +135,8 @@ class Tracker:
         self._update(frame, dt_s, points)
         proposals = self._keep_top(frame, box_before)
         self._observe_rest(rows)
-        near_rest = self._near_rest()
-        self._withdraw(near_rest)
-        settled = self._settled_background(near_rest)
-        kept = self._expire(settled)
-        self._begin_tracks(kept, settled, frame.matches, frame.observations)
+        kept = self._expire()
+        self._begin_tracks(kept, frame.matches, frame.observations)
         t = self.tracks
         if self._extended:
             self._decide_motion()
@@ -177,22 +172,14 @@ class Tracker:
         return (self.config.max_missed + frames) * self._period_s
 
     def _end_after_gap(self, stamp_s: float) -> None:
-        """Delete tracks unseen for more than max_missed + 1.5 periods, and remember those of settled background.
+        """Delete tracks unseen for more than max_missed + 1.5 periods.
 
-        After a gap that long, forget remembered background too, since the scene may be another one. An odometry
-        that registers asks for the tracks before `track`, so this is called once or twice a frame. The second call
-        changes nothing.
+        An odometry that registers asks for the tracks before `track`, so this is called once or twice a frame. The
+        second call changes nothing.
         """
-        t = self.tracks
-        elapsed_s = self._elapsed_s(stamp_s)
-        most_s = self._max_unseen_s(1.5)
-        gone = t.unseen_s + elapsed_s > most_s
+        gone = self.tracks.unseen_s + self._elapsed_s(stamp_s) > self._max_unseen_s(1.5)
         if gone.any():
-            settled = self._settled_background(self._near_rest())
-            self.background_map.add(t, (gone & settled).nonzero()[0])
             self._live.renew((~gone).nonzero()[0], 0)
-        if elapsed_s > most_s:
-            self.background_map.clear()
 
     def _predict(self, stamp_s: float) -> float:
         """Predict the tracks over the time since the last frame (Equation 1), and return that time [s]."""
@@ -319,51 +306,23 @@ class Tracker:
         distance_m: Float64 = np.hypot(step[:, 0], step[:, 1])
         return distance_m
 
-    def _near_rest(self) -> Bool:
-        """(M,) tracks near their rest position."""
-        near: Bool = self._from_rest_m() < self._rest.radius_m
-        return near
-
-    def _settled_background(self, near_rest: Bool) -> Bool:
-        """(M,) tracks that are confirmed background, and near their rest position, given which are near theirs."""
-        background: Bool = self.tracks.object_class == ObjectClass.BACKGROUND.value
-        return self.tracks.final & background & near_rest
-
-    def _withdraw(self, near_rest: Bool) -> None:
-        """Withdraw an inherited background class from tracks that leave their place without a view (e12)."""
-        t = self.tracks
-        withdrawn = t.inherited & ~near_rest & t.observed
-        self._advance(withdrawn.nonzero()[0], StateEvent.WITHDRAWN)
-
-    def _expire(self, settled: Bool) -> Int:
-        """End tracks unseen for more than max_missed + 0.5 periods (a9, a14, e6).
-
-        Those that are settled background (M,) are remembered.
-
-        Returns:
-            The rows (A,) of the other tracks.
-        """
+    def _expire(self) -> Int:
+        """End tracks unseen for more than max_missed + 0.5 periods (a9, a14, e6); returns the other rows (A,)."""
         t = self.tracks
         expired: Bool = ~t.observed & (t.unseen_s > self._max_unseen_s(0.5))
-        self.background_map.add(t, (expired & settled).nonzero()[0])
         self._advance(expired.nonzero()[0], StateEvent.EXPIRED)
         return (~expired).nonzero()[0]
 
-    def _begin_tracks(self, kept: Int, settled: Bool, matches: Matches, observations: Observations) -> None:
-        """Keep these rows, and begin a track with each unmatched proposal (a2).
-
-        At a place of remembered or of settled background (M,) it inherits that class (a1, a5, a6).
-        """
+    def _begin_tracks(self, kept: Int, matches: Matches, observations: Observations) -> None:
+        """Keep these rows, and begin a track with each unmatched proposal (a2)."""
         matched = np.zeros(len(observations), np.bool_)
         matched[matches.proposals] = True
         proposals = (~matched).nonzero()[0]
-        known = self.background_map.recall(self.tracks, kept[settled[kept]], observations, proposals)
         rows = self._live.renew(kept, len(proposals))
         new = slice(len(kept), None)  # the same rows; faster where one is enough
         t = self.tracks
         t.state[new] = self.machine.proposal
-        self._advance(rows, np.where(known, StateEvent.ASSOCIATED.value, StateEvent.UNASSOCIATED.value))
-        self._advance(rows[known], StateEvent.JOINS_FINAL)
+        self._advance(rows, StateEvent.UNASSOCIATED)
         position = self.association.initial_position(observations).take(proposals, axis=0)
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new

@@ -347,21 +347,6 @@ class RegroupingTuning:
 
 
 @dataclass(frozen=True, slots=True)
-class BackgroundMapTuning:
-    """Recognition of remembered background."""
-
-    min_coverage: float = 0.6
-    """Least part of a new proposal that lies within a remembered place. Less: what appears beside background takes
-    over its class.
-    Chosen on: judgement."""
-
-    max_rise_m: float = 0.5
-    """Height by which a new proposal may rise above a remembered place [m]. Greater: people before a hedge take over
-    its class.
-    Chosen on: judgement."""
-
-
-@dataclass(frozen=True, slots=True)
 class TrackingTuning:
     """Everything that is chosen in the tracking stage."""
 
@@ -374,4 +359,3 @@ class TrackingTuning:
     extent: ExtentTuning = ExtentTuning()
     rest: RestTuning = RestTuning()
     regrouping: RegroupingTuning = RegroupingTuning()
-    background_map: BackgroundMapTuning = BackgroundMapTuning()
