@@ -11,7 +11,7 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Faults, Reading, StreamInfo
-from modt.types import Frame, Self
+from modt.types import DESKEWED, Frame, Self
 from modt_simulation.faults import read_faults
 from modt_simulation.gait import Gait
 from modt_simulation.indoors import carpark, corridor, hall, lift, lobby, warehouse
@@ -95,8 +95,13 @@ class SyntheticStream:
         )
 
     def __iter__(self) -> Iterator[Frame]:
-        """The frames."""
-        return (frame for frame, _ in self.sweeps())
+        """The frames; each counts as a message of one sweep, which without distortion is seen in an instant."""
+        self.reading = Reading(poses="the simulation")
+        for frame, _ in self.sweeps():
+            self.reading.messages += 1
+            self.reading.sweeps += 1
+            self.reading.times[DESKEWED] += frame.turn_s > 0
+            yield frame
 
     def sweeps(self) -> Iterator[tuple[Frame, Truth]]:
         """The frames with their ground truth."""

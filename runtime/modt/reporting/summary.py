@@ -208,8 +208,8 @@ def _read_lines(read: dict[str, Any]) -> list[str]:
         return []
     joined = f", {read['joined']} of them parts of turns" if read["joined"] else ""
     frame = f"; points in {read['frame_id']}" if read["frame_id"] else ""
-    skewed = f"{read['deskewed']} of {read['sweeps']} deskewed"
-    counts = f"{read['messages']} messages{joined}, {read['sweeps']} sweeps, {read['used']} used, {skewed}"
+    deskewed = f", {read['deskewed']} deskewed" if read["deskewed"] else ""
+    counts = f"{read['messages']} messages{joined}, {read['sweeps']} sweeps, {read['used']} used{deskewed}"
     return [f"  read: {counts}{frame}; poses: {read['poses']}"]
 
 
