@@ -34,7 +34,7 @@ FINAL = {"tracked", "lost", "tracked_classified", "lost_classified"}
 def live(machine, script):
     """State after every frame of a scene with one object, "gone" when its track is deleted.
 
-    A step says whether the object is seen, seen 1 m further on ("moved"), hidden, or classified as certain or not.
+    A step says whether the object is seen, hidden, or classified as certain or not.
     """
     follower = Follower(TrackingConfig(max_missed=2), machine)
     states = []
