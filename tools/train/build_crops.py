@@ -40,6 +40,7 @@ from tools.train.labelled_scans import (
 )
 from tools.train.near_scans import near_scans
 from tools.train.paste import cut_objects, paste_objects
+from tools.train.people_scans import people_scans
 from tools.train.synthetic_scans import label_files, scans_from_labels, simulated_scans
 
 CELL_SCALES = (0.75, 1.4)
@@ -262,6 +263,22 @@ def bare_crops(path: Path, worlds: int, seed: int) -> None:
     """Write crops of simulated sweeps without an object, among heaps and plants, one sweep of each world."""
     scans = bare_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
     _save_simulated(path, scans, {"bare": worlds, "seed": seed})
+
+
+def people_crops(path: Path, worlds: int, seed: int) -> None:
+    """Write crops of simulated sweeps of people in all postures, one sweep of each world."""
+    scans = people_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
+    _save_simulated(path, scans, {"people": worlds, "seed": seed})
+
+
+def street_crops(path: Path, worlds: int, seed: int) -> None:
+    """Write crops of a sweep each of so many simulated streets and crossings, as frequent as they are met."""
+    writer = CropWriter()
+    for scan in simulated_scans(
+        SCENES, range(seed, seed + worlds // 2), TIMES_S[-1:], camera=False, sensors=tuple(SENSORS)
+    ):
+        writer.add(scan, SYNTHETIC, validation=True)
+    writer.save(path, {"street": worlds, "seed": seed})
 
 
 def _save_simulated(path: Path, scans: Iterable[Scan], provenance: dict[str, object]) -> None:

@@ -3,10 +3,11 @@
     python -m tools.train.build_models WORK_DIR [--kitti ROOT] [--scans FOLDER --profile PROFILE] [--further]
 
 Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/pointnet-kitti. With --further it trains
-the shipped ones on sweeps without objects alone (tools.train.train_bare), which takes minutes. With --scans it builds
-WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data. The scans
-have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the validation.
-Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z forward).
+the shipped ones on sweeps of heaps and of people alone (tools.train.train_further), which takes minutes. With --scans
+it builds WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data.
+The scans have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the
+validation. Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z
+forward).
 """
 
 from __future__ import annotations
@@ -17,7 +18,15 @@ from pathlib import Path
 
 from modt import profile
 from tools.options import parser
-from tools.train.build_crops import bare_crops, kitti_crops, near_crops, own_crops, synthetic_crops
+from tools.train.build_crops import (
+    bare_crops,
+    kitti_crops,
+    near_crops,
+    own_crops,
+    people_crops,
+    street_crops,
+    synthetic_crops,
+)
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
@@ -26,10 +35,14 @@ NEAR_WORLDS = {1: 3000, 2: 550}
 """Seed and number of the worlds near the sensor, first for training, then for the card."""
 NEAR_STEPS = 4000
 """Training steps of the network for near crops."""
-BARE_STEPS = 3000
-"""Training steps on sweeps without objects, at most."""
+FURTHER_STEPS = 1500
+"""Training steps on sweeps of heaps and of people, at most."""
 BARE_WORLDS = {3: 880, 4: 110}
 """Seed and number of the worlds without objects, first for training, then for the card."""
+PEOPLE_WORLDS = {5: 500, 7: 500, 6: 220}
+"""Seed and number of the worlds of people in all postures, the last for the card, the others for training."""
+STREET_WORLDS = {900_000: 44, 900_500: 44}
+"""Seed and number of the simulated streets and crossings beside them."""
 KITTI_DATA = (
     "106 + 2 and 53 more object frames and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; SemanticKITTI "
     "labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 sweeps of Argoverse 2 (B. "
@@ -55,14 +68,14 @@ def build(crops: list[Path], work: Path, out: Path, steps: int, data: str, licen
 
     Args:
         crops: data sets.
-        work: folder with the other data sets, of worlds without objects and of worlds near the sensor.
+        work: folder with the other data sets, of worlds without objects, of people, and near the sensor.
         out: the model.
         steps: training steps of each network.
         data: description of the data, for the card.
         licence: for the card.
     """
     run("train_pointnet", out, *crops, "--steps", steps, "--data", data, "--licence", licence)
-    train_further(crops, work, out, min(steps, BARE_STEPS))
+    train_further(crops, work, out, min(steps, FURTHER_STEPS))
     options = ["--steps", str(NEAR_STEPS), "--licence", licence]
     beside = out.with_stem(f"{out.stem}-near")
     near, held = (work / f"near-{seed}.npz" for seed in NEAR_WORLDS)
@@ -70,9 +83,12 @@ def build(crops: list[Path], work: Path, out: Path, steps: int, data: str, licen
 
 
 def train_further(crops: list[Path], work: Path, out: Path, steps: int) -> None:
-    """Train a model on worlds without objects. Its own data sets are `crops`."""
-    bare, held = (work / f"bare-{seed}.npz" for seed in BARE_WORLDS)
-    run("train_bare", out, "--bare", bare, "--held", held, "--steps", steps, "--crops", *crops)
+    """Train a model on worlds without objects and on worlds of people. Its own data sets are `crops`."""
+    bare = [work / f"bare-{seed}.npz" for seed in BARE_WORLDS]
+    people = [work / f"people-{seed}.npz" for seed in PEOPLE_WORLDS]
+    streets = [work / f"street-{seed}.npz" for seed in STREET_WORLDS]
+    data: list[str | Path] = ["--bare", *bare, "--people", *people, "--streets", *streets, "--crops", *crops]
+    run("train_further", out, *data, "--steps", steps)
 
 
 def main() -> None:
@@ -91,6 +107,10 @@ def main() -> None:
     scans = args.work / "scans.npz"
     for seed, worlds in BARE_WORLDS.items():
         bare_crops(args.work / f"bare-{seed}.npz", worlds, seed)
+    for seed, worlds in PEOPLE_WORLDS.items():
+        people_crops(args.work / f"people-{seed}.npz", worlds, seed)
+    for seed, worlds in STREET_WORLDS.items():
+        street_crops(args.work / f"street-{seed}.npz", worlds, seed)
     if not args.further:
         for seed, worlds in NEAR_WORLDS.items():
             near_crops(args.work / f"near-{seed}.npz", worlds, seed)
@@ -112,7 +132,7 @@ def main() -> None:
         shipped.append(([real, placed], MODELS / "pointnet-kitti.onnx", KITTI_DATA, KITTI_LICENCE))
     for crops, out, data, licence in shipped:
         if args.further:
-            train_further(crops, args.work, out, BARE_STEPS)
+            train_further(crops, args.work, out, FURTHER_STEPS)
         else:
             build(crops, args.work, out, args.steps, data, licence)
 

@@ -23,6 +23,8 @@ def test_one_command_trains_on_scans_of_ones_own(tmp_path, monkeypatch):
     monkeypatch.setattr(build_models, "WORLDS", 4)
     monkeypatch.setattr(build_models, "NEAR_WORLDS", {1: 12, 2: 12})
     monkeypatch.setattr(build_models, "BARE_WORLDS", {3: 12, 4: 12})
+    monkeypatch.setattr(build_models, "PEOPLE_WORLDS", {5: 6, 7: 6, 6: 6})
+    monkeypatch.setattr(build_models, "STREET_WORLDS", {900_000: 4, 900_500: 4})
     monkeypatch.setattr(build_models, "NEAR_STEPS", 10)
     options = ["--scans", str(tmp_path / "mine"), "--profile", "vlp-16", "--steps", "10"]
     monkeypatch.setattr(sys, "argv", ["build_models", str(tmp_path), *options])
@@ -31,7 +33,7 @@ def test_one_command_trains_on_scans_of_ones_own(tmp_path, monkeypatch):
     assembly.network(ClassificationConfig(model=str(path)), SensorConfig())  # checks the hash on the card
     card = path.with_suffix(".md").read_text(encoding="utf-8")
     assert "| vlp-16 |" in card
-    assert "## Without objects" in card
+    assert "## Trained further" in card
     metadata = ort.InferenceSession(path).get_modelmeta().custom_metadata_map
     beside = ort.InferenceSession(tmp_path / "pointnet-scans-near.onnx").get_modelmeta().custom_metadata_map
     assert len(json.loads(beside["box_bounds"])) == 3
