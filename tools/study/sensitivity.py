@@ -57,14 +57,11 @@ TOGETHER = 5
 """Constants that are compared with the same run of the shipped values."""
 MEASURES = ("AP", "length", "calls", "CPU")
 SIGNS = {"-": -CHANGE, "+": CHANGE}
-TOP = 10
 TOGETHER = 5
 """Constants that are compared with the same run of the shipped values."""
 MEASURES = ("AP", "length", "calls", "CPU")
 SIGNS = {"-": -CHANGE, "+": CHANGE}
-HEAD = "| constant | value | meaning | chosen on |" + "".join(
-    f" {measure}, {sign}20 % |" for sign in SIGNS for measure in MEASURES
-)
+NOT_MEASURED = dict.fromkeys(SIGNS, "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,13 +196,17 @@ def _both_ways(drives: Sequence[Drive], constant: Constant, shipped: Sequence[Sc
 
 
 def tables(results: Mapping[str, Mapping[str, Any]], measures: Sequence[str]) -> str:
-    """Markdown of the constants that matter most, and of every stage, with some of MEASURES."""
-    known = [constant for constant in constants(tuning.MethodTuning()) if constant.name in results]
-    known.sort(key=lambda constant: _weight(results[constant.name]), reverse=True)
-    missing = len(list(constants(tuning.MethodTuning()))) - len(known)
+    """Markdown of the constants that matter most, and of every stage, with some of MEASURES.
+
+    Constants without a result come last.
+    """
+    known = list(constants(tuning.MethodTuning()))
+    known.sort(key=lambda constant: _weight(results.get(constant.name)), reverse=True)
+    missing = sum(constant.name not in results for constant in known)
     drives = len(next(iter(results.values()))["+"][0])
     lines = [
-        f"At commit `{commit()}`, {drives} drives; made by `python -m {MARK}`. {missing} values were not measured.",
+        f"At commit `{commit()}`, {drives} drives; made by `python -m {MARK}`.",
+        f"{missing} values, shown with -, were not measured.",
         "By chance alone one difference in twenty is bold.",
         "",
         f"### The {TOP} that matter most",
@@ -227,13 +228,16 @@ def _table(
     yield f"| {' | '.join(head)} |"
     yield "|---" * len(head) + "|"
     for name, constant in named:
-        cells = [cell for sign in SIGNS for cell in _cells(results[constant.name][sign], len(measures))]
+        result = results.get(constant.name, NOT_MEASURED)
+        cells = [cell for sign in SIGNS for cell in _cells(result[sign], len(measures))]
         meaning, _, chosen = constant.meaning.partition("Chosen on: ")
         yield f"| `{name}` | {constant.value:g} | {meaning.strip()} | {chosen} | {' | '.join(cells)} |"
 
 
-def _weight(result: Mapping[str, Any]) -> tuple[float, float]:
+def _weight(result: Mapping[str, Any] | None) -> tuple[float, float]:
     """Largest effect on accuracy or track length whose interval excludes zero, then the largest of all [points]."""
+    if result is None:
+        return -1.0, -1.0
     found = [np.array(row) for sign in SIGNS if not isinstance(result[sign], str) for row in result[sign][:2]]
     effects = [(abs(float(row.mean())), margin(row)) for row in found]
     certain = [effect for effect, width in effects if effect > width]
@@ -241,6 +245,8 @@ def _weight(result: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _cells(side: str | list[list[float]], n: int = len(MEASURES)) -> list[str]:
+    if not side:
+        return ["-"] * n
     if isinstance(side, str):
         return ["refused"] * n
     return [summary(np.array(difference)) for difference in side[:n]]
