@@ -23,6 +23,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from PIL import Image
 
+from modt.energy.ledger import PIPELINE
 from modt.errors import MisuseError, ModtError
 from modt.geometry import corners
 from modt.publication import KIND_NAMES
@@ -217,9 +218,10 @@ def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
     facts.append(f"{frame['proposals']} proposals, budget {run.budget}")
     facts.append(f"{frame['classifications']} classified, {frame['deferred']} deferred")
     if "cpu_ms" in frame:
-        facts.append(f"{sum(frame['cpu_ms'].values()):.1f} ms of CPU time")
+        cpu_ms = sum(frame["cpu_ms"].get(name, 0.0) for name in PIPELINE)
+        facts.append(f"pipeline: {cpu_ms:.1f} ms of CPU time")
     if "energy_mJ" in frame:
-        facts.append(f"{frame['energy_mJ']:.0f} mJ ({frame['kind']})")
+        facts.append(f"pipeline {frame['pipeline_mJ']:.1f} mJ, process {frame['energy_mJ']:.0f} mJ ({frame['kind']})")
     style = {"va": "top", "color": INK, "fontsize": _TEXT_PT, "linespacing": 1.5, "bbox": _PANEL}
     return axes.text(0.01, 0.985, "\n".join(facts), transform=axes.transAxes, **style)
 

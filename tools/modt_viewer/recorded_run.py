@@ -13,7 +13,7 @@ import numpy as np
 from modt import profile
 from modt.config import EnergyConfig, ProfileConfig
 from modt.energy.attribution import usable
-from modt.energy.ledger import StageWork
+from modt.energy.ledger import PIPELINE, StageWork
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
 from modt.profile import to_yaml
@@ -35,8 +35,9 @@ class RecordedRun:
     Attributes:
         record: its directory.
         config: the profile that it ran with.
-        frames: number, stamp [s] and counts of each frame; `cpu_ms` by stage; `energy_mJ` with its `kind` where a
-            window covers it; `call_mJ`, the estimated energy of each of its classifications, where it is attributed.
+        frames: number, stamp [s] and counts of each frame; `cpu_ms` by stage; `energy_mJ` of the process and
+            `pipeline_mJ`, with their `kind`, where a window covers it; `call_mJ`, the estimated energy of each of its
+            classifications, where it is attributed.
         states: names, in the order of the column `state`.
         tracks: (R, COLUMNS) as `track_rows.COLUMNS`.
         poses: (F, 3) poses of the sensor in the world: x, y [m], yaw [rad].
@@ -134,7 +135,9 @@ def _costs(ledger: Path, board: EnergyConfig) -> dict[int, dict[str, Any]]:
     """CPU time and energy by number of frame."""
     lines = [*read_ledger(ledger)]
     windows = [*read_windows(ledger)]
-    call_W = run_energy(windows, lines, board).watts(CLASSIFICATION)
+    sums = run_energy(windows, lines, board)
+    call_W = sums.watts(CLASSIFICATION)
+    watts = sums.stage_watts(PIPELINE)
     costs: dict[int, dict[str, Any]] = {}
     for line in lines:
         costs[line.frame] = {"cpu_ms": {name: work.cpu_ns / 1e6 for name, work in line.stages.items()}}
@@ -148,6 +151,7 @@ def _costs(ledger: Path, board: EnergyConfig) -> dict[int, dict[str, Any]]:
             for frame in range(first, last + 1):
                 if frame in costs:
                     costs[frame] |= energy
+                    costs[frame]["pipeline_mJ"] = sum(watts[name] * costs[frame]["cpu_ms"][name] for name in watts)
     return costs
 
 

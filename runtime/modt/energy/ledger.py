@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from typing import ParamSpec, TypeVar
 
 SCHEMA = "modt.ledger/1"
-STAGES = ("source", "segmentation", "odometry", "tracking", "scheduling", "classification", "fusion", "sink")
+PIPELINE = ("segmentation", "odometry", "tracking", "scheduling", "classification", "fusion")
+"""Stages whose cost is that of the pipeline; reading and writing depend on where frames come from and go to."""
+STAGES = ("source", *PIPELINE, "sink")
 
 Clock = Callable[[], int]
 P = ParamSpec("P")

@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from modt.energy.ledger import PIPELINE
 from modt.viewer import theme
 from modt.viewer.packed import SIDE
 from modt.viewer.theme import REACH_M, THEME
@@ -24,6 +25,7 @@ def content(states: list[theme.Entry], budget: str | None, step_cm: int | None) 
         "classes": theme.classes(),
         "states": states,
         "stages": theme.stages(),
+        "pipeline": PIPELINE,
         "kinds": theme.kinds(),
         "budget": budget,
         "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},

@@ -14,7 +14,8 @@ let factsOf = (frame) => [], costOf = (rows) => "";
 
 function showFrame() {
   const frame = frames[state.at], rows = rowsAt[state.at] || [], list = element("frame");
-  const cpu = Object.values(frame.cpu_ms || {}).reduce((a, b) => a + b, 0);
+  const spent = frame.cpu_ms || {}, sum = (names) => names.reduce((total, name) => total + (spent[name] || 0), 0);
+  const cpu = sum(Object.keys(spent)), mJ = (value) => `${value.toFixed(value < 100 ? 1 : 0)} mJ, ${frame.kind}`;
   const facts = [
     ["number", `${frame.frame}`],
     ["proposals", frame.proposals],
@@ -22,8 +23,10 @@ function showFrame() {
     ["reported as objects", rows.filter((row) => row.class && row.seen).length],
     ["classified, deferred", `${frame.classifications}, ${frame.deferred}`],
     ["budget", run.budget],
-    ["CPU time", cpu ? `${cpu.toFixed(1)} ms` : "not recorded"],
-    ["energy", frame.energy_mJ === undefined ? "not recorded" : `${frame.energy_mJ.toFixed(0)} mJ, ${frame.kind}`],
+    ["CPU time of the pipeline", cpu ? `${sum(run.pipeline).toFixed(1)} ms` : "not recorded"],
+    ["with reading and writing", cpu ? `${cpu.toFixed(1)} ms` : null],
+    ["energy of the pipeline", frame.pipeline_mJ === undefined ? null : mJ(frame.pipeline_mJ)],
+    ["energy of the process", frame.energy_mJ === undefined ? "not recorded" : mJ(frame.energy_mJ)],
     ...factsOf(frame),
   ];
   list.replaceChildren();
