@@ -1,4 +1,4 @@
-"""Lines of sight beside proposals: which of their ends the view of the sensor makes.
+"""Lines of sight: which ends of a proposal the view of the sensor makes, and what something nearer hides.
 
 A proposal ends to the left and to the right where the object ends, or where something nearer hides the rest of it,
 or where the same surface goes on without it. In the latter cases the end is *bounded*: it may move while the object
@@ -53,8 +53,33 @@ class Sight:
         """
         if proposals.kind is None or not len(which):
             return np.zeros((len(which), 2), np.bool_)
-        every = max(1, len(points) // self.tuning.rays) | 1  # odd, since beams may take turns in an even number
-        return self._bounded_sides(points, proposals.kind, every, proposals, which)
+        return self._bounded_sides(points, proposals.kind, self._every(points), proposals, which)
+
+    def hides(self, points: Float32, kind: Int8, box: Float64) -> Bool:
+        """(R,) whether something nearer hides at least half of the bearings at which objects are expected.
+
+        Args:
+            points: (N, 4) points of the frame, sensor frame.
+            kind: (N,) what each point is.
+            box: (R, 7) boxes where the objects are expected, sensor frame. The shorter side is taken for the width.
+        """
+        every = self._every(points)
+        nearest = _nearest(points[::every], HIDES[kind[::every].astype(np.int64) + 128])
+        hides = np.zeros(len(box), np.bool_)
+        for i, expected in enumerate(box):
+            low, high = _slopes(expected)
+            range_m = float(np.hypot(expected[0], expected[1]))
+            centre = int(_bearing(*expected[:2].astype(np.float32)[:, None])[0])
+            half_m = expected[3:5].min() / 2
+            reach = int(half_m / max(range_m, half_m) * BEARINGS / (2 * np.pi))
+            bearings = (centre + np.arange(-reach, reach + 1)) % BEARINGS
+            nearer = nearest[bearings, low:high].min(axis=1) < range_m - self.tuning.margin_m
+            hides[i] = nearer.mean() >= 0.5
+        return hides
+
+    def _every(self, points: Float32) -> int:
+        """One of so many points is looked at."""
+        return max(1, len(points) // self.tuning.rays) | 1  # odd, since beams may take turns in an even number
 
     def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Bool:
         """The same, looking at one of `every` points."""

@@ -43,7 +43,8 @@ class TrackTable(Tracks):
     moving_covariance: Float64 = column(float, 4, 4)  # its covariance
     resting_mean: Float64 = column(float, 2)  # position if the track rests [m, world]
     resting_covariance: Float64 = column(float, 2, 2)  # its covariance [m2]
-    unseen_s: Float64 = column(float)  # time since the last proposal; a stalled clock adds one period a frame [s]
+    # time since the last proposal, but for that in hiding; a stalled clock adds one period a frame [s]
+    unseen_s: Float64 = column(float)
 
     def predicted_kdops(self, rows: Int | slice = slice(None)) -> Float64:
         """(8, R) k-DOPs last observed of the rows, of all by default, where the filter expects them now."""

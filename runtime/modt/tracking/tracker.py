@@ -13,6 +13,7 @@ from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.extent import extent_update_of
+from modt.tracking.hiding import Hiding
 from modt.tracking.kalman import SPEED, filter_of, velocity_of
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.motion_filter import motion_filter_of
@@ -72,6 +73,7 @@ class Tracker:
         self._P_new = np.diag(np.square(sigma))
         self._motion_filter = motion_filter_of(kernels, tuning.motion_filter)
         self._sight = sight_of(kernels, tuning.sight)
+        self._hiding = Hiding(self._sight, tuning.hiding)
         self._evidence = evidence = tuning.motion_evidence
         self._weight_by_sides = np.array(
             [
@@ -124,6 +126,8 @@ class Tracker:
             The tracks, in parts by the stage that writes them, the proposals, and which tracks want a class.
         """
         self._end_after_gap(stamp_s)
+        if self._extended:
+            self._delete(self._hiding.reunite(self.tracks))
         dt_s = self._predict(stamp_s)
         matches = self.association.match(self.tracks, located.observations)
         frame = Associated(proposals, located.observations, matches)
@@ -135,6 +139,9 @@ class Tracker:
         self._update(frame, dt_s, points)
         proposals = self._keep_top(frame, box_before)
         self._observe_rest(rows)
+        if self._extended and points is not None and proposals.kind is not None:
+            T_world_sensor = located.placement.T_world_sensor
+            self._hiding.stop_clock(self.tracks, points, proposals.kind, T_world_sensor, dt_s)
         kept = self._expire()
         self._begin_tracks(kept, frame.matches, frame.observations)
         t = self.tracks
@@ -181,6 +188,11 @@ class Tracker:
         if gone.any():
             self._live.renew((~gone).nonzero()[0], 0)
 
+    def _delete(self, rows: Int) -> None:
+        """Delete these rows."""
+        if len(rows):
+            self._live.renew(np.delete(np.arange(len(self.tracks)), rows), 0)
+
     def _predict(self, stamp_s: float) -> float:
         """Predict the tracks over the time since the last frame (Equation 1), and return that time [s]."""
         dt_s = self._elapsed_s(stamp_s)
@@ -216,7 +228,8 @@ class Tracker:
         matches = frame.matches
         rows = matches.rows
         if self._extended:
-            log_ratio = self._motion_filter.update(t, rows, matches.position, matches.covariance)
+            covariance = self._hiding.loosened(t, frame, points)
+            log_ratio = self._motion_filter.update(t, rows, matches.position, covariance)
             self._motion_filter.believe(t, rows, self._weighed(log_ratio, frame, points))
         else:
             self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)

@@ -287,6 +287,31 @@ class RestTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class HidingTuning:
+    """People in hiding."""
+
+    side_sigma_m: float = 0.3
+    """Standard deviation that a bounded side adds to the position of a person, along either axis [m]. Less: who goes
+    into hiding seems to slow down. Greater: who walks beside others is followed less closely.
+    Chosen on: simulated people who walk behind pillars, cars and lorries, and who meet."""
+
+    max_sigma_m: float = 1.8
+    """Standard deviation of the position of a person in hiding up to which the track is kept, a person's height [m].
+    Greater: tracks are kept longer, and more of them end with someone else.
+    Chosen on: judgement."""
+
+    reach_m: float = 1.5
+    """Distance from the way between the last place and the expected one within which a new person is the one who was
+    lost [m]. Less: who turns or goes faster in hiding is a new track. Greater: others are taken for the lost.
+    Chosen on: simulated people who walk behind pillars, cars and lorries."""
+
+    max_age: int = 8
+    """Greatest age of a track that may be the continuation of a lost one [frames]. Less: people who are recognised
+    late stay new tracks.
+    Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
 class RegroupingTuning:
     """Limits of regrouping."""
 
@@ -358,4 +383,5 @@ class TrackingTuning:
     paper_association: PaperAssociationTuning = PaperAssociationTuning()
     extent: ExtentTuning = ExtentTuning()
     rest: RestTuning = RestTuning()
+    hiding: HidingTuning = HidingTuning()
     regrouping: RegroupingTuning = RegroupingTuning()
