@@ -66,12 +66,22 @@ def stream(frequency, rng, n):
 @pytest.mark.parametrize("frequency", [(0.5, 0.1, 0.3, 0.1), (0.6, 0.28, 0.07, 0.05), tuple(ASSUMED)])
 def test_the_frequency_of_the_stream_is_learnt(frequency):
     rng = np.random.default_rng(1)
-    decision = Decision(DecisionConfig(), ASSUMED)
+    decision = Decision(DecisionConfig(), ASSUMED, DecisionTuning(certain_probability=0.0))
     for _ in range(300):
         seen = tracks(*stream(frequency, rng, 60))
         decision.decide(seen, seen, seen)
     assert decision.frequency == pytest.approx(frequency, abs=0.06)
     assert np.abs(decision.frequency - frequency).max() <= max(0.05, np.abs(ASSUMED - frequency).max() / 2)
+
+
+@pytest.mark.parametrize(("walks", "is_frequent"), [(0.95, True), (0.6, False)])
+def test_doubtful_people_do_not_make_each_other_frequent(walks, is_frequent):
+    decision = Decision(DecisionConfig(), ASSUMED)
+    for _ in range(100):
+        seen = tracks(*[[1 - walks, 0.0, walks, 0.0]] * 30, *[[1.0, 0.0, 0.0, 0.0]] * 30)
+        decision.decide(seen, seen, seen)
+    assert (decision.frequency[PEDESTRIAN] > 2 * ASSUMED[PEDESTRIAN]) == is_frequent
+    assert is_frequent or decision.frequency == pytest.approx(ASSUMED)
 
 
 def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_teaches_nothing():

@@ -3,19 +3,22 @@
 A posterior holds for the class frequencies that the model was trained to assume. Those of the stream are estimated
 from the posteriors themselves (M. Saerens et al., "Adjusting the outputs of a classifier to new a priori
 probabilities", Neural Computation 2002), slowly and within bounds: no object becomes rarer than the model assumes,
-since the first of its class may yet come. An object is reported where its expected cost, if it were missed, exceeds
-that of a false one. A reported class is kept down to `kept_probability`, since a posterior also falls while the
-object is half hidden.
+since the first of its class may yet come. Doubtful people count as background, since posteriors of what the model
+has not learnt are not calibrated: vines that resemble people a little would make people frequent, and so be people.
+
+An object is reported where its expected cost, if it were missed, exceeds that of a false one. A reported class is
+kept down to `kept_probability`, since a posterior also falls while the object is half hidden.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from modt.class_sizes import IS_PERSON
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.tuning import DecisionTuning
 from modt.config import DecisionConfig
-from modt.types import Decisions, Evidence, Float64, Motion
+from modt.types import Bool, Decisions, Evidence, Float64, Motion
 
 
 class LikeliestClass:
@@ -67,13 +70,16 @@ class Decision(LikeliestClass):
 
     def decide(self, decisions: Decisions, evidence: Evidence, motion: Motion) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
-        adapted = self.adapted(evidence.posterior.T.copy())
+        posterior = evidence.posterior.T.copy()
+        adapted = self.adapted(posterior)
         weight = adapted.copy()
         objects = decisions.object_class.nonzero()[0]
         last_class = decisions.object_class[objects]
         weight[last_class, objects] /= self._kept_share[last_class]
         self._report(decisions, weight)
-        self._learn(adapted.take(motion.observed.nonzero()[0], axis=1))
+        rows = motion.observed.nonzero()[0]
+        is_doubtful = IS_PERSON[:, None] & (posterior < self._tuning.certain_probability)
+        self._learn(adapted.take(rows, axis=1), is_doubtful.take(rows, axis=1))
 
     def adapted(self, posterior: Float64) -> Float64:
         """(4, M) posteriors under the frequencies of the stream."""
@@ -81,17 +87,22 @@ class Decision(LikeliestClass):
         adapted: Float64 = weighted / weighted.sum(axis=0)
         return adapted
 
-    def _learn(self, adapted: Float64) -> None:
-        """Add adapted posteriors (4, R), and estimate the frequency by the mean of all, within bounds."""
-        self._mass += adapted.sum(axis=1)
+    def _learn(self, adapted: Float64, is_doubtful: Bool) -> None:
+        """Add adapted posteriors (4, R), and estimate the frequency by the mean of all, within bounds.
+
+        The share of a person who `is_doubtful` (4, R) counts as background.
+        """
+        mass = np.where(is_doubtful, 0.0, adapted).sum(axis=1)
+        mass[ObjectClass.BACKGROUND] += adapted.shape[1] - mass.sum()
+        self._mass += mass
         n_seen = self._mass.sum()
         if n_seen > self._tuning.memory_proposals:
             self._mass *= self._tuning.memory_proposals / n_seen
-        mass = (self._start_mass + self._mass).tolist()  # lists are faster than arrays of four
-        n = sum(mass)
+        total = (self._start_mass + self._mass).tolist()  # lists are faster than arrays of four
+        n = sum(total)
         objects = [
             min(max(class_mass / n, assumed), assumed * self._tuning.max_frequency_ratio)
-            for class_mass, assumed in zip(mass[1:], self._assumed[1:].tolist(), strict=True)
+            for class_mass, assumed in zip(total[1:], self._assumed[1:].tolist(), strict=True)
         ]
         frequency = [max(1.0 - sum(objects), self._tuning.min_background_frequency), *objects]
         self.frequency = np.array(frequency) / sum(frequency)
