@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.classes import CLASSES, PERSON_M, ObjectClass
+from modt.classes import CLASSES, PERSON_M, ClassKind, ObjectClass
 from modt.types import NONE, Bool, Cut, Float32, Float64, FrameResult
 
-MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
+MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES])
 """(4, 2) greatest length and width of each class."""
-USUAL_SIZE_M: Float64 = np.array([spec.usual_m for spec in CLASSES.values()])
+USUAL_SIZE_M: Float64 = np.array([spec.usual_m for spec in CLASSES])
 """(4, 3) usual length, width and height of each class."""
-USUAL_SPREAD_M: Float64 = np.array([spec.spread_m for spec in CLASSES.values()])
+USUAL_SPREAD_M: Float64 = np.array([spec.spread_m for spec in CLASSES])
 """(4, 3) their deviations."""
 MAX_CAR_M = CLASSES[ObjectClass.CAR].max_length_m
 """Length of the longest car."""
@@ -21,8 +21,14 @@ MAX_PERSON_M = CLASSES[ObjectClass.PEDESTRIAN].max_length_m
 """Length of the longest pedestrian."""
 USUAL_CAR_M = 5.5, 2.2
 """Length and width that most cars do not exceed; larger ones would hold a car and its neighbour as well."""
-IS_PERSON: Bool = np.array([spec.person for spec in CLASSES.values()])
+IS_PERSON: Bool = np.array([spec.person for spec in CLASSES])
 """(4,) whether the class is or carries a person, which is never part of a larger object."""
+IS_WALKER: Bool = np.array([spec.kind is ClassKind.WALKER for spec in CLASSES])
+"""(4,) whether the class is a person on foot."""
+IS_RIDER: Bool = np.array([spec.kind is ClassKind.RIDER for spec in CLASSES])
+"""(4,) whether the class is a vehicle with a person on it."""
+IS_VEHICLE: Bool = np.array([spec.kind is ClassKind.VEHICLE for spec in CLASSES])
+"""(4,) whether the class is rigid, so that its parts are joined."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from modt.classes import CLASS_NAMES, CLASSES, OBJECTS, PERSON_M, ObjectClass
+from modt.classes import CLASS_NAMES, CLASSES, OBJECTS, PERSON_M, SHIPPED
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
@@ -50,14 +50,27 @@ def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
     return field(default=default, metadata={"options": options, "meaning": meaning})
 
 
-def per_class(
-    column: str | None, low: float, high: float, meaning: str, classes: Sequence[ObjectClass] = OBJECTS
-) -> Any:
-    """Field of a number for each class; the defaults are a column of the class table, null without one."""
-    values = tuple(getattr(CLASSES[c], column) for c in classes) if column else None
+RARE = 0.001
+"""Share of a class of the user's own among the proposals, where a profile states those of modt's classes alone."""
+
+
+def per_class(column: str | None, low: float, high: float, meaning: str, classes: Sequence[int] = OBJECTS) -> Any:
+    """Field of a number for each class; the defaults are a column of the class table, null without one.
+
+    A profile may leave out the values of the user's own classes, the last ones.
+    """
+    values = tuple(getattr(CLASSES[c], column) if column else RARE for c in classes)
     meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in classes)}."
     facts = {"low": low, "high": high, "least": len(classes), "most": len(classes), "meaning": meaning}
-    return field(default=values, metadata=facts)
+    own = values[len(classes) - len(CLASSES) + len(SHIPPED) :]
+    return field(default=values if column else None, metadata={**facts, "own": own})
+
+
+def completed(declared: Field[Any], value: Any) -> Any:
+    """The value of a field by class, with those of the user's own classes where it has none of them."""
+    own = declared.metadata.get("own", ())
+    complete = isinstance(value, tuple) and len(value) == declared.metadata.get("most", 0) - len(own)
+    return (*value, *own) if complete else value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,7 +212,7 @@ class FusionConfig(StageConfig):
         0.0,
         10.0,
         "Relative change of the number of points (Equation 4) from which a view is independent, with rule product.",
-        tuple(CLASSES),
+        range(len(CLASSES)),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from modt import assets
-from modt.config import ProfileConfig, StageConfig, ValueRangeError, check
+from modt.config import ProfileConfig, StageConfig, ValueRangeError, check, completed
 from modt.errors import MisuseError
 
 DEFAULT = "hdl-64e"
@@ -105,7 +105,7 @@ def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: i
     settings: dict[str, Any] = {}
     for key, value, at in _entries(node, origin, known, kind.__name__, line):
         plain = _plain(value, f"{origin}:{at}")
-        settings[key] = tuple(plain) if isinstance(plain, list) else plain
+        settings[key] = completed(known[key], tuple(plain) if isinstance(plain, list) else plain)
         try:
             check(known[key], settings[key])
         except ValueRangeError as error:

@@ -16,7 +16,7 @@ OTHER = N_CLASSES
 UNKNOWN_NEAR = N_CLASSES + 1
 """Kind of what is of no class, but too near to rule out a person."""
 KIND_NAMES = (*CLASS_NAMES, "other", "unknown_near")
-KIND_COLOURS = (*(spec.colour for spec in CLASSES.values()), "#9c36b5", "#f08c00")
+KIND_COLOURS = (*(spec.colour for spec in CLASSES), "#9c36b5", "#f08c00")
 
 
 def kinds(result: FrameResult) -> Int:

@@ -60,9 +60,9 @@ def test_tracked_objects_of_autoware_move_along_their_boxes(frame):
     assert labels == pytest.approx(
         {
             object_messages.UNKNOWN: CAR[0],
-            object_messages.CAR: CAR[1],
-            object_messages.PEDESTRIAN: CAR[2],
-            object_messages.BICYCLE: CAR[3],
+            1: CAR[1],
+            7: CAR[2],
+            6: CAR[3],
         }
     )
     at = car.kinematics.pose_with_covariance.pose.position

@@ -7,7 +7,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from modt.classes import CLASS_NAMES, ObjectClass
+from modt.class_sizes import IS_VEHICLE
+from modt.classes import CLASS_NAMES
 from modt.types import Bool, Float64
 from modt_evaluation.rows import Rows
 from modt_evaluation.truth import CLASSIFIED, Role
@@ -16,8 +17,8 @@ MOVING_MPS = 1.0
 """Speed from which an object counts as moving."""
 VELOCITY_FRAMES = 2
 """The true velocity is the displacement from so many frames before to so many frames after, over that time."""
-STRICT_IOU = [0.7 if c is ObjectClass.CAR else 0.5 for c in ObjectClass]
-LOOSE_IOU = [0.5 if c is ObjectClass.CAR else 0.25 for c in ObjectClass]
+STRICT_IOU = [0.7 if vehicle else 0.5 for vehicle in IS_VEHICLE]
+LOOSE_IOU = [0.5 if vehicle else 0.25 for vehicle in IS_VEHICLE]
 """Intersection over union from which a box is right, as KITTI."""
 RECALLS = np.arange(1, 41) / 40
 """Recalls over which precision is averaged, as KITTI."""

@@ -3,53 +3,41 @@
 from __future__ import annotations
 
 from modt.classes import ObjectClass
-from modt_evaluation.truth import KITTI_TYPES, PANDASET_TYPES, Role, Types
+from modt_evaluation.truth import KITTI_TYPES, LABELLED_TYPES, PANDASET_TYPES, Role, Types
 
 BACKGROUND = (ObjectClass.BACKGROUND, Role.COUNTED)
 """Judged for segmentation alone."""
-CAR = (ObjectClass.CAR, Role.COUNTED)
 LARGE_VEHICLE = (ObjectClass.CAR, Role.NEUTRAL)
-PEDESTRIAN = (ObjectClass.PEDESTRIAN, Role.COUNTED)
 CARRIED = (ObjectClass.PEDESTRIAN, Role.NEUTRAL)
-CYCLIST = (ObjectClass.CYCLIST, Role.COUNTED)
 WITHOUT_RIDER = ".without_rider"
 """Suffix of the types of nuScenes' bicycles and motorcycles that nobody rides."""
 
 
-def _types(**names_of: str) -> dict[str, tuple[ObjectClass, Role]]:
-    """Types by the name of a role here; each value lists names, separated by `, `."""
-    return {name: globals()[role] for role, names in names_of.items() for name in names.split(", ")}
+def _types(**names_of: str) -> dict[str, tuple[int, Role]]:
+    """Types by the name of a role here, and the names of the classes; each value lists names, separated by `, `."""
+    types = {name: globals()[role] for role, names in names_of.items() for name in names.split(", ")}
+    return {**types, **LABELLED_TYPES}
 
 
-KITTI_NAMES: Types = {**_types(BACKGROUND="Truck, Tram, Misc, DontCare"), **KITTI_TYPES}
-NUSCENES_TYPES: Types = _types(
-    CAR="vehicle.car",
+KITTI_NAMES: Types = {**dict.fromkeys(("Truck", "Tram", "Misc", "DontCare", "Forklift"), BACKGROUND), **KITTI_TYPES}
+NUSCENES_TYPES = _types(
     LARGE_VEHICLE="vehicle.truck, vehicle.trailer, vehicle.construction, vehicle.bus.bendy, vehicle.bus.rigid, "
     "vehicle.emergency.ambulance, vehicle.emergency.police",
-    PEDESTRIAN="human.pedestrian.adult, human.pedestrian.child, human.pedestrian.construction_worker, "
-    "human.pedestrian.police_officer",
     CARRIED="human.pedestrian.personal_mobility, human.pedestrian.stroller, human.pedestrian.wheelchair",
-    CYCLIST="vehicle.bicycle, vehicle.motorcycle",
     BACKGROUND="vehicle.bicycle.without_rider, vehicle.motorcycle.without_rider, vehicle.ego, animal, "
     "movable_object.barrier, movable_object.debris, movable_object.pushable_pullable, movable_object.trafficcone, "
     "static_object.bicycle_rack, static.manmade, static.other, static.vegetation, noise, flat.driveable_surface, "
     "flat.other, flat.sidewalk, flat.terrain",
 )
-ARGOVERSE_TYPES: Types = _types(
-    CAR="REGULAR_VEHICLE",
+ARGOVERSE_TYPES = _types(
     LARGE_VEHICLE="LARGE_VEHICLE, BUS, BOX_TRUCK, TRUCK, TRUCK_CAB, SCHOOL_BUS, ARTICULATED_BUS, VEHICULAR_TRAILER, "
     "MESSAGE_BOARD_TRAILER, RAILED_VEHICLE, TRAFFIC_LIGHT_TRAILER",
-    PEDESTRIAN="PEDESTRIAN, OFFICIAL_SIGNALER",
     CARRIED="STROLLER, WHEELCHAIR",
-    CYCLIST="BICYCLIST, MOTORCYCLIST, WHEELED_RIDER",
     BACKGROUND="BICYCLE, MOTORCYCLE, WHEELED_DEVICE, DOG, ANIMAL, BOLLARD, CONSTRUCTION_BARREL, CONSTRUCTION_CONE, "
     "SIGN, STOP_SIGN, MOBILE_PEDESTRIAN_CROSSING_SIGN, MOBILE_PEDESTRIAN_SIGN",
 )
-OTHER_TYPES: Types = _types(
-    CAR="car",
+OTHER_TYPES = _types(
     LARGE_VEHICLE="truck, bus, trailer, construction_vehicle, Bus",
-    PEDESTRIAN="pedestrian",
-    CYCLIST="cyclist, Rider",
     BACKGROUND="background, bicycle, motorcycle, barrier, traffic_cone, Static, Motor, ParkedBicycle, "
     "ParkedMotorcycle, TYPE_SIGN, TYPE_UNKNOWN, Unknown, Other",
 )
@@ -59,7 +47,7 @@ PANDASET_BACKGROUND = _types(
     "Construction Signs, Cones, Emergency Vehicle, Other Vehicle - Pedicab, Other Vehicle - Uncommon, Pylons, "
     "Road Barriers, Rolling Containers, Signs, Temporary Construction Barriers, Train, Tram / Subway, Trolley"
 )
-CUBOID_TYPES: dict[str, tuple[ObjectClass, Role]] = {
+CUBOID_TYPES: dict[str, tuple[int, Role]] = {
     **KITTI_NAMES,
     **OTHER_TYPES,
     **NUSCENES_TYPES,

@@ -15,7 +15,7 @@ from modt.types import MOTION_NAMES, NONE, Float32, Float64, Frame, FrameResult,
 
 MOST_PROPOSALS = 100_000
 """Most proposals of a valid record; sweeps have some hundreds."""
-SEMANTIC = np.array([(*spec.semantic_kitti, 0)[0] for spec in CLASSES.values()])
+SEMANTIC = np.array([(*spec.semantic_kitti, 0)[0] for spec in CLASSES])
 """SemanticKITTI's label of each class, 0 (unlabelled) for the background."""
 NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
 

@@ -41,23 +41,20 @@ LABELLED = (Role.COUNTED, Role.NEUTRAL)
 """Roles of objects that are to be segmented and followed."""
 
 
-Types = Mapping[str, tuple[ObjectClass, Role]]
+Types = Mapping[str, tuple[int, Role]]
 """Class and role of each labelled type; any other one is background, judged for segmentation alone."""
 
-KITTI_TYPES: Types = {name: (c, Role.COUNTED) for c, spec in CLASSES.items() for name in spec.kitti}
+KITTI_TYPES: Types = {name: (c, Role.COUNTED) for c, spec in enumerate(CLASSES) for name in spec.kitti}
 PAPER_TYPES: Types = {
     name: (c, Role.COUNTED if name == CLASSES[c].kitti[0] else Role.IGNORED) for name, (c, _) in KITTI_TYPES.items()
 }
 """Table III counts Car, Pedestrian and Cyclist only."""
-PANDASET_CLASSES = {
-    ObjectClass.CAR: ("Car", "Pickup Truck", "TYPE_VEHICLE"),
-    ObjectClass.PEDESTRIAN: ("Pedestrian", "Pedestrian with Object", "TYPE_PEDESTRIAN"),
-    ObjectClass.CYCLIST: ("Motorcycle", "TYPE_CYCLIST"),
+LABELLED_TYPES: Types = {
+    name: (c, Role.COUNTED) for c, spec in enumerate(CLASSES) for name in (*spec.kitti, *spec.labels)
 }
+"""The names of the classes in all data sets. They are spelt differently, and so contradict one another in none."""
 LARGE = "Medium-sized Truck", "Semi-truck", "Bus", "Towed Object", "Other Vehicle - Construction Vehicle"
-PANDASET_TYPES: Types = {
-    name: (c, Role.COUNTED) for c, names in PANDASET_CLASSES.items() for name in names
-} | dict.fromkeys(LARGE, (ObjectClass.CAR, Role.NEUTRAL))
+PANDASET_TYPES: Types = {**dict.fromkeys(LARGE, (ObjectClass.CAR, Role.NEUTRAL)), **LABELLED_TYPES}
 
 
 @dataclass(frozen=True, slots=True)

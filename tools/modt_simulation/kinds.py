@@ -14,23 +14,21 @@ class Kind:
     name: str  # KITTI object type; empty for what is not annotated
     semantic: int  # SemanticKITTI label at rest; 0: that of the material
     moving: int  # SemanticKITTI label in motion; 0: that of the material
-    object_class: ObjectClass = ObjectClass.BACKGROUND  # true class
+
+    @property
+    def object_class(self) -> int:
+        """True class: that of the table which has the name, else background."""
+        return next((c for c, spec in enumerate(CLASSES) if self.name in spec.kitti), ObjectClass.BACKGROUND)
 
 
-def _of_class(object_class: ObjectClass, row: int = 0) -> Kind:
-    """The kind of one of the KITTI object types that the class table lists for a class."""
-    spec = CLASSES[object_class]
-    semantic, moving = spec.semantic_kitti
-    return Kind(spec.kitti[row], semantic, moving, object_class)
-
-
-CAR = _of_class(ObjectClass.CAR)
-VAN = _of_class(ObjectClass.CAR, 1)
-PEDESTRIAN = _of_class(ObjectClass.PEDESTRIAN)
-SITTER = _of_class(ObjectClass.PEDESTRIAN, 1)
-CYCLIST = _of_class(ObjectClass.CYCLIST)
+CAR = Kind("Car", 10, 252)
+VAN = Kind("Van", 10, 252)
+PEDESTRIAN = Kind("Pedestrian", 30, 254)
+SITTER = Kind("Person", 30, 254)
+CYCLIST = Kind("Cyclist", 31, 253)
 TRUCK = Kind("Truck", 18, 258)
 BUS = Kind("Misc", 13, 257)
+FORKLIFT = Kind("Forklift", 99, 99)
 OTHER = Kind("Misc", 99, 99)
 BICYCLE = Kind("", 11, 11)
 SCENERY = Kind("", 0, 0)

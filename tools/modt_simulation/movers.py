@@ -103,7 +103,7 @@ def forklift(rng: Generator) -> Mover:
     driver = ellipsoid((-0.3, 0.0, 1.35), (0.2, 0.25, 0.5), Material.CLOTH)
     roof = box((-0.2, 0.0, 2.12), (1.3, 1.05, 0.05), Material.METAL)
     load = box((1.2, 0.0, rng.uniform(0.4, 0.9)), (1.0, 0.9, 0.7), Material.WOOD)
-    return Mover((3.4, 1.15, 2.15), 2.2, Solids.join([chassis, driver, roof, load]))
+    return Mover((3.4, 1.15, 2.15), 2.2, Solids.join([chassis, driver, roof, load]), kinds.FORKLIFT)
 
 
 def bus(rng: Generator) -> Mover:

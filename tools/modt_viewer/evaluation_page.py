@@ -13,7 +13,7 @@ from modt_profiling.reporting.document import Page, Plot, Section
 if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.axes import Axes
 
-_COLOURS = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)}
+_COLOURS = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES, strict=True)}
 _MIDDLE_M = {name: (low + high) / 2 for name, (low, high) in RANGES_M.items() if name != ALL}
 """Middle of each band of range [m]."""
 

@@ -93,7 +93,7 @@ def settled_from(rows: list[Row]) -> Row | None:
 
 def _plots(run: RecordedRun, rows: list[Row]) -> list[Plot]:
     frames = [_number(run, row) for row in rows]
-    colours = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)}
+    colours = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES, strict=True)}
 
     def posterior(axes: Axes) -> None:
         for name in CLASS_NAMES:

@@ -20,8 +20,8 @@ from modt_evaluation import overlap
 from modt_evaluation.kitti_labels import DONT_CARE, read_labels
 from modt_evaluation.truth import PANDASET_TYPES, Regions, Role
 
-KITTI_CLASS = {kind: c for c, spec in CLASSES.items() for kind in spec.kitti}
-SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.semantic_kitti} | dict.fromkeys(
+KITTI_CLASS = {kind: c for c, spec in enumerate(CLASSES) for kind in spec.kitti}
+SEMANTIC_CLASS = {label: c for c, spec in enumerate(CLASSES) for label in spec.semantic_kitti} | dict.fromkeys(
     (18, 258), ObjectClass.BACKGROUND
 )
 """Trucks are labelled objects of no class."""
@@ -92,7 +92,7 @@ class Scan:
     drive: str
     points: Float32
     objects: tuple[Int, ...]
-    kinds: tuple[ObjectClass, ...]
+    kinds: tuple[int, ...]
     boxes: Float64
     fov: FieldOfView
     unlabelled: Bool
@@ -144,7 +144,7 @@ def scan_from_boxes(
     drive: str,
     points: Float32,
     boxes: Float64,
-    kinds: list[ObjectClass],
+    kinds: list[int],
     fov: FieldOfView,
     unlabelled: Bool,
 ) -> Scan:
@@ -290,7 +290,7 @@ def _turn_rad(points: Float32, box: Float64) -> float:
     return np.pi / 2 if held_turned > TURNED_RATIO * held else 0.0
 
 
-def _pandaset_class(name: str, height_m: float) -> ObjectClass | None:
+def _pandaset_class(name: str, height_m: float) -> int | None:
     """Class of a cuboid; None between the classes."""
     if name in TWO_WHEELERS:
         return ObjectClass.CYCLIST if height_m > RIDDEN_M else ObjectClass.BACKGROUND

@@ -51,7 +51,7 @@ class ObjectCut:
 
     points: Float32
     box: Float64
-    kind: ObjectClass
+    kind: int
     drive: str
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.class_sizes import MAX_SIZE_M
-from modt.classes import N_CLASSES, ObjectClass
+from modt.class_sizes import IS_RIDER, IS_VEHICLE, IS_WALKER, MAX_SIZE_M
+from modt.classes import N_CLASSES
 from modt.classification.tuning import MotionTuning
 from modt.types import Float64, Int
 
@@ -48,15 +48,16 @@ LOG_LIKELIHOOD_RATIO: Float64 = (
     )
     / 10.0
 )
-"""(4, 3, 10) log P(cell | class, length) over that of background, by length, of car, pedestrian and cyclist.
+"""(4, 3, 10) log P(cell | class, length) over that of background, by length, of vehicle, walker and rider.
 
 For fragments, the first length, the length itself is evidence too: P(cell, length | class). The values are halved,
 since box and motion are not independent, and limited to 1.5. `python -m tools.train.motion_witness` counts them.
 """
 
 _BY_CLASS: Float64 = np.zeros((N_CLASSES, LOG_LIKELIHOOD_RATIO[:, 0].size))
-"""(4, 40) the table by class, and one after the other the cells of each length; 0 for background."""
-_BY_CLASS[1 : 1 + LOG_LIKELIHOOD_RATIO.shape[1]] = np.concatenate([*LOG_LIKELIHOOD_RATIO], axis=1)
+"""(4, 40) the table by class, and one after the other the cells of each length; 0 for other kinds."""
+for of_kind, is_of_kind in enumerate((IS_VEHICLE, IS_WALKER, IS_RIDER)):
+    _BY_CLASS[is_of_kind] = LOG_LIKELIHOOD_RATIO[:, of_kind].ravel()
 
 
 def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int, Int]:
@@ -76,12 +77,12 @@ class MotionLikelihood:
     """Likelihood of motion and size under each class.
 
     Args:
-        tuning: penalty of what is larger than a cyclist.
+        tuning: penalty of what is larger than a rider.
     """
 
     def __init__(self, tuning: MotionTuning) -> None:
         self._penalty = tuning.oversize_penalty
-        self._max_length_m, self._max_width_m = tuning.oversize_ratio * MAX_SIZE_M[ObjectClass.CYCLIST]
+        self._max_length_m, self._max_width_m = tuning.oversize_ratio * MAX_SIZE_M[IS_RIDER].max(axis=0)
 
     def log_ratio(self, moved_m: Float64, observed_s: Float64, size_m: Float64) -> Float64:
         """(4, R) log P(motion, size | class) over that of background.
@@ -94,5 +95,5 @@ class MotionLikelihood:
         length_band, cell = cells(moved_m, observed_s, size_m[:, 0])
         ratio: Float64 = _BY_CLASS.take(length_band * LOG_LIKELIHOOD_RATIO.shape[2] + cell, axis=1)
         is_larger = (size_m[:, 0] > self._max_length_m) | (size_m[:, 1] > self._max_width_m)
-        ratio[ObjectClass.CYCLIST] -= self._penalty * is_larger
+        ratio[IS_RIDER] -= self._penalty * is_larger
         return ratio

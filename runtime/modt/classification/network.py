@@ -16,7 +16,7 @@ os.environ["ORT_DISABLE_TELEMETRY"] = "1"  # read at its import; else it writes 
 import onnxruntime as ort
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 
-from modt.classes import N_CLASSES
+from modt.classes import CLASS_NAMES, N_CLASSES, VARIABLE
 from modt.classification.onnx_check import find_flaw
 from modt.errors import MisuseError
 from modt.model_file import REMEDY, ModelFile
@@ -32,6 +32,8 @@ _MODEL_ERRORS = (
     ort_errors.RuntimeException,
     UnicodeDecodeError,  # of its names
 )
+CLASSES_KEY = "classes"
+"""Key in the metadata of a model with the names of its classes, separated by commas."""
 MOST_S = 20.0
 """Longest run of the largest batch at the start [s]. The slowest boards take a tenth of a second."""
 MEMORY_BYTES = 1 << 30
@@ -65,9 +67,14 @@ class Network:
             self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
         except _MODEL_ERRORS as error:
             raise MisuseError(self._path, f"not an ONNX model ({_first_line(error)})", REMEDY) from None
+        table = ",".join(CLASS_NAMES)
+        if self.metadata.get(CLASSES_KEY, table) != table:
+            cause = f"its classes are {self.metadata[CLASSES_KEY]}, and those of the table {table}"
+            raise MisuseError(self._path, cause, f"name the file of its classes in {VARIABLE}")
         if [_fixed(shape) for shape in shapes] != [(None, None, 3), (None, N_CLASSES)]:
             cause = f"inputs and outputs of shape {' and '.join(map(str, shapes))}"
-            raise MisuseError(self._path, cause, f"use a model of (batch, points, 3) to (batch, {N_CLASSES})")
+            remedy = f"use a model of (batch, points, 3) to (batch, {N_CLASSES}), the classes {table}"
+            raise MisuseError(self._path, cause, remedy)
         self._input = names[0]
 
     def infer(self, batch: Float32) -> Float32:

@@ -27,13 +27,13 @@ def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Seq
     top.add_argument("--version", action="version", version=f"modt {__version__}")
     choice = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     given = next(iter(words), "")
-    for module in [commands[given]] if given in commands else dict.fromkeys(commands.values()):
-        import_module(module).add_parser(choice)
-    if not words:
-        return show_help(top)
-    arguments = top.parse_args(words)
     logging.basicConfig(level=logging.WARNING, format="modt: %(message)s", stream=sys.stderr)
     try:
+        for module in [commands[given]] if given in commands else dict.fromkeys(commands.values()):
+            import_module(module).add_parser(choice)
+        if not words:
+            return show_help(top)
+        arguments = top.parse_args(words)
         return int(arguments.run(arguments))
     except ModtError as error:
         print(f"modt: {error}", file=sys.stderr)

@@ -40,8 +40,8 @@ typedef struct {
 /* Sizes of the classes, and whether they are people. */
 typedef struct {
     const double (*usual_m)[3], (*spread_m)[3], (*max_m)[2];
-    const uint8_t *is_person;
-    i64 n_classes, pedestrian;
+    const uint8_t *is_person, *is_walker;
+    i64 n_classes;
 } ClassSizes;
 
 /* object_box.tuning.HeadingTuning */
@@ -96,7 +96,7 @@ static double axis_evidence(double length_m, double width_m, i64 class, const Cl
                             const HeadingTuning *tuning)
 {
     const double *usual_m = sizes->usual_m[class], *spread_m = sizes->spread_m[class];
-    if (class == sizes->pedestrian)
+    if (sizes->is_walker[class])
         return -tuning->across_evidence * (double)(length_m > tuning->shoulder_ratio * width_m);
     double ratio = likelihood(length_m, 0, usual_m, spread_m, tuning)
                    + likelihood(width_m, 1, usual_m, spread_m, tuning)
@@ -110,7 +110,7 @@ static double fit_variance(const double sides_m[2], i64 class, const ClassSizes 
 {
     double weight = clip((sides_m[0] - tuning->min_side_m) / tuning->full_side_m, tuning->least_fit_weight, 1.0);
     weight *= sizes->is_person[class] ? tuning->person_fit_weight : 1.0;
-    if (class == sizes->pedestrian)
+    if (sizes->is_walker[class])
         weight = tuning->pedestrian_fit_weight;
     double excess = maxd(sides_m[1] - sizes->usual_m[class][1], 0.0) / sizes->spread_m[class][1];
     return tuning->fit_sigma_rad * tuning->fit_sigma_rad * (1 + excess * excess) / weight;
@@ -219,7 +219,7 @@ static void estimate_size(const ObjectBoxColumns *tracks, i64 row, const double 
         *known_m += (!tracks->estimated[row] ? 1.0 : merged ? 0.0 : share) * change_m;
         double usual_m = sizes->usual_m[class][k], spread_m = sizes->spread_m[class][k];
         if (k == 0)
-            usual_m += tuning->stride_m * (double)(moving && class == sizes->pedestrian);
+            usual_m += tuning->stride_m * (double)(moving && sizes->is_walker[class]);
         double more_m = *known_m - usual_m, missing = maxd(-more_m, 0.0) / spread_m, part = 1 + missing * missing;
         double whole = 1 / (1 + tuning->doubt * (part * part));
         double trust = spread_m * spread_m / (spread_m * spread_m + noise_m[k] * noise_m[k]);
@@ -255,7 +255,7 @@ static void estimate_centre(const ObjectBoxColumns *tracks, i64 row, const Visib
     Vector unseen_m = {maxd(size_m[0] - extent_m[0], 0.0) / 2, maxd(size_m[1] - extent_m[1], 0.0) / 2};
     if (sizes->is_person[class]) {
         Vector centroid = {seen->centroid[proposal][0], seen->centroid[proposal][1]};
-        double depth_m = class == sizes->pedestrian ? tuning->pedestrian_depth_m : tuning->cyclist_depth_m;
+        double depth_m = sizes->is_walker[class] ? tuning->pedestrian_depth_m : tuning->cyclist_depth_m;
         double share = 1 + depth_m / __builtin_sqrt(maxd(dot(centroid, centroid), MIN_RANGE_M2));
         Vector body = in_world(seen, proposal, tracks->box[row], scaled(share, centroid));
         Vector step = {body.x - middle.x, body.y - middle.y};

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_SIZE_M, USUAL_SIZE_M, USUAL_SPREAD_M
-from modt.classes import ObjectClass
+from modt.class_sizes import IS_PERSON, IS_WALKER, MAX_SIZE_M, USUAL_SIZE_M, USUAL_SPREAD_M
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.object_box.tuning import ObjectBoxTuning
 from modt.placement import Placement
@@ -231,7 +230,7 @@ class WholeBoxes(SeenBoxes):
         ratio = likelihood(length_m, 0) + likelihood(width_m, 1) - likelihood(width_m, 0) - likelihood(length_m, 1)
         shoulders = -tuning.across_evidence * (length_m > tuning.shoulder_ratio * width_m)
         most = tuning.max_frame_evidence
-        return np.where(seen.object_class == ObjectClass.PEDESTRIAN, shoulders, np.clip(ratio, -most, most))
+        return np.where(IS_WALKER[seen.object_class], shoulders, np.clip(ratio, -most, most))
 
     def _turn_to_fit(self, state: ObjectBoxes, seen: Seen, evidence: Float64) -> None:
         """Turn the headings to the nearest of the four directions of each rectangle, and count its evidence."""
@@ -257,7 +256,7 @@ class WholeBoxes(SeenBoxes):
         length_m = (seen.sides_m[0] - tuning.min_side_m) / tuning.full_side_m
         weight = np.clip(length_m, tuning.least_fit_weight, 1.0)
         weight *= np.where(IS_PERSON[seen.object_class], tuning.person_fit_weight, 1.0)
-        weight[seen.object_class == ObjectClass.PEDESTRIAN] = tuning.pedestrian_fit_weight
+        weight[IS_WALKER[seen.object_class]] = tuning.pedestrian_fit_weight
         excess_m = np.maximum(seen.sides_m[1] - USUAL_SIZE_M[seen.object_class, 1], 0.0)
         excess = excess_m / USUAL_SPREAD_M[seen.object_class, 1]
         variance: Float64 = tuning.fit_sigma_rad * tuning.fit_sigma_rad * (1 + excess * excess) / weight
@@ -316,7 +315,7 @@ class WholeBoxes(SeenBoxes):
         share[~state.estimated] = 1.0
         state.known_m[:] += share * change_m
         usual_m = USUAL_SIZE_M.take(class_, axis=0)
-        usual_m[:, 0] += tuning.stride_m * (seen.moving & (class_ == ObjectClass.PEDESTRIAN))
+        usual_m[:, 0] += tuning.stride_m * (seen.moving & IS_WALKER[class_])
         spread_m = USUAL_SPREAD_M.take(class_, axis=0)
         more_m = state.known_m - usual_m
         missing = np.maximum(-more_m, 0.0) / spread_m
@@ -375,9 +374,7 @@ class WholeBoxes(SeenBoxes):
         """(R, 2) points beyond the centroids, where the axes of people's bodies are [m, world]."""
         tuning = self.tuning.centre
         centroid = proposals.centroid.take(seen.proposal, axis=0)[:, :2]
-        depth_m = np.where(
-            seen.object_class == ObjectClass.PEDESTRIAN, tuning.pedestrian_depth_m, tuning.cyclist_depth_m
-        )
+        depth_m = np.where(IS_WALKER[seen.object_class], tuning.pedestrian_depth_m, tuning.cyclist_depth_m)
         share = 1 + depth_m / np.sqrt(np.maximum(_dot(centroid, centroid), MIN_RANGE_M2))
         return _in_world(seen, proposals, share[:, None] * centroid, T_world_sensor)
 

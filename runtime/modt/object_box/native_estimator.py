@@ -7,8 +7,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_SIZE_M, USUAL_SIZE_M, USUAL_SPREAD_M
-from modt.classes import N_CLASSES, ObjectClass
+from modt.class_sizes import IS_PERSON, IS_WALKER, MAX_SIZE_M, USUAL_SIZE_M, USUAL_SPREAD_M
+from modt.classes import N_CLASSES
 from modt.geometry.kernels import GeometryKernels
 from modt.native.library import Array, Layout, Number, Rows, declare
 from modt.object_box.estimator import HEADINGS, SIDES, WholeBoxes, forward_of
@@ -59,8 +59,8 @@ _SIZES = Layout(
     spread_m=Array(np.float64, "n_classes", 3),
     max_m=Array(np.float64, "n_classes", 2),
     is_person=Array(np.bool_, "n_classes"),
+    is_walker=Array(np.bool_, "n_classes"),
     n_classes=Number(np.int64),
-    pedestrian=Number(np.int64),
 )
 
 
@@ -89,8 +89,8 @@ class NativeWholeBoxes(WholeBoxes):
             spread_m=USUAL_SPREAD_M,
             max_m=MAX_SIZE_M,
             is_person=IS_PERSON,
+            is_walker=IS_WALKER,
             n_classes=N_CLASSES,
-            pedestrian=ObjectClass.PEDESTRIAN.value,
         )
         self._parts = _HEADING.of(tuning.heading), _SIZE.of(tuning.size), _CENTRE.of(tuning.centre)
 

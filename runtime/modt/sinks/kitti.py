@@ -12,7 +12,7 @@ from modt.placement import Mount
 from modt.sinks.output import LineFile, Writer, without_links, writing
 from modt.types import NONE, Cut, Float64, FrameResult
 
-KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
+KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES]
 
 NO_CAMERA = Camera(
     P_image_sensor=np.zeros((3, 4)),

@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from modt.classes import N_CLASSES
+from modt.classes import CLASSES, N_CLASSES
 from modt.publication import KIND_NAMES, PublishedObjects, published_objects
 from modt.ros2.cdr import CdrWriter, header_fields, text_fields
 from modt.sinks.poses import box_poses, in_sensor_frame
@@ -16,13 +16,10 @@ DETECTIONS = "vision_msgs/Detection3DArray"
 TRACKED_OBJECTS = "autoware_perception_msgs/TrackedObjects"
 OBSTACLES = "nav2_dynamic_msgs/ObstacleArray"
 
-# Labels of autoware_perception_msgs/ObjectClassification
 UNKNOWN = 0
-CAR = 1
-BICYCLE = 6
-PEDESTRIAN = 7
-AUTOWARE_LABELS = (UNKNOWN, CAR, PEDESTRIAN, BICYCLE)
-"""Label of each class."""
+"""Label of autoware_perception_msgs/ObjectClassification of what has no class."""
+AUTOWARE_LABELS = tuple(spec.autoware for spec in CLASSES)
+"""Such a label of each class."""
 # Values of orientation_availability of autoware_perception_msgs/TrackedObjectKinematics
 SIGN_UNKNOWN = 1
 AVAILABLE = 2

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, MAX_CAR_M, PART_PERSON, USUAL_CAR_M
-from modt.classes import ObjectClass
+from modt.class_sizes import IS_PERSON, IS_VEHICLE, MAX_CAR_M, PART_PERSON, USUAL_CAR_M
 from modt.geometry.kdop import widths
 from modt.tracking.pairs import Situation, first_of_each, fit_together, mask_at
 from modt.types import NONE, Bool, Int
@@ -51,7 +50,7 @@ def _known_parts(now: Situation) -> Joins:
     parts = pairs.proposals[joined]
     hosts = host[joined]
 
-    is_car = tracks.object_class == ObjectClass.CAR.value
+    is_car = IS_VEHICLE[tracks.object_class]
     known_m = widths(tracks.known_kdops(rows))
     # A background track no longer than a car also joins parts, but no possible person and no part of a car.
     may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
@@ -72,7 +71,7 @@ def _new_parts(now: Situation) -> Joins:
     proposal_of_track, owner = now.assignment
     kdop = now.observations.kdop
     count = now.observations.count
-    rows = ((tracks.object_class == ObjectClass.CAR.value) & (proposal_of_track != NONE)).nonzero()[0]
+    rows = (IS_VEHICLE[tracks.object_class] & (proposal_of_track != NONE)).nonzero()[0]
     new = (tracks.hits < now.tuning.min_hits) & ~IS_PERSON[tracks.object_class]
     parts = ((owner == NONE) | mask_at(new, owner)).nonzero()[0]
     around = kdop.take(proposal_of_track[rows], axis=1) + now.tuning.beside_m
