@@ -151,6 +151,7 @@ SHIPPED = (
     ),
 )
 """The classes of modt in the order of their values."""
+N_SHIPPED = len(SHIPPED)
 
 
 def read_rows(path: Path) -> tuple[ClassSpec, ...]:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from modt.classes import CLASS_NAMES, CLASSES, OBJECTS, PERSON_M, SHIPPED
+from modt.classes import CLASS_NAMES, CLASSES, N_SHIPPED, OBJECTS, PERSON_M
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def per_class(column: str | None, low: float, high: float, meaning: str, classes
     values = tuple(getattr(CLASSES[c], column) if column else RARE for c in classes)
     meaning = f"{meaning} Values for {', '.join(CLASS_NAMES[c] for c in classes)}."
     facts = {"low": low, "high": high, "least": len(classes), "most": len(classes), "meaning": meaning}
-    own = values[len(classes) - len(CLASSES) + len(SHIPPED) :]
+    own = values[len(classes) - len(CLASSES) + N_SHIPPED :]
     return field(default=values if column else None, metadata={**facts, "own": own})
 
 

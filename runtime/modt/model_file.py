@@ -12,7 +12,7 @@ from modt.errors import MisuseError, refuse_pipe
 
 MAX_BYTES = 64 << 20
 """Size of a model file at most."""
-REMEDY = "use a model of tools/train/export_pointnet.py"
+REMEDY = "use a model of modt, or of modt train"
 
 
 @dataclass(frozen=True, slots=True)

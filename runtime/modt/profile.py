@@ -256,9 +256,13 @@ def _read(path: Path) -> Layer:
     name = path.stem if path.parent == assets.folder("profiles") else str(path)
     try:
         with path.open(encoding="utf-8") as file:
-            return read(file.read(MAX_CHARACTERS + 1), path, name)
+            layer = read(file.read(MAX_CHARACTERS + 1), path, name)
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(path, f"cannot be read ({error})", "make it a readable UTF-8 file") from None
+    stage = layer.settings.get("classification", {})
+    if isinstance(stage, dict) and (path.parent / str(stage.get("model", ""))).is_file():
+        stage["model"] = str(path.parent / stage["model"])
+    return layer
 
 
 def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:

@@ -33,9 +33,9 @@ from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Cut
 from modt_simulation.synthetic_stream import SyntheticStream
+from modt_training.dataset import Sensors, crop_features
+from modt_training.export_pointnet import classifier_entry, to_lists
 from tests.classification.scenes import blobs
-from tools.train.dataset import Sensors, crop_features
-from tools.train.export_pointnet import classifier_entry, to_lists
 
 RNG = np.random.default_rng(5)
 SENSOR = SensorConfig()

@@ -17,9 +17,9 @@ from modt.classification.network import Network
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.config import SensorConfig
 from modt.errors import MisuseError
+from modt_training.export_pointnet import graph
 from tests.classification.scenes import blobs, classifier, saved
 from tests.fuzz.runs import network
-from tools.train.export_pointnet import graph
 
 SIZES = (3, 32, 64, 512, 256, 128, 4)
 

@@ -30,8 +30,8 @@ from modt.classification.reflectance_classifier import (
 from modt.config import SensorConfig
 from modt.errors import MisuseError
 from modt.types import N_REFLECTANCE, Cut, Proposals
+from modt_training.export_pointnet import classifier_entry, to_lists
 from tests.classification.scenes import blobs, classifier
-from tools.train.export_pointnet import classifier_entry, to_lists
 
 RNG = np.random.default_rng(6)
 BOX_LAYERS = from_lists([[RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4)]], N_FEATURES)

@@ -14,7 +14,7 @@ COMMANDS = dict(commands())
 def test_the_table_has_a_summary_of_each_command(capsys):
     main()
     assert "tools.train.build_models" in COMMANDS
-    assert "tools.train.dataset" not in COMMANDS
+    assert "tools.train.labelled_scans" not in COMMANDS
     assert [line.split(maxsplit=3)[2:] for line in capsys.readouterr().out.splitlines()] == [
         [*item] for item in COMMANDS.items()
     ]

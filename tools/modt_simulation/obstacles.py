@@ -12,7 +12,7 @@ from modt_simulation import kinds, scenery
 from modt_simulation.builder import MARGIN_M, SceneBuilder
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
-from modt_simulation.movers import MAKERS, Mover
+from modt_simulation.movers import MAKERS, Mover, forklift
 from modt_simulation.people import Posture
 from modt_simulation.solids import Solids, block, ellipsoid
 from modt_simulation.terrain import Terrain
@@ -170,6 +170,27 @@ def movers(rng: Generator, seconds: float, height_m: float) -> World:
     for k in range(16):
         builder.scenery(makers[k % 4](rng), *_around(rng, 12.0, 28.0))
     return _level(builder, Material.ASPHALT, height_m, TOUCHING_M)
+
+
+def loading(rng: Generator, seconds: float, height_m: float) -> World:
+    """Forklifts that pass the robot or stand, among parked cars, people, pallets and bins."""
+    builder = SceneBuilder(rng, seconds)
+    bearing = rng.uniform(-np.pi, np.pi)
+    for k in range(4):
+        _passing(builder, forklift(rng), "forklift", rng.uniform(4.0, 18.0), bearing + k * np.pi / 2)
+    for _ in range(6):
+        standing = forklift(rng)
+        path = Path.standing(*_around(rng, 5.0, 28.0))
+        builder.bodies.append(Body(standing.kind, standing.size, path, standing.solids, "forklift that stands"))
+    for _ in range(3):
+        builder.vehicle(kinds.CAR, Path.standing(*_around(rng, 7.0, 25.0)))
+    for _ in range(5):
+        x, y, _ = _around(rng, 3.0, 20.0)
+        builder.bystander(x, y)
+    makers = (scenery.pallets, scenery.bin_, scenery.pole)
+    for k in range(12):
+        builder.scenery(makers[k % 3](rng), *_around(rng, 5.0, 28.0))
+    return _level(builder, Material.ASPHALT, height_m)
 
 
 def _passing(builder: SceneBuilder, mover: Mover, name: str, distance_m: float, bearing_rad: float) -> None:

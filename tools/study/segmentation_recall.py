@@ -19,10 +19,11 @@ from modt.cli.options import frames as number_range
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Int
 from modt_simulation.sensors import SENSORS
+from modt_training.scan import Scan
+from modt_training.simulated import simulated_scans
 from tools.options import parser
 from tools.train.build_crops import kitti
-from tools.train.labelled_scans import THINNED, Scan, argoverse_scans, pandaset_scans, thinned
-from tools.train.synthetic_scans import simulated_scans
+from tools.train.labelled_scans import THINNED, argoverse_scans, pandaset_scans, thinned
 
 MIN_POINTS = 20
 SCENES = ("street", "crossing", "yard")

@@ -24,8 +24,8 @@ from modt_simulation.simulator import Simulator
 from modt_simulation.solids import Solids, Triple, block, box, cylinder, ellipsoid, rod, wedge
 from modt_simulation.terrain import Terrain
 from modt_simulation.world import World
-from tools.train.labelled_scans import Scan
-from tools.train.synthetic_scans import labelled_scan
+from modt_training.scan import Scan
+from modt_training.simulated import labelled_scan
 
 HEIGHT_M = (0.25, 2.2)
 """Least and greatest height of a mount that is not the usual one of its sensor."""

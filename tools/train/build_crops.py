@@ -8,29 +8,21 @@ ones are not validated either. Every scan is segmented by the profile of its sen
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import chain, cycle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-import modt
-from modt.classes import N_CLASSES, ObjectClass
-from modt.classification.crops import gather, ground_z_m
 from modt.config import ProfileConfig
-from modt.segmentation.segmenter import Segmenter
-from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
 from modt_simulation.sensors import SENSORS
+from modt_training.crop_writer import CropWriter, add_labelled
+from modt_training.dataset import CLUSTERED, PASTED, SYNTHETIC
+from modt_training.scan import Scan
+from modt_training.simulated import simulated_scans
 from tools.train.bare_scans import bare_scans
-from tools.train.dataset import CLUSTERED, MAJORITY, PASTED, SHIPPED, SYNTHETIC, VARIANT_NAMES, Sensors
 from tools.train.labelled_scans import (
     THINNED,
-    Scan,
     argoverse_scans,
     folder_scans,
     object_scans,
@@ -41,10 +33,8 @@ from tools.train.labelled_scans import (
 from tools.train.near_scans import near_scans
 from tools.train.paste import cut_objects, paste_objects
 from tools.train.people_scans import people_scans
-from tools.train.synthetic_scans import label_files, scans_from_labels, simulated_scans
+from tools.train.synthetic_scans import label_files, scans_from_labels
 
-CELL_SCALES = (0.75, 1.4)
-"""Cell sizes relative to the profile's, for training alone."""
 SYNTHETIC_CELL_SCALES = (0.75, 1.0, 1.0, 1.4)
 """Cell sizes of simulated sweeps, in turn, relative to the profile's."""
 SCENES = ("street", "crossing")
@@ -55,151 +45,12 @@ MIN_HOST_POINTS = 60_000
 """Objects are pasted into scans of more points."""
 SEEDS_APART = 100_000
 """Number of worlds between the first ones of two seeds."""
-MAX_POINTS = 1200
-UNLABELLED_SHARE = 0.2
-"""A greater share of points without a label makes a proposal unknown."""
-FOREIGN_SHARE = 0.2
-"""A greater share of another object's points makes a proposal partial."""
-MIN_BOX_POINTS = 5
-"""Minimum points of an object for training."""
-MIN_DETECTABLE_POINTS = 10
-"""Minimum points of an object for the ground truth of the validation."""
-TALL_M = 1.85
-"""Minimum height of a van."""
-
-
-@dataclass(frozen=True)
-class Labels:
-    """Labels of the proposals of a scan.
-
-    Attributes:
-        kind: (R,) class.
-        partial: (R,) fragment or merged objects.
-        unknown: (R,) excluded from validation: outside the annotated regions, or an object with too few points.
-        tall: (R,) vehicles of at least TALL_M; rare, and different in shape from other cars.
-        majority: (R,) class whose objects hold more than half of its points, whole or not.
-        whole: (B,) the proposal of each object, NONE where it has none of its own.
-    """
-
-    kind: Int
-    partial: Bool
-    unknown: Bool
-    tall: Bool
-    majority: Int
-    whole: Int
-
-
-def label(scan: Scan, proposals: Proposals) -> Labels:
-    """Label the proposals of a scan by overlap with its objects."""
-    number = proposals.label(len(scan.points))
-    size = proposals.count
-    kind = np.full(len(proposals), ObjectClass.BACKGROUND, np.int64)
-    outside = np.bincount(number[scan.unlabelled & (number >= 0)], minlength=len(proposals))
-    partial = np.zeros(len(proposals), np.bool_)
-    tall = np.zeros(len(proposals), np.bool_)
-    unknown = outside > UNLABELLED_SHARE * size
-    held = np.zeros((len(proposals), N_CLASSES))
-    whole_of = np.full(len(scan.objects), NONE)
-    valid = points_in_view(scan) >= MIN_DETECTABLE_POINTS
-    for k, (members, object_class, box) in enumerate(zip(scan.objects, scan.kinds, scan.boxes, strict=True)):
-        if len(members) < MIN_BOX_POINTS:
-            continue
-        # Points that each proposal shares with the object; a proposal is whole where both hold most of the other.
-        proposal_of_member = number[members]
-        shared = np.bincount(proposal_of_member[proposal_of_member >= 0], minlength=len(proposals))
-        held[:, object_class] += shared
-        whole = (shared > 0.5 * size) & (shared > 0.5 * len(members))
-        kind[whole] = object_class
-        tall[whole] = object_class == ObjectClass.CAR and box[5] > TALL_M
-        partial |= (shared > FOREIGN_SHARE * size) & ~whole
-        partial[whole] = False
-        unknown[whole] = not valid[k]
-        whole_of[k] = np.flatnonzero(whole)[0] if whole.any() else NONE
-    majority = np.where(held.max(axis=1) > 0.5 * size, held.argmax(axis=1), ObjectClass.BACKGROUND)
-    return Labels(kind, partial, unknown, tall, majority, whole_of)
-
-
-def reflectance_of(proposals: Proposals) -> Float64:
-    """(P, 5) reflectance statistics of proposals, NaN where not measured."""
-    if proposals.reflectance is None:
-        return np.full((len(proposals), N_REFLECTANCE), np.nan)
-    return proposals.reflectance
-
-
-def points_in_view(scan: Scan) -> Int:
-    """(B,) points of each object in the annotated field of view."""
-    return np.array([(scan.fov.depth(scan.points[members]) > 0).sum() for members in scan.objects], np.int64)
-
-
-class CropWriter:
-    """Collects crops and writes the data set."""
-
-    def __init__(self) -> None:
-        self.columns: dict[str, list[Any]] = {}
-        self.rows = 0
-
-    def add(self, scan: Scan, variant: int, scale: float = 1.0, *, validation: bool = False) -> None:
-        """Add the proposals of a scan at `scale` times the profile's cell size; for validation with its objects."""
-        stage = scan.profile.segmentation
-        sensor = scan.profile.sensor
-        stage = dataclasses.replace(stage, cell_m=stage.cell_m * scale)
-        proposals = Segmenter(stage, sensor, scan.fov).segment(scan.points)
-        labels = label(scan, proposals)
-        whole = (labels.kind > 0) & ~labels.partial
-        kept = np.flatnonzero(whole) if variant == PASTED else np.arange(len(proposals))
-        crops = gather(proposals, kept, MAX_POINTS)
-        n = len(kept)
-        row: dict[str, Any] = {"xyz": np.ascontiguousarray(crops.xyz), "count": crops.count}
-        row |= {"label": labels.kind[kept].astype(np.int8)}
-        row |= {"partial": labels.partial[kept], "unknown": labels.unknown[kept], "tall": labels.tall[kept]}
-        row |= {"variant": np.full(n, variant, np.int8), "reflectance": reflectance_of(proposals)[kept]}
-        row |= {MAJORITY: labels.majority[kept].astype(np.int8)}
-        row |= {key: np.full(n, getattr(scan, key)) for key in ("name", "drive", "sensor")}
-        row |= dataclasses.asdict(Sensors.of(sensor, proposals.box[kept], ground_z_m(proposals, kept, sensor)))
-        if validation:
-            kinds = np.array(scan.kinds, np.int64)
-            points = points_in_view(scan)
-            objects = np.flatnonzero((kinds > ObjectClass.BACKGROUND) & (points >= MIN_DETECTABLE_POINTS))
-            proposal = labels.whole[objects]
-            truth = {
-                "label": kinds[objects],
-                "points": points[objects],
-                "row": np.where(proposal == NONE, NONE, proposal + self.rows),
-            }
-            truth |= {key: np.full(len(objects), getattr(scan, key)) for key in ("drive", "sensor")}
-            row |= {f"truth_{key}": value for key, value in truth.items()}
-        for key, value in row.items():
-            self.columns.setdefault(key, []).append(value)
-        self.rows += n
-
-    def save(self, path: Path, provenance: dict[str, object]) -> None:
-        """Write the file; prints its hash and the number of trainable crops by variant and class."""
-        table: dict[str, Any] = {key: np.concatenate(parts) for key, parts in self.columns.items()}
-        table["offsets"] = np.append(0, np.cumsum(table.pop("count")))
-        for key in ("label", "points", "row", "drive", "sensor"):
-            table.setdefault(f"truth_{key}", np.zeros(0, np.str_ if key in {"drive", "sensor"} else np.int64))
-        trainable = ~table["partial"] & ~(table["unknown"] & (table["label"] == 0))
-        tally = {
-            name: np.bincount(table["label"][trainable & (table["variant"] == v)], minlength=4).tolist()
-            for v, name in enumerate(VARIANT_NAMES)
-        }
-        provenance |= {"scans": len(np.unique(table["name"])), "crops": tally, "modt": modt.__version__}
-        provenance |= {"sensors": np.unique(table["sensor"]).tolist()}
-        np.savez_compressed(path, provenance=np.array(json.dumps(provenance)), **table)
-        print(path, hashlib.sha256(path.read_bytes()).hexdigest(), json.dumps(tally), flush=True)
 
 
 def kitti(root: Path) -> Iterator[Scan]:
     """Labelled scans of KITTI's object frames; none is of a test drive."""
     for folder in ("training", "training_more"):
         yield from object_scans(root / "object" / folder)
-
-
-def add_labelled(writer: CropWriter, scan: Scan) -> None:
-    """Add a scan, for validation and, in finer and coarser clusters, for training."""
-    writer.add(scan, SHIPPED, validation=True)
-    for scale in CELL_SCALES:
-        writer.add(scan, CLUSTERED, scale)
 
 
 def kitti_crops(path: Path, root: Path) -> None:
@@ -225,7 +76,7 @@ def kitti_crops(path: Path, root: Path) -> None:
         if len(scan.points) > MIN_HOST_POINTS:
             for made in paste_objects(scan, cuts, PASTES, rng):
                 writer.add(made, PASTED)
-    writer.save(path, {"paste": PASTES, "seed": 0})
+    print(writer.save(path, {"paste": PASTES, "seed": 0}), flush=True)
 
 
 def own_crops(path: Path, folder: Path, config: ProfileConfig, sensor: str) -> None:
@@ -233,7 +84,7 @@ def own_crops(path: Path, folder: Path, config: ProfileConfig, sensor: str) -> N
     writer = CropWriter()
     for scan in folder_scans(folder, sensor, config):
         add_labelled(writer, scan)
-    writer.save(path, {"paste": 0, "seed": 0})
+    print(writer.save(path, {"paste": 0, "seed": 0}), flush=True)
 
 
 def synthetic_crops(path: Path, worlds: int, labels: Path | None = None) -> None:
@@ -278,11 +129,11 @@ def street_crops(path: Path, worlds: int, seed: int) -> None:
         SCENES, range(seed, seed + worlds // 2), TIMES_S[-1:], camera=False, sensors=tuple(SENSORS)
     ):
         writer.add(scan, SYNTHETIC, validation=True)
-    writer.save(path, {"street": worlds, "seed": seed})
+    print(writer.save(path, {"street": worlds, "seed": seed}), flush=True)
 
 
 def _save_simulated(path: Path, scans: Iterable[Scan], provenance: dict[str, object]) -> None:
     writer = CropWriter()
     for scan, scale in zip(scans, cycle(SYNTHETIC_CELL_SCALES), strict=False):
         writer.add(scan, SYNTHETIC, scale, validation=True)
-    writer.save(path, provenance)
+    print(writer.save(path, provenance), flush=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +15,10 @@ from modt.config import ProfileConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.geometry import Camera, FieldOfView
 from modt.sources.kitti_calibration import camera_of_sequence
-from modt.types import Bool, Float32, Float64, Int
-from modt_evaluation import overlap
+from modt.types import Float32, Float64, Int
 from modt_evaluation.kitti_labels import DONT_CARE, read_labels
 from modt_evaluation.truth import PANDASET_TYPES, Regions, Role
+from modt_training.scan import Scan, on_bottom, points_in_box, scan_from_boxes
 
 KITTI_CLASS = {kind: c for c, spec in enumerate(CLASSES) for kind in spec.kitti}
 SEMANTIC_CLASS = {label: c for c, spec in enumerate(CLASSES) for label in spec.semantic_kitti} | dict.fromkeys(
@@ -71,41 +71,6 @@ AT_SENSOR = Camera(np.eye(3, 4), np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
 
-@dataclass(frozen=True)
-class Scan:
-    """A scan and its labels.
-
-    Attributes:
-        name: name of the scan.
-        drive: its recording; the unit of the split into training and validation.
-        points: (N, 4) sensor frame.
-        objects: point indices of each of the B labelled objects.
-        kinds: class of each, BACKGROUND for other labelled types.
-        boxes: (B, 7) x, y, z of the centre of the bottom face, l, w, h, yaw, sensor frame; NaN where unknown.
-        fov: region with complete labels.
-        unlabelled: (N,) points without a label.
-        sensor: name of the sensor, by which results are grouped.
-        profile: profile of the sensor.
-    """
-
-    name: str
-    drive: str
-    points: Float32
-    objects: tuple[Int, ...]
-    kinds: tuple[int, ...]
-    boxes: Float64
-    fov: FieldOfView
-    unlabelled: Bool
-    sensor: str = profile.DEFAULT
-    profile: ProfileConfig = field(default_factory=profile.load)
-
-    def only(self, kept: Bool) -> Scan:
-        """The scan with the points of a mask (N,) alone."""
-        row = np.cumsum(kept) - 1
-        objects = tuple(row[members[kept[members]]] for members in self.objects)
-        return replace(self, points=self.points[kept], objects=objects, unlabelled=self.unlabelled[kept])
-
-
 def thinned(scan: Scan, step: int) -> Scan:
     """A scan of an HDL-64E with every step-th beam alone, by the sensor that this would be."""
     config = scan.profile
@@ -125,32 +90,6 @@ def beams(points: Float32) -> Int:
     """(N,) beam of each point of KITTI's scans, which are stored beam by beam: the azimuth jumps back between two."""
     azimuth = np.arctan2(points[:, 1], points[:, 0]) % (2 * np.pi)
     return np.append(0, np.cumsum(np.diff(azimuth) < -np.pi))
-
-
-def points_in_box(points: Float32, box: Float64) -> Bool:
-    """(N,) points of the object in a box: a little beyond its faces, and clear of the ground."""
-    return overlap.inside(points, box + np.eye(7)[2] * box[5] / 2)
-
-
-def on_bottom(boxes: Float64) -> Float64:
-    """(..., 7) boxes by the centres of their bottom faces, from boxes by their centres."""
-    out = boxes.copy()
-    out[..., 2] -= boxes[..., 5] / 2
-    return out
-
-
-def scan_from_boxes(
-    name: str,
-    drive: str,
-    points: Float32,
-    boxes: Float64,
-    kinds: list[int],
-    fov: FieldOfView,
-    unlabelled: Bool,
-) -> Scan:
-    """A scan with the points of each object taken from its box."""
-    objects = tuple(np.flatnonzero(points_in_box(points, box)) for box in boxes)
-    return Scan(name, drive, points, objects, tuple(kinds), boxes, fov, unlabelled | (fov.depth(points) <= 0))
 
 
 def drives_of_frames(folder: Path) -> dict[str, str]:

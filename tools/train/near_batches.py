@@ -15,8 +15,8 @@ from modt.config import SegmentationConfig
 from modt.segmentation.view_ends import ViewEnds
 from modt.types import Cut, Float64, Int
 from modt_simulation.sensors import SENSORS
-from tools.train.augment import subsample
-from tools.train.dataset import SYNTHETIC, Dataset, Pools, Sensors, draw_batch
+from modt_training.augment import distance_m, subsample
+from modt_training.dataset import SYNTHETIC, Dataset, Pools, Sensors, draw_batch
 from tools.train.near_scans import HEIGHT_M, MIN_RANGE_M, RANGE_M
 
 SHARE = np.array([0.5, 0.08, 0.38, 0.04])
@@ -86,12 +86,6 @@ class NearSource:
             np.concatenate([self._near.label[rows], self._streets.label[street[kept]]]),
             np.concatenate([self._flags[rows] | side, flags | street_side]),
         )
-
-
-def distance_m(crops: Crops) -> Float64:
-    """(R,) distance of the middle of the points of each crop."""
-    middle = np.add.reduceat(crops.xyz[:, :2], crops.offsets[:-1]) / crops.count[:, None]
-    return np.asarray(np.hypot(*middle.T), np.float64)
 
 
 def _by_class(data: Dataset, rows: Int) -> Pools:

@@ -21,8 +21,8 @@ from modt_simulation.simulator import Simulator
 from modt_simulation.solids import Solids, box, cylinder
 from modt_simulation.world import World
 from modt_simulation.yard import enclose, floor
-from tools.train.labelled_scans import Scan
-from tools.train.synthetic_scans import labelled_scan
+from modt_training.scan import Scan
+from modt_training.simulated import labelled_scan
 
 HEIGHT_M = (0.2, 1.0)
 """Least and greatest height of the sensor's mount."""

@@ -19,7 +19,7 @@ from modt.config import SensorConfig
 from modt.geometry import FieldOfView
 from modt.types import Bool, Float32, Float64, Int
 from modt_evaluation.overlap import PAD_M
-from tools.train.labelled_scans import Scan
+from modt_training.scan import Scan
 
 MIN_POINTS = 8
 """Least number of visible points of a pasted object."""

@@ -24,10 +24,10 @@ from modt_simulation.simulator import Simulator
 from modt_simulation.solids import Solids, block
 from modt_simulation.world import Body, World
 from modt_simulation.yard import enclose, floor
+from modt_training.scan import Scan
+from modt_training.simulated import labelled_scan
 from tools.train import bare_scans
-from tools.train.labelled_scans import Scan
 from tools.train.near_scans import mounted
-from tools.train.synthetic_scans import labelled_scan
 
 HEIGHT_M = (0.25, 2.2)
 """Least and greatest height of a mount that is not the usual one of its sensor."""

@@ -9,66 +9,24 @@ from pathlib import Path
 import numpy as np
 
 from modt import profile
-from modt.geometry import FieldOfView
-from modt.types import Frame
 from modt_evaluation.kitti_labels import read_labels
 from modt_simulation import kinds, road, roadside
 from modt_simulation.builder import SceneBuilder
 from modt_simulation.motion import Path as Trajectory
 from modt_simulation.sensors import sensor as model_of
-from modt_simulation.simulator import Simulator, Truth
+from modt_simulation.simulator import Simulator
 from modt_simulation.street import furnish, residential
-from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
-from tools.train.labelled_scans import AT_SENSOR, TEST_DRIVE, Scan, drives_of_frames
+from modt_training.scan import Scan
+from modt_training.simulated import labelled_scan
+from tools.train.labelled_scans import AT_SENSOR, TEST_DRIVE, drives_of_frames
 
 PEOPLE = ("Pedestrian", "Cyclist", "Person_sitting")
-SECONDS = 4.0
 CAMERA_AHEAD_M = 0.27
 """Place of the camera of the label files, ahead of the sensor."""
 KINDS = {
     kind.name: kind for kind in (kinds.CAR, kinds.VAN, kinds.TRUCK, kinds.PEDESTRIAN, kinds.SITTER, kinds.CYCLIST)
 } | {"Tram": kinds.TRUCK}
 """Simulated kind of each KITTI object type."""
-
-
-def labelled_scan(
-    frame: Frame, truth: Truth, name: str, world: str, *, camera: bool, sensor: str = profile.DEFAULT
-) -> Scan:
-    """A simulated sweep as a labelled scan, in the camera's view or over the full circle."""
-    order = np.argsort(truth.instance, kind="stable")
-    ends = np.searchsorted(truth.instance[order], truth.bodies, side="right")
-    objects = [order[end - n : end] for end, n in zip(ends, truth.points, strict=True)]
-    return Scan(
-        name,
-        world,
-        frame.points,
-        tuple(objects),
-        tuple(kind.object_class for kind in truth.kinds),
-        truth.boxes - np.outer(truth.boxes[:, 5] / 2, np.eye(7)[2]),
-        FieldOfView.of_camera(CAMERA) if camera else FieldOfView(),
-        np.zeros(len(frame.points), np.bool_),
-        sensor,
-        profile.load(sensor),
-    )
-
-
-def simulated_scans(
-    scenes: Sequence[str],
-    seeds: Sequence[int],
-    times_s: Sequence[float],
-    *,
-    camera: bool,
-    sensors: Sequence[str] = (profile.DEFAULT,),
-) -> Iterator[Scan]:
-    """Sweeps at the given times of a short drive through each scene, for each seed, by one sensor after another."""
-    in_turn = cycle(sensors)
-    for seed in seeds:
-        for scene in scenes:
-            simulator = SyntheticStream(scene, sensor := next(in_turn), SECONDS, seed).simulator
-            for time_s in times_s:
-                frame, truth = simulator.sweep(round(time_s / simulator.sensor.period_s))
-                name = f"{scene}-{seed}"
-                yield labelled_scan(frame, truth, f"{name}/{frame.index}", name, camera=camera, sensor=sensor)
 
 
 def scans_from_labels(files: Sequence[Path], seeds: Sequence[int], sensors: Sequence[str]) -> Iterator[Scan]:

@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 import onnx
 import torch
-from onnx import helper, numpy_helper
+from onnx import helper
 from scipy.special import log_softmax, softmax
-from torch import Tensor, nn
+from torch import nn
 
 from modt.classes import CLASS_NAMES, N_CLASSES, ObjectClass
 from modt.classification import box_classifier
@@ -30,13 +30,13 @@ from modt.classification.box_classifier import BoxClassifier, Layers, bound_feat
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.classification.pool import log_pool
 from modt.types import Bool, Cut, Float64, Int
+from modt_training.augment import distance_m, subsample
+from modt_training.dataset import Dataset, crop_features, dataset_features, load
+from modt_training.export_pointnet import Layer, graph, to_lists
+from modt_training.fine_tuning import POINTS, Student, layers_of, tensors
+from modt_training.network import Batch, train_mlp
 from tools.options import make_torch_deterministic, parser
-from tools.train.augment import subsample
-from tools.train.dataset import Dataset, crop_features, dataset_features, load
-from tools.train.export_pointnet import N_SHARED, Layer, graph, to_lists
-from tools.train.near_batches import SHARE, NearSource, cut_flags, distance_m
-from tools.train.network import Batch, MaxPooledLinear, train_mlp
-from tools.train.train_pointnet import POINTS, tensors
+from tools.train.near_batches import SHARE, NearSource, cut_flags
 
 FREQUENCY = np.array([0.86, 0.03, 0.1, 0.01])
 """Frequency of the classes among proposals near a small robot."""
@@ -52,36 +52,6 @@ EVERY = 100
 """Number of steps over which the printed loss is averaged."""
 RANGES_M = ((0.5, 1.0), (1.0, 1.5), (1.5, 3.0), (3.0, 7.0))
 """Rows of the card's table."""
-
-
-class Student(nn.Module):
-    """The exported network, its normalisation folded in."""
-
-    def __init__(self, layers: list[Layer]) -> None:
-        super().__init__()
-        self.weight = nn.ParameterList(torch.from_numpy(w.T.astype(np.float32)) for w, _ in layers)
-        self.bias = nn.ParameterList(torch.from_numpy(b.astype(np.float32)) for _, b in layers)
-
-    def forward(self, xyz: Tensor, count: Tensor) -> Tensor:
-        """(R, 4) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
-        h = xyz
-        for i, (weight, bias) in enumerate(zip(self.weight, self.bias, strict=True)):
-            product = MaxPooledLinear.apply(h, weight, count) if i == N_SHARED - 1 else h @ weight.T
-            h = product + bias
-            h = torch.relu(h) if i < len(self.weight) - 1 else h
-        return h
-
-    def layers(self) -> list[Layer]:
-        """(in, out) weight and (out,) bias of each layer."""
-        pairs = zip(self.weight, self.bias, strict=True)
-        return [(w.detach().numpy().T.copy(), b.detach().numpy().copy()) for w, b in pairs]
-
-
-def layers_of(model: onnx.ModelProto) -> list[Layer]:
-    """(in, out) weight and (out,) bias of each layer of an exported network."""
-    array = {i.name: numpy_helper.to_array(i) for i in model.graph.initializer}
-    weights = [array[f"weight{i}"] for i in range(len(array) // 2)]
-    return [(w.T if i < N_SHARED else w, array[f"bias{i}"].ravel()) for i, w in enumerate(weights)]
 
 
 def train(first: list[Layer], source: NearSource, steps: int, seed: int) -> tuple[Student, float]:

@@ -3,7 +3,7 @@
     python -m tools.train.train_pointnet MODEL.onnx CROPS.npz... --data TEXT --licence TEXT [--steps N]
 
 Writes the model, with all three calibrated, and beside it a card with out-of-fold scores by sensor
-(tools.train.scores; folds split by drive).
+(modt_training.scores; folds split by drive).
 """
 
 from __future__ import annotations
@@ -18,33 +18,29 @@ from scipy.special import softmax
 
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
-from modt.classification.crops import Crops, canonical
 from modt.config import REFLECTANCE_SCALES
 from modt.types import Bool, Float64, Int
-from tools.options import make_torch_deterministic, parser
-from tools.train import train_box_classifier, train_reflectance_classifier
-from tools.train.augment import augment, subsample
-from tools.train.dataset import (
+from modt_training import train_box_classifier
+from modt_training.augment import augment, subsample
+from modt_training.dataset import (
     BATCH_SIZE,
     FOLDS,
     SEED,
     Dataset,
     Pools,
-    Sensors,
     dataset_features,
     draw_batch,
     load,
     sampling_pools,
 )
-from tools.train.export_pointnet import export
-from tools.train.held_out import Model, out_of_fold
-from tools.train.network import PointNet
-from tools.train.scores import by_sensor
+from modt_training.export_pointnet import export
+from modt_training.fine_tuning import MAX_POINTS, POINTS, tensors
+from modt_training.held_out import Model, out_of_fold
+from modt_training.network import PointNet
+from modt_training.scores import by_sensor
+from tools.options import make_torch_deterministic, parser
+from tools.train import train_reflectance_classifier
 
-POINTS = 128
-"""Maximum number of points of a crop in a batch."""
-MAX_POINTS = 400
-"""Maximum number of points of a crop before augmentation."""
 MIN_FREQUENCY = 1e-4
 """Frequency stated for a class without a crop in the validation."""
 PRINTED_STEPS = 1000
@@ -55,12 +51,6 @@ BOX_STEPS = 600
 """Training steps of the box classifier that rates how often to draw background."""
 MIN_WORTH = 0.03
 """Least relative rate at which background is drawn."""
-
-
-def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]:
-    """Input of the network: (K, 3) canonical points, crop after crop, and (R,) points of each crop."""
-    local = canonical(crops, sensors.ground_z_m)
-    return torch.from_numpy(local.xyz), torch.from_numpy(local.count)
 
 
 def worth(data: Dataset, box: Float64, rows: Int, seed: int) -> Float64:

@@ -14,11 +14,11 @@ from scipy.special import softmax
 
 from modt.classification.box_classifier import N_FEATURES, Layers, logits
 from modt.types import Bool, Float64, Int
-from tools.train import train_box_classifier
-from tools.train.dataset import FOLDS, SEED, Dataset, dataset_features, draw_batch, sampling_pools
-from tools.train.held_out import Calibration, Model, Validation, fit_calibration, fit_pool, out_of_fold
-from tools.train.network import Batch, train_mlp
-from tools.train.scores import by_sensor
+from modt_training import train_box_classifier
+from modt_training.dataset import FOLDS, SEED, Dataset, dataset_features, draw_batch, sampling_pools
+from modt_training.held_out import Calibration, Model, Validation, fit_calibration, fit_pool, out_of_fold
+from modt_training.network import Batch, train_mlp
+from modt_training.scores import by_sensor
 
 STEPS = 600
 JITTER = 0.1

@@ -22,12 +22,12 @@ from scipy.special import softmax
 
 from modt.classes import CLASS_NAMES
 from modt_evaluation.class_score import average_precision
+from modt_training.dataset import BATCH_SIZE, SEED, SHIPPED, Dataset, folds, load, sampling_pools
+from modt_training.export_pointnet import graph
+from modt_training.held_out import Validation
+from modt_training.network import PointNet
 from tools.options import make_torch_deterministic, parser
 from tools.train.build_models import KITTI_LICENCE
-from tools.train.dataset import BATCH_SIZE, SEED, SHIPPED, Dataset, folds, load, sampling_pools
-from tools.train.export_pointnet import graph
-from tools.train.held_out import Validation
-from tools.train.network import PointNet
 from tools.train.train_pointnet import batch_loss, logits
 
 EPOCHS = {40: "pointnet-paper-40", 100: "pointnet-paper"}

@@ -10,12 +10,12 @@ from modt.geometry import rotation_zyx, se3
 from modt.placement import Mount
 from modt.sources.recognise import open_stream
 from modt_simulation.synthetic_stream import SyntheticStream
+from modt_training.simulated import simulated_scans
 from tests.recorded import written
 from tools.study import ego_drift, mounts
 from tools.study.boards import BOARDS, Work, rating_of, table
 from tools.study.filter_consistency import BodyTrack, body_tracks, study
 from tools.study.segmentation_recall import Tally
-from tools.train.synthetic_scans import simulated_scans
 
 
 def circle(n, radius=20.0, scale=1.0, turn=1.0):

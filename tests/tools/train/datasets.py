@@ -11,8 +11,8 @@ from modt.classification.crops import Crops
 from modt.config import SensorConfig
 from modt.geometry import FieldOfView
 from modt.types import N_REFLECTANCE, NONE, Bool, Float32, Int
-from tools.train.dataset import Dataset, LabelledObjects, Sensors
-from tools.train.labelled_scans import Scan
+from modt_training.dataset import Dataset, LabelledObjects, Sensors
+from modt_training.scan import Scan
 
 
 def data_of(crops: Crops, label: Int, **columns: Any) -> Dataset:

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from modt.classification.crops import Crops, gather
 from modt.config import SensorConfig
 from modt.types import Cut
+from modt_training.augment import augment, subsample
+from modt_training.dataset import Sensors
 from tests.classification.scenes import blobs
 from tests.tools.train.datasets import data_of
-from tools.train.augment import augment, subsample
-from tools.train.dataset import Sensors
 from tools.train.near_batches import MIN_CUT_POINTS, NearSource, cut_near
 from tools.train.near_scans import HEIGHT_M, near_scans
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from modt.segmentation.segmenter import Segmenter
+from modt_training.crop_writer import label
 from tools.train.bare_scans import bare_scans
-from tools.train.build_crops import label
 
 SENSORS = ("vlp-16", "mid-360")
 

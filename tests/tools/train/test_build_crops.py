@@ -5,8 +5,8 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.types import NONE, Proposals
+from modt_training.crop_writer import label
 from tests.tools.train.datasets import scan_of
-from tools.train.build_crops import label
 from tools.train.paste import ObjectCut, paste_objects
 
 POINTS = np.zeros((40, 4), np.float32)

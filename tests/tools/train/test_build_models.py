@@ -9,9 +9,9 @@ import pytest
 from modt.app import assembly
 from modt.classification.network import ort
 from modt.config import ClassificationConfig, SensorConfig
+from modt_training.simulated import simulated_scans
 from tests.tools.train.datasets import write_folder
 from tools.train import build_models
-from tools.train.synthetic_scans import simulated_scans
 
 
 @pytest.mark.slow

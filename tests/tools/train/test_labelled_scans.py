@@ -7,9 +7,10 @@ from modt.classes import ObjectClass
 from modt.config import SensorConfig
 from modt.errors import MisuseError
 from modt_simulation.synthetic_stream import K
+from modt_training.simulated import simulated_scans
 from tests.tools.train.datasets import scan_of, write_folder
 from tools.train.labelled_scans import AT_SENSOR, argoverse_scans, beams, folder_scans, pandaset_scans, thinned
-from tools.train.synthetic_scans import label_scene, simulated_scans
+from tools.train.synthetic_scans import label_scene
 
 
 def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from modt.classes import ObjectClass
 from modt.segmentation.segmenter import Segmenter
 from modt_simulation.people import PERSON, Person, Posture, people_solids
-from tools.train.build_crops import label
+from modt_training.crop_writer import label
 from tools.train.people_scans import people_scans
 
 SENSORS = ("vlp-16", "mid-360")

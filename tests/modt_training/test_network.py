@@ -6,7 +6,7 @@ import pytest
 
 def test_max_pooled_linear_has_the_gradients_of_its_definition():
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
-    from tools.train.network import MaxPooledLinear
+    from modt_training.network import MaxPooledLinear
 
     torch.manual_seed(0)
     count = torch.tensor([1, 7, 30])
@@ -29,8 +29,8 @@ def test_the_exported_network_equals_the_trained_one(pool_first, tmp_path):
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.network import Network
     from modt.model_file import ModelFile
-    from tools.train.export_pointnet import graph
-    from tools.train.network import PointNet as Trained
+    from modt_training.export_pointnet import graph
+    from modt_training.network import PointNet as Trained
 
     torch.manual_seed(0)
     net = Trained()

@@ -10,10 +10,10 @@ from scipy.special import softmax
 from modt.classification.crops import Crops
 from modt.types import NONE, Int
 from modt_evaluation.class_score import top_calibration_error
+from modt_training.dataset import CLUSTERED, SHIPPED, SYNTHETIC, Dataset, folds
+from modt_training.held_out import Calibration, Validation, fit_calibration, fit_pool, out_of_fold
+from modt_training.scores import by_sensor, recall_at, shift
 from tests.tools.train.datasets import data_of, truth_of
-from tools.train.dataset import CLUSTERED, SHIPPED, SYNTHETIC, Dataset, folds
-from tools.train.held_out import Calibration, Validation, fit_calibration, fit_pool, out_of_fold
-from tools.train.scores import by_sensor, recall_at, shift
 
 IDENTITY = Calibration(1.0, np.zeros(4))
 

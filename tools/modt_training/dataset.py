@@ -12,7 +12,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from modt.classes import N_CLASSES
+from modt.classes import N_CLASSES, N_SHIPPED
 from modt.classification.box_classifier import box_features
 from modt.classification.crops import Crops
 from modt.config import SensorConfig
@@ -30,13 +30,13 @@ FOLDS = 3
 """Folds of the cross-validation."""
 SEED = 1
 """Seed of the first fold, and of the training on all crops."""
-CLASS_SHARE = np.array([0.46, 0.24, 0.16, 0.14])
+CLASS_SHARE = np.append([0.46, 0.24, 0.16, 0.14], np.full(N_CLASSES - N_SHIPPED, 0.16))
 """Share of each class in a batch; objects are rarer, background is more varied."""
 VARIANT_SHARE = np.array(
     [[0.4, 0.35, 0.0, 0.25], [0.3, 0.25, 0.3, 0.15], [0.2, 0.15, 0.3, 0.35], [0.2, 0.15, 0.3, 0.35]]
 )
 """Share of each variant (shipped, clustered, pasted, synthetic) in each class, where present; more generated crops
-for the classes that are rare in real scans."""
+for the classes that are rare in real scans, which those of the user's own are too."""
 TALL_SHARE = 0.3
 """Share of vans among the cars."""
 BATCH_SIZE = 128
@@ -114,7 +114,7 @@ class Dataset:
     Attributes:
         crops: R crops.
         sensors: sensors of the crops.
-        label, majority, partial, unknown, tall: (R,) as in tools.train.build_crops.Labels.
+        label, majority, partial, unknown, tall: (R,) as in modt_training.crop_writer.Labels.
         variant, drive: (R,) variant and drive of each crop.
         sensor: (R,) index into `sensor_names`, for each crop.
         reflectance: (R, 5) statistics of the returns; NaN where unknown or measured by another sensor.
@@ -230,7 +230,7 @@ def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> Po
     for c in range(N_CLASSES):
         of_class = rows[data.label[rows] == c]
         group = 2 * data.variant[of_class] + data.tall[of_class]
-        share = np.outer(VARIANT_SHARE[c], [1 - TALL_SHARE, TALL_SHARE]).ravel()
+        share = np.outer(VARIANT_SHARE[min(c, len(VARIANT_SHARE) - 1)], [1 - TALL_SHARE, TALL_SHARE]).ravel()
         total = np.bincount(group, worth[of_class], minlength=len(share))
         weight = worth[of_class] * (share / np.where(total > 0, total, 1.0))[group]
         pools.append((of_class, weight / weight.sum()))

@@ -18,7 +18,7 @@ from modt_evaluation.class_score import (
     precision_recall,
     top_calibration_error,
 )
-from tools.train.held_out import Validation, fit_calibration
+from modt_training.held_out import Validation, fit_calibration
 
 MIN_OBJECT_POINTS = 20
 """Least number of points of the objects that count for recall at a precision."""

@@ -14,7 +14,7 @@ from modt.classes import N_CLASSES
 from modt.classification.box_classifier import Layers, Weights
 from modt.classification.pool import PoolWeights, log_pool
 from modt.types import NONE, Bool, Float64, Int
-from tools.train.dataset import Dataset, LabelledObjects, folds
+from modt_training.dataset import Dataset, LabelledObjects, folds
 
 Model = Callable[[Int], Float64]
 """Maps rows (R,) to logits (R, 4)."""

@@ -18,11 +18,11 @@ from torch import Tensor, nn
 from modt.classes import N_CLASSES
 from modt.classification.box_classifier import Layers
 from modt.types import Float64, Int
-from tools.train.export_pointnet import Layer
+from modt_training.export_pointnet import Layer
 
 SHARED = (3, 32, 64, 512)
 """Widths of the layers over points."""
-HEAD = (512, 256, 128, 4)
+HEAD = (512, 256, 128, N_CLASSES)
 """Widths of the layers after the maximum."""
 DROPOUT = 0.3
 """Share of the last hidden layer that a training step leaves out."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from modt.classification import box_classifier, reflectance_classifier
 from modt.classification.box_classifier import Layers
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from modt.classification.pool import PoolWeights
-from tools.train.scores import MIN_OBJECT_POINTS, PRECISIONS
+from modt_training.scores import MIN_OBJECT_POINTS, PRECISIONS
 
 Layer = tuple[NDArray[Any], NDArray[Any]]
 """(in, out) weight and (out,) bias."""
@@ -155,7 +155,7 @@ def _shares(values: list[float]) -> str:
 
 
 def _by_sensor(report: dict[str, Any]) -> list[str]:
-    """Tables of the out-of-fold scores (tools.train.scores), method by method and sensor by sensor."""
+    """Tables of the out-of-fold scores (modt_training.scores), method by method and sensor by sensor."""
     boxes = report["boxes"]
     methods = {
         "network": report["cross_validation"],
@@ -168,14 +168,19 @@ def _by_sensor(report: dict[str, Any]) -> list[str]:
             f"box{of_sensor}": facts["cross_validation"],
             _pool_name(facts["weights"]) + of_sensor: facts["pool"],
         }
+    return score_tables(methods)
+
+
+def score_tables(methods: Mapping[str, dict[str, Any]]) -> list[str]:
+    """Markdown tables of out-of-fold scores by sensor, for each method by its name."""
     lines = [
         "## Out of fold, by sensor (drives never split)",
         "",
-        "Car / pedestrian / cyclist. AP: average precision over proposals; objects that the segmentation missed are",
-        "false negatives. Log loss, calibration error of the likeliest class, and temperature (what is left to",
-        "divide the logits by): under the class frequency of the sensor's proposals. Recall: of objects of",
-        f"{MIN_OBJECT_POINTS} points, found and called right at this precision; in brackets, of those that have a",
-        "proposal of their own.",
+        f"{' / '.join(CLASS_NAMES[1:]).capitalize()}. AP: average precision over proposals; objects that the",
+        "segmentation missed are false negatives. Log loss, calibration error of the likeliest class, and",
+        "temperature (what is left to divide the logits by): under the class frequency of the sensor's proposals.",
+        f"Recall: of objects of {MIN_OBJECT_POINTS} points, found and called right at this precision; in brackets,",
+        "of those that have a proposal of their own.",
         "",
     ]
     for method, scores in methods.items():

@@ -13,7 +13,7 @@ from numpy.random import Generator
 
 from modt.classification.crops import Crops
 from modt.types import Bool, Float64, Int
-from tools.train.dataset import Sensors
+from modt_training.dataset import Sensors
 
 MAX_RANGE_M = 75.0
 MIN_POINTS = 6
@@ -55,6 +55,12 @@ def subsample(crops: Crops, limit: int, rng: Generator) -> Crops:
     order = np.lexsort((rng.random(len(crop_of_point)), crop_of_point))
     kept = np.sort(order[np.arange(len(crop_of_point)) - crops.offsets[:-1][crop_of_point] < limit])
     return Crops(crops.xyz[kept], np.append(0, np.cumsum(np.minimum(crops.count, limit))))
+
+
+def distance_m(crops: Crops) -> Float64:
+    """(R,) distance of the middle of the points of each crop."""
+    middle = np.add.reduceat(crops.xyz[:, :2], crops.offsets[:-1]) / crops.count[:, None]
+    return np.asarray(np.hypot(*middle.T), np.float64)
 
 
 def _deform(xyz: Float64, centre: Float64, crop_of_point: Int, ground_z_m: Float64, rng: Generator) -> Float64:

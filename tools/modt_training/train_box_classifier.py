@@ -15,8 +15,8 @@ from numpy.random import Generator
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.box_classifier import Layers, logits
 from modt.types import Bool, Float64, Int
-from tools.train.augment import augment, subsample
-from tools.train.dataset import (
+from modt_training.augment import augment, subsample
+from modt_training.dataset import (
     BATCH_SIZE,
     FOLDS,
     SEED,
@@ -26,9 +26,9 @@ from tools.train.dataset import (
     draw_batch,
     sampling_pools,
 )
-from tools.train.held_out import Calibration, Model, fit_pool, out_of_fold
-from tools.train.network import Batch, train_mlp
-from tools.train.scores import by_sensor
+from modt_training.held_out import Calibration, Model, fit_pool, out_of_fold
+from modt_training.network import Batch, train_mlp
+from modt_training.scores import by_sensor
 
 STEPS = 2000
 """Steps of the training."""
