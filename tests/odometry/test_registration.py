@@ -77,6 +77,26 @@ def test_no_track_is_moved_where_poses_are_missing_begin_late_or_restart(given):
     np.testing.assert_allclose(follower.T_world_sensor, T_world_start @ gentle_curve(19), atol=0.15)
 
 
+def test_a_roll_or_a_climb_does_not_go_on_where_poses_end():
+    def rolling(i):
+        return gentle_curve(i) @ se3(rotation_zyx(0.01 * i, 0.0, 0.0), np.array([0.0, 0.0, 0.05 * i]))
+
+    follower = drive(30, given=lambda i: (rolling(i) if i < 8 else None, 0))
+    assert follower.T_world_sensor[2, 3] == pytest.approx(rolling(7)[2, 3])
+    assert follower.T_world_sensor[2, 2] == pytest.approx(1.0)
+    distance, turn = pose_error(gentle_curve(29), follower)
+    assert turn < 0.5
+    assert distance < 0.3
+
+
+def test_a_world_stays_upright_where_poses_begin_again():
+    def rolling(i):
+        return gentle_curve(i) @ se3(rotation_zyx(0.01 * i, 0.0, 0.0), np.zeros(3))
+
+    follower = drive(20, given=lambda i: (None if 6 <= i < 14 else rolling(i), i >= 14))
+    np.testing.assert_allclose(follower.T_world_sensor[2, :3], rolling(19)[2, :3], atol=1e-9)
+
+
 def test_without_landmarks_the_last_motion_continues():
     follower = drive(10)
     before = follower.T_world_sensor.copy()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.geometry import inverse, se3
+from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks, observe
 from modt.odometry.pose_check import PoseCheck
@@ -86,7 +86,7 @@ class PoseEstimator:
         else:
             placement = self._register(sweep, landmarks)
             if T_odometry_sensor is not None:  # an odometry that begins late or restarts is aligned with the world
-                self._T_world_odometry = placement.T_world_sensor @ inverse(T_odometry_sensor)
+                self._T_world_odometry = _aligned(placement.T_world_sensor, T_odometry_sensor)
             located = Located(placement, sweep.observe(placement))
         placement = located.placement
         self._T_world_before = self._T_world_last
@@ -102,7 +102,7 @@ class PoseEstimator:
             placement = self._register(sweep, landmarks)
             check.follow(now_s, T_odometry_sensor, placement.T_world_sensor)
             if not check.doubted:  # where the poses began to be right again is not known, so they are aligned anew
-                self._T_world_odometry = placement.T_world_sensor @ inverse(T_odometry_sensor)
+                self._T_world_odometry = _aligned(placement.T_world_sensor, T_odometry_sensor)
             return Located(placement, sweep.observe(placement))
         given_placement = sweep.place(self._T_world_odometry @ T_odometry_sensor)
         located = Located(given_placement, sweep.observe(given_placement))
@@ -138,9 +138,12 @@ class PoseEstimator:
 
     def _register(self, sweep: _Sweep, landmarks: Landmarks) -> Placement:
         """Placement of a sweep without a pose, by stationary objects."""
-        # The motion between the last two frames goes on, by the same displacement.
-        last_motion = inverse(self._T_world_before) @ self._T_world_last
-        predicted = sweep.place(self._T_world_last @ last_motion)
+        # The motion between the last two frames goes on, by the same displacement. Registration corrects it in the
+        # plane only, so a pitch or a climb that also went on would never end.
+        T_world_last = _planar(self._T_world_last)
+        last_motion = inverse(_planar(self._T_world_before)) @ T_world_last
+        last_motion[2, 3] = 0.0
+        predicted = sweep.place(T_world_last @ last_motion)
         placement = self._corrected(predicted, sweep, landmarks)
         change_m = sweep.deskewed_change_m(predicted, placement, self._tuning.repeat_range_m)
         if change_m > self._tuning.repeat_tolerance_m:
@@ -203,6 +206,16 @@ class _Sweep:
         b = other.motion
         difference_mps = abs(b.velocity_mps - a.velocity_mps) + range_m * abs(b.yaw_rate_radps - a.yaw_rate_radps)
         return difference_mps * abs(self.turn_s) / 2
+
+
+def _planar(T: Float64) -> Float64:
+    """(4, 4) pose at the same place and with the same heading that is level."""
+    return se3(rotation_zyx(0.0, 0.0, yaw_of(T)), T[:3, 3])
+
+
+def _aligned(T_world_sensor: Float64, T_odometry_sensor: Float64) -> Float64:
+    """(4, 4) T_world_odometry, a turn about the vertical and a shift by which two poses have one place and heading."""
+    return _planar(T_world_sensor) @ inverse(_planar(T_odometry_sensor))
 
 
 def _rigid(T: Float64) -> Float64:
