@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 
 from modt.app import assembly
-from modt.geometry import FieldOfView, rotation_zyx, se3
+from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, transform_boxes
+from modt.odometry.pose_check import PoseCheck
 from modt.profile import load
 from modt_simulation.synthetic_stream import SyntheticStream
+from tests.odometry.odometry_scenes import static_tracks
+from tests.odometry.odometry_scenes import street as street_of_boxes
+from tests.tracking.tracking_scenes import Follower, frame_of
 
 ONSET, END = 30, 50
 
@@ -62,3 +66,38 @@ def test_wrong_poses_are_doubted_and_right_ones_believed_again(name, street):
     assert any(doubted[ONSET : ONSET + 5]) == (name != "none")
     assert not doubted[-1]
     assert max(off_m) < 0.5
+
+
+STEP_M = 0.07
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, -1.0, 2.0])
+def test_poses_wrong_by_centimetres_a_frame_are_doubted_and_what_rests_stays_at_rest(share):
+    follower = Follower()
+    boxes = street_of_boxes(n=40)
+    for k in range(80):
+        x = STEP_M * k
+        given_x = x if k < ONSET else STEP_M * ONSET + share * (x - STEP_M * ONSET)
+        seen = transform_boxes(inverse(pose(x, 0.0, 0.0)), boxes)
+        follower.follow(*frame_of(seen, k, pose(given_x, 0.0, 0.0), points=150))
+    assert follower.odometry.pose_check.doubted
+    assert np.percentile(follower.tracks.x[:, 3], 95) < 0.2
+
+
+def test_poses_wrong_since_before_anything_was_seen_are_doubted():
+    follower = Follower()
+    boxes = street_of_boxes(n=40)
+    for k in range(20):
+        seen = transform_boxes(inverse(pose(0.6 * k, 0.0, 0.0)), boxes)
+        follower.follow(*frame_of(seen, k, pose(0.0, 0.0, 0.0), points=150))
+    assert follower.odometry.pose_check.doubted
+
+
+@pytest.mark.parametrize(("step_m", "way_m", "drifted"), [(0.1, 0.0, False), (0.3, 0.0, True), (0.3, 10.0, False)])
+def test_what_rested_may_move_by_the_errors_of_a_way(step_m, way_m, drifted):
+    check = PoseCheck()
+    kdop = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (8, 1))
+    step = step_m * np.array([1.0, np.sqrt(0.5), 0.0, -np.sqrt(0.5), -1.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)])
+    assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    assert not check.drifted(0.5, static_tracks(kdop + 5 * step), pose(way_m, 0.0, 0.0))  # not looked at so soon
+    assert check.drifted(1.0, static_tracks(kdop + step), pose(way_m, 0.0, 0.0)) == drifted

@@ -95,6 +95,21 @@ def test_a_fault_is_reported_within_two_seconds_and_withdrawn_within_three(name)
     assert levels[-1] == TrustLevel.GOOD
 
 
+def test_a_knock_under_a_cover_is_reported_when_the_cover_is_gone():
+    """The sensor stands: the sweeps before and after the cover show one place."""
+    watch = TrustWatch(load(SENSOR).sensor)
+    frame = drive("street")[0]
+    rng = np.random.default_rng(0)
+    keys = []
+    for k in range(100):
+        noise = 1 + rng.normal(0, 1e-3, (len(frame.points), 1))
+        points = np.column_stack([frame.points[:, :3] * noise, frame.points[:, 3]]).astype(np.float32)
+        points = np.zeros_like(points) if 40 <= k < 60 else points
+        points = FAULTS["pitched by -8 deg"](points, k) if 50 <= k < 90 else points
+        keys.append(watch.add(Frame(k, 0.1 * k, points), frame.T_world_sensor).keys)
+    assert all("ground" in now for now in keys[66:90])
+
+
 def test_reflectance_is_no_matter_of_trust():
     def garbage(points, k):
         return np.column_stack([points[:, :3], np.random.default_rng(k).random(len(points))]).astype(np.float32)

@@ -219,7 +219,7 @@ class Stages:
     def _use(self, chosen: ChosenProfile) -> None:
         """Exchange the stages for those of another profile; the tracks are kept."""
         self.pipeline = self._new_pipeline(chosen.config)
-        if chosen.config.sensor != self.config.sensor:
+        if chosen.config.sensor != self.config.sensor and not self.trust.watch.displaced:
             watch = TrustWatch(chosen.config.sensor)
             watch.adopt(self.trust.watch)
             self.trust.watch = watch

@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from modt.geometry import inverse, yaw_of
-from modt.geometry.kdop import centres
+from modt.geometry.kdop import centres, shift_between
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
-from modt.observations import Observations
+from modt.observations import Observations, StaticTracks
 from modt.odometry.registration import Landmarks
 from modt.odometry.tuning import PoseCheckTuning
-from modt.types import Float64
+from modt.types import Float64, Int
+
+
+class Anchors(NamedTuple):
+    """Where tracks at rest were at a time: their ids (n,), ascending, and k-DOPs (n, 8), and the given pose."""
+
+    time_s: float
+    id: Int
+    kdop: Float64
+    T_world_sensor: Float64
 
 
 class PoseCheck:
     """Whether given poses are believed. Registration places the frames while they are not.
 
-    Doubt begins with a frame whose pose moves the landmarks, while registration brings them back. It ends once the
-    poses have moved as registration does for a while; the motion counts, as their origin may have jumped.
+    Doubt begins with a frame whose pose moves the landmarks, while registration brings them back. Poses that are
+    wrong by little a frame carry the landmarks along, so doubt also begins when most of what rested a second ago has
+    moved alike. It ends once the poses have moved as registration does for a while; the motion counts, as their origin
+    may have jumped.
 
     Args:
         kernels: passes over pairs.
@@ -34,6 +47,7 @@ class PoseCheck:
         self._tuning = tuning
         self.doubted = False
         self._began_s = 0.0  # when the doubt began
+        self._anchors: Anchors | None = None
         # Time, given and registered pose from which the motions are compared
         self._compared_from: tuple[float, Float64, Float64] | None = None
         self._now_s = 0.0
@@ -44,10 +58,13 @@ class PoseCheck:
         return self._now_s - self._began_s if self.doubted else 0.0
 
     def near(self, landmarks: Landmarks, observations: Observations) -> tuple[int, int]:
-        """Number of established landmarks, and of those near which something is observed."""
+        """Number of established landmarks, or of all if few are, and of those near which something is observed.
+
+        By poses that are wrong since before anything was seen, nothing rests for long.
+        """
         known = landmarks.established.nonzero()[0]
-        if not len(known):
-            return 0, 0
+        if len(known) < self._tuning.min_landmarks:
+            known = np.arange(len(landmarks.established))
         centre = centres(landmarks.kdop.take(known, axis=1))
         seen = centres(observations.kdop)
         widened = np.concatenate([centre, -centre]) + self._tuning.near_m
@@ -63,12 +80,47 @@ class PoseCheck:
         least = max(self._tuning.min_landmarks, self._tuning.convincing_share * known)
         return near_registered >= least and near_registered > self._tuning.better * near
 
-    def begin(self, now_s: float) -> None:
-        """Begin to doubt."""
+    def drifted(self, now_s: float, tracks: StaticTracks, T_world_sensor: Float64) -> bool:
+        """Whether the tracks at rest have moved alike since the anchors were set; if not, they are set anew.
+
+        Args:
+            now_s: time of the frame [s].
+            tracks: tracks after the frame before.
+            T_world_sensor: (4, 4) its pose.
+        """
+        anchors = self._anchors
+        if anchors is not None and 0 <= now_s - anchors.time_s < self._tuning.anchor_s:
+            return False
+        if anchors is not None and now_s - anchors.time_s < 2 * self._tuning.anchor_s:
+            _, before, now = np.intersect1d(anchors.id, tracks.id, assume_unique=True, return_indices=True)
+            seen = tracks.observed[now]
+            way_m = float(np.hypot(*(T_world_sensor - anchors.T_world_sensor)[:2, 3]))
+            if self._moved_alike(anchors.kdop[before[seen]].T, tracks.kdop[now[seen]].T, way_m):
+                return True
+        rests = tracks.stationary & tracks.observed
+        self._anchors = Anchors(now_s, tracks.id[rests], tracks.kdop[rests], T_world_sensor)
+        return False
+
+    def _moved_alike(self, were: Float64, are: Float64, way_m: float) -> bool:
+        """Whether k-DOPs (8, k) have moved by more than the errors of a way, most of them."""
+        if were.shape[1] < self._tuning.min_landmarks:
+            return False
+        step_m = np.median(shift_between(were, are, self._kernels.shape_tuning), axis=0)
+        return self._differ(float(np.hypot(*step_m)), way_m)
+
+    def _differ(self, far_m: float, way_m: float) -> bool:
+        """Whether two motions that end at a distance differ by more than the errors of a way."""
+        return far_m > self._tuning.motion_m + self._tuning.motion_share * way_m
+
+    def begin(self, now_s: float) -> Int:
+        """Begin to doubt; returns the ids (k,) of the tracks that rested when they were last looked at."""
+        rested = np.zeros(0, np.int64) if self._anchors is None else self._anchors.id
         self.doubted = True
+        self._anchors = None
         self._began_s = now_s
         self._now_s = now_s
         self._compared_from = None
+        return rested
 
     def follow(self, now_s: float, T_given: Float64, T_registered: Float64) -> None:
         """Compare the motions by both poses (4, 4); the doubt ends after some time in which they agree."""
@@ -80,10 +132,7 @@ class PoseCheck:
         difference = inverse(given) @ inverse(T_registered_before) @ T_registered
         far_m = float(np.hypot(difference[0, 3], difference[1, 3]))
         way_m = float(np.hypot(given[0, 3], given[1, 3]))
-        if (
-            far_m > self._tuning.motion_m + self._tuning.motion_share * way_m
-            or abs(yaw_of(difference)) > self._tuning.motion_rad
-        ):
+        if self._differ(far_m, way_m) or abs(yaw_of(difference)) > self._tuning.motion_rad:
             self._compared_from = now_s, T_given, T_registered
         elif now_s - from_s >= self._tuning.agree_s:
             self.doubted = False

@@ -80,9 +80,11 @@ class PoseEstimator:
         if T_odometry_sensor is None and self._posed:
             self._landmarks.clear()  # a drift of the poses before does not snap back
         self._posed = T_odometry_sensor is not None
-        landmarks = self._landmarks.update(static_tracks(frame.time_s))
+        tracks = static_tracks(frame.time_s)
+        landmarks = self._landmarks.update(tracks)
         if T_odometry_sensor is not None and self._T_world_odometry is not None:
-            located = self._checked(frame.time_s, sweep, landmarks, T_odometry_sensor)
+            drifted = self.pose_check.drifted(frame.time_s, tracks, self._T_world_last)
+            located = self._checked(frame.time_s, sweep, landmarks, T_odometry_sensor, drifted=drifted)
         else:
             placement = self._register(sweep, landmarks)
             if T_odometry_sensor is not None:  # an odometry that begins late or restarts is aligned with the world
@@ -94,7 +96,9 @@ class PoseEstimator:
         self._time_s = frame.time_s
         return located
 
-    def _checked(self, now_s: float, sweep: _Sweep, landmarks: Landmarks, T_odometry_sensor: Float64) -> Located:
+    def _checked(
+        self, now_s: float, sweep: _Sweep, landmarks: Landmarks, T_odometry_sensor: Float64, *, drifted: bool
+    ) -> Located:
         """The sweep by its pose, or by registration while the poses are doubted."""
         check = self.pose_check
         assert self._T_world_odometry is not None
@@ -107,13 +111,13 @@ class PoseEstimator:
         given_placement = sweep.place(self._T_world_odometry @ T_odometry_sensor)
         located = Located(given_placement, sweep.observe(given_placement))
         known, near = check.near(landmarks, located.observations)
-        if check.agrees(known, near):
+        if check.agrees(known, near) and not drifted:
             return located
         placement = self._register(sweep, landmarks)
         registered = Located(placement, sweep.observe(placement))
-        if not check.convinces(known, near, check.near(landmarks, registered.observations)[1]):
+        if not drifted and not check.convinces(known, near, check.near(landmarks, registered.observations)[1]):
             return located
-        check.begin(now_s)
+        self._landmarks.hold(check.begin(now_s))
         return registered
 
     def _begin(self, T_odometry_sensor: Float64) -> None:
@@ -214,7 +218,7 @@ def _planar(T: Float64) -> Float64:
 
 
 def _aligned(T_world_sensor: Float64, T_odometry_sensor: Float64) -> Float64:
-    """(4, 4) T_world_odometry, a turn about the vertical and a shift by which two poses have one place and heading."""
+    """(4, 4) T_world_odometry, a turn about the vertical and a shift that give two poses one place and heading."""
     return _planar(T_world_sensor) @ inverse(_planar(T_odometry_sensor))
 
 

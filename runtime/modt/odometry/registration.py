@@ -49,15 +49,24 @@ class LandmarkMap:
         """Forget all landmarks."""
         self._id = np.zeros(0, np.int64)
         self._frames = np.zeros(0, np.int64)
+        self._held = np.zeros(0, np.bool_)
         self._mean = np.zeros((0, 8))
+
+    def hold(self, track_id: Int) -> None:
+        """Keep tracks (k,) as landmarks where they are, though they seem to move, for as long as they stay there.
+
+        Poses that were wrong have moved them all. If the landmarks went on like this, so would registration.
+        """
+        self._held |= np.isin(self._id, track_id)
+        self._frames[self._held] = np.maximum(self._frames[self._held], self._tuning.established_frames)
 
     def update(self, tracks: StaticTracks) -> Landmarks:
         """Add the last frame and return the landmarks; to be called once in each frame without a pose."""
         self._renumber(tracks.id)
         self._add(tracks)
         # The landmarks are the candidates among the tracks, in their order.
-        candidates = tracks.candidate.nonzero()[0]
-        rested = tracks.stationary & (self._frames >= self._tuning.established_frames)
+        candidates = (tracks.candidate | (self._held & tracks.observed)).nonzero()[0]
+        rested = (tracks.stationary | self._held) & (self._frames >= self._tuning.established_frames)
         established = rested[candidates]
         kdop = tracks.predicted_kdop.take(candidates, axis=1)
         kdop[:, established] = self._mean[candidates[established]].T
@@ -66,21 +75,28 @@ class LandmarkMap:
     def _renumber(self, track_id: Int) -> None:
         """Bring the rows into the order of (M,) ascending track ids. New tracks have no frames and a mean of zero."""
         frames = np.zeros(len(track_id), np.int64)
+        held = np.zeros(len(track_id), np.bool_)
         mean = np.zeros((len(track_id), 8))
         known = np.isin(track_id, self._id, assume_unique=True)
         before = self._id.searchsorted(track_id[known])
         frames[known] = self._frames[before]
+        held[known] = self._held[before]
         mean[known] = self._mean.take(before, axis=0)
         self._id = track_id
         self._frames = frames
+        self._held = held
         self._mean = mean
 
     def _add(self, tracks: StaticTracks) -> None:
         """Add the k-DOPs of the tracks that the last frame showed to their means."""
         rows = tracks.observed.nonzero()[0]
-        frames = np.where(tracks.stationary[rows], self._frames[rows] + 1, 0)
-        gain = np.maximum(1.0 / np.maximum(frames, 1), self._tuning.min_gain)[:, None]
         off = tracks.kdop.take(rows, axis=0) - self._mean.take(rows, axis=0)
+        if self._held.any():
+            far_m = np.hypot(*centres(off.T)[::2])
+            self._held[rows] &= (far_m < self._tuning.max_jump_m) & ~tracks.stationary[rows]
+        stays = tracks.stationary[rows] | self._held[rows]
+        frames = np.where(stays, self._frames[rows] + 1, 0)
+        gain = np.maximum(1.0 / np.maximum(frames, 1), self._tuning.min_gain)[:, None]
         self._frames[rows] = frames
         self._mean[rows] += np.where(np.abs(off) < self._tuning.max_jump_m, gain, 1.0) * off
 

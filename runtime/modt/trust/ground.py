@@ -26,6 +26,8 @@ MIN_STEP_M = 0.08
 """Least limit of a change of the height [m], under a sensor that is low."""
 BACK_SHARE = 0.7
 """Share of the limits within which the ground is back."""
+UNSEEN_FACTOR = 2.5
+"""Multiple of the limits by which the ground has moved if the sensor went on while nothing was seen."""
 LEFT_SHARE = 0.25
 """Share of a step that another one may leave, as the ground has another shape elsewhere."""
 OUT_OF_VIEW = np.array([np.inf, 0.0, 0.0])
@@ -89,6 +91,21 @@ class GroundCheck:
         if self._looks >= back_looks or self._size(self._step) < max(1.0, LEFT_SHARE * self._greatest):
             self.moved = ""
             self._before = None
+
+    def look_past(self, before: Sample, now: Sample, *, same_place: bool) -> None:
+        """Notice a ground that moved since a sweep after which nothing was seen, though slopes may have passed."""
+        if not self._known or self._before is not None:
+            return
+        steps = (_step(before, now, known=True), self._from_plane(now))
+        if min(self._size(step) for step in steps) >= (1.0 if same_place else UNSEEN_FACTOR):
+            self._add([(before, now)])
+
+    def _from_plane(self, sample: Sample) -> Float64:
+        """Plane (3,) by which most cells of a sweep are off the known ground; OUT_OF_VIEW if few have any."""
+        cells = np.flatnonzero(np.isfinite(sample.lowest_m))
+        if len(cells) < MIN_CELLS:
+            return OUT_OF_VIEW
+        return _fitted(cells, sample.lowest_m.take(cells) - self.plane @ _CELLS.take(cells, axis=1))
 
     def _add(self, pairs: Sequence[tuple[Sample, Sample]]) -> None:
         """Add the steps of the ground between the two sweeps of each pair."""

@@ -143,12 +143,13 @@ class TrustTuning:
     Chosen on: an alarm within 2 s."""
 
     looks: int = 2
-    """Number of looks in a row after which a lasting finding is reported, or withdrawn.
+    """Number of looks in a row after which a lasting finding is reported.
     Chosen on: an alarm within 2 s."""
 
     back_looks: int = 3
-    """Number of looks in a row in which ground or scene are as they were, after which a change is withdrawn.
-    Chosen on: good again within 5 s."""
+    """Number of looks in a row without a finding after which it is withdrawn. Greater: another fault that begins
+    meanwhile is found before the trust is good.
+    Chosen on: good again within 3 s."""
 
     learn_s: float = 2.0
     """Time after the start before anything is expected [s].

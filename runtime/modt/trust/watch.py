@@ -32,10 +32,16 @@ class Finding:
 
 
 class Debounced:
-    """Reasons that begin after some looks in a row with a finding, and end after some without one."""
+    """Reasons that begin after some looks in a row with a finding, and end after some without one.
 
-    def __init__(self, looks: int) -> None:
+    Args:
+        looks: with a finding.
+        back_looks: without one; none of the checks in `at_once`, which have waited themselves.
+    """
+
+    def __init__(self, looks: int, back_looks: int) -> None:
         self._looks = looks
+        self._back_looks = back_looks
         self._found: dict[str, int] = {}  # looks in a row with a finding, or minus those without one
         self.reasons: dict[str, Reason] = {}
 
@@ -50,7 +56,7 @@ class Debounced:
                 known = self.reasons.get(key)
                 since_s = known.since_s if known else now_s
                 self.reasons[key] = Reason(key, finding.level, finding.cause, finding.remedy, since_s)
-            elif in_a_row <= -self._looks:
+            elif in_a_row <= -(self._looks if key in at_once else self._back_looks):
                 self.reasons.pop(key, None)
                 del self._found[key]
 
@@ -74,13 +80,19 @@ class TrustWatch:
         self._ground = GroundCheck(tuning.ground, sensor.height_m)
         self._scene = SceneCheck(tuning.scene)
         self._samples: list[Sample] = []  # those since the last look, its own included
-        self._debounced = Debounced(tuning.looks)
+        self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
         self._began_s: float | None = None
         self._repeated = False  # the sweep of the last look was one before
+        self._before_loss: Sample | None = None  # the last sweep before the view was lost
         self._own: frozenset[str] = frozenset()  # checks of the sweeps themselves that have a reason
         self.another_sensor = False
         self.trust = Trust()
+
+    @property
+    def displaced(self) -> bool:
+        """Whether ground or scene have moved, which a watch without their history would not know."""
+        return bool(self._ground.moved) or not self._scene.change.is_none
 
     def adopt(self, other: TrustWatch) -> None:
         """Keep the reasons of another sensor's watch until looks of this one have confirmed or withdrawn them."""
@@ -140,6 +152,10 @@ class TrustWatch:
         if not repeated and not self._repeated:
             self._follow()
         self._repeated = repeated
+        lost = repeated or (loss is not None and loss.blind)
+        if not lost and self._before_loss is not None and not self.displaced:
+            self._look_past(self._before_loss, seen)
+        self._before_loss = (self._before_loss or self._samples[0]) if lost else None
         change = self._scene.change
         if self._ground.moved:
             yield "ground", Finding(TrustLevel.BLIND, self._ground.moved, MOUNT)
@@ -154,11 +170,20 @@ class TrustWatch:
         if not had_moved and not self._ground.moved:
             self._scene.look(self._samples[0], pairs, self._tuning.back_looks)
 
+    def _look_past(self, before: Sample, now: Sample) -> None:
+        """Compare the sweeps before and after a time in which nothing was seen."""
+        same_place = bool(np.hypot(*(now.T_world_sensor - before.T_world_sensor)[:2, 3]) < SAME_PLACE_M)
+        self._ground.look_past(before, now, same_place=same_place)
+        if not self._ground.moved and same_place:
+            self._scene.look(before, [(before, now)], self._tuning.back_looks)
+
 
 GAP_S = 1.0
 """Longest time between two frames after which a look is made [s]."""
 AT_ONCE_S = 0.25
 """Longest time between two frames of which a step tells that it came at once [s]."""
+SAME_PLACE_M = 1.0
+"""Greatest way between two sweeps that show the same scene [m]."""
 MOST_SAMPLES = 24
 """Greatest number of frames between two looks that are kept."""
 OWN = frozenset({"frozen", "returns", "scene", "ground"})
