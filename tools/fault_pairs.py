@@ -132,11 +132,15 @@ def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode,
     stages = Stages(Request(profile=[SENSOR], odometry="recording"), stream.info, Ledger(), live=True)
     stages.recognise(frames[0])
     levels = []
+    points = frames[0].points
     for k, frame in enumerate(frames):
         given = frame
-        for episode in pair:
-            if episode.begin <= k < episode.end:
-                given = _changed(given, episode, frames)
+        active = [episode for episode in pair if episode.begin <= k < episode.end]
+        for episode in active:
+            given = moved_by(episode.change, given, frames[episode.begin - 1])
+        if any(episode.change.freezes for episode in active):  # a frozen sensor repeats what it sent before
+            given = replace(given, points=points)
+        points = given.points
         levels.append(stages.step(given, stages.budget, reduced=False).trust.level)
         stages.ledger.close_frame(k)
         stages.watch(given)
@@ -145,13 +149,12 @@ def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode,
     return levels
 
 
-def _changed(frame: Frame, episode: Episode, frames: list[Frame]) -> Frame:
-    before = frames[episode.begin - 1]
+def moved_by(change: Change, frame: Frame, before: Frame) -> Frame:
+    """A frame with a fault that began after a frame before it."""
     assert frame.T_world_sensor is not None
     assert before.T_world_sensor is not None
-    points = before.points if episode.change.freezes else frame.points
-    T = episode.change.pose(frame.T_world_sensor, before.T_world_sensor)
-    return replace(frame, points=np.ascontiguousarray(episode.change.points(points)), T_world_sensor=T)
+    T = change.pose(frame.T_world_sensor, before.T_world_sensor)
+    return replace(frame, points=np.ascontiguousarray(change.points(frame.points)), T_world_sensor=T)
 
 
 def silent(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: float) -> list[str]:

@@ -29,8 +29,8 @@ class PoseCheck:
 
     Doubt begins with a frame whose pose moves the landmarks, while registration brings them back. Poses that are
     wrong by little a frame carry the landmarks along, so doubt also begins when most of what rested a second ago has
-    moved alike. It ends once the poses have moved as registration does for a while; the motion counts, as their origin
-    may have jumped.
+    moved alike. It ends once the poses have moved as registration does for a while; the motion counts, as their
+    origin may have jumped.
 
     Args:
         kernels: passes over pairs.

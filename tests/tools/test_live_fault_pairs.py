@@ -1,0 +1,48 @@
+"""Verdicts over records of live runs with pairs of faults."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tools import live_fault_pairs
+from tools.live_fault_pairs import LIVE_FAULTS, NETWORK, PERIOD_S, LiveEpisode
+
+FAULTS = {fault.name: fault for fault in LIVE_FAULTS}
+PAIR = (LiveEpisode(FAULTS["covered"], 60, 120), LiveEpisode(FAULTS["loss"], 80, 140))
+
+
+def recorded(folder, good, lost=3, frames=200):
+    """A run directory with 200 recorded frames, of which those of `good` are trusted."""
+    lines = [{"stamp_s": PERIOD_S * k, "trust": {"level": "good" if k in good else "blind"}} for k in range(200)]
+    (folder / "tracks.jsonl").write_text("\n".join(map(json.dumps, lines)))
+    status = {
+        "counts": {"frames": frames},
+        "recording": {"lost_lines": 0},
+        "sensor": {"lost_messages": lost, "incomplete_sweeps": 0},
+    }
+    (folder / "status.json").write_text(json.dumps(status))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("good", "options", "broken"),
+    [
+        (range(75), {}, []),
+        (range(90), {}, ["covered"]),
+        (range(75), {"lost": 0}, ["loss"]),
+        (range(75), {"frames": 201}, ["1 frames"]),
+    ],
+    ids=["kept", "silent", "not counted", "not recorded"],
+)
+def test_what_is_silent_or_missing_is_listed(tmp_path, good, options, broken):
+    found = list(live_fault_pairs.judged(recorded(tmp_path, good, **options), PAIR, 0.0))
+    assert [what.split(":")[0][: len(name)] for what, name in zip(found, broken, strict=True)] == broken
+
+
+def test_a_pair_overlaps_and_has_one_fault_of_the_network_at_most():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        one, other = live_fault_pairs.drawn(rng)
+        assert one.begin < other.begin < one.end <= other.end
+        assert not {one.fault.name, other.fault.name} <= NETWORK.keys()

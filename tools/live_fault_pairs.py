@@ -1,0 +1,358 @@
+"""Tries random pairs of faults over live runs: packets and poses are sent over sockets to a running `modt run`.
+
+    python -m tools.live_fault_pairs --pairs 1000 --seed 1 --out runs/pairs.jsonl
+
+Each pair gets a run of its own, in real time; several at once with `--parallel`. A pair that OUT holds is not run
+again, so a run of this tool can be cut and continued. The faults are those of `tools.fault_pairs`, of the network and
+of the process. A pair is listed if the run ended or did not end well when asked to, if a fault was silent (the trust
+was good after its limit, or its counter stayed), or if a frame is neither recorded nor counted as lost. The exit
+status is 0 if none is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain, pairwise, repeat
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modt.types import Frame
+from modt_simulation.synthetic_stream import SyntheticStream
+from tools.deploy.faults import FAULTS
+from tools.deploy.sender import Faulty
+from tools.fault_pairs import CHANGES, FIRST, LASTING, SECONDS, SENSOR, Change, moved_by
+from tools.options import parser
+from tools.send.ideal_packets import packets_of
+from tools.send.loops import VelodyneStamps
+
+PERIOD_S = 0.1
+POSES_PER_SWEEP = 5
+WAITING = 9
+"""Number of sweeps that are repeated until a run has its first frames: their packets are full."""
+MOST_WAITING = 40
+"""Most repetitions."""
+PACKET_BYTES = 1206
+PACKET_S = 24 * 55.296e-6
+"""Time between two packets [s]."""
+PACKETS_PER_SWEEP = round(PERIOD_S / PACKET_S)
+MOST_LATE_S = 0.5
+"""Greatest delay of a packet with which a pair counts [s]. The machine was too busy for it otherwise."""
+ENDED_S = 15.0
+"""Longest time until a run has ended after SIGTERM [s]."""
+JITTER = 1e-3
+"""Noise of the ranges while the robot waits for the run to start, as a share; without it the sweeps would repeat."""
+
+
+@dataclass(frozen=True, slots=True)
+class LiveFault:
+    """A fault of the scene or the poses, of the network, or a signal to the process."""
+
+    name: str
+    change: Change | None = None
+    signals: tuple[signal.Signals, ...] = ()
+    counted: Callable[[dict[str, Any]], int] = lambda status: 0
+
+
+def _sensor(*names: str) -> Callable[[dict[str, Any]], int]:
+    return lambda status: sum(int(status["sensor"][name]) for name in names)
+
+
+def _refused(status: dict[str, Any]) -> int:
+    return sum(status["sensor"]["refused_messages"].values())
+
+
+NETWORK = {
+    "silence": _sensor("silences"),
+    "garbage": _refused,
+    "loss": _sensor("lost_messages", "incomplete_sweeps"),
+    "duplicates": _refused,
+    "reordering": lambda status: _refused(status) + _sensor("lost_messages", "incomplete_sweeps")(status),
+    "lying stamps": _refused,
+    "clock set back": _refused,
+}
+LIVE_FAULTS = (
+    *(LiveFault(change.name, change) for change in CHANGES),
+    *(LiveFault(name, counted=counter) for name, counter in NETWORK.items()),
+    LiveFault("reload", signals=(signal.SIGHUP,), counted=lambda status: int(status["loop"]["reloads"])),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LiveEpisode:
+    """A fault from one sweep up to another one."""
+
+    fault: LiveFault
+    begin: int
+    end: int
+
+
+def drawn(rng: np.random.Generator) -> tuple[LiveEpisode, LiveEpisode]:
+    """Two faults, of which one at most is of the network; the second one begins while the first one lasts."""
+    while True:
+        one, other = (LIVE_FAULTS[k] for k in rng.choice(len(LIVE_FAULTS), 2, replace=False))
+        if not (one.name in NETWORK and other.name in NETWORK):
+            break
+    lengths = rng.integers(*LASTING, 2)
+    begin = FIRST + int(rng.integers(1, lengths[0]))
+    end = max(begin + int(lengths[1]), FIRST + int(lengths[0]))
+    return LiveEpisode(one, FIRST, FIRST + int(lengths[0])), LiveEpisode(other, begin, end)
+
+
+class Sender:
+    """Sends the packets of a drive and its poses, with the faults of a pair.
+
+    Args:
+        frames: sweeps of the drive.
+        pair: its faults.
+        ports: UDP ports of packets and poses.
+        hang_up: sends a signal to the run.
+        ready: whether the run has frames, so that the drive may begin.
+    """
+
+    def __init__(
+        self,
+        frames: Sequence[Frame],
+        pair: Sequence[LiveEpisode],
+        ports: tuple[int, int],
+        hang_up: Callable[[signal.Signals], None],
+        ready: Callable[[], bool],
+    ) -> None:
+        self._frames = frames
+        self._pair = pair
+        self._ports = ports
+        self._hang_up = hang_up
+        self._ready = ready
+        self._faulty = Faulty()
+        self.began_s = 0.0  # stamp of the first sweep of the drive
+        self.latest_s = 0.0  # greatest delay of a packet, as on a busy machine
+
+    def _active(self, sweep: int) -> list[LiveEpisode]:
+        return [episode for episode in self._pair if episode.begin <= sweep < episode.end]
+
+    def _given(self) -> list[Frame]:
+        """The sweeps and their poses with the changes of their times. A frozen sensor repeats what it has sent."""
+        given: list[Frame] = []
+        for sweep, frame in enumerate(self._frames):
+            changed = frame
+            frozen = False
+            for episode in self._active(sweep):
+                change = episode.fault.change
+                if change is not None:
+                    frozen |= change.freezes
+                    changed = moved_by(change, changed, self._frames[episode.begin - 1])
+            given.append(replace(changed, points=given[-1].points) if frozen else changed)
+        return given
+
+    def _waiting(self) -> list[Frame]:
+        """Sweeps at the begin of the drive, before the run is ready; without noise they would be frozen."""
+        rng = np.random.default_rng(0)
+        noise = 1 + rng.normal(0, JITTER, (WAITING, len(self._frames[0].points), 1)).astype(np.float32)
+        first = self._frames[0]
+        return [replace(first, points=np.hstack([first.points[:, :3] * n, first.points[:, 3:]])) for n in noise]
+
+    def run(self) -> None:
+        """Send the drive in real time. All that takes long is done before."""
+        given = self._given()
+        drive = [payload for _, payload in packets_of(given, SENSOR, PERIOD_S)]
+        waiting = [payload for _, payload in packets_of(self._waiting(), SENSOR, PERIOD_S)]
+        first_s = time.time()
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as packets,
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as poses,
+        ):
+            packets.connect(("127.0.0.1", self._ports[0]))
+            poses.connect(("127.0.0.1", self._ports[1]))
+            n = 0
+            while n < MOST_WAITING * len(waiting) and not (n and self._ready()):
+                for payload in waiting:
+                    if n % PACKETS_PER_SWEEP == 0:
+                        self._send_poses(poses, [self._frames[0]] * 2, first_s + n * PACKET_S)
+                    at_s = first_s + n * PACKET_S
+                    self._send_packet(packets, _stamped(payload, at_s), at_s)
+                    n += 1
+            self.began_s = first_s + n * PACKET_S
+            said = 0
+            times_s = (self.began_s + k * PACKET_S for k in range(len(drive)))
+            timed = ((at_s, _stamped(payload, at_s)) for at_s, payload in zip(times_s, drive, strict=True))
+            end = repeat((np.inf, bytes(PACKET_BYTES)))
+            for at_s, payload in self._faulty.applied(chain(timed, end)):
+                if np.isinf(at_s):
+                    break
+                while said < min(int((at_s - self.began_s) / PERIOD_S), len(given) - 1):
+                    self._switch(said, said + 1)
+                    self._send_poses(poses, given[said : said + 2], self.began_s + said * PERIOD_S)
+                    said += 1
+                self._send_packet(packets, payload, at_s)
+
+    def _send_packet(self, to: socket.socket, payload: bytes, at_s: float) -> None:
+        """Send a packet at its time."""
+        time.sleep(max(at_s - time.time(), 0.0))
+        self.latest_s = max(self.latest_s, time.time() - at_s)
+        _send(to, payload)
+
+    def _switch(self, before: int, sweep: int) -> None:
+        """Begin and end the faults of the network, and send the signals that are due."""
+        named = [e.fault.name for e in self._active(sweep) if e.fault.name in NETWORK]
+        self._faulty.fault = next((f for f in FAULTS if f.name in named), self._faulty.none)
+        for episode in self._pair:
+            if before < episode.begin <= sweep:
+                for number in episode.fault.signals:
+                    self._hang_up(number)
+
+    def _send_poses(self, to: socket.socket, pair: Sequence[Frame], begin_s: float) -> None:
+        """Send the poses between two sweeps."""
+        for before, after in pairwise(pair):
+            for k in range(POSES_PER_SWEEP):
+                share = k / POSES_PER_SWEEP
+                T = before.T_world_sensor if share < 0.5 else after.T_world_sensor
+                assert before.T_world_sensor is not None
+                assert after.T_world_sensor is not None
+                assert T is not None
+                pose = T.copy()
+                pose[:3, 3] = (1 - share) * before.T_world_sensor[:3, 3] + share * after.T_world_sensor[:3, 3]
+                message = {"stamp": begin_s + share * PERIOD_S, "pose": pose[:3].ravel().tolist()}
+                _send(to, json.dumps(message).encode())
+
+
+def _stamped(payload: bytes, at_s: float) -> bytes:
+    stamps = VelodyneStamps()
+    return stamps.stamped(payload, round(1e6 * at_s) % stamps.wrap_us)
+
+
+def _send(to: socket.socket, payload: bytes) -> None:
+    try:
+        to.send(payload)
+    except ConnectionRefusedError:  # nobody listens yet
+        return
+
+
+def free_ports(number: int) -> tuple[int, ...]:
+    """UDP ports of this machine that nobody uses."""
+    bound = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(number)]
+    for one in bound:
+        one.bind(("127.0.0.1", 0))
+    ports = tuple(int(one.getsockname()[1]) for one in bound)
+    for one in bound:
+        one.close()
+    return ports
+
+
+def status_of(folder: Path) -> dict[str, Any]:
+    """The status of a run; empty before the first."""
+    try:
+        content: dict[str, Any] = json.loads((folder / "status.json").read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return content
+
+
+def started(folder: Path) -> bool:
+    """Whether a run has frames."""
+    return bool(status_of(folder).get("counts", {}).get("frames"))
+
+
+def tried(frames: Sequence[Frame], pair: Sequence[LiveEpisode]) -> list[str] | None:
+    """What a live run with a pair of faults does not keep; None if the packets were late, so it does not count."""
+    with tempfile.TemporaryDirectory(prefix="modt-pairs-") as name:
+        folder = Path(name) / "run"
+        packets, poses = free_ports(2)
+        command = ["-m", "modt", "run", f"velodyne://127.0.0.1:{packets}", "--profile", SENSOR, "--core", "none"]
+        command += ["--odometry", f"udp://127.0.0.1:{poses}", "--out", str(folder)]
+        with (Path(name) / "log").open("wb") as log:
+            run = subprocess.Popen([sys.executable, *command], stdout=log, stderr=log)
+        try:
+            sender = Sender(
+                frames, pair, (packets, poses), lambda number: os.kill(run.pid, number), lambda: started(folder)
+            )
+            sender.run()
+            if run.poll() is not None:
+                return [f"the run ended with {run.returncode}"]
+            run.send_signal(signal.SIGTERM)
+            run.wait(ENDED_S)
+        except subprocess.TimeoutExpired:
+            return ["the run did not end"]
+        finally:
+            if run.poll() is None:
+                run.kill()
+                run.wait()
+        if sender.latest_s > MOST_LATE_S:
+            return None
+        broken = [] if run.returncode == 0 else [f"the run ended with {run.returncode}"]
+        return [*broken, *judged(folder, pair, sender.began_s)]
+
+
+def judged(folder: Path, pair: Sequence[LiveEpisode], began_s: float) -> Iterator[str]:
+    """Faults of a pair that were silent in the records of a run, and records that are missing."""
+    lines = [json.loads(line) for line in (folder / "tracks.jsonl").read_text().splitlines()]
+    status = status_of(folder)
+    missing = status["counts"]["frames"] - len(lines) - status["recording"]["lost_lines"]
+    if missing:
+        yield f"{missing} frames are neither recorded nor counted as lost"
+    sweep = (np.array([line["stamp_s"] for line in lines]) - began_s) / PERIOD_S
+    good = np.array([line["trust"]["level"] == "good" for line in lines])
+    for episode, other in (pair, pair[::-1]):
+        change = episode.fault.change
+        if change is None:
+            if not episode.fault.counted(status):
+                yield f"{episode.fault.name}: not counted"
+            continue
+        visible = max(episode.begin, other.end if other.begin <= episode.begin else 0)
+        late = (sweep > visible + change.limit_s / PERIOD_S + 1) & (sweep < episode.end - 1)
+        if (good & late).any():
+            yield f"{change.name}: good in {np.count_nonzero(good & late)} of {np.count_nonzero(late)} frames"
+
+
+def _tried_number(frames: Sequence[Frame], seed: int, number: int) -> list[str] | None:
+    """A pair by its number, as faults hold functions, which no process hands on."""
+    rng = np.random.default_rng(seed)
+    pairs = [drawn(rng) for _ in range(number + 1)]
+    return tried(frames, pairs[number])
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--pairs", type=int, default=1000, help="number of pairs (default: %(default)s)")
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--scene", default="street", help="simulated scene (default: %(default)s)")
+    options.add_argument("--parallel", type=int, default=1, help="runs at once (default: %(default)s)")
+    options.add_argument("--out", type=Path, default=Path("runs/pairs.jsonl"), help="results, one line a pair")
+    given = options.parse_args()
+    frames = list(SyntheticStream(given.scene, SENSOR, SECONDS, given.seed))
+    given.out.parent.mkdir(parents=True, exist_ok=True)
+    known = [json.loads(line) for line in given.out.read_text().splitlines()] if given.out.exists() else []
+    done = {result["pair"] for result in known}
+    rng = np.random.default_rng(given.seed)
+    pairs = [drawn(rng) for _ in range(given.pairs)]
+
+    numbers = [k for k in range(given.pairs) if k not in done]
+    with ProcessPoolExecutor(given.parallel) as pool, given.out.open("a", encoding="utf-8") as out:
+        results = pool.map(partial(_tried_number, frames, given.seed), numbers)
+        for number, broken in zip(numbers, results, strict=True):
+            names = " and ".join(f"{e.fault.name} ({e.begin} to {e.end})" for e in pairs[number])
+            if broken is None:
+                print(f"{names}: not counted, as the machine was too busy", flush=True)
+                continue
+            known.append({"pair": number, "faults": names, "broken": broken})
+            print(json.dumps(known[-1]), file=out, flush=True)
+            if broken:
+                print(f"{names}: {'; '.join(broken)}", flush=True)
+    failed = sum(bool(result["broken"]) for result in known)
+    print(f"{len(known)} pairs over live runs, {failed} with a broken promise")
+    sys.exit(bool(failed))
+
+
+if __name__ == "__main__":
+    main()
