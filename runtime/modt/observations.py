@@ -14,6 +14,9 @@ from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.placement import Placement
 from modt.types import Bool, Float64, Int, Proposals
 
+MIN_RANGE_M = 1e-3
+"""Distance from the sensor within which a proposal lies in no direction [m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Observations:
@@ -45,6 +48,12 @@ class Observations:
     def position(self) -> Float64:
         """(P, 2) centre of the k-DOP along x and y [m]."""
         return centres(self.kdop)[::2].T
+
+    def sight(self, proposals: Int) -> Float64:
+        """(2, K) unit vectors from the sensor to proposals (K,) [world]; zero for one at the sensor."""
+        off = self.centroid.T.take(proposals, axis=1) - self.sensor_xy[:, None]
+        unit: Float64 = off / np.maximum(np.sqrt(off[0] * off[0] + off[1] * off[1]), MIN_RANGE_M)
+        return unit
 
     def moved(self, step: Float64) -> Observations:
         """The same, displaced by steps (P, 2) [m, world]."""

@@ -94,16 +94,22 @@ def random_kdops(rng, n):
     return a, a + np.maximum(change, -rng.uniform(0.5, 0.9, (8, n)) * np.tile(half, (2, 1)))  # no width is negative
 
 
-def slow_shift_along(a, b, k):
-    """Displacement along an axis, and from 0 to 1 how little its ends agree."""
+def slow_shift_along(a, b, k, seen_along=0.0):
+    """Displacement along an axis, and from 0 to 1 how little its ends agree.
+
+    The axis lies along the line of sight by `seen_along`, the cosine of the angle between them.
+    """
     longest = max(*(a[:4] + a[4:]), *(b[:4] + b[4:]), 1.0)
     ahead = b[k] - a[k]
     behind = a[k + 4] - b[k + 4]
     agree = max(0.0, 1 - ((ahead - behind) * longest / TUNING.agreement_m) ** 2) ** 2
-    return agree * (ahead + behind) / 2 + (1 - agree) * min(ahead, behind, key=abs), 1 - agree
+    end = min(ahead, behind, key=abs)
+    if abs(seen_along) > TUNING.near_cosine:
+        end = behind if seen_along > 0 else ahead
+    return agree * (ahead + behind) / 2 + (1 - agree) * end, 1 - agree
 
 
-def slow_measured(a, b, variance, before):
+def slow_measured(a, b, sight, variance, before):
     """Displacement, covariance and end variances of one pair, axis by axis."""
     width = b[:4] + b[4:]
     growth = width - (a[:4] + a[4:])
@@ -111,10 +117,12 @@ def slow_measured(a, b, variance, before):
     weighted = np.zeros(2)
     end_variance = []
     for k in range(4):
-        shift, disagreement = slow_shift_along(a, b, k)
-        by_ends = disagreement * (TUNING.disagreement * growth[k]) ** 2
+        seen_along = AXES[:, k] @ sight
+        shift, disagreement = slow_shift_along(a, b, k, seen_along)
+        doubt = TUNING.near_disagreement if abs(seen_along) > TUNING.near_cosine else TUNING.disagreement
+        by_ends = disagreement * (doubt * growth[k]) ** 2
         by_ends = max(by_ends, TUNING.end_variance_decay * before[k])
-        end_variance.append(min(by_ends, (TUNING.disagreement * max(width)) ** 2))
+        end_variance.append(min(by_ends, (doubt * max(width)) ** 2))
         weight = 1 / (2 * (variance + end_variance[-1]))
         information += weight * np.outer(AXES[:, k], AXES[:, k])
         weighted += weight * shift * AXES[:, k]
@@ -136,15 +144,39 @@ def slow_shift(a, b):
     return sum(AXES[:, k] * slow_shift_along(a, b, k)[0] for k in range(4)) / 2
 
 
+def random_sights(rng, n):
+    """(2, n) unit vectors."""
+    bearing = rng.uniform(-np.pi, np.pi, n)
+    return np.stack([np.cos(bearing), np.sin(bearing)])
+
+
+def kdop_of_rectangle(near_m, far_m, half_m):
+    """(8, 1) k-DOP of a rectangle from near_m to far_m along x, and half_m to either side."""
+    corners = np.array([(x, y) for x in (near_m, far_m) for y in (-half_m, half_m)])
+    return (corners @ DIRECTIONS).max(axis=0)[:, None]
+
+
+@pytest.mark.parametrize("far_m", [20.5, 23.2, 24.0])
+def test_what_hides_its_own_far_end_moves_as_its_near_end(far_m):
+    # A car comes nearer by 0.8 m; how far its roof is seen changes by itself.
+    before = kdop_of_rectangle(20.0, 22.0, 0.9)
+    after = kdop_of_rectangle(19.2, far_m, 0.9)
+    sight = np.array([[1.0], [0.0]])
+    shift, covariance, _ = NUMPY_GEOMETRY.measured(before, after, sight, 0.05**2, np.zeros((4, 1)))
+    np.testing.assert_allclose(shift[0], (-0.8, 0.0), atol=0.05)
+    assert covariance[0, 0, 0] < 0.2**2
+
+
 @given(st.integers(0, 6), st.integers(0, 2**16))
 def test_measured_displacement_matches_the_slow_reference(n, seed):
     rng = np.random.default_rng(seed)
     a, b = random_kdops(rng, n)
     variance = rng.uniform(0.01, 1.0)
     before = rng.uniform(0, 0.5, (4, n))
-    shift, covariance, end_variance = NUMPY_GEOMETRY.measured(a, b, variance, before)
+    sight = random_sights(rng, n)
+    shift, covariance, end_variance = NUMPY_GEOMETRY.measured(a, b, sight, variance, before)
     for k in range(n):
-        slow = slow_measured(a[:, k], b[:, k], variance, before[:, k])
+        slow = slow_measured(a[:, k], b[:, k], sight[:, k], variance, before[:, k])
         for fast, one in zip((shift[k], covariance[k], end_variance[:, k]), slow, strict=True):
             np.testing.assert_allclose(fast, one, atol=1e-9)
 

@@ -10,17 +10,19 @@ from modt.geometry.kernels import GeometryKernels
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.geometry.tuning import ShapeTuning
 from modt.native.library import NotAvailableError, load
-from tests.geometry.test_kdop import WEIGHTS, random_pairs
+from tests.geometry.test_kdop import WEIGHTS, random_pairs, random_sights
 
 
 def compared(kernels):
     """All that kernels compare of some k-DOPs."""
     a, b, covariance, variance, pairs = random_pairs(0, 6)
     shapes = (Shapes.of(s.kdop, s.bottom, s.top, np.ones(6, np.int64), kernels.shape_tuning) for s in (a, b))
+    sight = random_sights(np.random.default_rng(1), 6) * np.tile([0.0, 1.0], 3)  # every second near end is not known
+    before = np.tile([0.02, 0.02, 0.0, 0.0, 0.0, 0.0], (4, 1))
     results = (
         kernels.coverage(a.kdop, b.kdop, *pairs),
         *kernels.pair_costs(*shapes, covariance, variance, pairs, WEIGHTS),
-        *kernels.measured(a.kdop, b.kdop, 0.01, np.full((4, 6), 0.02)),
+        *kernels.measured(a.kdop, b.kdop, sight, 0.01, before),
     )
     return np.concatenate([result.ravel() for result in results])
 

@@ -34,7 +34,7 @@ from modt.tracking.tracker import Tracker
 from modt.tracking.tuning import SightTuning
 from modt.types import NONE, UNRECORDED, PointKind
 from modt_simulation.synthetic_stream import SyntheticStream
-from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs
+from tests.geometry.test_kdop import WEIGHTS, random_kdops, random_pairs, random_sights
 from tests.segmentation import scans
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_cells import cloud
@@ -239,7 +239,7 @@ def in_some_order(rng, a, b):
 
 
 def some_displacements(rng, n):
-    return *random_kdops(rng, n), rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
+    return *random_kdops(rng, n), random_sights(rng, n), rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
 
 
 def some_assignments(rng, n):

@@ -211,11 +211,27 @@ def shift_between(a: Float64, b: Float64, tuning: ShapeTuning) -> Float64:
     return shift
 
 
-def shift_along_axes(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64, Float64, Float64]:
-    """Displacement along each axis from k-DOPs a to b (8, K).
+def nearer_ends(sight: Float64, tuning: ShapeTuning) -> Float64:
+    """(4, K) which end of each axis is nearer to the sensor: 1 the one behind, -1 the one ahead, 0 neither.
+
+    Args:
+        sight: (2, K) unit vectors from the sensor to the objects.
+        tuning: how far an axis may be from the line of sight.
+    """
+    x, y = sight
+    along = np.stack([x, HALF_ROOT * (x + y), y, HALF_ROOT * (y - x)])
+    nearer: Float64 = np.sign(along) * (np.abs(along) > tuning.near_cosine)
+    return nearer
+
+
+def shift_along_axes(
+    a: Float64, b: Float64, tuning: ShapeTuning, nearer: Float64 | None = None
+) -> tuple[Float64, Float64, Float64]:
+    """Displacement along each axis from k-DOPs a to b (8, K), given which ends are nearer to the sensor (4, K).
 
     Returns:
-        shift: (4, K) mean of both ends where they agree, else that of the end that moved less [m].
+        shift: (4, K) mean of both ends where they agree, else that of the nearer end, or else of the end that moved
+            less [m].
         disagreement: (4, K) from 0, where both ends moved alike, to 1.
         growth: (4, K) growth of the width, which is the difference between the displacements of the ends [m].
     """
@@ -226,8 +242,12 @@ def shift_along_axes(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float
     longest = np.maximum(width, width - growth).max(axis=0)  # of the widths after and before
     relative_growth = growth * (np.maximum(longest, 1.0) / tuning.agreement_m)
     disagreement = 1 - np.square(np.maximum(1 - np.square(relative_growth), 0.0))
-    # Less half the growth, the mean of both ends is the displacement of the one that moved less.
-    return (both - disagreement * np.copysign(growth, both)) / 2, disagreement, growth
+    # Less half the growth, the mean of both ends is the displacement of the end behind, plus half of it, that of the
+    # end ahead. Towards zero by half of it, it is that of the end that moved less.
+    to_end = np.copysign(growth, both)
+    if nearer is not None:
+        to_end = np.where(nearer != 0.0, nearer * growth, to_end)
+    return (both - disagreement * to_end) / 2, disagreement, growth
 
 
 def shape_similarity(a: Float64, b: Float64, tuning: ShapeTuning) -> tuple[Float64, Float64]:

@@ -14,6 +14,7 @@ from modt.geometry.kdop import (
     in_plane,
     kdop_ends,
     mahalanobis,
+    nearer_ends,
     overlap_shares,
     overlapping_pairs,
     shift_along_axes,
@@ -131,17 +132,22 @@ class GeometryKernels:
         shape += weights.height * height / 2 + weights.points * points
         return distance / 2 + shape + np.log(spread) / 2, coverage
 
-    def measured(self, a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
+    def measured(
+        self, a: Float64, b: Float64, sight: Float64, variance: float, before: Float64
+    ) -> tuple[Float64, Float64, Float64]:
         """Displacement between k-DOPs with its covariance.
 
         An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the
-        object moved by the mean of both ends where they agree, else by the displacement of the end that moved less.
+        object moved by the mean of both ends where they agree. Where they do not, it moved as the end that is nearer
+        to the sensor, since an object hides its own far end. Across the line of sight it moved as the end that moved
+        less.
         The disagreement of the two ends is a variance of the position along that axis, which lasts: the next k-DOP is
         compared with one that was already in doubt.
 
         Args:
             a: (8, K) k-DOPs before [m].
             b: (8, K) and after [m].
+            sight: (2, K) unit vectors from the sensor to the objects; zero where no end is nearer.
             variance: variance of the displacement if the ends agree [m2].
             before: (4, K) variance along each axis by ends that disagreed, a frame ago [m2].
 
@@ -151,8 +157,10 @@ class GeometryKernels:
             end_variance: (4, K) variance along each axis by ends that disagree, or did [m2].
         """
         tuning = self.shape_tuning
-        along, disagreement, growth = shift_along_axes(a, b, tuning)
-        doubt = tuning.disagreement * tuning.disagreement
+        nearer = nearer_ends(sight, tuning)
+        along, disagreement, growth = shift_along_axes(a, b, tuning, nearer)
+        near = tuning.near_disagreement * tuning.near_disagreement
+        doubt = np.where(nearer != 0.0, near, tuning.disagreement * tuning.disagreement)
         end_variance = np.maximum(doubt * disagreement * np.square(growth), tuning.end_variance_decay * before)
         np.minimum(end_variance, doubt * np.square(widths(b).max(axis=0)), out=end_variance)
         # The four axes together weigh as much as one measurement in each direction.

@@ -71,7 +71,7 @@ _SIGNATURES: Signatures = {
     "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _TUNING, OutputArgument)),
     "modt_measured": (
         None,
-        (FLOAT64, FLOAT64, _L, _D, FLOAT64, _TUNING, OutputArgument, OutputArgument, OutputArgument),
+        (FLOAT64, FLOAT64, FLOAT64, _L, _D, FLOAT64, _TUNING, OutputArgument, OutputArgument, OutputArgument),
     ),
     "modt_pair_costs": (
         None,
@@ -193,13 +193,15 @@ class NativeGeometryKernels(GeometryKernels):
         )  # fmt: skip
         return share
 
-    def measured(self, a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
+    def measured(
+        self, a: Float64, b: Float64, sight: Float64, variance: float, before: Float64
+    ) -> tuple[Float64, Float64, Float64]:
         """Displacement between k-DOPs a and b (8, K) with its covariance, and the variance by ends that disagree."""
         n = a.shape[1]
         shift = np.empty((n, 2))
         covariance = np.empty((n, 2, 2))
         end_variance = np.empty((4, n))
-        self.library.modt_measured(a, b, n, variance, before, self._tuning, shift, covariance, end_variance)
+        self.library.modt_measured(a, b, sight, n, variance, before, self._tuning, shift, covariance, end_variance)
         return shift, covariance, end_variance
 
     def pair_costs(

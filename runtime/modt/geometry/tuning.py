@@ -34,6 +34,15 @@ class ShapeTuning:
     that is less. Greater: the filter trusts such axes less.
     Chosen on: simulated drives, by the consistency of the filter (NEES)."""
 
+    near_cosine: float = 0.38
+    """Cosine of the angle between an axis and the line of sight from which one end along the axis is nearer to the
+    sensor, and measures displacements. Less: the near side of what is seen across is taken for its end.
+    Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
+
+    near_disagreement: float = 0.05
+    """As `disagreement`, where the nearer end measures. Greater: what grows in view is followed later.
+    Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
+
     end_variance_decay: float = 0.97
     """Share of the variance by ends that disagreed that is left a frame later.
     Chosen on: simulated drives, by the consistency of the filter (NEES)."""

@@ -155,7 +155,8 @@ EXPORT i64 modt_overlapping_pairs(const double *a, i64 n_a, const double *b, i64
 
 /* modt.geometry.tuning.ShapeTuning, which says what each member does. */
 typedef struct {
-    double end_jitter_m, width_softening_m, area_padding_m, agreement_m, disagreement, end_variance_decay;
+    double end_jitter_m, width_softening_m, area_padding_m, agreement_m, disagreement, near_cosine, near_disagreement;
+    double end_variance_decay;
 } ShapeTuning;
 
 typedef struct {
@@ -180,6 +181,15 @@ static inline double sum_x(const double along[AXES])
 static inline double sum_y(const double along[AXES])
 {
     return along[NORTH] + HALF_ROOT * (along[NORTH_EAST] + along[NORTH_WEST]);
+}
+
+/* Coordinates of a vector along the four axes. */
+static inline void along_axes(double x, double y, double along[AXES])
+{
+    along[EAST] = x;
+    along[NORTH_EAST] = HALF_ROOT * (x + y);
+    along[NORTH] = y;
+    along[NORTH_WEST] = HALF_ROOT * (y - x);
 }
 
 /* pair_costs: costs of n_pairs pairs (rows[p], columns[p]) of shapes a and b, and how much of the smaller one is covered.
@@ -244,13 +254,15 @@ EXPORT void modt_coverage(const double *a, i64 n_a, const double *b, i64 n_b, co
     }
 }
 
-/* measured: displacements from k-DOPs a to b (8, n) with their covariances. `end_variance` (4, n) is the variance by ends
- * that disagree; `before` (4, n) is what it was a frame ago. */
-EXPORT void modt_measured(const double *a, const double *b, i64 n, double variance, const double *before,
+/* measured: displacements from k-DOPs a to b (8, n) with their covariances. `sight` (2, n) are unit vectors from the
+ * sensor. `end_variance` (4, n) is the variance by ends that disagree; `before` (4, n) is what it was a frame ago. */
+EXPORT void modt_measured(const double *a, const double *b, const double *sight, i64 n, double variance,
+                          const double *before,
                           const ShapeTuning *tuning, double (*shift)[2], double (*covariance)[2][2],
                           double *end_variance)
 {
-    double doubt = tuning->disagreement * tuning->disagreement;
+    const double doubt_across = tuning->disagreement * tuning->disagreement;
+    const double doubt_near = tuning->near_disagreement * tuning->near_disagreement;
     for (i64 i = 0; i < n; i++) {
         /* Along each axis: twice the mean displacement of its ends, and by how much the width grew. */
         double both[AXES], growth[AXES], widest = -INFINITY, longest = 1.0;
@@ -262,17 +274,22 @@ EXPORT void modt_measured(const double *a, const double *b, i64 n, double varian
             widest = maxd(widest, width);
             longest = maxd(longest, maxd(width, width - growth[k])); /* after and before */
         }
-        double weight[AXES], weighted[AXES];
+        double weight[AXES], weighted[AXES], seen_along[AXES];
+        along_axes(sight[i], sight[n + i], seen_along);
         for (int k = 0; k < AXES; k++) {
             double relative_growth = growth[k] * (longest / tuning->agreement_m);
             double agreement = maxd(1 - relative_growth * relative_growth, 0.0);
             double disagreement = 1 - agreement * agreement;
+            const int is_near = __builtin_fabs(seen_along[k]) > tuning->near_cosine;
+            const double doubt = is_near ? doubt_near : doubt_across;
+            const double to_end = is_near ? __builtin_copysign(1.0, seen_along[k]) * growth[k]
+                                          : __builtin_copysign(growth[k], both[k]);
             double by_ends = maxd(doubt * disagreement * (growth[k] * growth[k]),
                                   tuning->end_variance_decay * before[k * n + i]);
             by_ends = mind(by_ends, doubt * (widest * widest));
             end_variance[k * n + i] = by_ends;
             weight[k] = 0.5 / (variance + by_ends);
-            weighted[k] = weight[k] * ((both[k] - disagreement * __builtin_copysign(growth[k], both[k])) / 2);
+            weighted[k] = weight[k] * ((both[k] - disagreement * to_end) / 2);
         }
         /* The inverse of the covariance is the sum over the axes of weight * axis * axis'. */
         double diagonal = (weight[NORTH_EAST] + weight[NORTH_WEST]) / 2;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
@@ -72,7 +73,11 @@ class KdopAssociation:
         mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
         before = tracks.end_variance.T.take(rows, axis=1)
         kdop = observations.kdop.take(columns, axis=1)
-        shift, covariance, end_variance = self._kernels.measured(mean, kdop, self._variance, before)
+        # What rests has its near end hidden by its neighbours as often as it hides its far end itself.
+        is_car = tracks.object_class[rows] == ObjectClass.CAR.value
+        near_end_measures = is_car & (tracks.moving_probability[rows] > 0.5)
+        sight = observations.sight(columns) * near_end_measures
+        shift, covariance, end_variance = self._kernels.measured(mean, kdop, sight, self._variance, before)
         return Matches(rows, columns, x + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:

@@ -158,7 +158,9 @@ def locate_pieces(
     off = kdop - mean
     off = np.where(both, 0.0, np.where(touched, -off[OPPOSITE], off))
     before = tracks.end_variance.T.take(rows, axis=1) + both[:4] * UNMEASURED_M2
-    shift, covariance, end_variance = now.kernels.measured(mean, mean + off, variance, before)
+    shift, covariance, end_variance = now.kernels.measured(
+        mean, mean + off, np.zeros((2, len(rows))), variance, before
+    )
     match_of_piece = (matches.rows == rows[:, None]).argmax(axis=1)
     # The pieces are new to their tracks, so the matches hold the expected positions, from which the shift leads.
     measured = matches._replace(

@@ -247,12 +247,12 @@ class Tracker:
         tuning = self._evidence
         length_m, width_m, height_m = frame.proposals.box[frame.matches.proposals, 3:6].T
         flat = (height_m < tuning.min_height_m) & (height_m < tuning.flat_height * length_m)
-        weighed = np.where(flat, np.minimum(log_ratio, 0.0), log_ratio)
+        known = self.tracks.object_class[frame.matches.rows] != ObjectClass.BACKGROUND.value
+        weighed = np.where(flat & ~known, np.minimum(log_ratio, 0.0), log_ratio)
         claims = (weighed > 0).nonzero()[0]
         if points is None or not len(claims):
             return weighed
         compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)
-        known = self.tracks.object_class[frame.matches.rows] != ObjectClass.BACKGROUND.value
         kind = np.where(known, 2, compact)[claims]
         sides = self._sight.bounded_sides(points, frame.proposals, frame.matches.proposals[claims])
         weighed[claims] *= self._weight_by_sides[kind, sides.sum(axis=1)]
