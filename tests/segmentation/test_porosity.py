@@ -73,3 +73,18 @@ def test_compiled_kernels_find_the_same_air(share):
     found = segmented(points, native)
     assert np.array_equal(expected.kind, found.kind)
     assert np.array_equal(expected.members, found.members)
+
+
+def test_rays_set_to_one_place_do_not_raise_the_density():
+    points, _ = scans.scan((), elevation=scans.VLP_16, step_deg=3 * STEP_DEG)
+    lost = np.tile(np.float32([[1.0, 0.1, -0.1, 0.0], [1.0, 0.5, -0.1, 0.0]]), (len(points), 1))
+    rays = RayDensity(SENSOR)
+    rays.update(np.concatenate([points, lost]))
+    assert 0.28 < rays.density < 0.38
+
+
+def test_the_density_is_at_most_the_one_of_the_profile():
+    points, _ = scans.scan((PERSON,), elevation=scans.VLP_16, step_deg=STEP_DEG / 3)
+    rays = RayDensity(SENSOR)
+    rays.update(points)
+    assert rays.density == 1.0

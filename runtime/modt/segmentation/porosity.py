@@ -16,26 +16,33 @@ from modt.types import NONE, Bool, Float32, Float64, Int
 
 WINDOW = 3
 """Side of the window of cells in which returns are counted."""
+DEFAULT_SPAN_DEG = -15.0, 15.0
+"""Elevations of the lowest and the highest beam of a sensor whose profile has none."""
 
 
 class RayDensity:
     """Density of the rays of a sensor, over the one of its profile.
 
     It is that of the densest part of the view in the first sweeps, 1 at most. A head that turns faster, or a driver
-    that thins the sweep, makes it less.
+    that thins the sweep, makes it less. Two denser directions are left out, in case a driver sets rays without a
+    return to one place.
 
     Args:
         sensor: spacing of the rays.
     """
 
     SWEEPS = 5
-    PARTS = 24  # of the view, in a turn
-    PART_RAD = 2 * np.pi / PARTS
+    DIRECTIONS = 24  # in a turn
+    PART_RAD = 2 * np.pi / DIRECTIONS  # height and width of a part of the view
+    LEFT_OUT = 2
 
     def __init__(self, sensor: SensorConfig) -> None:
         self.density = 0.0
         self._azimuth_step_rad = np.deg2rad(sensor.azimuth_step_deg)
         self._beams = sensor.beams
+        self._low_rad, high_rad = np.deg2rad(sensor.span_deg or DEFAULT_SPAN_DEG)
+        self._rows = max(round((high_rad - self._low_rad) / self.PART_RAD), 1)
+        self._row_rad = (high_rad - self._low_rad) / self._rows
         self._left = self.SWEEPS
 
     def update(self, points: Float32) -> None:
@@ -48,10 +55,14 @@ class RayDensity:
         seen = (extent > 0) & (extent < FAR_M)  # NaN is neither
         bearing = np.arctan2(y[seen], x[seen])
         tangent = z[seen] / np.maximum(np.hypot(x[seen], y[seen]), np.float32(1e-3))
-        part = np.floor(np.stack([bearing, np.arctan(tangent)]) / self.PART_RAD).astype(np.int64) % self.PARTS
+        direction = np.floor(bearing / self.PART_RAD).astype(np.int64) % self.DIRECTIONS
+        row = np.floor((np.arctan(tangent) - self._low_rad) / self._row_rad).astype(np.int64)
+        inside = (row >= 0) & (row < self._rows)
         solid_angle = np.broadcast_to(self._beams.step_rad(tangent) * self._azimuth_step_rad, tangent.shape)
-        of_part = np.bincount(part[0] * self.PARTS + part[1], solid_angle)
-        self.density = max(self.density, float(of_part.max(initial=0.0)) / self.PART_RAD**2)
+        part = (row * self.DIRECTIONS + direction)[inside]
+        of_part = np.bincount(part, solid_angle[inside], self._rows * self.DIRECTIONS).reshape(self._rows, -1)
+        densest = float(np.sort(of_part)[:, -1 - self.LEFT_OUT].max())
+        self.density = min(max(self.density, densest / (self.PART_RAD * self._row_rad)), 1.0)
 
 
 def mean_solidity(found: Clusters, label: Int, n: int) -> Float64:
