@@ -26,6 +26,8 @@ GRID_CELLS = 200
 """Cells of both grids of the segmentation per metre of range, at a cell of 1 m."""
 MAX_CELLS = 5e7
 """Greatest number of cells of both grids (200 MB)."""
+DEFAULT_SPAN_DEG = -15.0, 15.0
+"""Elevations of the lowest and the highest beam of a sensor whose profile has none."""
 REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 """Sensors whose reflectance a model may have learnt."""
 
@@ -306,6 +308,21 @@ class SensorConfig(StageConfig):
         """Elevations of the lowest and the highest beam; None if unknown."""
         beams = self.elevations_deg or self.elevation_span_deg
         return None if beams is None else (min(beams), max(beams))
+
+    @property
+    def assumed_span_deg(self) -> tuple[float, float]:
+        """`span_deg`, or DEFAULT_SPAN_DEG if it is unknown."""
+        return self.span_deg or DEFAULT_SPAN_DEG
+
+    @property
+    def rays_per_turn(self) -> float:
+        """Number of rays in a turn."""
+        if self.elevations_deg is not None:
+            beams = float(len(self.elevations_deg))
+        else:
+            low_deg, high_deg = self.assumed_span_deg
+            beams = (high_deg - low_deg) / self.elevation_step_deg + 1
+        return beams * 360 / self.azimuth_step_deg
 
     @property
     def person_seen_from_m(self) -> float | None:

@@ -97,12 +97,12 @@ class PointKind(IntEnum):
     GROUND = -1
     STRUCTURE = -2  # above the ground, part of a surface that is no object: wall, hedge, shelf, beam
     LOW = -3  # above the ground, of a group too low for an object
-    SPARSE = -4  # above the ground, of a group with too few points for an object
+    SPARSE = -4  # above the ground, of a group with too few points for an object, or that most rays pass: leaves
     OVERHEAD = -5  # of the ceiling, or higher than what is looked for
     OUT_OF_RANGE = -6  # too near, too far, in a blind sector, or no return
     OUT_OF_VIEW = -7  # outside the field of view
     FOOT = -8  # low, part of a proposal or a structure beside it
-    AIRBORNE = -9  # above the ground, where most rays pass: fog, dust, a flake, loose leaves
+    AIRBORNE = -9  # above the ground, where most rays pass, while the air is full of fog, dust or flakes
 
 
 class MotionState(IntEnum):

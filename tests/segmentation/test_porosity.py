@@ -88,3 +88,31 @@ def test_the_density_is_at_most_the_one_of_the_profile():
     rays = RayDensity(SENSOR)
     rays.update(points)
     assert rays.density == 1.0
+
+
+def leaves(share, centre=(3.0, 3.0, 0.0), radius_m=1.0, seed=0):
+    """A scan of a person and of a bush in which a share of the rays ends; what each point lies on, AIR of the bush."""
+    rng = np.random.default_rng(seed)
+    points, on = scans.scan((PERSON,), elevation=scans.VLP_16, step_deg=STEP_DEG)
+    range_m = np.linalg.norm(points[:, :3], axis=1)
+    direction = points[:, :3] / range_m[:, None]
+    along_m = direction @ centre
+    apart_m = np.sqrt(np.maximum(np.dot(centre, centre) - along_m**2, 0.0))
+    half_m = np.sqrt(np.maximum(radius_m**2 - apart_m**2, 0.0))
+    ends_m = rng.uniform(along_m - half_m, along_m + half_m)
+    in_leaves = (along_m > 0) & (half_m > 0) & (ends_m < range_m) & (rng.random(len(points)) < share)
+    points[in_leaves, :3] = (direction * ends_m[:, None])[in_leaves]
+    return points, np.where(in_leaves, AIR, on)
+
+
+def test_leaves_are_not_of_the_air():
+    points, on = leaves(0.2)
+    kind = segmented(points).kind
+    assert (on == AIR).sum() > 40
+    assert not (kind == PointKind.AIRBORNE).any()
+    assert (kind[(on == AIR) & (points[:, 2] > -1.0)] == PointKind.SPARSE).mean() > 0.5
+
+
+def test_a_flake_in_every_direction_is_of_the_air():
+    points, on = hazy(0.02)
+    assert (segmented(points).kind[on == AIR] == PointKind.AIRBORNE).mean() > 0.5

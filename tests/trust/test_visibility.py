@@ -39,7 +39,7 @@ def test_fog_has_its_visibility(visibility_m):
     assert after((share, 1.0)).visibility_m == pytest.approx(visibility_m, rel=0.05)
 
 
-def test_what_is_usual_in_clear_air_is_no_fog():
+def test_single_flakes_are_no_fog():
     estimate = after((0.025, 200.0))
     assert estimate.visibility_m is None
     assert not estimate.findings()

@@ -55,14 +55,15 @@ class Clusterer:
     def cluster(self, points: PointColumns, height: Float32) -> tuple[Clusters, Int | None]:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m].
 
-        In a sweep with much air, airborne points are left out and the others are clustered anew. Then the clusters
-        are those of the points at the places returned besides; else these are None.
+        Where the air is full, airborne points are left out and the others are clustered anew. Then the clusters are
+        those of the points at the places returned besides; else these are None.
         """
         found = self._cells(points, height)
-        if found.air.share <= self.tuning.max_sweep_share:
-            return self._clustered(found), None
+        if not self.porosity.is_full(found):
+            return self._clustered(found, PointKind.SPARSE), None
         solid = np.flatnonzero(~self.kernels.airborne_points(self.porosity, found))
-        return self._clustered(self._cells(points.take(solid), height.take(solid))), solid
+        solid_found = self._cells(points.take(solid), height.take(solid))
+        return self._clustered(solid_found, PointKind.AIRBORNE), solid
 
     def _cells(self, points: PointColumns, height: Float32) -> Clusters:
         """Cells of (K,) points, in no cluster yet."""
@@ -72,7 +73,7 @@ class Clusterer:
         kind = np.zeros(len(cells), np.int8)
         return Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, kind, 0, air)
 
-    def _clustered(self, found: Clusters) -> Clusters:
+    def _clustered(self, found: Clusters, kind_of_porous: PointKind) -> Clusters:
         """These cells in clusters that can be objects."""
         cluster, sizes = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
         cluster, sizes = self._people_split_off(cluster, sizes, found.cells, found.sampled, found.air.beam_m)
@@ -82,7 +83,7 @@ class Clusterer:
         kind = self._kind(sizes.merged(target))
         target_of_cell = target.take(cluster)
         is_porous = self.kernels.mean_solidity(found, target_of_cell, len(kind)) < self.tuning.min_cluster_solidity
-        kind[is_porous] = PointKind.AIRBORNE
+        kind[is_porous] = kind_of_porous
         valid = kind == PointKind.MEMBER
         return replace(
             found,

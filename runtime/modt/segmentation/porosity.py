@@ -16,8 +16,8 @@ from modt.types import NONE, Bool, Float32, Float64, Int
 
 WINDOW = 3
 """Side of the window of cells in which returns are counted."""
-DEFAULT_SPAN_DEG = -15.0, 15.0
-"""Elevations of the lowest and the highest beam of a sensor whose profile has none."""
+DIRECTIONS = 24
+"""Number of directions around the sensor in which returns are counted."""
 
 
 class RayDensity:
@@ -29,18 +29,21 @@ class RayDensity:
 
     Args:
         sensor: spacing of the rays.
+
+    Attributes:
+        in_view: (DIRECTIONS,) directions from which returns came.
     """
 
     SWEEPS = 5
-    DIRECTIONS = 24  # in a turn
     PART_RAD = 2 * np.pi / DIRECTIONS  # height and width of a part of the view
     LEFT_OUT = 2
 
     def __init__(self, sensor: SensorConfig) -> None:
         self.density = 0.0
+        self.in_view = np.zeros(DIRECTIONS, np.bool_)
         self._azimuth_step_rad = np.deg2rad(sensor.azimuth_step_deg)
         self._beams = sensor.beams
-        self._low_rad, high_rad = np.deg2rad(sensor.span_deg or DEFAULT_SPAN_DEG)
+        self._low_rad, high_rad = np.deg2rad(sensor.assumed_span_deg)
         self._rows = max(round((high_rad - self._low_rad) / self.PART_RAD), 1)
         self._row_rad = (high_rad - self._low_rad) / self._rows
         self._left = self.SWEEPS
@@ -53,16 +56,22 @@ class RayDensity:
         x, y, z = points[:, :3].T
         extent = np.abs(points[:, :3]).max(axis=1, initial=0.0)
         seen = (extent > 0) & (extent < FAR_M)  # NaN is neither
-        bearing = np.arctan2(y[seen], x[seen])
+        direction = direction_of(x[seen], y[seen])
         tangent = z[seen] / np.maximum(np.hypot(x[seen], y[seen]), np.float32(1e-3))
-        direction = np.floor(bearing / self.PART_RAD).astype(np.int64) % self.DIRECTIONS
         row = np.floor((np.arctan(tangent) - self._low_rad) / self._row_rad).astype(np.int64)
         inside = (row >= 0) & (row < self._rows)
         solid_angle = np.broadcast_to(self._beams.step_rad(tangent) * self._azimuth_step_rad, tangent.shape)
-        part = (row * self.DIRECTIONS + direction)[inside]
-        of_part = np.bincount(part, solid_angle[inside], self._rows * self.DIRECTIONS).reshape(self._rows, -1)
+        part = (row * DIRECTIONS + direction)[inside]
+        of_part = np.bincount(part, solid_angle[inside], self._rows * DIRECTIONS).reshape(self._rows, -1)
+        self.in_view |= of_part.any(axis=0)
         densest = float(np.sort(of_part)[:, -1 - self.LEFT_OUT].max())
         self.density = min(max(self.density, densest / (self.PART_RAD * self._row_rad)), 1.0)
+
+
+def direction_of(x: Float32, y: Float32) -> Int:
+    """(N,) direction, of DIRECTIONS, in which each place lies."""
+    direction: Int = np.floor(np.arctan2(y, x) * (DIRECTIONS / (2 * np.pi))).astype(np.int64) % DIRECTIONS
+    return direction
 
 
 def mean_solidity(found: Clusters, label: Int, n: int) -> Float64:
@@ -95,7 +104,9 @@ class PorosityFinder:
         self.reach_beams = np.float32(tuning.reach_beams)
         self.point_sqrt_range = np.float32(np.sqrt(tuning.point_range_m))
         self.max_sqrt_range = np.float32(np.sqrt(tuning.max_range_m))
+        self.tuning = tuning
         self.rays = RayDensity(sensor)
+        self._rays_per_direction = sensor.rays_per_turn / DIRECTIONS
         # A window is WINDOW * step * sqrt(range) wide, and returns of a beam are range * azimuth_step apart.
         self._usual_rays = WINDOW * grid.step / np.deg2rad(sensor.azimuth_step_deg)
 
@@ -126,6 +137,20 @@ class PorosityFinder:
         n_looked_at = int(cells.entries.take(near).sum())
         share = int(cells.entries[airborne].sum()) / max(n_looked_at, 1)
         return AirOfCells(beam_m, solidity[:-1], airborne, share)
+
+    def is_full(self, found: Clusters) -> bool:
+        """Whether the air of a sweep is full of fog, flakes or drops all round, or of a cloud nearby.
+
+        Most rays also pass through leaves. But those are in few directions, or fewer than the returns of surfaces.
+        """
+        air = found.air
+        if air.share > self.tuning.max_sweep_share:
+            return True
+        cells = np.flatnonzero(air.airborne)
+        direction = direction_of(found.sampled.x.take(cells), found.sampled.y.take(cells))
+        returns = np.bincount(direction, found.cells.entries.take(cells), DIRECTIONS)[self.rays.in_view]
+        enough = self.tuning.min_air_rays * self.rays.density * self._rays_per_direction
+        return bool(np.count_nonzero(returns >= enough) >= self.tuning.min_directions * len(returns) > 0)
 
     def airborne_points(self, found: Clusters) -> Bool:
         """(K,) airborne points: those of airborne cells, and those without enough others close by."""

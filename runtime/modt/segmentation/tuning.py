@@ -144,9 +144,15 @@ class PorosityTuning:
     point_range_m: float = 7.0
     """Range up to which single points are looked at [m]. More takes people behind dust for dust, less leaves fog
     above heads."""
-    max_sweep_share: float = 0.15
-    """Share of airborne returns among those above ground, above which all points are clustered anew without them.
-    Less takes time where hedges and woods are thin, more leaves dust on what it touches and flakes above heads."""
+    max_sweep_share: float = 0.3
+    """Share of airborne returns among those above ground, above which the air is full. Less takes woods and hedges
+    for fog, more leaves dust on what it touches."""
+    min_air_rays: float = 0.005
+    """Share of the rays of a direction that end in the air, from which the air is full there. Less takes leaves for
+    fog, more leaves flakes above heads."""
+    min_directions: float = 0.75
+    """Share of the directions in view in which that must be so, for the whole air to be full. Less takes hedges and
+    woods on both sides for fog, more misses fog between walls."""
     min_cluster_solidity: float = 0.24
     """Mean solidity of its returns from which a cluster can be an object. More takes people in fog for fog."""
     max_range_m: float = 15.0

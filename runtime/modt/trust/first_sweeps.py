@@ -29,7 +29,7 @@ def doubts(sweeps: Sequence[Float32], sensor: SensorConfig) -> Iterator[tuple[bo
     points = sweeps[-1]
     range_m = np.hypot(points[:, 0], points[:, 1])
     points = points[(range_m > 0) & (range_m < sensor.max_range_m)]
-    expected = n_rays(sensor)
+    expected = sensor.rays_per_turn
     if len(points) < FEW_SHARE * expected:
         yield True, f"{len(points)} returns of about {expected:.0f}", "uncover and clean the sensor"
     if not len(points):
@@ -46,13 +46,3 @@ def doubts(sweeps: Sequence[Float32], sensor: SensorConfig) -> Iterator[tuple[bo
     reach_m = float(np.quantile(near_far_m, 0.9))
     if reach_m < NEAR_M:
         yield False, f"nine tenths of the returns are within {reach_m:.1f} m", "look for fog, dust or a cover"
-
-
-def n_rays(sensor: SensorConfig) -> float:
-    """Number of firings in a turn, by the beams of a profile."""
-    if sensor.elevations_deg is not None:
-        beams = float(len(sensor.elevations_deg))
-    else:
-        low_deg, high_deg = sensor.span_deg or (-15.0, 15.0)
-        beams = (high_deg - low_deg) / sensor.elevation_step_deg + 1
-    return beams * 360 / sensor.azimuth_step_deg

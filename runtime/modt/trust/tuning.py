@@ -113,17 +113,9 @@ class VisibilityTuning:
     """Time over which the share is averaged [s].
     Chosen on: an alarm within 2 s."""
 
-    memory_s: float = 60.0
-    """Time over which the usual share in clear air is averaged [s].
-    Chosen on: judgement."""
-
-    clear_share: float = 0.03
-    """Share below which the air is clear, and its usual share is learned.
-    Chosen on: simulated streets and yards."""
-
     most_m: float = 1000.0
     """Visibility from which it is good, and no figure is given [m].
-    Chosen on: the share of returns in clear air."""
+    Chosen on: judgement."""
 
     degraded_m: float = 150.0
     """Visibility below which it is reported as a reason [m].

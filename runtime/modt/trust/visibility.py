@@ -11,7 +11,6 @@ import math
 import numpy as np
 
 from modt.config import SensorConfig
-from modt.trust.first_sweeps import n_rays
 from modt.trust.tuning import VisibilityTuning
 from modt.trust.watch import Finding
 from modt.types import Int8, PointKind, TrustLevel
@@ -21,7 +20,7 @@ CONTRAST = math.log(20)
 
 
 class VisibilityEstimate:
-    """Visibility of a sensor, against the returns of the air that it has in clear air: leaves, fences and edges.
+    """Visibility of a sensor by the returns of the air.
 
     Args:
         sensor: number of its rays.
@@ -33,10 +32,9 @@ class VisibilityEstimate:
 
     def __init__(self, sensor: SensorConfig, tuning: VisibilityTuning = VisibilityTuning()) -> None:
         self.visibility_m: float | None = None
-        self._n_rays = n_rays(sensor)
+        self._n_rays = sensor.rays_per_turn
         self._tuning = tuning
         self._share = 0.0  # of the rays that end in the air
-        self._usual = 0.0  # the same in clear air
         self._last_s: float | None = None
 
     def add(self, kind: Int8 | None, time_s: float) -> None:
@@ -49,9 +47,7 @@ class VisibilityEstimate:
         gain = 1.0 if self._last_s is None else min(elapsed_s / self._tuning.mean_s, 1.0)
         self._last_s = time_s
         self._share += gain * (share - self._share)
-        if self._share < self._tuning.clear_share:
-            self._usual += min(elapsed_s / self._tuning.memory_s, 1.0) * (self._share - self._usual)
-        extinction_per_m = -math.log(1.0 - min(max(self._share - self._usual, 0.0), 0.99)) / self._tuning.depth_m
+        extinction_per_m = -math.log(1.0 - min(self._share, 0.99)) / self._tuning.depth_m
         visible = extinction_per_m * self._tuning.most_m < CONTRAST
         self.visibility_m = None if visible else CONTRAST / extinction_per_m
 
