@@ -53,7 +53,6 @@ def test_components_are_those_of_a_flood_fill_and_lie_between_two_euclidean_radi
 @pytest.mark.parametrize("n", [1, 2, 7])
 def test_points_of_no_height_are_no_cluster(n):
     points = np.tile(np.float32([[5.0, 1.0, -0.5]]), (n, 1))
-    clusters, _ = Clusterer(SensorConfig(), SegmentationConfig()).cluster(
-        PointColumns.from_array(points), np.full(n, 1.0, np.float32)
-    )
-    assert clusters.n == 0
+    clusterer = Clusterer(SensorConfig(), SegmentationConfig())
+    cells = clusterer.occupied_cells(PointColumns.from_array(points), np.full(n, 1.0, np.float32))
+    assert clusterer.cluster(cells).n == 0

@@ -91,7 +91,7 @@ def test_the_density_is_at_most_the_one_of_the_profile():
 
 
 def leaves(share, centre=(3.0, 3.0, 0.0), radius_m=1.0, seed=0):
-    """A scan of a person and of a bush in which a share of the rays ends; what each point lies on, AIR of the bush."""
+    """A scan of a person and of a bush in which a share of the rays ends; what each lies on, AIR of it."""
     rng = np.random.default_rng(seed)
     points, on = scans.scan((PERSON,), elevation=scans.VLP_16, step_deg=STEP_DEG)
     range_m = np.linalg.norm(points[:, :3], axis=1)

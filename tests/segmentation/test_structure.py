@@ -42,8 +42,8 @@ def person(x, y):
 def clustered(points, kernels=NUMPY):
     """Clusters of points whose heights above ground are their z."""
     columns = PointColumns.from_array(points.astype(np.float32))
-    clusters, _ = Clusterer(SENSOR, SegmentationConfig(), kernels).cluster(columns, columns.z)
-    return clusters
+    clusterer = Clusterer(SENSOR, SegmentationConfig(), kernels)
+    return clusterer.cluster(clusterer.occupied_cells(columns, columns.z))
 
 
 def label(clusters):
@@ -146,7 +146,8 @@ def test_a_person_whose_hand_touches_a_wall_needs_its_surface_to_be_found(seed):
     without = replace(tuning, structure=replace(tuning.structure, max_lines=0))
     parted = []
     for each in (tuning, without):
-        clusters, _ = Clusterer(SENSOR, SegmentationConfig(), NUMPY, each).cluster(columns, columns.z)
+        clusterer = Clusterer(SENSOR, SegmentationConfig(), NUMPY, each)
+        clusters = clusterer.cluster(clusterer.occupied_cells(columns, columns.z))
         on_wall, on_person = np.split(label(clusters) != NONE, [len(of_wall)])
         parted.append(on_person.mean() > 0.5 and on_wall.mean() < 0.2)
     assert parted == [True, False]

@@ -121,41 +121,80 @@ static ALWAYS_INLINE float columns_at(float window_rays, float sqrt_range)
     return maxf(window_rays / sqrt_range, 1.0f);
 }
 
-/* PorosityFinder.air of n cells: returns the number of returns in airborne cells, of the number looked at, which is
- * written. Scratch: `place`, (n,). */
-EXPORT i64 modt_air(const PorosityRules *r, const Grid *grid, const Cells *cells, const float *sqrt_range,
-                    const float *beam_m, float window_rays, i32 n, i32 *place, float *solidity, uint8_t *airborne, i64 *looked_at)
+/* Square part of a grid around the sensor that holds all cells that are looked at, with those beside them. Between
+ * calls all are empty. */
+typedef struct {
+    i32 side, first;   /* cells of a side; row and column of the first in the grid */
+    i32 *returns;      /* (side, side) points of each cell, 0 of an empty one */
+    float *low, *high; /* (side, side) least and greatest height in each [m], infinite and -infinite of an empty one */
+    float *solidity;   /* (side, side) 0 of an empty one */
+} NearCells;
+
+/* Place of a cell among the near ones, or NONE */
+static ALWAYS_INLINE i32 near_place(const NearCells *near, const Cells *cells, i32 c)
 {
-    const CellMap map = map_of(grid, cells, n, place);
+    i32 row = cells->row[c] - near->first, column = cells->column[c] - near->first;
+    int inside = row >= 0 && row < near->side && column >= 0 && column < near->side;
+    return inside ? row * near->side + column : NONE;
+}
+
+/* Solidity of the window around a near cell with this many rays of a beam */
+static ALWAYS_INLINE float window_solidity(const NearCells *near, i32 at, float columns, float beam_m)
+{
+    i32 returns = 0;
+    float low = INFINITY, high = -INFINITY;
+    for (i32 row = at - near->side; row <= at + near->side; row += near->side)
+        for (i32 k = row - 1; k <= row + 1; k++) {
+            returns += near->returns[k];
+            low = minf(low, near->low[k]);
+            high = maxf(high, near->high[k]);
+        }
+    return returns > 1 ? (float)returns / (columns * ((high - low) / beam_m + 1.0f)) : 0.0f;
+}
+
+/* PorosityFinder.air of n cells: returns the number of returns in airborne cells, of the number looked at, which is
+ * written. */
+EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *cells, const float *sqrt_range,
+                    const float *beam_m, float window_rays, i32 n, float *solidity, uint8_t *airborne, i64 *looked_at)
+{
+    for (i32 c = 0; c < n; c++) {
+        i32 at = near_place(near, cells, c);
+        if (at == NONE)
+            continue;
+        near->returns[at] = (i32)cells->entries[c];
+        near->low[at] = cells->low[c];
+        near->high[at] = cells->high[c];
+    }
     i64 of_air = 0;
     *looked_at = 0;
     for (i32 c = 0; c < n; c++) {
-        solidity[c] = 1.0f;
-        if (!(sqrt_range[c] < r->max_sqrt_range))
-            continue;
-        i64 returns = 0;
-        *looked_at += cells->entries[c];
-        float low = INFINITY, high = -INFINITY;
-        for (i32 row = -map.side; row <= map.side; row += map.side)
-            for (i32 column = -1; column <= 1; column++) {
-                i32 other = cell_at(&map, place[c] + row + column);
-                if (other == NONE)
-                    continue;
-                returns += cells->entries[other];
-                low = minf(low, cells->low[other]);
-                high = maxf(high, cells->high[other]);
-            }
-        float rays = columns_at(window_rays, sqrt_range[c]) * ((high - low) / beam_m[c] + 1.0f);
-        solidity[c] = returns > 1 ? (float)returns / rays : 0.0f;
+        i32 at = near_place(near, cells, c);
+        int is_near = sqrt_range[c] < r->max_sqrt_range;
+        PROVEN(!is_near || (at > near->side && at < near->side * near->side - near->side - 1));
+        solidity[c] = is_near ? window_solidity(near, at, columns_at(window_rays, sqrt_range[c]), beam_m[c]) : 1.0f;
+        *looked_at += is_near ? cells->entries[c] : 0;
+        if (at != NONE)
+            near->solidity[at] = solidity[c];
     }
     for (i32 c = 0; c < n; c++) {
-        airborne[c] = solidity[c] < r->min_solidity;
-        for (i32 row = -map.side; airborne[c] && row <= map.side; row += map.side)
-            for (i32 column = -1; column <= 1; column++) {
-                i32 other = cell_at(&map, place[c] + row + column);
-                airborne[c] &= other == NONE || solidity[other] < r->min_solidity;
-            }
+        airborne[c] = 0;
+        if (!(solidity[c] < r->min_solidity))
+            continue;
+        const float *middle = near->solidity + near_place(near, cells, c);
+        float most = 0.0f;
+        for (i32 k = -1; k <= 1; k++)
+            most = maxf(most, maxf(maxf(middle[k - near->side], middle[k]), middle[k + near->side]));
+        airborne[c] = most < r->min_solidity;
         of_air += airborne[c] ? cells->entries[c] : 0;
+    }
+    for (i32 c = 0; c < n; c++) {
+        i32 at = near_place(near, cells, c);
+        if (at == NONE)
+            continue;
+        near->returns[at] = 0;
+        near->low[at] = INFINITY;
+        near->high[at] = -INFINITY;
+        near->solidity[at] = 0.0f;
     }
     return of_air;
 }

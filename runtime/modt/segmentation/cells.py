@@ -156,12 +156,13 @@ class AirOfCells:
     beam_m: Float32  # (C,) vertical distance of neighbouring beams [m]
     solidity: Float32  # (C,) share of the rays there that end there; 1 where it was not looked for
     airborne: Bool  # (C,) cells of returns from the air
-    share: float  # share of the returns in airborne cells, of all that were looked at
+    returns: int  # number of returns in airborne cells
+    share: float  # their share of all returns that were looked at
 
     @classmethod
     def none(cls, n: int) -> Self:
         """No air in n cells."""
-        return cls(np.ones(n, np.float32), np.ones(n, np.float32), np.zeros(n, np.bool_), 0.0)
+        return cls(np.ones(n, np.float32), np.ones(n, np.float32), np.zeros(n, np.bool_), 0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,29 +52,20 @@ class Clusterer:
         max_diagonal_m = min(tuning.strips.max_diagonal_m, config.max_extent_m)
         self.strips = replace(tuning.strips, max_diagonal_m=max_diagonal_m)
 
-    def cluster(self, points: PointColumns, height: Float32) -> tuple[Clusters, Int | None]:
-        """Clusters of (K,) points, K > 0, with (K,) heights above ground [m].
-
-        Where the air is full, airborne points are left out and the others are clustered anew. Then the clusters are
-        those of the points at the places returned besides; else these are None.
-        """
-        found = self._cells(points, height)
-        if not self.porosity.is_full(found):
-            return self._clustered(found, PointKind.SPARSE), None
-        solid = np.flatnonzero(~self.kernels.airborne_points(self.porosity, found))
-        solid_found = self._cells(points.take(solid), height.take(solid))
-        return self._clustered(solid_found, PointKind.AIRBORNE), solid
-
-    def _cells(self, points: PointColumns, height: Float32) -> Clusters:
-        """Cells of (K,) points, in no cluster yet."""
+    def occupied_cells(self, points: PointColumns, height: Float32) -> Clusters:
+        """Cells of (K,) points, K > 0, with (K,) heights above ground [m], in no cluster yet."""
         cells, sample, sampled, cell_of_point = self.kernels.occupied_cells(self.cells.fine, points, height)
         air = self.kernels.air(self.porosity, cells, sampled.sqrt_range, self._beam_m(sampled))
         cluster = np.full(len(cells), NONE)
         kind = np.zeros(len(cells), np.int8)
         return Clusters(points, height, cell_of_point, cells, sample, sampled, cluster, kind, 0, air)
 
-    def _clustered(self, found: Clusters, kind_of_porous: PointKind) -> Clusters:
-        """These cells in clusters that can be objects."""
+    def airborne_points(self, found: Clusters) -> Bool | None:
+        """(K,) airborne points, None unless the air is full."""
+        return self.kernels.airborne_points(self.porosity, found) if self.porosity.is_full(found) else None
+
+    def cluster(self, found: Clusters, kind_of_porous: PointKind = PointKind.SPARSE) -> Clusters:
+        """These cells in clusters that can be objects; a cluster that most rays pass is of a kind."""
         cluster, sizes = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
         cluster, sizes = self._people_split_off(cluster, sizes, found.cells, found.sampled, found.air.beam_m)
         found = replace(found, cluster_of_cell=cluster, n=len(sizes))

@@ -44,13 +44,15 @@ class Above(NamedTuple):
         """K."""
         return len(self.rows) - len(self.is_clear)
 
-    def without_air(self, solid: Int) -> Above:
-        """These points without those of the K that are airborne, given the places of the others."""
-        n_tall = self.n_tall
-        is_air = np.ones(n_tall, np.bool_)
-        is_air[solid] = False
-        self.kind[self.rows[:n_tall][is_air]] = PointKind.AIRBORNE
-        kept = np.concatenate([solid, np.arange(n_tall, len(self.rows))])
+    @property
+    def tall(self) -> tuple[PointColumns, Float32]:
+        """The K points, and (K,) heights above the ground [m]."""
+        return self.points.part(0, self.n_tall), self.height_m[: self.n_tall]
+
+    def without(self, is_air: Bool) -> Above:
+        """These points without the airborne ones among the K, of a (K,) mask."""
+        self.kind[self.rows[: len(is_air)][is_air]] = PointKind.AIRBORNE
+        kept = np.flatnonzero(~np.append(is_air, np.zeros(len(self.is_clear), np.bool_)))
         return self._replace(
             rows=self.rows.take(kept), points=self.points.take(kept), height_m=self.height_m.take(kept)
         )

@@ -81,6 +81,12 @@ POROSITY_RULES = Layout(
     "PorosityRules",
     **_members(Number(_f32), "min_solidity", "reach_m", "reach_beams", "max_sqrt_range", "point_sqrt_range"),
 )
+NEAR_CELLS = Layout(
+    "NearCells",
+    **_members(Number(_i32), "side", "first"),
+    returns=Array(_i32, "side", "side"),
+    **_members(Array(_f32, "side", "side"), "low", "high", "solidity"),
+)
 PERSON_SIZE = Layout("PersonSize", **_members(Number(_f32), *(f.name for f in fields(PersonSize))))
 CLUSTER_RULES = Layout(
     "ClusterRules",
@@ -136,7 +142,7 @@ _SIGNATURES: Signatures = {
         _L,
         (POINT_COLUMNS, FLOAT32, _L, GRID, OutputArgument, POINT_COLUMNS, OutputArgument, CELLS),
     ),
-    "modt_air": (_L, (POROSITY_RULES, GRID, CELLS, FLOAT32, FLOAT32, _F, _I, *[OutputArgument] * 4)),
+    "modt_air": (_L, (POROSITY_RULES, NEAR_CELLS, CELLS, FLOAT32, FLOAT32, _F, _I, *[OutputArgument] * 3)),
     "modt_mean_solidity": (None, (INT64, FLOAT32, INT64, _L, _L, OutputArgument, OutputArgument)),
     "modt_airborne_points": (
         None,
@@ -210,6 +216,20 @@ def _clusters(clusters: Clusters) -> Filled:
 
 def _grid(grid: SqrtRangeGrid) -> Filled:
     return GRID.of(grid, cells_per_unit=1 / grid.step, table=np.empty((grid.side, grid.side), np.int32))
+
+
+def _near_cells(finder: PorosityFinder) -> Filled:
+    """Empty cells around the sensor, three more than are looked at on each side."""
+    reach = min(int(finder.max_sqrt_range / finder.grid.step) + 3, finder.grid.centre)
+    shape = (2 * reach, 2 * reach)
+    return NEAR_CELLS(
+        side=2 * reach,
+        first=finder.grid.centre - reach,
+        returns=np.zeros(shape, np.int32),
+        low=np.full(shape, np.inf, np.float32),
+        high=np.full(shape, -np.inf, np.float32),
+        solidity=np.zeros(shape, np.float32),
+    )
 
 
 def _cluster_rules(clusterer: CellClusterer) -> Filled:
@@ -287,18 +307,17 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         looked_at = np.empty(1, np.int64)
         of_air = self.library.modt_air(
             self._structure(POROSITY_RULES.of, finder),
-            self._structure(_grid, finder.grid),
+            self._structure(_near_cells, finder),
             CELLS.of(cells),
             sqrt_range,
             beam_m,
             finder.window_rays,
             n,
-            np.empty(n, np.int32),
             solidity,
             airborne,
             looked_at,
         )
-        return AirOfCells(beam_m, solidity, airborne, of_air / max(int(looked_at[0]), 1))
+        return AirOfCells(beam_m, solidity, airborne, of_air, of_air / max(int(looked_at[0]), 1))
 
     def mean_solidity(self, found: Clusters, label: Int, n: int) -> Float64:
         """(n,) mean solidity of the points of each label, given (C,) the label of each cell; 1 without points."""

@@ -135,8 +135,8 @@ class PorosityFinder:
         airborne = np.zeros(len(cells), np.bool_)
         airborne[near] = solidity.take(around, mode="wrap").max(axis=1) < self.min_solidity
         n_looked_at = int(cells.entries.take(near).sum())
-        share = int(cells.entries[airborne].sum()) / max(n_looked_at, 1)
-        return AirOfCells(beam_m, solidity[:-1], airborne, share)
+        n_airborne = int(cells.entries[airborne].sum())
+        return AirOfCells(beam_m, solidity[:-1], airborne, n_airborne, n_airborne / max(n_looked_at, 1))
 
     def is_full(self, found: Clusters) -> bool:
         """Whether the air of a sweep is full of fog, flakes or drops all round, or of a cloud nearby.
@@ -146,11 +146,15 @@ class PorosityFinder:
         air = found.air
         if air.share > self.tuning.max_sweep_share:
             return True
+        n_in_view = np.count_nonzero(self.rays.in_view)
+        enough = self.tuning.min_air_rays * self.rays.density * self._rays_per_direction
+        min_directions = self.tuning.min_directions * n_in_view
+        if air.returns < min_directions * enough:
+            return False
         cells = np.flatnonzero(air.airborne)
         direction = direction_of(found.sampled.x.take(cells), found.sampled.y.take(cells))
         returns = np.bincount(direction, found.cells.entries.take(cells), DIRECTIONS)[self.rays.in_view]
-        enough = self.tuning.min_air_rays * self.rays.density * self._rays_per_direction
-        return bool(np.count_nonzero(returns >= enough) >= self.tuning.min_directions * len(returns) > 0)
+        return bool(np.count_nonzero(returns >= enough) >= min_directions > 0)
 
     def airborne_points(self, found: Clusters) -> Bool:
         """(K,) airborne points: those of airborne cells, and those without enough others close by."""

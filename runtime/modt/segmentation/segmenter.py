@@ -62,10 +62,12 @@ class Segmenter:
         above = self._above_ground_in_view(points)
         if not len(above.rows):
             return Proposals.empty(above.kind)
-        n_tall = above.n_tall
-        tall, solid = self.clusterer.cluster(above.points.part(0, n_tall), above.height_m[:n_tall])
-        if solid is not None:
-            above = above.without_air(solid)
+        cells = self.clusterer.occupied_cells(*above.tall)
+        is_air = self.clusterer.airborne_points(cells)
+        if is_air is not None:
+            above = above.without(is_air)
+            cells = self.clusterer.occupied_cells(*above.tall)
+        tall = self.clusterer.cluster(cells, PointKind.SPARSE if is_air is None else PointKind.AIRBORNE)
         tall = self._seen(tall)
         low, places, feet = self.low.find(above, tall)
         low = self._seen(low)
