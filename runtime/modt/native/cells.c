@@ -143,22 +143,21 @@ static ALWAYS_INLINE float window_solidity(const NearCells *near, i32 at, float 
 {
     i32 returns = 0;
     float low = INFINITY, high = -INFINITY;
-    for (i32 row = at - near->side; row <= at + near->side; row += near->side)
-        for (i32 k = row - 1; k <= row + 1; k++) {
-            returns += near->returns[k];
-            low = minf(low, near->low[k]);
-            high = maxf(high, near->high[k]);
-        }
+    for (i32 k = at - near->side; k <= at + near->side; k += near->side) {
+        returns += near->returns[k - 1] + near->returns[k] + near->returns[k + 1];
+        low = minf(low, minf(near->low[k - 1], minf(near->low[k], near->low[k + 1])));
+        high = maxf(high, maxf(near->high[k - 1], maxf(near->high[k], near->high[k + 1])));
+    }
     return returns > 1 ? (float)returns / (columns * ((high - low) / beam_m + 1.0f)) : 0.0f;
 }
 
 /* PorosityFinder.air of n cells: returns the number of returns in airborne cells, of the number looked at, which is
- * written. */
+ * written. Scratch: `place`, (n,). */
 EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *cells, const float *sqrt_range,
-                    const float *beam_m, float window_rays, i32 n, float *solidity, uint8_t *airborne, i64 *looked_at)
+                    const float *beam_m, float window_rays, i32 n, i32 *place, float *solidity, uint8_t *airborne, i64 *looked_at)
 {
     for (i32 c = 0; c < n; c++) {
-        i32 at = near_place(near, cells, c);
+        i32 at = place[c] = near_place(near, cells, c);
         if (at == NONE)
             continue;
         near->returns[at] = (i32)cells->entries[c];
@@ -168,7 +167,7 @@ EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *
     i64 of_air = 0;
     *looked_at = 0;
     for (i32 c = 0; c < n; c++) {
-        i32 at = near_place(near, cells, c);
+        i32 at = place[c];
         int is_near = sqrt_range[c] < r->max_sqrt_range;
         PROVEN(!is_near || (at > near->side && at < near->side * near->side - near->side - 1));
         solidity[c] = is_near ? window_solidity(near, at, columns_at(window_rays, sqrt_range[c]), beam_m[c]) : 1.0f;
@@ -180,7 +179,7 @@ EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *
         airborne[c] = 0;
         if (!(solidity[c] < r->min_solidity))
             continue;
-        const float *middle = near->solidity + near_place(near, cells, c);
+        const float *middle = near->solidity + place[c];
         float most = 0.0f;
         for (i32 k = -1; k <= 1; k++)
             most = maxf(most, maxf(maxf(middle[k - near->side], middle[k]), middle[k + near->side]));
@@ -188,7 +187,7 @@ EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *
         of_air += airborne[c] ? cells->entries[c] : 0;
     }
     for (i32 c = 0; c < n; c++) {
-        i32 at = near_place(near, cells, c);
+        i32 at = place[c];
         if (at == NONE)
             continue;
         near->returns[at] = 0;

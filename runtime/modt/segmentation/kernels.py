@@ -51,8 +51,8 @@ class Above(NamedTuple):
 
     def without(self, is_air: Bool) -> Above:
         """These points without the airborne ones among the K, of a (K,) mask."""
-        self.kind[self.rows[: len(is_air)][is_air]] = PointKind.AIRBORNE
-        kept = np.flatnonzero(~np.append(is_air, np.zeros(len(self.is_clear), np.bool_)))
+        self.kind[self.rows.take(np.flatnonzero(is_air))] = PointKind.AIRBORNE
+        kept = np.concatenate([np.flatnonzero(~is_air), np.arange(len(is_air), len(self.rows))])
         return self._replace(
             rows=self.rows.take(kept), points=self.points.take(kept), height_m=self.height_m.take(kept)
         )

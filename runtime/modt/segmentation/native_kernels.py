@@ -142,7 +142,7 @@ _SIGNATURES: Signatures = {
         _L,
         (POINT_COLUMNS, FLOAT32, _L, GRID, OutputArgument, POINT_COLUMNS, OutputArgument, CELLS),
     ),
-    "modt_air": (_L, (POROSITY_RULES, NEAR_CELLS, CELLS, FLOAT32, FLOAT32, _F, _I, *[OutputArgument] * 3)),
+    "modt_air": (_L, (POROSITY_RULES, NEAR_CELLS, CELLS, FLOAT32, FLOAT32, _F, _I, *[OutputArgument] * 4)),
     "modt_mean_solidity": (None, (INT64, FLOAT32, INT64, _L, _L, OutputArgument, OutputArgument)),
     "modt_airborne_points": (
         None,
@@ -313,6 +313,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
             beam_m,
             finder.window_rays,
             n,
+            np.empty(n, np.int32),
             solidity,
             airborne,
             looked_at,
