@@ -1,10 +1,10 @@
 """Write the figures of README.md and docs/paper.md, all at one commit.
 
-    python -m tools.docs.figures KITTI_ROOT [--further FILE] [--pandaset FOLDER] [--only readme|paper]
+    python -m tools.docs.figures KITTI_ROOT [--further FILE] [--pandaset FOLDER] [--only readme|weather|paper]
 
 KITTI_ROOT holds drive 0005 (2011_09_26) with its tracklets, FILE is the table of objects that these leave out
-(docs/evaluation.md), FOLDER a labelled PandaSet sequence. README.md takes a minute and a half of CPU time, and
-docs/paper.md three minutes. Without FOLDER the table has no row of PandaSet.
+(docs/evaluation.md), FOLDER a labelled PandaSet sequence. README.md takes three minutes of CPU time, half of them for
+its table of weather, and docs/paper.md three minutes. Without FOLDER the table has no row of PandaSet.
 """
 
 from __future__ import annotations
@@ -39,6 +39,14 @@ SEEDS = range(450, 453)
 """Seeds of the simulated drives of each sensor. No choice of this project is made on them."""
 SECONDS = 6.0
 """Duration of each of them [s]."""
+WEATHER_MARK = f"{MARK} weather"
+WEATHER_SENSOR = "vlp-16"
+WEATHERS = {
+    "snow of 2.5 mm/h": "snow:2.5",
+    "fog, 50 m of visibility": "fog:50",
+    "dust, optical depth 1.5": "dust:1.5",
+}
+"""Rows of the table of weather, and the `--weather` of `modt simulate` that makes their drives."""
 PANDASET_PROFILE = "pandar64"
 MODE = "accurate"
 BASELINE = "conventional"
@@ -54,16 +62,33 @@ SIMULATED_S = 2.0
 
 def readme(kitti: Path, further: Path | None, pandaset: Path | None) -> str:
     """Section of README.md: a row for each sensor, and two sentences on the KITTI drive."""
-    kinds = "detected", "recall", "precision", "length"
-    lines = [f"| at commit `{commit()}` | {' | '.join(kinds)} |", "|---|" + "---|" * len(kinds)]
+    lines = _head()
     for sensor, name in SENSORS.items():
-        made = [drives.simulated(scene, sensor, SECONDS, seed) for seed in SEEDS for scene in SCENES]
-        rows = [drives.judged(drive, MODE, k) for k, drive in enumerate(made)]
-        lines.append(_row(f"{name}, simulated", evaluation(rows)))
+        lines.append(_row(f"{name}, simulated", _simulated(sensor)))
     if pandaset is not None:
         drive = drives.labelled(pandaset, PANDASET_PROFILE)
         lines.append(_row("Pandar64, PandaSet (development)", evaluation([drives.judged(drive, MODE)])))
     return "\n".join([*lines, "", *on_kitti(drives.labelled(kitti, further=further))])
+
+
+def weather() -> str:
+    """Section of README.md on weather: the scenes and seeds of the first table, with one sensor."""
+    lines = _head()
+    for about, condition in WEATHERS.items():
+        name = f"{SENSORS[WEATHER_SENSOR]}, {about}: `--weather {condition}`"
+        lines.append(_row(name, _simulated(WEATHER_SENSOR, condition)))
+    return "\n".join(lines)
+
+
+def _head() -> list[str]:
+    kinds = "detected", "recall", "precision", "length"
+    return [f"| at commit `{commit()}` | {' | '.join(kinds)} |", "|---|" + "---|" * len(kinds)]
+
+
+def _simulated(sensor: str, weather: str | None = None) -> Evaluation:
+    """All simulated drives of a sensor in one weather."""
+    made = [drives.simulated(scene, sensor, SECONDS, seed, weather=weather) for seed in SEEDS for scene in SCENES]
+    return evaluation([drives.judged(drive, MODE, k) for k, drive in enumerate(made)])
 
 
 def on_kitti(drive: drives.Drive) -> Iterator[str]:
@@ -120,20 +145,22 @@ def main() -> None:
     options.add_argument("kitti", type=Path, metavar="KITTI_ROOT")
     options.add_argument("--further", type=Path, metavar="FILE")
     options.add_argument("--pandaset", type=Path, metavar="FOLDER")
-    options.add_argument("--only", choices=("readme", "paper"))
+    options.add_argument("--only", choices=("readme", "weather", "paper"))
     args = options.parse_args()
     host.pin_to_core(None)
     drive = next((d for d in kitti_drives(args.kitti) if d.number == DRIVE and d.scans), None)
     if drive is None:
         options.error(f"{args.kitti}: no drive {DRIVE} with labels and sweeps")
-    if args.only != "paper":
-        _write(ROOT / "README.md", readme(drive.path, args.further, args.pandaset))
-    if args.only != "readme":
-        _write(ROOT / "docs" / "paper.md", paper_page(drive, args.further))
+    if args.only in (None, "readme"):
+        _write(ROOT / "README.md", MARK, readme(drive.path, args.further, args.pandaset))
+    if args.only in (None, "readme", "weather"):
+        _write(ROOT / "README.md", WEATHER_MARK, weather())
+    if args.only in (None, "paper"):
+        _write(ROOT / "docs" / "paper.md", MARK, paper_page(drive, args.further))
 
 
-def _write(page: Path, made: str) -> None:
-    page.write_text(replace_section(page.read_text(encoding="utf-8"), MARK, made), encoding="utf-8")
+def _write(page: Path, mark: str, made: str) -> None:
+    page.write_text(replace_section(page.read_text(encoding="utf-8"), mark, made), encoding="utf-8")
 
 
 if __name__ == "__main__":

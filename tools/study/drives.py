@@ -34,9 +34,9 @@ class Drive:
     fov: FieldOfView = field(default_factory=FieldOfView)
 
 
-def simulated(scene: str, sensor: str, seconds: float, seed: int) -> Drive:
-    """A simulated drive, labelled all round."""
-    stream = SyntheticStream(scene, sensor, seconds, seed)
+def simulated(scene: str, sensor: str, seconds: float, seed: int, *, weather: str | None = None) -> Drive:
+    """A simulated drive, labelled all round, in the weather of `modt simulate`."""
+    stream = SyntheticStream(scene, sensor, seconds, seed, weather=weather)
     frames = []
     for frame, truth in stream.sweeps():
         names = [kind.name for kind in truth.kinds]

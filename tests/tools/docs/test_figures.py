@@ -78,3 +78,13 @@ def perfect(drive: DriveRows) -> DriveRows:
     proposals = drive.proposals.copy()
     proposals["posterior"] = np.eye(4)[proposals["label"]]
     return replace(drive, proposals=proposals)
+
+
+@pytest.mark.slow
+def test_the_table_of_weather_names_the_options_that_made_each_row(monkeypatch):
+    monkeypatch.setattr(figures, "SEEDS", [2])
+    monkeypatch.setattr(figures, "SECONDS", 0.4)
+    _, _, *rows = figures.weather().splitlines()
+    assert [re.search(r"`(.*)`", row).group(1) for row in rows] == [
+        f"--weather {weather}" for weather in ("snow:2.5", "fog:50", "dust:1.5")
+    ]
