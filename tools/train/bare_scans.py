@@ -203,7 +203,7 @@ def _bush(rng: Generator) -> Solids:
     return Solids.join(parts)
 
 
-def _sapling(rng: Generator) -> Solids:
+def sapling(rng: Generator) -> Solids:
     """A young or pruned tree, vine or shrub: a thin trunk, branches, and foliage that hangs low."""
     bare = rng.uniform(0.3, 1.9)
     parts = [cylinder((0.0, 0.0, bare / 2 + 0.2), rng.uniform(0.02, 0.12), bare + 0.4, Material.BARK)]
@@ -236,8 +236,8 @@ def _thicket(rng: Generator) -> Solids:
 
 
 MAKERS: tuple[Callable[[Generator], Solids], ...] = (
-    _dome, _dome, _dome, _roof, _roof, _cone, _boulder, _rubble, _rubble, _bank, _stack, _bush, _bush, _sapling,
-    _sapling, _slab, _thicket,
+    _dome, _dome, _dome, _roof, _roof, _cone, _boulder, _rubble, _rubble, _bank, _stack, _bush, _bush, sapling,
+    sapling, _slab, _thicket,
 )  # fmt: skip
 
 
@@ -252,7 +252,7 @@ def _rows(builder: SceneBuilder) -> None:
             x = along + rng.normal(0.0, 0.2)
             y = row * gap + rng.normal(0.0, 0.1)
             c, s = np.cos(turn), np.sin(turn)
-            builder.scenery(_sapling(rng), float(c * x - s * y), float(s * x + c * y))
+            builder.scenery(sapling(rng), float(c * x - s * y), float(s * x + c * y))
 
 
 def _ground(rng: Generator) -> Terrain:

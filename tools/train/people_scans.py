@@ -45,6 +45,8 @@ PAIR_SHARE = 0.12
 """Share of the people who have another one close to them."""
 BACKED_SHARE = 0.15
 """Share of the people right before a wall, a counter or a machine."""
+ROWS_SHARE = 0.3
+"""Share of the scenes with rows of vines or young trees on both sides of the robot."""
 ROBOT_M = (0.4, 0.4)
 """Length and width of the robot, which nothing overlaps."""
 JOINTS = {"lean": 0.15, "hips_x": 0.04, "hips_z": 0.03, "hands_x": 0.12, "hands_z": 0.1, "feet_x": 0.08}
@@ -56,6 +58,8 @@ TOUCHING_M = 0.0
 def people_scene(rng: Generator, height_m: float) -> World:
     """A robot at rest among people in all postures and things of their size, in the open or between walls."""
     builder = SceneBuilder(rng, 4.0)
+    if rng.random() < ROWS_SHARE:
+        _rows(builder)
     for k in range(SLOTS):
         draw = rng.random()
         bearing = 2 * np.pi * (k + rng.uniform(-0.3, 0.3)) / SLOTS
@@ -87,6 +91,17 @@ def _backing(builder: SceneBuilder, distance_m: float, bearing: float) -> None:
     away = distance_m + rng.uniform(0.45, 0.9)
     size = (rng.uniform(0.2, 0.8), rng.uniform(0.8, 3.0), rng.uniform(0.8, 2.5))
     builder.scenery(block(size, Material.WALL), away * np.cos(bearing), away * np.sin(bearing), bearing)
+
+
+def _rows(builder: SceneBuilder) -> None:
+    """Add rows of vines or young trees along the way of the robot."""
+    rng = builder.rng
+    plant = (belongings.stake, bare_scans.sapling)[rng.integers(2)]
+    gap = rng.uniform(1.8, 4.5)
+    step = rng.uniform(0.8, 2.5)
+    for row in (-1.5, -0.5, 0.5, 1.5):
+        for along in np.arange(-14.0, 14.0, step) + rng.uniform(0.0, step):
+            builder.scenery(plant(rng), along + rng.normal(0.0, 0.1), row * gap + rng.normal(0.0, 0.06))
 
 
 def _joints(rng: Generator) -> dict[str, float]:
