@@ -34,10 +34,12 @@ function zoom(factor, px = canvas.width / 2, py = canvas.height / 2) {
   state.metre = metre;
 }
 
+// The nearest box at a place of the canvas; where several lie there, an object before background, a seen one before a lost one.
 function trackAt(px, py) {
   const [x, y] = place(px, py), near = 12 / state.metre;
   let best = null, least = Infinity;
-  for (const row of rowsAt[state.at] || []) {
+  const rows = [...(rowsAt[state.at] || [])].sort((a, b) => Boolean(b.class) - Boolean(a.class) || b.seen - a.seen);
+  for (const row of rows) {
     if (!state.background && !row.class) continue;
     const dx = x - row.x, dy = y - row.y, c = Math.cos(row.yaw), s = Math.sin(row.yaw);
     const u = Math.abs(c * dx + s * dy), v = Math.abs(c * dy - s * dx);
