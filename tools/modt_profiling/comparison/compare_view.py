@@ -11,6 +11,20 @@ from modt_profiling.comparison.prediction_report import against_table
 from modt_profiling.reporting import energy_plots
 from modt_profiling.reporting.document import Document, Plot, Table
 
+_UNITS = {
+    "E_seg": "energy of one segmentation",
+    "E_class": "energy of one classification",
+    "E_track": "energy of tracking a frame",
+    "seg_cpu_ms": "CPU time of one segmentation",
+    "class_cpu_ms": "CPU time of one classification",
+    "track_cpu_ms": "CPU time of tracking a frame",
+    "class_call_cpu_us": "CPU time of a call of the network",
+    "class_item_cpu_us": "further CPU time of each proposal in it",
+    "class_point_cpu_us": "further CPU time of each point in it",
+    "a": "a",
+}
+"""Names of the unit costs for people."""
+
 
 def compare_document(tree: dict[str, Any]) -> Document:
     """The energy saved, whether the counts explain it, and the distribution of the energy."""
@@ -29,7 +43,8 @@ def compare_document(tree: dict[str, Any]) -> Document:
     ]
     terms = [energy_plots.gamma_terms(f"{mode}: from N_go to gamma", s) for mode, s in tree["savings"].items()]
     blind = [against_table(tree["against"])] if "against" in tree else []
-    costs = Table(["unit", "cost by the run of varied load"], [[*item] for item in tree["unit_costs"].items()])
+    units = [[_UNITS[key], cost] for key, cost in tree["unit_costs"].items()]
+    costs = Table(["unit of work", "cost by the run of varied load"], units)
     return Document(
         f"Energy of {tree['stream']}", about, results, [*blind, _modes(tree), *terms, costs], tree["test"]
     )
@@ -41,14 +56,14 @@ def _modes(tree: dict[str, Any]) -> Table:
     rows = [
         ["energy of the pipeline", *(m["net_J"].scaled(1e3, "mJ") for m in modes)],
         [f"  with idling, {tree['basis']}", *(m["gross_J"].scaled(1e3, "mJ") for m in modes)],
-        *([f"  {stage}", *(m["stages"][stage]["energy_J"].scaled(1e3, "mJ") for m in modes)] for stage in stages),
-        ["cpu time", *(m["cpu_ms"] for m in modes)],
-        *([f"  {stage}", *(m["stages"][stage]["cpu_ms"] for m in modes)] for stage in stages),
+        *([f"  of {stage}", *(m["stages"][stage]["energy_J"].scaled(1e3, "mJ") for m in modes)] for stage in stages),
+        ["CPU time of the pipeline", *(m["cpu_ms"] for m in modes)],
+        *([f"  of {stage}", *(m["stages"][stage]["cpu_ms"] for m in modes)] for stage in stages),
         ["proposals", *(m["proposals"] for m in modes)],
         ["classified", *(m["classified"] for m in modes)],
         ["beta", *(m["beta"].scaled(1e2, "%") for m in modes)],
         ["N_go", *(m["N_go"] for m in modes)],
-        ["views a track", *(m["views"] for m in modes)],
+        ["classifications a track", *(m["views"] for m in modes)],
     ]
     return Table(["a frame", *tree["modes"]], rows)
 
@@ -61,8 +76,8 @@ def _verdict(saving: dict[str, Any]) -> str:
     interval = f"{100 * deviation.low:+.1f} to {100 * deviation.high:+.1f}"
     return (
         f"reconciled {saving['gamma_reconciled'].text()}; "
-        f"the reconciliation {closes}: deviation ~{100 * deviation.value:+.1f} % ({interval}, over frames); "
-        f"at a = {saving['a'].marked()} the error of gamma = N_go is ~{100 * short.value:+.0f} %"
+        f"the reconciliation {closes}: deviation {100 * deviation.value:+.1f} % ({interval}, over frames); "
+        f"at a = {saving['a'].marked()} the error of gamma = N_go is {100 * short.value:+.0f} %"
     )
 
 

@@ -38,7 +38,7 @@ TERMS = (
     "docs/energy.md derives gamma from n, N_go and a, and says what meters can tell",
 )
 """Symbols of the reports, explained at their foot."""
-CHART_IN = (4.4, 2.3)
+CHART_IN = (3.6, 2.3)
 """Width and height of a chart [inch]; a page stretches it to the width that it has."""
 
 
@@ -105,9 +105,10 @@ class Document:
 
     def page(self, plots: Sequence[Plot]) -> Page:
         """The report with its plots."""
-        notes = Section(lines=[self.test, LEGEND, *TERMS])
-        results = Section(tiles=self.results, plots=plots, tables=self.tables)
-        return Page(self.title, "; ".join(self.about), [results, notes])
+        results = Section(tiles=self.results, plots=plots)
+        tables = Section("Tables", lines=[LEGEND], tables=self.tables)
+        notes = Section("Terms", lines=[self.test, *TERMS])
+        return Page(self.title, "; ".join(self.about), [results, tables, notes])
 
 
 def _wrapped(text: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +37,8 @@ def reconciliation_tree(found: Reconciliation, gamma: float | None) -> dict[str,
     }
 
 
+_MAX_BARS = 30
+"""Greatest number of bars of a histogram."""
 _MAX_N_GO = 1000.0
 """Upper end of the N_go axis of the curve of Equation 3 [frames]."""
 
@@ -90,10 +93,12 @@ def proposal_counts(title: str, frames: Float64, counts: dict[str, list[float]],
 def length_histogram(title: str, lengths: dict[str, list[int]]) -> Plot:
     """Histogram of track lengths [frames], by the occurrences of each length."""
     longest = max([1, *lengths["values"]])
+    width = math.ceil(longest / _MAX_BARS)  # frames, so that each bar counts as many lengths
 
     def draw(axes: Axes) -> None:
-        axes.hist(lengths["values"], np.linspace(0.5, longest + 0.5, 31), weights=lengths["counts"])
-        axes.set(xlabel="frames seen", ylabel="tracks")
+        axes.hist(lengths["values"], np.arange(0.5, longest + width, width), weights=lengths["counts"], rwidth=0.9)
+        axes.set(xlabel="frames seen", ylabel="tracks", xlim=(0.0, longest + width))
+        axes.locator_params(axis="x", integer=True)
 
     return Plot(title, "counted", draw)
 
@@ -108,20 +113,20 @@ def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quanti
             return
         curve = np.array([EnergyModel(1.0, a.value, n.value, n_go).gamma for n_go in length.tolist()])
         short = length[length <= 10 * curve[-1]]
-        axes.plot(length, curve, label="Equation 3 at this a and n")
+        axes.plot(length, curve, label="Equation 3")
         axes.plot(short, short, "--", label="gamma = N_go")
         for name, (n_go, gamma) in runs.items():
             axes.plot(np.array([n_go.value], float), np.array([gamma.value], float), label=name)
 
-    return Plot("Gamma against N_go", f"dashed: gamma = N_go; line: Equation 3; {note}", draw)
+    return Plot("Gamma against N_go", f"dashed: gamma = N_go; line: Equation 3 at this a and n; {note}", draw)
 
 
 def gamma_terms(title: str, saving: dict[str, Any]) -> Table:
     """Table of the terms from gamma = N_go to the ratio of the runs, without those that change nothing."""
     short = ["the short form, gamma = N_go", "", saving["gamma_short"]]
     changes = [(term, f"{term['change'].value:+.3f}") for term in saving["terms"]]
-    rows = [[term["name"], f"~{change}", term["gamma"]] for term, change in changes if float(change)]
-    return Table([title, "change", "gamma"], [short, *rows])
+    rows = [[term["name"], change, term["gamma"]] for term, change in changes if float(change)]
+    return Table([title, "estimated change", "gamma"], [short, *rows])
 
 
 def conditions_text(conditions: dict[str, Any]) -> str:

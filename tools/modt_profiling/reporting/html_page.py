@@ -21,7 +21,7 @@ _ENVIRONMENT = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-_LEGEND_COLUMNS = 3
+_LEGEND_COLUMNS = 2
 _STYLE = {
     "axes.edgecolor": LIGHT["soft"],
     "axes.formatter.min_exponent": 4,  # numbers of a logarithmic axis are written out below 10 000
@@ -33,7 +33,7 @@ _STYLE = {
     "axes.spines.top": False,
     "axes.xmargin": 0.02,
     "axes.axisbelow": True,
-    "font.size": 8.5,
+    "font.size": 9.0,
     "grid.color": LIGHT["line"],
     "legend.columnspacing": 1.2,
     "legend.frameon": False,

@@ -236,7 +236,7 @@ def run_document(tree: dict[str, Any]) -> Document:
 
 
 def _stages(tree: dict[str, Any]) -> Table:
-    keys = {"cpu_ms": "cpu", "wall_ms": "wall", "calls": "calls", "items": "items", "points": "points"}
+    keys = {"cpu_ms": "CPU a frame", "wall_ms": "elapsed", "calls": "calls", "items": "items", "points": "points"}
     parts = tree["parts_J"]
     times = tree["cpu"]
     whole = sum(part.value or 0.0 for part in parts.values()) or 1.0
@@ -258,7 +258,8 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
     frames = np.cumsum(each) - each
     parts_mJ = energy_plots.stage_energy_mJ(series)
     basis = energy_plots.basis(tree["gross_J"])
-    baseline = "E1, tracking-by-detection (computed)"
+    note = f"E1: tracking-by-detection, estimated; E2: {basis}"
+    baseline = "E1, computed"
     run_mJ = np.sum([*parts_mJ.values()], axis=0)
     run_ms = np.sum([*series["cpu_ms"].values()], axis=0)
     further_ms = np.array(series["e1_cpu_ms"]) - run_ms  # CPU time of the classifications that E1 adds
@@ -267,7 +268,7 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
     point = {tree["mode"]: (saved["N_go"], saved["gamma_of_this_run"])}
     return [
         energy_plots.stage_energy("Energy by stage", parts_mJ, frames, basis),
-        energy_plots.cumulative_energy(energy_mJ, each, f"E2: {basis}; E1: estimated", dashed=baseline),
+        energy_plots.cumulative_energy(energy_mJ, each, note, dashed=baseline),
         energy_plots.gamma_curve(saved["a"], saved["proposals"], point, "dot: this run"),
         energy_plots.length_histogram("Lengths of tracks", series["lives"]),
         energy_plots.proposal_counts("Use of the budget", frames, used, series["budget"]),
