@@ -26,7 +26,7 @@ SHOWN = """({
   pixels: new Int32Array(image.data.buffer).reduce((n, value) => n + (value !== colours.paperPixel), 0),
   labels: drawn.filter(([name]) => name === "fillText").map(([, text]) => text),
   boxes: drawn.filter(([name]) => name === "fill").length,
-  facts: [...element("frame").children].map((child) => child.textContent).join(" "),
+  facts: [...element("answers").children, ...element("frame").children].map((child) => child.textContent).join(" "),
   story: element("story").innerText,
   legends: ["classes", "states", "stage-legend", "truth"].map((id) => element(id)?.textContent),
   wide: document.documentElement.scrollWidth > innerWidth,

@@ -11,7 +11,7 @@ costOf = (rows) => {
 state.kinds = run.left_out;
 state.truth = Boolean(run.truth);
 if (run.truth) {
-  element("states").insertAdjacentHTML("afterend", '<h2>Truth (dotted, key G)</h2><div class="legend" id="truth"></div>');
+  element("answers").insertAdjacentHTML("afterend", '<h2>Truth (dotted, key G)</h2><div class="legend" id="truth"></div>');
   legend("truth", Object.values(run.truth), true);
   KEYS.g = toggle("truth");
   factsOf = (frame) => {
@@ -31,7 +31,7 @@ function drawTruth({ outcome, class: class_, ...box }) {
   path(corners, true);
   stroke(colour, outcome === "missed" ? 3 : 1.5, [2, 2]);
   if (outcome === "missed" && state.labels)
-    write(`missed ${run.classes[class_].name}`, middleOf(corners), topOf(corners), colour);
+    write(`missed ${run.classes[class_].name}`, corners, colour, false);
 }
 
 const packedSweep = (at) => element(`points-${at}`).textContent;

@@ -20,6 +20,7 @@ from modt.profile import to_yaml
 from modt.sinks.records import BROKEN, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.types import NONE, Float64, FrameResult, Int
+from modt.viewer.html_page import trust_text
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE, planar, result_rows, scaled
 from modt_evaluation.recorded_result import recorded_result
@@ -78,6 +79,7 @@ class RecordedRun:
                     "proposals": len(result.proposals),
                     "classifications": classifications,
                     "deferred": result.n_deferred,
+                    "trust": trust_text(record["trust"]),
                 }
                 frames.append(counts | costs.get(result.frame.index, {}))
             except BROKEN as error:

@@ -21,9 +21,11 @@ from modt_evaluation.truth import FrameTruth, Truth
 
 MARGIN_M = 0.02
 """Margin around the boxes of proposals, because they are rounded."""
-ERROR = "#d6177f"
-"""Colour of errors: missed objects, whose outline is dotted, and false tracks."""
-_OUTCOMES = {"found": COLOURS[7], "missed": ERROR, "not judged": COLOURS[5], "false": ERROR}
+MISSED = "#d6177f"
+"""Colour of missed objects, whose outline is dotted."""
+FALSE = "#a86a00"
+"""Colour of false tracks, whose box is crossed out."""
+_OUTCOMES = {"found": COLOURS[7], "missed": MISSED, "not judged": COLOURS[5], "false": FALSE}
 LEGEND: dict[str, Entry] = {name: {"name": name, "colour": colour} for name, colour in _OUTCOMES.items()}
 """Outcomes of labelled objects; `false`: tracks that are reported as a wrong class."""
 DRAWN = [BOX_KEYS.index(key) for key in ("x", "y", "l", "w", "yaw")]

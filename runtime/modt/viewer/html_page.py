@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,11 @@ def content(states: list[theme.Entry], budget: str | None, step_cm: int | None) 
         "reach_m": REACH_M,
         "frames": [],
     }
+
+
+def trust_text(trust: Mapping[str, Any]) -> str:
+    """Level of a recorded trust, and the causes of one that is not good."""
+    return "; ".join([trust["level"], *(reason["cause"] for reason in trust["reasons"])])
 
 
 def page(name: str, about: str, known: dict[str, Any], script: Path) -> tuple[str, str]:

@@ -12,9 +12,9 @@ from modt.energy.ledger import LedgerLine
 from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.sinks.records import line
-from modt.types import FrameResult, PointKind, Trust
+from modt.types import FrameResult, PointKind
 from modt.viewer import theme
-from modt.viewer.html_page import LIVE, content, page
+from modt.viewer.html_page import LIVE, content, page, trust_text
 from modt.viewer.live_server import LiveServer
 from modt.viewer.packed import LEVEL_M, LEVELS, SIDE, Cells, group_of, occupied, packed_cells, packed_table
 from modt.viewer.track_rows import planar, result_rows, scaled
@@ -94,7 +94,7 @@ def live_message(result: FrameResult, costs: dict[str, Any], status: str = "") -
         "proposals": len(result.proposals),
         "classifications": len(result.classified),
         "deferred": result.n_deferred,
-        "trust": _trust_text(result.trust),
+        "trust": trust_text(result.trust.record()),
         "pose": planar(result.T_world_sensor).round(4).tolist(),
         **costs,
     }
@@ -106,11 +106,6 @@ def live_message(result: FrameResult, costs: dict[str, Any], status: str = "") -
         "points": packed_cells(live_cells(result).thinned(MOST_CELLS), FASTEST),
     }
     return line(content)
-
-
-def _trust_text(trust: Trust) -> str:
-    """Level and causes of a trust that is not good, else nothing."""
-    return "; ".join([trust.word, *(reason.cause for reason in trust.reasons)]) if trust.level else ""
 
 
 def live_cells(result: FrameResult) -> Cells:

@@ -8,8 +8,9 @@ const frames = run.frames, rowsAt = [], rowsOf = new Map(); // rows of the track
 let first = 0, last = frames.length - 1;
 
 const state = {
+  ready: false, // whether a frame has been read
   at: 0, playing: false, hovered: null, kept: null,
-  points: true, kinds: false, trails: true, background: true, labels: true,
+  points: true, kinds: false, trails: true, background: false, labels: true, details: false,
   up: true, metre: 10, x: 0, y: 0, // pixels a metre, and where the sensor is on the canvas
 };
 

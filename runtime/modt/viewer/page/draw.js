@@ -2,7 +2,8 @@
 
 const canvas = element("view"), context = canvas.getContext("2d", { alpha: false });
 const TRAIL = 30; // frames
-let sweep = null, pixels = null, palettes = {}, colours = {}, dot = 1, taken = [];
+let sweep = null, pixels = null, palettes = {}, colours = {}, dot = 1;
+let taken = [], boxes = []; // rectangles of texts, and of objects
 // A page may replace these: { text, colour } that marks a track, and drawing between the boxes and their labels.
 let markOf = (row) => null, drawMore = (frame) => {};
 
@@ -89,38 +90,68 @@ const reported = (row, digits) => {
 };
 const label = (row) => `#${row.id} ${reported(row, 0)}`;
 
-// A line of text centred at x, above y, or further up where another one lies; left out where there is no room.
-function write(text, x, y, colour, needed) {
-  const width = context.measureText(text).width, height = 14 * dot;
-  if (x < 0 || x > canvas.width || y < 0 || y > canvas.height + height) return;
-  const left = Math.max(2, Math.min(canvas.width - width - 2, x - width / 2));
-  for (let k = 0; k < 4; k++) {
-    const box = [left, y - (k + 1) * height, left + width, y - k * height];
-    if (!needed && taken.some((t) => box[0] < t[2] && t[0] < box[2] && box[1] < t[3] && t[1] < box[3])) continue;
-    taken.push(box);
-    if (k) {
-      path([[x, y], [x, box[3]]], false);
-      stroke(colours.soft, 1);
-    }
-    context.lineWidth = 3 * dot;
-    context.strokeStyle = colours.paper;
-    context.fillStyle = colour;
-    context.strokeText(text, box[0], box[3] - 3 * dot);
-    context.fillText(text, box[0], box[3] - 3 * dot);
-    return;
+// Rectangle around the corners of a box: left, top, right, bottom.
+function bounds(corners) {
+  const x = corners.map((corner) => corner[0]), y = corners.map((corner) => corner[1]);
+  return [Math.min(...x), Math.min(...y), Math.max(...x), Math.max(...y)];
+}
+
+const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+
+// Places of a text about a box, the preferred one first: above, below, at its sides, and further above.
+function places(width, [left, top, right, bottom]) {
+  const height = 14 * dot, gap = 2 * dot, centre = (left + right) / 2, middle = (top + bottom + height) / 2;
+  const x = Math.max(gap, Math.min(canvas.width - width - gap, centre - width / 2));
+  const feet = [[x, top - gap], [x, bottom + gap + height], [right + 2 * gap, middle], [left - 2 * gap - width, middle]];
+  for (let k = 1; k < 6; k++) feet.push([x, top - gap - k * height]);
+  return feet.map(([begin, foot]) => [begin, foot - height, begin + width, foot]);
+}
+
+// A text beside a box, at the first place that covers neither a text nor another box, else no text.
+// It is left out where there is no room, unless it is needed.
+function write(text, corners, colour, needed) {
+  const own = bounds(corners), x = (own[0] + own[2]) / 2;
+  if (x < 0 || x > canvas.width || own[3] < 0 || own[1] > canvas.height) return;
+  const all = places(context.measureText(text).width, own);
+  const free = all.filter((place) => !taken.some((other) => overlap(place, other)));
+  const place = free.find((place) => !boxes.some((box) => overlap(place, box))) ?? free[0] ?? (needed && all[0]);
+  if (!place) return;
+  taken.push(place);
+  if (place[3] < own[1] - 4 * dot) {
+    path([[x, own[1]], [x, place[3]]], false);
+    stroke(colours.soft, 1);
   }
+  context.lineWidth = 3 * dot;
+  context.strokeStyle = colours.paper;
+  context.fillStyle = colour;
+  context.strokeText(text, place[0], place[3] - 3 * dot);
+  context.fillText(text, place[0], place[3] - 3 * dot);
 }
 
 // Value of a motion that is known to be one.
 const MOVING = 2;
+// Direction of motion over ground, in the frame of the sensor [rad].
+const headingOf = (row) => row.world_heading - frames[state.at].pose[2];
+// Whether a track is drawn and can be pointed at: background on request.
+const isShown = (row) => state.background || row.class > 0;
+
+function arrow(from, to) {
+  const length = Math.hypot(to[0] - from[0], to[1] - from[1]), head = Math.min(7 * dot, length);
+  if (length < 2 * dot) return;
+  const u = (to[0] - from[0]) / length, v = (to[1] - from[1]) / length;
+  const barb = (side) => [to[0] - head * (u - side * v), to[1] - head * (v + side * u)];
+  path([from, to, barb(0.5), to, barb(-0.5)], false);
+  stroke(colours.ink, 1.5);
+}
 
 function drawTrack(row) {
   const chosen = row.id === (state.kept ?? state.hovered), object = row.class > 0;
   const box = outline(row), middle = screen(row.x, row.y), filled = run.classes[row.class].colour;
-  const edge = run.states[row.state].colour, mark = markOf(row);
+  const edge = state.details ? run.states[row.state].colour : filled, mark = markOf(row);
   if (state.trails && (object || chosen)) {
+    context.globalAlpha = chosen ? 1 : 0.4;
     path(trail(row), false);
-    stroke(filled, chosen ? 3 : 2);
+    stroke(filled, chosen ? 2 : 1.5);
   }
   path(box, true);
   context.globalAlpha = object ? 0.35 : row.seen ? 0.1 : 0.04;
@@ -129,21 +160,23 @@ function drawTrack(row) {
   context.globalAlpha = object || chosen ? 1 : row.seen ? 0.5 : 0.3;
   const shown = chosen ? colours.ink : mark?.colour ?? edge;
   stroke(shown, chosen || mark ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
-  if (object && row.motion === MOVING) {
-    const heading = row.world_heading - frames[state.at].pose[2], reach = row.world_speed_mps;
-    path([middle, screen(row.x + reach * Math.cos(heading), row.y + reach * Math.sin(heading))], false);
-    stroke(edge, 2);
+  if (mark) {
+    for (const corner of [0, 1]) {
+      path([box[corner], box[corner + 2]], false);
+      stroke(shown, 1.5);
+    }
   }
-  if (row.classified) {
+  if (object && row.motion === MOVING) {
+    const heading = headingOf(row), reach = row.world_speed_mps;
+    arrow(middle, screen(row.x + reach * Math.cos(heading), row.y + reach * Math.sin(heading)));
+  }
+  if (row.classified && state.details) {
     context.beginPath();
     context.arc(...middle, Math.max(9 * dot, 0.7 * state.metre * Math.hypot(row.l, row.w)), 0, 7);
     stroke(colours.ink, 1.5);
   }
   context.globalAlpha = 1;
 }
-
-const topOf = (box) => Math.min(...box.map((corner) => corner[1])) - 2 * dot;
-const middleOf = (box) => box.reduce((sum, corner) => sum + corner[0] / box.length, 0);
 
 function drawRings() {
   context.font = `${11 * dot}px system-ui,sans-serif`;
@@ -168,23 +201,25 @@ function draw() {
   taken = [[state.x - 10 * dot, state.y - 8 * dot, state.x + 10 * dot, state.y + 8 * dot]]; // the sensor
   drawPoints();
   drawRings();
+  if (!state.ready) return;
   const frame = frames[state.at], chosen = state.kept ?? state.hovered;
-  const shown = (rowsAt[state.at] || []).filter((row) => state.background || row.class || row.id === chosen);
+  const shown = (rowsAt[state.at] || []).filter((row) => isShown(row) || row.id === chosen);
+  boxes = shown.filter((row) => row.class).map((row) => bounds(outline(row)));
   shown.sort((a, b) => a.class - b.class || a.seen - b.seen);
   shown.forEach(drawTrack);
   context.font = `${12 * dot}px system-ui,sans-serif`;
   drawMore(frame);
   for (const row of shown.reverse())
     if ((state.labels && row.class) || row.id === chosen) {
-      const box = outline(row), { text, colour } = markOf(row) || { text: "", colour: colours.ink };
-      write(text + label(row), middleOf(box), topOf(box), colour, row.id === chosen);
+      const { text, colour } = markOf(row) || { text: "", colour: colours.ink };
+      write(text + label(row), outline(row), colour, row.id === chosen);
     }
   canvas.dataset.frame = frame.frame;
 }
 
 let drawing = false;
 function redraw() {
-  if (drawing || !frames[state.at]) return;
+  if (drawing) return;
   drawing = true;
-  requestAnimationFrame(() => { drawing = false; if (frames[state.at]) draw(); });
+  requestAnimationFrame(() => { drawing = false; draw(); });
 }

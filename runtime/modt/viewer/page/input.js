@@ -7,6 +7,7 @@ async function go(at) {
   const wanted = state.at, found = await readSweep(wanted);
   if (wanted !== state.at) return; // overtaken
   sweep = found;
+  state.ready = true;
   showFrame();
   showStory();
   redraw();
@@ -40,7 +41,7 @@ function trackAt(px, py) {
   let best = null, least = Infinity;
   const rows = [...(rowsAt[state.at] || [])].sort((a, b) => Boolean(b.class) - Boolean(a.class) || b.seen - a.seen);
   for (const row of rows) {
-    if (!state.background && !row.class) continue;
+    if (!isShown(row)) continue;
     const dx = x - row.x, dy = y - row.y, c = Math.cos(row.yaw), s = Math.sin(row.yaw);
     const u = Math.abs(c * dx + s * dy), v = Math.abs(c * dy - s * dx);
     const off = Math.hypot(Math.max(u - row.l / 2, 0), Math.max(v - row.w / 2, 0));
@@ -95,6 +96,7 @@ const KEYS = {
   "-": () => zoom(0.8),
   0: reset,
   r: toggle("up"), p: toggle("points"), k: toggle("kinds"), t: toggle("trails"), b: toggle("background"), l: toggle("labels"),
+  d: () => (element("details").open = !element("details").open),
   Escape: () => (state.kept = state.hovered = null),
 };
 document.onkeydown = (event) => {
@@ -107,7 +109,8 @@ document.onkeydown = (event) => {
 
 slider.oninput = () => go(Number(slider.value));
 element("play").onclick = (event) => { event.currentTarget.blur(); play(); }; // or Space would press it, too
-new ResizeObserver(() => { fit(); if (canvas.dataset.frame) redraw(); }).observe(canvas);
+element("details").ontoggle = (event) => { state.details = event.target.open; redraw(); };
+new ResizeObserver(() => { fit(); redraw(); }).observe(canvas);
 matchMedia("(prefers-color-scheme: dark)").onchange = () => { theme(); redraw(); };
 theme();
 reset();

@@ -23,7 +23,7 @@ async function take({ status, frame, states, tracks, points }) {
   await addTracks(tracks, at);
   frames[at] = frame;
   packedSweeps[at] = points;
-  notice.textContent = [status || "live", frame.trust].filter(Boolean).join("; ");
+  notice.textContent = status || "live";
   last = slider.max = at;
   forget(at - HISTORY);
   if (run.states.length !== states.length) legend("states", (run.states = states), true);

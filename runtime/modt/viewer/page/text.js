@@ -12,25 +12,71 @@ const time = (stamp) => stamp < 1e8 ? `${stamp.toFixed(2)} s` : new Date(1000 * 
 // A page may replace these: further names and values of a frame, and what the classification of a track cost.
 let factsOf = (frame) => [], costOf = (rows) => "";
 
-function showFrame() {
-  const frame = frames[state.at], rows = rowsAt[state.at] || [], list = element("frame");
-  const spent = frame.cpu_ms || {}, sum = (names) => names.reduce((total, name) => total + (spent[name] || 0), 0);
-  const cpu = sum(Object.keys(spent)), mJ = (value) => `${value.toFixed(value < 100 ? 1 : 0)} mJ, ${frame.kind}`;
-  const facts = [
-    ["number", `${frame.frame}`],
-    ["proposals", frame.proposals],
-    ["tracks, lost among them", `${rows.length}, ${rows.filter((row) => !row.seen).length}`],
-    ["reported as objects", rows.filter((row) => row.class && row.seen).length],
-    ["classified, deferred", `${frame.classifications}, ${frame.deferred}`],
-    ["budget", run.budget],
-    ["CPU time of the pipeline", cpu ? `${sum(run.pipeline).toFixed(1)} ms` : "not recorded"],
-    ["with reading and writing", cpu ? `${cpu.toFixed(1)} ms` : null],
-    ["energy of the pipeline", frame.pipeline_mJ === undefined ? null : mJ(frame.pipeline_mJ)],
-    ["energy of the process", frame.energy_mJ === undefined ? "not recorded" : mJ(frame.energy_mJ)],
-    ...factsOf(frame),
-  ];
+const NEAREST = 6; // movers that are listed
+const SIDES = ["ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right"];
+const energy = (mJ, { kind }) => `${mJ.toFixed(mJ < 100 ? 1 : 0)} mJ, ${kind}`;
+const rangeOf = (row) => Math.hypot(row.x, row.y);
+
+// A mover in words: what, where from the sensor, how fast, and whether it comes nearer.
+function describe(row) {
+  const side = SIDES[(Math.round(Math.atan2(row.y, row.x) / (Math.PI / 4)) + 8) % 8], heading = headingOf(row);
+  const nearer = -(row.x * Math.cos(heading) + row.y * Math.sin(heading)) / rangeOf(row);
+  const whither = nearer > 0.7 ? "comes nearer" : nearer < -0.7 ? "goes away" : "crosses";
+  const name = run.classes[row.class].name.replaceAll("_", " ");
+  return `${name} #${row.id}, ${rangeOf(row).toFixed(0)} m ${side}, ${row.world_speed_mps.toFixed(1)} m/s, ${whither}`;
+}
+
+// How many of each kind are around.
+function showAround(rows) {
+  element("classes").replaceChildren();
+  run.classes.forEach(({ name, colour }, k) => {
+    if (!k) return; // background
+    const n = rows.filter((row) => row.class === k).length;
+    const line = add(element("classes"), "span", "", { className: n ? "" : "none" });
+    add(line, "i").style.background = colour;
+    line.append(`${n} ${name.replaceAll("_", " ")}`);
+  });
+}
+
+function showMovers(rows) {
+  const movers = rows.filter((row) => row.class && row.motion === MOVING).sort((a, b) => rangeOf(a) - rangeOf(b));
+  const list = element("moving"), more = movers.length - NEAREST;
+  list.replaceChildren();
+  for (const row of movers.slice(0, NEAREST)) {
+    const keep = () => { state.kept = row.id; showStory(); redraw(); };
+    add(add(list, "li"), "button", describe(row), { onclick: keep });
+  }
+  if (!movers.length) add(list, "li", "nothing", { className: "soft" });
+  if (more > 0) add(list, "li", `and ${more} more`, { className: "soft" });
+}
+
+function showFacts(list, facts) {
   list.replaceChildren();
   for (const [name, value] of facts.filter(([, value]) => value !== null)) add(list, "dt", name), add(list, "dd", value);
+}
+
+function showFrame() {
+  const frame = frames[state.at], rows = rowsAt[state.at] || [], seen = rows.filter((row) => row.seen);
+  const spent = frame.cpu_ms || {}, sum = (names) => names.reduce((total, name) => total + (spent[name] || 0), 0);
+  const cpu = sum(Object.keys(spent));
+  showAround(seen);
+  showMovers(seen);
+  showFacts(element("answers"), [
+    ["trust", frame.trust],
+    ["CPU time of the pipeline", cpu ? `${sum(run.pipeline).toFixed(1)} ms` : "not recorded"],
+    ["energy of the pipeline", frame.pipeline_mJ === undefined ? null : energy(frame.pipeline_mJ, frame)],
+    ["energy of the process", frame.energy_mJ === undefined ? "not recorded" : energy(frame.energy_mJ, frame)],
+    ...factsOf(frame),
+  ]);
+  showFacts(element("frame"), [
+    ["number", `${frame.frame}`],
+    ["proposals", frame.proposals],
+    ["tracks, lost among them", `${rows.length}, ${rows.length - seen.length}`],
+    ["reported as objects", seen.filter((row) => row.class).length],
+    ["classified, deferred", `${frame.classifications}, ${frame.deferred}`],
+    ["budget", run.budget],
+    ["CPU time with reading and writing", cpu ? `${cpu.toFixed(1)} ms` : null],
+  ]);
   element("stages").replaceChildren();
   for (const { name, colour } of run.stages) {
     const part = (frame.cpu_ms || {})[name] || 0;
@@ -90,7 +136,6 @@ function legend(id, entries, outline) {
 }
 
 function legends() {
-  legend("classes", run.classes, false);
   legend("states", run.states, true);
   legend("stage-legend", run.stages, false);
   legend("kinds", run.points ? run.kinds : [], false);
