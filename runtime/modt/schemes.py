@@ -61,9 +61,12 @@ def _background(module: str, name: str, depth: int) -> Callable[[Address], Sink]
     """Opener of a writer that may wait; at most `depth` frames, with their points, wait for it."""
 
     def opened(address: Address) -> Sink:
-        from modt.sinks.background import Background
+        from modt.sinks.background import Background, StatusBackground
+        from modt.sinks.output import StatusSink
 
-        return Background(address.text, _opener(module, name)(address), depth)
+        writer = _opener(module, name)(address)
+        kind = StatusBackground if isinstance(writer, StatusSink) else Background
+        return kind(address.text, writer, depth)
 
     return opened
 

@@ -164,6 +164,8 @@ def test_the_run_is_seen_in_a_browser_while_it_goes_on(start, chromium):
         before = tab.value("last")
         tab.until(f"last > {before} + 2")
         assert tab.value("[state.at, canvas.dataset.frame === String(frames[1].frame)]") == [1, True]
+        tab.until("notice.textContent.includes('profile vlp-16, mode accurate')")
+        assert "modt_counts_frames_total" in tab.value("fetch('metrics').then((answer) => answer.text())")
         story = "(state.kept = rowsAt[1][0].id, showStory(), element('story').innerText)"
         assert "mJ" not in tab.value(story)  # what a track cost is known afterwards
         tab.press("End")

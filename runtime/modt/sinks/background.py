@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 from modt.energy.ledger import LedgerLine
 from modt.energy.windows import EnergyWindow
 from modt.errors import ModtError
-from modt.sinks.output import Health, LedgerSink, Writer
+from modt.sinks.output import Health, LedgerSink, StatusSink, Writer
 
 log = logging.getLogger(__name__)
 
@@ -163,3 +163,13 @@ class Background(Generic[T]):
         self._state = cause
         with self._changed:
             self._changed.wait_for(lambda: self._end_s is not None, self._retry_s)
+
+
+class StatusBackground(Background[T]):
+    """Background of a writer that also shows the status of a service."""
+
+    def status(self, words: str, metrics: str, /) -> None:
+        """Queue a status."""
+        writer = self._writer
+        assert isinstance(writer, StatusSink)
+        self._put(lambda: writer.status(words, metrics))
