@@ -20,7 +20,7 @@ from modt_profiling.reporting.run_sums import run_facts
 from modt_viewer.recorded_run import RecordedRun
 from tests.cli.commands import environment, here, modt, refusal
 from tests.recorded import drive_and_run
-from tests.viewer.chromium import LOADED, WIDE
+from tests.viewer.chromium import LOADED, SETTLED, WIDE
 from tests.viewer.pages import Page
 
 pytestmark = pytest.mark.command
@@ -133,6 +133,25 @@ def test_pointing_at_a_track_tells_its_story(run, records, chromium):
     assert shown["story"].count("classified: ") == times > 0
     assert f"{track['state'].replace('_', ' ')}, {track['points']} points" in shown["story"]
     assert "mJ of classification (estimated)" in shown["story"]
+
+
+def test_the_page_answers_first_what_is_around_and_what_moves(run, records, chromium):
+    seen = [track for track in records[9]["tracks"] if track["box"]]
+    movers = sum(track["motion"] == "moving" for track in seen)
+    with chromium.tab((run / "view.html").as_uri()) as tab:
+        tab.value(f"go(9).then(() => {SETTLED})")
+        around = tab.value("element('classes').innerText")
+        for name in CLASS_NAMES[1:]:
+            assert f"{sum(track['class'] == name for track in seen)} {name}" in around
+        listed = tab.value("[...element('moving').children].map((line) => line.innerText)")
+        assert len(listed) == 7 if movers > 6 else len(listed) == movers > 0
+        assert f"trust\n{records[9]['trust']['level']}" in tab.value("element('answers').innerText")
+        tab.value("element('moving').querySelector('button').click()")
+        number = re.search(r"#\d+", listed[0])[0]
+        assert tab.value("element('story').innerText").startswith(f"{number} ")
+        assert tab.value("element('states').checkVisibility()") is False
+        tab.press("d")
+        tab.until("state.details && element('states').checkVisibility()")
 
 
 def test_keys_step_and_hide(run, records, chromium):

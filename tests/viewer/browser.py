@@ -11,7 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 NAMES = "chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
-WAIT_S = 30.0
+WAIT_S = 120.0
+"""Time after which a page is taken to hang, on however busy a machine [s]."""
 OPTIONS = (
     "--headless=new",
     "--no-sandbox",

@@ -36,7 +36,10 @@ SHOWN = """({
 DRAWN = "canvas.dataset.frame !== undefined"
 LOADED = "document.readyState === 'complete' && location.protocol === 'file:'"
 WIDE = "document.documentElement.scrollWidth > innerWidth"
-SETTLED = "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 50))"
+SETTLED = """readSweep(state.at).then(
+  () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))
+)"""
+"""Promise that the frame shown, its points too, is drawn: the page has asked for both before."""
 
 
 class Chromium:
