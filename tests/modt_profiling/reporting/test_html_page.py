@@ -17,6 +17,7 @@ from modt_profiling.reporting.html_page import html, svg
 from modt_profiling.reporting.quantity import Quantity
 from modt_profiling.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
 from modt_profiling.reporting.view_extra import save
+from tests.viewer.chromium import LOADED, WIDE
 
 
 def drawn(plot):
@@ -37,6 +38,28 @@ def test_a_page_is_one_file_without_an_unescaped_name(run):
     for plot in plots:
         assert ElementTree.fromstring(plot).attrib["viewBox"]
         assert not re.search(r"\bnan|inf\b", plot)
+
+
+SCROLLED = "[...document.querySelectorAll('.table, .text')].filter((box) => box.scrollWidth > box.clientWidth).length"
+CUT = """[...document.querySelectorAll('.chart svg')].flatMap((svg) => {
+  const frame = svg.getBoundingClientRect();
+  const cut = (box) => box.left < frame.left - 1 || box.right > frame.right + 1 || box.top < frame.top - 1;
+  return [...svg.querySelectorAll('text')].filter((text) => cut(text.getBoundingClientRect()));
+}).map((text) => text.textContent)"""
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_tables_and_charts_fit_the_page(run, tmp_path, chromium, width):
+    tree = run_tree(run)
+    path = tmp_path / "report.html"
+    save(path, run_document(tree).page(run_plots(tree)))
+    with chromium.tab(path.as_uri(), width=width, ready=LOADED) as tab:
+        assert not tab.value(WIDE)
+        assert tab.value(CUT) == []
+        assert width < 1000 or tab.value(SCROLLED) == 0
+        cells = "[...document.querySelectorAll('td:first-child')]"
+        (line_px,) = tab.value(f"[...new Set({cells}.slice(0, 6).map((cell) => cell.clientHeight))]")
+        assert line_px < 40, "the names of the stages are whole"
 
 
 def test_a_line_of_one_point_has_a_mark_and_a_name_is_escaped():
