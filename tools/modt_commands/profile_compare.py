@@ -33,14 +33,11 @@ def run(arguments: argparse.Namespace) -> int:
     core = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.app.inputs import Request
+    from modt.cli.progress import bar
     from modt_profiling.comparison.compare import compare
     from modt_profiling.comparison.compare_view import compare_document, compare_plots
     from modt_profiling.reporting.quantity import to_json
     from modt_profiling.reporting.view_extra import save
-
-    def begin_repetition(number: int) -> None:
-        if sys.stderr.isatty():
-            print(f"modt-profile: {number} of {arguments.repeat}", file=sys.stderr)
 
     tree = compare(
         Request.of(arguments),
@@ -48,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         meter_name=arguments.meter,
         prediction=arguments.against,
         core=core,
-        begin_repetition=begin_repetition,
+        progress=lambda turns: bar(turns, "turn", shown=sys.stderr.isatty()),
     )
     document = compare_document(tree)
     if arguments.html is not None:

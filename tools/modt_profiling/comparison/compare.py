@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,8 @@ from modt_profiling.comparison.mode_runs import MODES, VARIED, Comparison, ident
 from modt_profiling.comparison.prediction_report import against, observed_tree, read_prediction
 from modt_profiling.energy.named_meter import choose_meter
 
+Progress = Callable[[int | None], AbstractContextManager[Callable[[str], None]]]
+
 
 def compare(
     request: inputs.Request,
@@ -25,7 +29,7 @@ def compare(
     meter_name: str | None,
     prediction: Path | None,
     core: int | None,
-    begin_repetition: Callable[[int], None],
+    progress: Progress,
 ) -> dict[str, Any]:
     """Run all modes, interleaved, and report them.
 
@@ -35,7 +39,8 @@ def compare(
         meter_name: meter to read; None for the best.
         prediction: file of a prediction to hold against the measurement.
         core: core that the process is pinned to.
-        begin_repetition: called with the number of each repetition, from 1 on.
+        progress: from the number of turns of the modes, or None where it is unknown, a context with the function that
+            is called after each turn.
 
     Raises:
         MisuseError: no usable frame, no such meter, or a prediction of something else.
@@ -48,10 +53,10 @@ def compare(
     meters = choose_meter(discover(profile.energy), meter_name).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
     comparison = Comparison(request, profile, core, meters if metered else ())
-    repetitions = []
-    for number in range(1, repeat + 1):
-        begin_repetition(number)
-        repetitions.append(comparison.repetition())
+    turns = None if info.n_frames is None else repeat * comparison.turns(info.n_frames)
+    with progress(turns) as end_turn:
+        numbers = range(1, repeat + 1)
+        repetitions = [comparison.repetition(partial(end_turn, f"repetition {n} of {repeat}")) for n in numbers]
     frames = len(repetitions[0][VARIED].lines)
     if not frames:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")

@@ -129,8 +129,13 @@ Repetition = dict[str, ModeRun]
 """One pass of every mode through the stream, by the name of the mode."""
 
 
-def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> None:
-    """Process every frame by every run, `turn` frames at a time, with the first run rotating."""
+def interleave(
+    stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int, end_turn: Callable[[], None] = lambda: None
+) -> None:
+    """Process every frame by every run, `turn` frames at a time, with the first run rotating.
+
+    `end_turn` is called between two turns, when nothing is measured.
+    """
     gc.collect()
     gc.freeze()
     frames = iter(stream)
@@ -141,6 +146,7 @@ def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> N
             for frame in block:
                 run.step(frame)
             run.end_turn()
+            end_turn()
         first = (first + 1) % len(runs)
     for run in runs:
         run.finish()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -44,15 +46,19 @@ class Comparison:
         """
         return 10**9 if self.meters else 1
 
-    def repetition(self) -> Repetition:
+    def repetition(self, end_turn: Callable[[], None]) -> Repetition:
         """Every mode once through the stream, from its initial state; all repetitions do the same work."""
         runs = {name: self._mode_run(name) for name in (*MODES, VARIED)}
         stream = inputs.stream(self.request)
         for frame in islice(stream, 1):
             for mode_run in runs.values():
                 _warm_up(mode_run, frame)
-        interleave(stream, [*runs.values()], self.turn_frames)
+        interleave(stream, [*runs.values()], self.turn_frames, end_turn)
         return runs
+
+    def turns(self, frames: int) -> int:
+        """Number of turns in a repetition of so many frames."""
+        return math.ceil(frames / self.turn_frames) * (len(MODES) + 1)
 
     def _mode_run(self, name: str) -> ModeRun:
         mode = assembly.MODES[BASELINE if name == VARIED else name]
