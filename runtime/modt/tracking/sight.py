@@ -20,6 +20,8 @@ from modt.types import OBSTACLES, Bool, Float32, Float64, Int, Int8, PointKind, 
 
 BEARINGS = 720
 """Bearings of the grid, of equal pseudo-angle."""
+WIDEST_RAD = 8.0 / BEARINGS
+"""Angle of the widest bearing of the grid, of those in which x and y are alike [rad]."""
 SLOPES = 32
 """Slopes of the grid, from LEAST_SLOPE on."""
 LEAST_SLOPE = np.float32(-0.6)
@@ -64,16 +66,17 @@ class Sight:
             box: (R, 7) boxes where the objects are expected, sensor frame. The shorter side is taken for the width.
         """
         every = self._every(points)
-        nearest = _nearest(points[::every], HIDES[kind[::every].astype(np.int64) + 128])
+        range_m = np.hypot(box[:, 0], box[:, 1])
+        half_m = box[:, 3:5].min(axis=1) / 2
+        reach = (half_m / np.maximum(range_m, half_m) * BEARINGS / (2 * np.pi)).astype(np.int64)
+        before = every * _before(points[::every], box, (reach + 2) * WIDEST_RAD)
+        nearest = _nearest(points[before], HIDES[kind[before].astype(np.int64) + 128])
+        centre = _bearing(*box[:, :2].T.astype(np.float32))
         hides = np.zeros(len(box), np.bool_)
         for i, expected in enumerate(box):
             low, high = _slopes(expected)
-            range_m = float(np.hypot(expected[0], expected[1]))
-            centre = int(_bearing(*expected[:2].astype(np.float32)[:, None])[0])
-            half_m = expected[3:5].min() / 2
-            reach = int(half_m / max(range_m, half_m) * BEARINGS / (2 * np.pi))
-            bearings = (centre + np.arange(-reach, reach + 1)) % BEARINGS
-            nearer = nearest[bearings, low:high].min(axis=1) < range_m - self.tuning.margin_m
+            bearings = (centre[i] + np.arange(-reach[i], reach[i] + 1)) % BEARINGS
+            nearer = nearest[bearings, low:high].min(axis=1) < range_m[i] - self.tuning.margin_m
             hides[i] = nearer.mean() >= 0.5
         return hides
 
@@ -101,6 +104,17 @@ class Sight:
                     self.tuning.margin_m
                 )
         return sides
+
+
+def _before(points: Float32, box: Float64, half_rad: Float64) -> Int:
+    """(n,) points within angles (R,) of the directions of boxes (R, 7), beyond them too."""
+    x, y = np.ascontiguousarray(points[:, :2].T)
+    towards = np.zeros(len(points), np.bool_)
+    for box_x, box_y, tangent in zip(box[:, 0], box[:, 1], np.tan(np.minimum(half_rad, 1.5)), strict=True):
+        along = x * np.float32(box_x) + y * np.float32(box_y)
+        across = x * np.float32(box_y) - y * np.float32(box_x)
+        towards |= np.abs(across) <= np.float32(tangent) * along
+    return towards.nonzero()[0]
 
 
 def _bearing(x: Float32, y: Float32) -> Int:
