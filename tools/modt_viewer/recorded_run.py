@@ -153,7 +153,9 @@ def _costs(ledger: Path, board: EnergyConfig) -> dict[int, dict[str, Any]]:
             for frame in range(first, last + 1):
                 if frame in costs:
                     costs[frame] |= energy
-                    costs[frame]["pipeline_mJ"] = sum(watts[name] * costs[frame]["cpu_ms"][name] for name in watts)
+                    costs[frame]["pipeline_mJ"] = sum(
+                        W * costs[frame]["cpu_ms"].get(name, 0.0) for name, W in watts.items()
+                    )
     return costs
 
 
