@@ -1,9 +1,11 @@
 """The frames of a live source or a recording, on a clock that only working and waiting move."""
 
 import dataclasses
+import itertools
 import logging
 import os
 import signal
+import threading
 from types import SimpleNamespace
 from unittest.mock import Mock, call
 
@@ -11,16 +13,18 @@ import numpy as np
 import pytest
 
 from modt.app.deadlines import Deadlines
-from modt.app.failures import MAX_IN_A_ROW, RENEW_AFTER, Failures, OncePerSecond
+from modt.app.failures import MAX_IN_A_ROW, MAX_KINDS, RENEW_AFTER, Failures, OncePerSecond
 from modt.app.load_shedding import Step
 from modt.app.loop import WAIT_S, Service
 from modt.app.playback import Playback
 from modt.app.stop import NAP_S, Stop
 from modt.energy.ledger import Ledger, StageWork
 from modt.errors import MisuseError, ModtError
+from modt.sinks.background import Background
+from modt.sinks.recording import AtOnce
 from modt.sources.stream import Received, StreamEndedError
 from modt.types import Budget, Frame, Trust, TrustLevel
-from tests.results import Kept, ledger_line, result
+from tests.results import Kept, ledger_line, result, status
 
 POINTS = np.zeros((1, 4), np.float32)
 
@@ -259,6 +263,54 @@ def test_a_log_has_one_line_a_second_of_each_kind():
                 lines.append(record.getMessage())
     assert len(lines) == 30
     assert lines[:4] == ["0: stepped", "0: silent", "0: stepped", "100: stepped (and 99 lines like it)"]
+
+
+def test_lines_that_differ_by_numbers_are_of_one_kind_and_kinds_are_bounded():
+    limit = OncePerSecond(lambda: 0.0)
+
+    def passes(text):
+        return limit.filter(logging.LogRecord("a", logging.WARNING, "", 0, text, (), None))
+
+    clients = [f"client 127.0.0.1:{port} left after {port / 7:.2f} s" for port in range(30000, 31000)]
+    assert sum(passes(text) for text in clients) == 1
+    words = ["".join(letters) for letters in itertools.product("uvwxyz", repeat=5)]
+    assert all(passes(f"kind {word}") for word in words)
+    assert len(limit._passed) == MAX_KINDS
+
+
+def test_a_place_of_the_status_that_hangs_keeps_it_from_no_other(tmp_path, monkeypatch):
+    may_end = threading.Event()
+    monkeypatch.setattr("modt.app.prometheus.write_metrics", lambda path, text: may_end.wait(60))
+    monkeypatch.setattr("modt.app.loop.asdict", dict)  # a status that is a table already
+    service = Live(1.0).service
+    service.recording.writer = AtOnce()
+    service.metrics = tmp_path / "modt.prom"
+    service.writers["metrics"] = Background("metrics", AtOnce(), 1)
+    try:
+        for _ in range(5):
+            service._write_status(status())
+        assert service.recording.write_status.call_count == service.recording.keep_status.call_count == 5
+        assert service.writers["metrics"].health()["dropped"] >= 3
+    finally:
+        may_end.set()
+        service.writers["metrics"].close()
+
+
+def test_deadlines_follow_a_sensor_at_another_rate_and_come_back():
+    live = Live(1.0)
+    live.stages.trust = Mock(record=lambda **silent: {})
+    live.sensor.info = SimpleNamespace(period_s=0.1)
+    live.sensor.health = lambda: {"period_s": live.sensor.period_s, "refused_messages": {}}
+    live.service.status = Mock()
+    live.service._write_status = Mock()
+    for period_s, reasons in ((0.05, ["period"]), (0.1, [])):
+        live.sensor.period_s = period_s
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("modt.app.loop.one_line", lambda status: "")
+            Service._report(live.service, live.notifier)
+        assert list(live.stages.source_findings) == reasons
+        live.deadlines.budget(Budget(16, None), 100.0, 0)
+        assert live.deadlines.figures().budget_ms == pytest.approx(1e3 * period_s)
 
 
 def test_a_signal_ends_the_loop_though_the_sensor_is_silent():

@@ -13,7 +13,7 @@ from modt.app.inputs import Request
 from modt.app.stages import RANGE_SHARE, Stages
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
-from modt.types import NONE, UNLIMITED, Frame
+from modt.types import NONE, UNLIMITED, Frame, TrustLevel
 from modt_simulation.synthetic_stream import SyntheticStream
 
 INFO = SyntheticStream("street", "vlp-16", 2.0, 0).info
@@ -123,6 +123,26 @@ def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
     stages.reload()
     assert stages.config.sensor == sensor
     assert stages.pipeline is not made
+
+
+def test_a_reload_of_another_sensors_profile_is_a_reason_until_the_right_one_is_loaded(tmp_path):
+    own = tmp_path / "robot.yaml"
+
+    def write(name):
+        own.write_text(profile.to_yaml(profile.dump(profile.load(name))))
+
+    write("vlp-16")
+    stages = stages_of(profile=str(own))
+    stages.recognise(frames()[0])
+    assert not stages._findings()
+    write("hdl-64e")
+    stages.reload()
+    (finding,) = stages._findings().values()
+    assert finding.level is TrustLevel.DEGRADED
+    assert "do not fit the profile" in finding.cause
+    write("vlp-16")
+    stages.reload()
+    assert not stages._findings()
 
 
 def test_a_reduced_frame_holds_what_is_near():

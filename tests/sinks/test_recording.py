@@ -38,6 +38,19 @@ def test_a_disk_that_hangs_leaves_the_status_readable_in_memory(tmp_path, monkey
     assert not memory.exists()
 
 
+@pytest.mark.parametrize("keep", KEPT)
+def test_a_directory_with_a_file_of_somebody_else_costs_the_records_alone(tmp_path, keep):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "notes.txt").write_text("mine")
+    recording = begun(tmp_path, keep=keep)
+    recording.write(frame(0))
+    recording.write_status("{}")
+    recording.finish()
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["notes.txt"]
+    assert "holds notes.txt" in recording.health().failing
+    assert recording.health().lost_lines == ("tracks.jsonl" in KEPT[keep])
+
+
 @pytest.mark.slow
 def test_all_parts_together_stay_within_the_limit_and_the_newest_lines_are_there(tmp_path):
     for start in range(2):  # over a restart as well

@@ -99,6 +99,17 @@ def test_objects_are_cubes_with_labels_and_an_arrow_along_their_motion():
     assert (shown["motion", 13].scale.x, abs(shown["motion", 13].pose.orientation.z)) == pytest.approx((1.5, 1.0))
 
 
+@pytest.mark.parametrize("form", ["vision", "autoware", "nav2"])
+def test_numbers_beyond_31_bits_break_no_message(form):
+    ids = (2**31, 2**40 + 7)
+    far = result(3, [5, 4], dict(enumerate(ids)), dict.fromkeys(ids, CAR))
+    far = with_kinds(dataclasses.replace(far, frame=dataclasses.replace(far.frame, stamp_s=2.0**33)))
+    shown = published(far, messages=form, obstacles="all")
+    numbers = [marker.id for marker in shown["/modt/markers"].markers if marker.ns == "objects"]
+    assert numbers == [0, 7]
+    assert all(marker.header.stamp.sec == 2**31 - 1 for marker in shown["/modt/markers"].markers if marker.ns)
+
+
 def test_the_pose_of_the_sensor_is_an_odometry_and_a_transform():
     encoded = {topic.name: topic.encode(FRAME) for topic in topics(TopicOptions(world_frame_id="map"))}
     tree = Transforms()

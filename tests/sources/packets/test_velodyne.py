@@ -9,8 +9,10 @@ import pytest
 
 from modt.sources.drivers.velodyne import VelodyneDecoder, model_named
 from modt.sources.packets.pcap_file import PcapFile
-from tests.sources.packets.simulated import bearing_deg, decoded, equal, packets
-from tools.send.ideal_packets import LAYOUTS, ideal_calibration
+from modt.sources.packets.turn_decoder import OTHER_SENSOR
+from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets, scene
+from tools.send.ideal_packets import LAYOUTS, ideal_calibration, packets_of
+from tools.send.loops import VelodyneStamps
 
 
 def sweeps_of(timed, **options):
@@ -116,6 +118,33 @@ def test_single_returns_of_any_kind_are_taken_but_no_unknown_model():
     sweeps, reception = sweeps_of(with_tail(packets(), (0x37, 0x77)))
     assert sweeps == []
     assert reception.refused == {"of a model of Velodyne that is unknown; give model=": len(packets())}
+
+
+@pytest.mark.parametrize("behind_s", [0.02, 0.05, 0.08])
+def test_of_two_heads_on_one_port_one_is_followed_and_the_other_named(behind_s):
+    """Both heads have the same clock; the second one is behind the first in its turn."""
+    stamps = VelodyneStamps()
+
+    def sent(by_s):
+        timed = [(at_s + by_s, payload) for at_s, payload in packets()]
+        return [(at_s, stamps.stamped(payload, round(1e6 * at_s) % stamps.wrap_us)) for at_s, payload in timed]
+
+    alone, _ = sweeps_of(sent(0.0))
+    both, reception = sweeps_of(sorted(sent(0.0) + sent(behind_s)))
+    assert equal(both[: len(alone)], alone)
+    assert len(both) <= len(alone) + 1, "the first head ends before the second one"
+    assert list(reception.refused) == [OTHER_SENSOR]
+    assert reception.refused[OTHER_SENSOR] > 0.8 * len(packets())
+
+
+@pytest.mark.parametrize("turn_s", [0.05, 0.2])
+def test_a_head_at_another_rate_loses_nothing(turn_s):
+    timed = [(BEGAN_S + at_s, payload) for at_s, payload in packets_of(scene("vlp-16", 5), "vlp-16", turn_s)]
+    sweeps, reception = sweeps_of(timed)
+    assert len(sweeps) == 3
+    assert all(sweep.complete for sweep in sweeps)
+    assert [sweep.turn_s for sweep in sweeps] == pytest.approx([turn_s] * 3, abs=1e-3)
+    assert (reception.lost, reception.refused) == (0, {})
 
 
 @pytest.mark.kitti
