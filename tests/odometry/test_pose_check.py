@@ -101,3 +101,17 @@ def test_what_rested_may_move_by_the_errors_of_a_way(step_m, way_m, drifted):
     assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
     assert not check.drifted(0.5, static_tracks(kdop + 5 * step), pose(way_m, 0.0, 0.0))  # not looked at so soon
     assert check.drifted(1.0, static_tracks(kdop + step), pose(way_m, 0.0, 0.0)) == drifted
+
+
+@pytest.mark.parametrize(
+    ("turn_rad", "wrong_rad", "drifted"), [(1.0, 0.015, False), (0.0, 0.015, True), (1.0, 0.1, True)]
+)
+def test_what_rested_may_move_by_an_error_of_the_scale_of_a_turn(turn_rad, wrong_rad, drifted):
+    """Most of what is seen is at 20 m on one side, so that a turn moves it alike."""
+    check = PoseCheck()
+    kdop = np.tile([21.0, 15.0, 1.0, -13.0, -19.0, -13.0, 1.0, 15.0], (8, 1))
+    step = (
+        20.0 * wrong_rad * np.array([0.0, np.sqrt(0.5), 1.0, np.sqrt(0.5), 0.0, -np.sqrt(0.5), -1.0, -np.sqrt(0.5)])
+    )
+    assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    assert check.drifted(1.0, static_tracks(kdop + step), pose(0.0, 0.0, turn_rad)) == drifted

@@ -94,22 +94,25 @@ class PoseCheck:
         if anchors is not None and now_s - anchors.time_s < 2 * self._tuning.anchor_s:
             _, before, now = np.intersect1d(anchors.id, tracks.id, assume_unique=True, return_indices=True)
             seen = tracks.observed[now]
-            way_m = float(np.hypot(*(T_world_sensor - anchors.T_world_sensor)[:2, 3]))
-            if self._moved_alike(anchors.kdop[before[seen]].T, tracks.kdop[now[seen]].T, way_m):
+            motion = inverse(anchors.T_world_sensor) @ T_world_sensor
+            if self._moved_alike(anchors.kdop[before[seen]].T, tracks.kdop[now[seen]].T, T_world_sensor, motion):
                 return True
         rests = tracks.stationary & tracks.observed
         self._anchors = Anchors(now_s, tracks.id[rests], tracks.kdop[rests], T_world_sensor)
         return False
 
-    def _moved_alike(self, were: Float64, are: Float64, way_m: float) -> bool:
-        """Whether k-DOPs (8, k) have moved by more than the errors of a way, most of them."""
+    def _moved_alike(self, were: Float64, are: Float64, T_world_sensor: Float64, motion: Float64) -> bool:
+        """Whether k-DOPs (8, k) have moved by more than the errors of a motion (4, 4), most of them."""
         if were.shape[1] < self._tuning.min_landmarks:
             return False
         step_m = np.median(shift_between(were, are, self._kernels.shape_tuning), axis=0)
-        return self._differ(float(np.hypot(*step_m)), way_m)
+        range_m = float(np.median(np.hypot(*(centres(are)[:2] - T_world_sensor[:2, 3, None]))))
+        by_turn_m = self._tuning.turn_share * abs(yaw_of(motion)) * range_m
+        return self._differ(float(np.hypot(*step_m)) - by_turn_m, motion)
 
-    def _differ(self, far_m: float, way_m: float) -> bool:
-        """Whether two motions that end at a distance differ by more than the errors of a way."""
+    def _differ(self, far_m: float, motion: Float64) -> bool:
+        """Whether a motion (4, 4) and another one that ends at a distance differ by more than the errors of a way."""
+        way_m = float(np.hypot(motion[0, 3], motion[1, 3]))
         return far_m > self._tuning.motion_m + self._tuning.motion_share * way_m
 
     def begin(self, now_s: float) -> Int:
@@ -131,8 +134,8 @@ class PoseCheck:
         given = inverse(T_given_before) @ T_given
         difference = inverse(given) @ inverse(T_registered_before) @ T_registered
         far_m = float(np.hypot(difference[0, 3], difference[1, 3]))
-        way_m = float(np.hypot(given[0, 3], given[1, 3]))
-        if self._differ(far_m, way_m) or abs(yaw_of(difference)) > self._tuning.motion_rad:
+        most_rad = self._tuning.motion_rad + self._tuning.turn_share * abs(yaw_of(given))
+        if self._differ(far_m, given) or abs(yaw_of(difference)) > most_rad:
             self._compared_from = now_s, T_given, T_registered
         elif now_s - from_s >= self._tuning.agree_s:
             self.doubted = False
