@@ -99,7 +99,8 @@ def frame_record(k):
     seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
     lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
     counts = {"proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
-    facts = {"schema": "modt.frame/4", "T_world_sensor": np.eye(4)[:3].ravel().tolist(), **counts}
+    trust = {"level": "good", "reasons": []}
+    facts = {"schema": "modt.frame/4", "T_world_sensor": np.eye(4)[:3].ravel().tolist(), "trust": trust, **counts}
     return {**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]}
 
 
