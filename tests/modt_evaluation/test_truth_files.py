@@ -1,7 +1,9 @@
+import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
+from modt.geometry import rotation_zyx, transform
 from modt.types import NONE
 from modt_evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES
 from modt_evaluation.truth import Role
@@ -34,6 +36,19 @@ def test_raw_drive(tmp_path):
     assert second.box[0] == pytest.approx([10, 8, -0.95, 4, 2, 1.5, 0.5])
     assert truth.frames[3].role.tolist() == [Role.COUNTED]
     assert open_truth(drive, paper=True).frames[3].role.tolist() == [Role.IGNORED]
+
+
+def test_a_tracklet_leans_as_its_turns_about_x_and_y_say(tmp_path):
+    drive = tracklets(layouts.raw_drive(tmp_path), ("Car", 0, [8]), ("Car", 1, [9]))
+    path = drive / "tracklet_labels.xml"
+    path.write_text(path.read_text().replace("<rx>0</rx><ry>0</ry>", "<rx>0.1</rx><ry>-0.2</ry>", 1))
+    leaning, upright = (open_truth(drive).frames[k] for k in (0, 1))
+    R_sensor_box = rotation_zyx(0.1, -0.2, 0.5)
+    foot = transform(leaning.T_box_sensor, np.array([[10, 8, -1.7]]))
+    (box,) = leaning.box
+    assert box[:3] - [0, 0, 0.75] == pytest.approx(foot[0])
+    np.testing.assert_allclose(leaning.T_box_sensor[:3, :3] @ R_sensor_box, rotation_zyx(0, 0, box[6]), atol=1e-12)
+    np.testing.assert_array_equal(upright.T_box_sensor, np.eye(4))
 
 
 @pytest.mark.parametrize(("x", "rules"), [(-1, KITTI_RULES), (-9, KITTI_ALL_ROUND_RULES)])

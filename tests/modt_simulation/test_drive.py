@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from modt.cli.main import main
-from modt.geometry import inverse
+from modt.geometry import inverse, transform, transform_boxes, wrap
 from modt.sources.recognise import open_stream
+from modt_evaluation.overlap import inside as within
 from modt_evaluation.truth_files import open_truth
 from modt_simulation.kitti_raw import DATE
 from modt_simulation.synthetic_stream import SyntheticStream
@@ -54,10 +55,31 @@ def test_tracklets_hold_the_boxes_in_view_of_the_camera(drive):
     writer, _, ((_, truth), *_) = drive
     labelled = open_truth(writer.drive).frames[0]
     assert len(labelled.id) > 3
-    off = np.linalg.norm(labelled.box[:, None, :6] - truth.boxes[:, :6], axis=2)
+    seen = transform_boxes(inverse(labelled.T_box_sensor), labelled.box)
+    off = np.linalg.norm(seen[:, None, :6] - truth.boxes[:, :6], axis=2)
     assert off.min(axis=1).max() < 1e-5
     assert labelled.box[:, 0].min() > 0
     assert set(labelled.type_) <= {"Car", "Van", "Truck", "Pedestrian", "Cyclist"}
+
+
+def test_tracklets_of_a_walking_robot_hold_the_points_of_their_bodies(tmp_path):
+    stream = SyntheticStream("street", "vlp-16", 0.5, seed=4, gait="6")
+    writer = written(tmp_path, stream)
+    labels = open_truth(writer.drive).frames
+    inside = total = 0
+    for frame, truth in stream.sweeps():
+        labelled = labels[frame.index]
+        T = frame.T_world_sensor
+        placed = transform_boxes(T @ inverse(labelled.T_box_sensor), labelled.box)
+        for box in placed:
+            body = np.argmin(np.linalg.norm(truth.world_boxes[:, :3] - box[:3], axis=1))
+            np.testing.assert_allclose(truth.world_boxes[body, :6], box[:6], atol=1e-5)
+            assert abs(wrap(truth.world_boxes[body, 6] - box[6])) < 1e-5
+            points = transform(T, frame.points[truth.instance == truth.bodies[body], :3].astype(np.float64))
+            inside += np.count_nonzero(within(points, box, foot_m=-0.15))
+            total += len(points)
+    assert total > 500
+    assert inside > 0.98 * total
 
 
 def test_labels_hold_class_and_instance(drive):

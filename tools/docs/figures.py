@@ -3,7 +3,7 @@
     python -m tools.docs.figures KITTI_ROOT [--further FILE] [--pandaset FOLDER] [--only readme|weather|paper]
 
 KITTI_ROOT holds drive 0005 (2011_09_26) with its tracklets, FILE is the table of objects that these leave out
-(docs/evaluation.md), FOLDER a labelled PandaSet sequence. README.md takes three minutes of CPU time, half of them for
+(docs/evaluation.md), FOLDER a labelled PandaSet sequence. README.md takes four minutes of CPU time, half of them for
 its table of weather, and docs/paper.md three minutes. Without FOLDER the table has no row of PandaSet.
 """
 
@@ -42,11 +42,12 @@ SECONDS = 6.0
 WEATHER_MARK = f"{MARK} weather"
 WEATHER_SENSOR = "vlp-16"
 WEATHERS = {
-    "snow of 2.5 mm/h": "snow:2.5",
-    "fog, 50 m of visibility": "fog:50",
-    "dust, optical depth 1.5": "dust:1.5",
+    "snow of 2.5 mm/h": ("weather", "snow:2.5"),
+    "fog, 50 m of visibility": ("weather", "fog:50"),
+    "dust, optical depth 1.5": ("weather", "dust:1.5"),
+    "a gait of 6 degrees": ("gait", "6"),
 }
-"""Rows of the table of weather, and the `--weather` of `modt simulate` that makes their drives."""
+"""Rows of the table of weather, and the option of `modt simulate` that makes their drives."""
 PANDASET_PROFILE = "pandar64"
 MODE = "accurate"
 BASELINE = "conventional"
@@ -72,11 +73,11 @@ def readme(kitti: Path, further: Path | None, pandaset: Path | None) -> str:
 
 
 def weather() -> str:
-    """Section of README.md on weather: the scenes and seeds of the first table, with one sensor."""
+    """Section of README.md on weather and gait: the scenes and seeds of the first table, with one sensor."""
     lines = _head()
-    for about, condition in WEATHERS.items():
-        name = f"{SENSORS[WEATHER_SENSOR]}, {about}: `--weather {condition}`"
-        lines.append(_row(name, _simulated(WEATHER_SENSOR, condition)))
+    for about, (option, condition) in WEATHERS.items():
+        name = f"{SENSORS[WEATHER_SENSOR]}, {about}: `--{option} {condition}`"
+        lines.append(_row(name, _simulated(WEATHER_SENSOR, **{option: condition})))
     return "\n".join(lines)
 
 
@@ -85,9 +86,9 @@ def _head() -> list[str]:
     return [f"| at commit `{commit()}` | {' | '.join(kinds)} |", "|---|" + "---|" * len(kinds)]
 
 
-def _simulated(sensor: str, weather: str | None = None) -> Evaluation:
-    """All simulated drives of a sensor in one weather."""
-    made = [drives.simulated(scene, sensor, SECONDS, seed, weather=weather) for seed in SEEDS for scene in SCENES]
+def _simulated(sensor: str, **conditions: str) -> Evaluation:
+    """All simulated drives of a sensor in the same conditions, those of SyntheticStream."""
+    made = [drives.simulated(scene, sensor, SECONDS, seed, **conditions) for seed in SEEDS for scene in SCENES]
     return evaluation([drives.judged(drive, MODE, k) for k, drive in enumerate(made)])
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.geometry import FieldOfView, inverse, transform_boxes
+from modt.geometry import FieldOfView, inverse, se3, transform_boxes
 from modt.types import NONE, Float32, Float64, FrameResult, Int, Self
 from modt_evaluation.truth import FrameTruth
 
@@ -34,7 +34,10 @@ class JudgedFrame:
 
     @classmethod
     def of_result(cls, result: FrameResult, truth: FrameTruth, fov: FieldOfView | None = None) -> Self:
-        """Frame judged by a result of the pipeline in memory."""
+        """Frame judged by a result of the pipeline in memory; the truth is that of the sensor frame."""
+        R = result.frame.R_level_sensor
+        if R is not None:
+            truth = replace(truth, T_box_sensor=truth.T_box_sensor @ inverse(se3(R, np.zeros(3))))
         tracks = result.tracks
         seen = np.flatnonzero(tracks.proposal != NONE)
         return cls(

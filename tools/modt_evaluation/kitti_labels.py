@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.geometry import Camera, inverse, transform
+from modt.geometry import Camera, inverse, rotation_zyx, transform, yaw_of
+from modt.placement import Mount
 from modt.sources.text_file import read_lines
 from modt.types import NONE, Float64
 
@@ -29,7 +30,8 @@ class Label:
     frame: int  # 0 in the object benchmark
     id: int  # NONE in the object benchmark
     type_: str  # as labelled
-    box: Float64  # (7,) x, y, z of the centre, l, w, h [m], yaw [rad], sensor frame
+    box: Float64  # (7,) x, y, z of the centre, l, w, h [m], sensor frame, and yaw [rad] about `up`
+    up: Float64 | None = None  # (3,) axis of the height, sensor frame; None for its z axis
     image_box: Float64 | None = None  # (4,) left, top, right, bottom [pixel], None where it is not labelled
 
 
@@ -49,13 +51,40 @@ def read_tracklets(path: Path) -> list[Label]:
             height, width, length = (float(item.findtext(key, "")) for key in "hwl")
             first = int(item.findtext("first_frame", ""))
             type_ = item.findtext("objectType", "")
-            for frame, pose in enumerate(item.iterfind("poses/item"), first):
-                x, y, foot, yaw = (float(pose.findtext(key, "")) for key in ("tx", "ty", "tz", "rz"))
-                box = np.array([x, y, foot + height / 2, length, width, height, yaw])
-                labels.append(Label(_possible(frame, number, box), number, type_, box))
+            for count, pose in enumerate(item.iterfind("poses/item"), first):
+                place = np.array([float(pose.findtext(key, "")) for key in ("tx", "ty", "tz", "rz")])
+                lean = np.array([float(pose.findtext(key, "0")) for key in ("rx", "ry")])
+                frame = _possible(count, number, np.array([*place, *lean, length, width, height]))
+                box, up = _tracklet_box(place, lean, (length, width, height))
+                labels.append(Label(frame, number, type_, box, up))
         except ValueError:
             raise MisuseError(path, f"item {number} is no tracklet", REMEDY) from None
     return labels
+
+
+def _tracklet_box(place: Float64, lean: Float64, size: tuple[float, float, float]) -> tuple[Float64, Float64 | None]:
+    """The box of a tracklet's pose and its `up`, as in Label.
+
+    Args:
+        place: (4,) x, y, z of the foot [m] and turn about z [rad].
+        lean: (2,) turns about x and y [rad]. They come before that about z. KITTI's own tracklets have none.
+        size: length, width and height [m].
+    """
+    if not lean.any():
+        x, y, foot, yaw = place.tolist()
+        return np.array([x, y, foot + size[2] / 2, *size, yaw]), None
+    roll, pitch = lean.tolist()
+    R_sensor_box = rotation_zyx(roll, pitch, float(place[3]))
+    up = R_sensor_box[:, 2]
+    yaw = yaw_of(upright(up) @ R_sensor_box)
+    centre = place[:3] + up * (size[2] / 2)
+    return np.concatenate([centre, size, [yaw]]), up
+
+
+def upright(up: Float64) -> Float64:
+    """(3, 3) R_level_sensor of a sensor in whose frame (3,) is the upward unit vector; its heading stays."""
+    R = Mount.upright(up).R_level_sensor
+    return np.eye(3) if R is None else R
 
 
 def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
@@ -77,7 +106,7 @@ def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
         except (ValueError, IndexError):
             raise MisuseError(f"{path}:{number}", "no label of KITTI's", REMEDY) from None
         box = np.array([x, y, z + height / 2, length, width, height, -turn - np.pi / 2])
-        labels.append(Label(frame, id_, words[0], box, values[3:7]))
+        labels.append(Label(frame, id_, words[0], box, image_box=values[3:7]))
     return labels
 
 

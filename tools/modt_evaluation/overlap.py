@@ -31,7 +31,8 @@ class ObjectPoints:
         """Select them among (N, 4) points of the sensor frame."""
         centre = transform(inverse(truth.T_box_sensor), truth.box[:, :3])
         reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
-        reach += 0.05 * truth.box[:, 5]  # sensors are tilted by a few degrees at most
+        lean = float(np.hypot(*truth.T_box_sensor[2, :2]))  # sine of the angle between the sensor and the boxes
+        reach += lean * truth.box[:, 5] / 2
         across = np.ascontiguousarray(points[:, :2].T)
         found = cls([], [])
         for box, (x, y), r in zip(truth.box, centre[:, :2].tolist(), reach.tolist(), strict=True):

@@ -6,13 +6,14 @@ import csv
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.geometry import Camera
+from modt.geometry import Camera, se3, transform_boxes
 from modt.sources import argoverse, nuscenes
 from modt.sources.file_names import files_in
 from modt.sources.kitti_calibration import camera_of_sequence
@@ -21,7 +22,7 @@ from modt.sources.recognise import open_scans
 from modt.sources.scan_file import ScanStream
 from modt.types import NONE
 from modt_evaluation.dataset_labels import ANNOTATIONS, argoverse_labels, nuscenes_labels
-from modt_evaluation.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets
+from modt_evaluation.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets, upright
 from modt_evaluation.label_names import ARGOVERSE_TYPES, CUBOID_TYPES, KITTI_NAMES, NUSCENES_TYPES
 from modt_evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES
 from modt_evaluation.truth import (
@@ -143,8 +144,23 @@ def _followed(labels: list[Label], types: Types, scans: ScanStream | None, camer
     place = scans.info.name if scans else "labels"
     end = max([*by_frame, *(scan.index for scan in recorded)], default=NONE) + 1
     none = np.zeros((0, 7))
-    frames = {f: _frame(types, place, by_frame[f], camera, parked=parked.get(f, none)) for f in range(end)}
+    frames = {}
+    for f in range(end):
+        frame = _frame(types, place, by_frame[f], camera, parked=parked.get(f, none))
+        frames[f] = _upright(frame, by_frame[f])
     return Truth(frames, scans, KITTI_ALL_ROUND_RULES if any(map(_behind, labels)) else KITTI_RULES)
+
+
+def _upright(frame: FrameTruth, labels: list[Label]) -> FrameTruth:
+    """A frame whose boxes stand upright, by the mean `up` of its labels; unchanged if none has one."""
+    ups = [label.up for label in labels if label.up is not None]
+    if not ups:
+        return frame
+    up = np.mean(ups, axis=0)
+    T_level_sensor = se3(upright(up / np.linalg.norm(up)), np.zeros(3))
+    box = transform_boxes(T_level_sensor, frame.box)
+    parked = transform_boxes(T_level_sensor, frame.parked)
+    return replace(frame, box=box, parked=parked, T_box_sensor=T_level_sensor)
 
 
 def _behind(label: Label) -> bool:

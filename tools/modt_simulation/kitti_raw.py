@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from modt.geometry import Camera, FieldOfView, inverse, se3
+from modt.geometry import Camera, FieldOfView, inverse, se3, transform
 from modt.types import Float64, Frame
 from modt_simulation.simulator import Truth
 
@@ -34,7 +35,8 @@ class _Track:
 
     kind: str  # KITTI object type
     size: tuple[float, float, float]  # length, width, height [m]
-    poses: dict[int, tuple[float, float, float, float, int, int]] = field(default_factory=dict)
+    # foot [m], turns about x, y and z [rad], occlusion, truncation
+    poses: dict[int, tuple[float, float, float, float, float, float, int, int]] = field(default_factory=dict)
     last_seen: int = 0  # last frame with points in view
 
 
@@ -47,9 +49,14 @@ class Tracklets:
 
     def add(self, frame: int, truth: Truth) -> None:
         """Add the truth of one frame."""
-        columns = (truth.bodies, truth.boxes, truth.points, self.fov.depth(truth.boxes[:, :3]))
-        for kind, body, box, points, depth in zip(truth.kinds, *(column.tolist() for column in columns), strict=True):
-            x, y, z, length, width, height, yaw = box
+        T_sensor_world = inverse(truth.T_world_sensor)
+        foot = transform(T_sensor_world, truth.world_boxes[:, :3] - np.outer(truth.world_boxes[:, 5] / 2, [0, 0, 1]))
+        yaw = truth.world_boxes[:, 6]
+        turns = Rotation.from_matrix(T_sensor_world[:3, :3]) * Rotation.from_euler("z", yaw[:, None])
+        poses = np.column_stack([foot, turns.as_euler("ZYX")[:, ::-1]])
+        columns = (truth.bodies, truth.world_boxes, poses, truth.points, self.fov.depth(truth.boxes[:, :3]))
+        for kind, body, box, pose, points, depth in zip(truth.kinds, *(c.tolist() for c in columns), strict=True):
+            length, width, height = box[3:6]
             shown = depth > 0 and points > 0
             if shown and body not in self._tracks:
                 self._tracks[body] = _Track(kind.name, (length, width, height))
@@ -57,7 +64,7 @@ class Tracklets:
                 continue
             track = self._tracks[body]
             hidden = LARGELY_OCCLUDED if points < MIN_VISIBLE_POINTS else VISIBLE
-            track.poses[frame] = (x, y, z - height / 2, yaw, hidden, int(abs(depth) < length / 2))
+            track.poses[frame] = (*pose, hidden, int(abs(depth) < length / 2))
             if shown:
                 track.last_seen = frame
 
@@ -75,9 +82,10 @@ class Tracklets:
             yield _elements(2, objectType=track.kind, h=f"{height:.6f}", w=f"{width:.6f}", l=f"{length:.6f}")
             yield _elements(2, first_frame=poses[0][0]) + "\t\t<poses>\n"
             yield _elements(3, count=len(poses), item_version=2)
-            for _, (x, y, z, yaw, occlusion, truncation) in poses:
+            for _, (x, y, z, rx, ry, rz, occlusion, truncation) in poses:
                 yield "\t\t\t<item>\n"
-                yield _elements(4, tx=f"{x:.9f}", ty=f"{y:.9f}", tz=f"{z:.9f}", rx=0, ry=0, rz=f"{yaw:.9f}", state=2)
+                yield _elements(4, tx=f"{x:.9f}", ty=f"{y:.9f}", tz=f"{z:.9f}")
+                yield _elements(4, rx=f"{rx:.9f}", ry=f"{ry:.9f}", rz=f"{rz:.9f}", state=2)
                 yield _elements(4, occlusion=occlusion, occlusion_kf=0, truncation=truncation)
                 yield _elements(4, amt_occlusion=-1, amt_occlusion_kf=-1)
                 yield _elements(4, amt_border_l=-1, amt_border_r=-1, amt_border_kf=-1)

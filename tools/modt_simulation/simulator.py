@@ -205,8 +205,14 @@ class Truth:
     semantic: Int  # (N,) SemanticKITTI label of each point
     bodies: Int  # (b,) indices of all bodies of annotated kinds, visible or not: their identities
     kinds: tuple[Kind, ...]  # kind of each
-    boxes: Float64  # (b, 7) box of each, sensor frame
+    world_boxes: Float64  # (b, 7) box of each, upright in the world
+    T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp
     points: Int  # (b,) number of points of each in this sweep
+
+    @property
+    def boxes(self) -> Float64:
+        """(b, 7) box of each in the sensor frame, as if the sensor stood upright."""
+        return transform_boxes(inverse(self.T_world_sensor), self.world_boxes)
 
 
 class Simulator:
@@ -319,6 +325,7 @@ class Simulator:
             semantic=np.where(label > 0, label, SEMANTIC[material]).astype(np.int64),
             bodies=self._annotated,
             kinds=self._kinds,
-            boxes=transform_boxes(inverse(T_world_sensor), self.world.boxes(time_s)[self._annotated]),
+            world_boxes=self.world.boxes(time_s)[self._annotated],
+            T_world_sensor=T_world_sensor,
             points=points[self._annotated],
         )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from modt.app import assembly
 from modt.config import ProfileConfig
@@ -14,7 +15,7 @@ from modt.profile import DEFAULT, load
 from modt.sources.recognise import open_stream
 from modt.types import Frame, FrameResult
 from modt_evaluation.evaluation import DriveRows, collect
-from modt_evaluation.experiments.drives import SIMULATED_TYPES
+from modt_evaluation.experiments.drives import simulated_truth
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.further_objects import with_further
 from modt_evaluation.rules import CUBOID_RULES, Rules
@@ -34,13 +35,12 @@ class Drive:
     fov: FieldOfView = field(default_factory=FieldOfView)
 
 
-def simulated(scene: str, sensor: str, seconds: float, seed: int, *, weather: str | None = None) -> Drive:
-    """A simulated drive, labelled all round, in the weather of `modt simulate`."""
-    stream = SyntheticStream(scene, sensor, seconds, seed, weather=weather)
+def simulated(scene: str, sensor: str, seconds: float, seed: int, **conditions: Any) -> Drive:
+    """A simulated drive, labelled all round; `conditions` are those of SyntheticStream."""
+    stream = SyntheticStream(scene, sensor, seconds, seed, **conditions)
     frames = []
     for frame, truth in stream.sweeps():
-        names = [kind.name for kind in truth.kinds]
-        frames.append((frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), names, truth.boxes)))
+        frames.append((frame, simulated_truth(truth)))
     return Drive(stream.info.name, load(sensor), frames)
 
 

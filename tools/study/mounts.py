@@ -21,16 +21,14 @@ from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
-from modt.geometry import inverse, transform_boxes
-from modt.placement import Mount
 from modt.profile import load
 from modt.sensor_fit.recognition import recognise
 from modt_evaluation.evaluation import DriveRows, collect
-from modt_evaluation.experiments.drives import SIMULATED_TYPES
+from modt_evaluation.experiments.drives import simulated_truth
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.rows import Outcome
 from modt_evaluation.rules import CUBOID_RULES
-from modt_evaluation.truth import FrameTruth, Role
+from modt_evaluation.truth import Role
 from modt_simulation.sensors import SENSORS
 from modt_simulation.synthetic_stream import SCENES, SyntheticStream
 from tools.options import parser
@@ -44,20 +42,15 @@ MOUNTS_DEG = ((0.0, 0.0), (0.0, 10.0), (0.0, 15.0), (10.0, 0.0), (15.0, 0.0), (1
 PLACES = ("yard", "corridor", "hall", "crowd", "ramp")
 
 
-def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig, mount: Mount) -> DriveRows:
-    """Run a drive in a mode and judge it in the level frame."""
+def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig) -> DriveRows:
+    """Run a drive in a mode and judge it."""
     frames = list(stream.sweeps())
     config = recognise(frames[0][0].points, config).mounted(config)
     step = steps_of(mode_name, config)
 
     def judged() -> Iterator[JudgedFrame]:
         for frame, truth in frames:
-            pose = mount.level(frame).T_world_sensor
-            assert pose is not None
-            boxes = transform_boxes(inverse(pose), stream.simulator.world.boxes(frame.stamp_s)[truth.bodies])
-            labels = FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], boxes)
-            result = JudgedFrame.of_result(step(frame), labels)
-            yield replace(result, points=mount.turn(frame.points))
+            yield JudgedFrame.of_result(step(frame), simulated_truth(truth))
 
     return collect(judged(), CUBOID_RULES)
 
@@ -110,7 +103,7 @@ def main() -> None:
             SyntheticStream(scene, sensor, args.seconds, seed, height_m=height_m, mount_deg=angles)
             for seed in range(*args.seeds)
         ]
-        drives = [run(stream, args.mode, of_mount(sensor, height_m), Mount.of(*angles)) for stream in streams]
+        drives = [run(stream, args.mode, of_mount(sensor, height_m)) for stream in streams]
         print(row(f"{sensor} | {scene} | {height_m:g} | {angles[0]:g}, {angles[1]:g}", drives), flush=True)
 
 

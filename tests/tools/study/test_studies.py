@@ -7,7 +7,6 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.geometry import rotation_zyx, se3
-from modt.placement import Mount
 from modt.sources.recognise import open_stream
 from modt_simulation.synthetic_stream import SyntheticStream
 from modt_training.simulated import simulated_scans
@@ -100,7 +99,7 @@ def test_the_filter_is_nearly_consistent(kind, tracks, mean, beyond, consistenci
 @pytest.mark.slow
 def test_a_row_over_mounts_has_recall_and_precision_of_people():
     stream = SyntheticStream("crowd", "vlp-16", 1.0, 3, height_m=0.8, mount_deg=(0.0, 10.0))
-    drive = mounts.run(stream, "accurate", mounts.of_mount("vlp-16", 0.8), Mount.of(0.0, 10.0))
+    drive = mounts.run(stream, "accurate", mounts.of_mount("vlp-16", 0.8))
     *_, people, _cars = mounts.row("vlp-16", [drive]).strip("| ").split(" | ")
     number, _, shares = people.partition(": ")
     detected, recall, precision = map(int, shares.split(" / "))

@@ -14,12 +14,13 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT
-from modt.types import Frame
+from modt.types import Frame, Int
 from modt_evaluation.further_objects import with_further
 from modt_evaluation.kitti_labels import MAX_ID
 from modt_evaluation.rules import CUBOID_RULES, Rules
 from modt_evaluation.truth import KITTI_TYPES, PAPER_TYPES, FrameTruth, Role, Truth
 from modt_evaluation.truth_files import TRACKLETS, open_truth
+from modt_simulation import simulator
 from modt_simulation.kinds import TRUCK
 from modt_simulation.synthetic_stream import SyntheticStream
 
@@ -121,9 +122,16 @@ class SimulatedDrive:
     def sweeps(self) -> Iterator[tuple[Frame, FrameTruth]]:
         """Every sweep with its labels; a body without a point has none."""
         for frame, truth in SyntheticStream(self.scene, self.sensor, self.seconds, self.seed).sweeps():
-            seen = np.flatnonzero(truth.points)
-            names = [truth.kinds[k].name for k in seen]
-            yield frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies[seen].tolist(), names, truth.boxes[seen])
+            yield frame, simulated_truth(truth, np.flatnonzero(truth.points))
+
+
+def simulated_truth(truth: simulator.Truth, which: Int | slice = slice(None)) -> FrameTruth:
+    """The labels of some bodies of a simulated sweep, upright in the world."""
+    rows = np.arange(len(truth.kinds))[which].tolist()
+    names = [truth.kinds[k].name for k in rows]
+    boxes = truth.world_boxes[which]
+    bodies = truth.bodies[which].tolist()
+    return FrameTruth.of(SIMULATED_TYPES, bodies, names, boxes, T_box_sensor=truth.T_world_sensor)
 
 
 Drive = KittiDrive | SimulatedDrive
