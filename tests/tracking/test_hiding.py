@@ -40,6 +40,15 @@ def test_what_is_behind_something_is_hidden(at, kind, hides):
     assert SIGHT.hides(points, proposals.kind, np.array([at])).tolist() == [hides]
 
 
+def test_points_that_are_no_numbers_hide_nothing():
+    points, proposals = scene([PILLAR], [MEMBER])
+    bad = np.array([[np.inf, 0, 0, 0], [np.nan, 0, 0, 0], [1, -np.inf, 0, 0]], np.float32)
+    kind = np.append(proposals.kind, np.full(3, PointKind.OUT_OF_RANGE, np.int8))
+    at = np.array([person(0.0), person(-3.0)])
+    assert SIGHT.hides(np.concatenate([points, bad]), kind, at).tolist() == [True, False]
+    assert SIGHT.hides(points[:0], proposals.kind[:0], at).tolist() == [False, False]
+
+
 def ids_of_walk(ys, pillar=PILLAR):
     """Ids before and after hiding of who is at y in each frame, None where hidden by the pillar."""
     follower = Follower(tuning=TrackingTuning(sight=SIGHT.tuning))

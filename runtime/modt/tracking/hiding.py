@@ -13,8 +13,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON
-from modt.classes import ObjectClass
+from modt.class_sizes import IS_PERSON, IS_WALKER
 from modt.geometry import inverse, transform_boxes
 from modt.tracking.association import NO_ROWS, Associated
 from modt.tracking.sight import Sight
@@ -50,7 +49,7 @@ class Hiding:
             points: (N, 4) points of the frame, sensor frame; None if they are not known.
         """
         matches = frame.matches
-        people = (tracks.object_class[matches.rows] == ObjectClass.PEDESTRIAN).nonzero()[0]
+        people = IS_WALKER[tracks.object_class[matches.rows]].nonzero()[0]
         if points is None or not len(people):
             return matches.covariance
         sides = self._sight.bounded_sides(points, frame.proposals, matches.proposals[people])

@@ -69,8 +69,8 @@ class Sight:
         range_m = np.hypot(box[:, 0], box[:, 1])
         half_m = box[:, 3:5].min(axis=1) / 2
         reach = (half_m / np.maximum(range_m, half_m) * BEARINGS / (2 * np.pi)).astype(np.int64)
-        before = every * _before(points[::every], box, (reach + 2) * WIDEST_RAD)
-        nearest = _nearest(points[before], HIDES[kind[before].astype(np.int64) + 128])
+        solid = _solid(points, kind, every)
+        nearest = _nearest(solid[_before(solid, box, (reach + 2) * WIDEST_RAD)])
         centre = _bearing(*box[:, :2].T.astype(np.float32))
         hides = np.zeros(len(box), np.bool_)
         for i, expected in enumerate(box):
@@ -86,7 +86,7 @@ class Sight:
 
     def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Bool:
         """The same, looking at one of `every` points."""
-        nearest = _nearest(points[::every], HIDES[kind[::every].astype(np.int64) + 128])
+        nearest = _nearest(_solid(points, kind, every))
         sides = np.zeros((len(which), 2), np.bool_)
         for i, proposal in enumerate(which.tolist()):
             members = slice(*proposals.offsets[proposal : proposal + 2].tolist())
@@ -106,6 +106,11 @@ class Sight:
         return sides
 
 
+def _solid(points: Float32, kind: Int8, every: int) -> Float32:
+    """(n, 4) points, one of `every`, that stand above the ground, and so hide what is behind them; all are finite."""
+    return points[::every][HIDES[kind[::every].astype(np.int64) + 128]]
+
+
 def _before(points: Float32, box: Float64, half_rad: Float64) -> Int:
     """(n,) points within angles (R,) of the directions of boxes (R, 7), beyond them too."""
     x, y = np.ascontiguousarray(points[:, :2].T)
@@ -123,9 +128,9 @@ def _bearing(x: Float32, y: Float32) -> Int:
     return np.minimum(bearing, BEARINGS - 1)
 
 
-def _nearest(points: Float32, hides: Bool) -> Float32:
-    """(BEARINGS, SLOPES) distance of the nearest of the points (n, 4) that hide what is behind them [m]."""
-    x, y, z = np.ascontiguousarray(points[hides, :3].T)
+def _nearest(points: Float32) -> Float32:
+    """(BEARINGS, SLOPES) distance of the nearest of the points (n, 4) [m]."""
+    x, y, z = np.ascontiguousarray(points[:, :3].T)
     range_m = np.maximum(np.sqrt(x * x + y * y), np.float32(1e-3))
     slope = np.floor((z / range_m - LEAST_SLOPE) * PER_SLOPE)
     inside = ((slope >= 0) & (slope < SLOPES)).nonzero()[0]
