@@ -336,10 +336,11 @@ def test_lines_of_sight(kernels, seed, n, rays):
     boxes[:, 3:6] = rng.uniform(0.1, 4.0, (n + 2, 3))
     points, proposals = sight_scene(boxes, [PointKind.MEMBER] * n + [PointKind.STRUCTURE, PointKind.GROUND])
     which = rng.permutation(n)[: rng.integers(0, n + 1)]
-    reference, compiled = (
-        sight_of(each, SightTuning(rays=rays)).bounded_sides(points, proposals, which) for each in (NUMPY, kernels)
-    )
-    np.testing.assert_array_equal(compiled, reference)
+    reference, compiled = (sight_of(each, SightTuning(rays=rays)) for each in (NUMPY, kernels))
+    nearest = reference.look(points, proposals.kind)
+    np.testing.assert_array_equal(compiled.look(points, proposals.kind), nearest)
+    sides = reference.bounded_sides(nearest, proposals, which)
+    np.testing.assert_array_equal(compiled.bounded_sides(nearest, proposals, which), sides)
 
 
 @pytest.mark.slow

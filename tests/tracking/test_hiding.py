@@ -37,7 +37,7 @@ def person(y, x=8.0):
 )
 def test_what_is_behind_something_is_hidden(at, kind, hides):
     points, proposals = scene([PILLAR], [kind])
-    assert SIGHT.hides(points, proposals.kind, np.array([at])).tolist() == [hides]
+    assert SIGHT.hides(SIGHT.look(points, proposals.kind), np.array([at])).tolist() == [hides]
 
 
 def test_points_that_are_no_numbers_hide_nothing():
@@ -45,8 +45,8 @@ def test_points_that_are_no_numbers_hide_nothing():
     bad = np.array([[np.inf, 0, 0, 0], [np.nan, 0, 0, 0], [1, -np.inf, 0, 0]], np.float32)
     kind = np.append(proposals.kind, np.full(3, PointKind.OUT_OF_RANGE, np.int8))
     at = np.array([person(0.0), person(-3.0)])
-    assert SIGHT.hides(np.concatenate([points, bad]), kind, at).tolist() == [True, False]
-    assert SIGHT.hides(points[:0], proposals.kind[:0], at).tolist() == [False, False]
+    assert SIGHT.hides(SIGHT.look(np.concatenate([points, bad]), kind), at).tolist() == [True, False]
+    assert SIGHT.hides(SIGHT.look(points[:0], proposals.kind[:0]), at).tolist() == [False, False]
 
 
 def ids_of_walk(ys, pillar=PILLAR):
@@ -124,7 +124,7 @@ def test_the_position_of_a_person_with_a_hidden_side_is_uncertain():
     points, proposals = scene([person(0.75), person(-3.0), PILLAR], [MEMBER] * 3)
     tracks = tracks_at([person(0.75), person(-3.0), PILLAR], PEDESTRIAN, PEDESTRIAN)
     frame = associated(proposals, [0, 1, 2])
-    loosened = Hiding(SIGHT).loosened(tracks, frame, points)
+    loosened = Hiding(SIGHT).loosened(tracks, frame, SIGHT.look(points, proposals.kind))
     more = (loosened - frame.matches.covariance)[:, 0, 0]
     assert (more > 0).tolist() == [True, False, False]
     assert Hiding(SIGHT).loosened(tracks, frame, None) is frame.matches.covariance
@@ -138,7 +138,7 @@ def test_who_is_expected_in_view_stays_in_hiding():
     tracks.unseen_s[:] = 0.3
     tracks.x[0, 1] = tracks.moving_mean[0, 1] = 1.3
     tracks.velocity[0, 1] = tracks.moving_mean[0, 3] = 5.0
-    Hiding(SIGHT).stop_clock(tracks, points, proposals.kind, EYE, 0.1)
+    Hiding(SIGHT).stop_clock(tracks, SIGHT.look(points, proposals.kind), EYE, 0.1)
     assert tracks.x[0, 1] == tracks.moving_mean[0, 1] == pytest.approx(0.8)
     assert tracks.unseen_s[0] == pytest.approx(0.2)
 
@@ -148,5 +148,5 @@ def test_the_time_of_an_uncertain_place_counts():
     tracks = tracks_at([person(0.0)], PEDESTRIAN, P=np.eye(4) * 4.0)
     tracks.proposal[:] = NONE
     tracks.unseen_s[:] = 0.3
-    Hiding(SIGHT).stop_clock(tracks, points, proposals.kind, EYE, 0.1)
+    Hiding(SIGHT).stop_clock(tracks, SIGHT.look(points, proposals.kind), EYE, 0.1)
     assert tracks.unseen_s[0] == 0.3

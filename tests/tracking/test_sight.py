@@ -1,7 +1,5 @@
 """Lines of sight: which ends of a proposal something nearer makes, or the same surface."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -64,10 +62,6 @@ def test_bounded_sides(others, kinds, sides):
     members_first = sorted(zip(kinds, others, strict=True), key=lambda pair: pair[0] != MEMBER)
     boxes = [SUBJECT, *(other for _, other in members_first)]
     points, proposals = scene(boxes, [MEMBER, *(kind for kind, _ in members_first)])
-    found = Sight(SightTuning(rays=10**6)).bounded_sides(points, proposals, np.array([0]))
+    sight = Sight(SightTuning(rays=10**6))
+    found = sight.bounded_sides(sight.look(points, proposals.kind), proposals, np.array([0]))
     assert found.sum(axis=1).tolist() == [sides]
-
-
-def test_nothing_is_bounded_where_the_kinds_of_points_are_unknown():
-    points, proposals = scene([SUBJECT, HIDES_LEFT], [MEMBER, STRUCTURE])
-    assert not Sight().bounded_sides(points, replace(proposals, kind=None), np.array([0])).any()

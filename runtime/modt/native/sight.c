@@ -13,8 +13,8 @@ static ALWAYS_INLINE i64 bearing_of(float x, float y)
     return bearing < BEARINGS ? bearing : BEARINGS - 1;
 }
 
-/* sight._nearest, of one of `every` points */
-static void find_nearest(const float (*points)[4], const int8_t *kind, i64 n, i64 every, float (*nearest)[SLOPES])
+/* sight.Sight._look: the nearest of one of `every` points, for each direction */
+EXPORT void modt_look(const float (*points)[4], const int8_t *kind, i64 n, i64 every, float (*nearest)[SLOPES])
 {
     for (i64 b = 0; b < BEARINGS; b++)
         for (i64 s = 0; s < SLOPES; s++)
@@ -39,14 +39,12 @@ static i64 slope_at(double height_m, double range_m)
     return (i64)mind(maxd(slope, 0.0), SLOPES - 1);
 }
 
-/* sight.Sight._bounded_sides: whether each of n_which proposals is bounded clockwise and counter-clockwise. The proposals
- * own columns of the coordinates (3, n_members) from offsets on. `nearest` is scratch. */
-EXPORT void modt_bounded_sides(const float (*points)[4], const int8_t *kind, i64 n, i64 every, const float *coordinates,
-                               i64 n_members, const i64 *offsets, const double (*box)[7], const double (*centroid)[3],
-                               const i64 *which, i64 n_which, float margin_m, float (*nearest)[SLOPES],
-                               uint8_t (*sides)[2])
+/* sight.Sight.bounded_sides: whether each of n_which proposals is bounded clockwise and counter-clockwise. The proposals
+ * own columns of the coordinates (3, n_members) from offsets on. */
+EXPORT void modt_bounded_sides(const float (*nearest)[SLOPES], const float *coordinates, i64 n_members,
+                               const i64 *offsets, const double (*box)[7], const double (*centroid)[3],
+                               const i64 *which, i64 n_which, float margin_m, uint8_t (*sides)[2])
 {
-    find_nearest(points, kind, n, every, nearest);
     for (i64 w = 0; w < n_which; w++) {
         const i64 proposal = which[w], centre = bearing_of((float)centroid[proposal][0], (float)centroid[proposal][1]);
         const double *seen = box[proposal];

@@ -19,7 +19,7 @@ from modt.tracking.association import NO_ROWS, Associated
 from modt.tracking.sight import Sight
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import HidingTuning
-from modt.types import Float32, Float64, Int, Int8, Motion, Tracks
+from modt.types import Float32, Float64, Int, Motion, Tracks
 
 _OF_BOTH = ("hits", "observed_s")
 """Columns that add up as a track continues another one."""
@@ -40,34 +40,31 @@ class Hiding:
         self._sight = sight
         self._tuning = tuning
 
-    def loosened(self, tracks: TrackTable, frame: Associated, points: Float32 | None) -> Float64:
+    def loosened(self, tracks: TrackTable, frame: Associated, nearest: Float32 | None) -> Float64:
         """(K, 2, 2) covariances of the matched positions, greater of pedestrians with a bounded side.
 
         Args:
             tracks: as predicted.
             frame: proposals and matches.
-            points: (N, 4) points of the frame, sensor frame; None if they are not known.
+            nearest: result of `Sight.look` for the frame; None if its points are not known.
         """
         matches = frame.matches
         people = IS_WALKER[tracks.object_class[matches.rows]].nonzero()[0]
-        if points is None or not len(people):
+        if nearest is None or not len(people):
             return matches.covariance
-        sides = self._sight.bounded_sides(points, frame.proposals, matches.proposals[people])
+        sides = self._sight.bounded_sides(nearest, frame.proposals, matches.proposals[people])
         covariance = matches.covariance.copy()
         covariance[people[sides.any(axis=1)]] += self._tuning.side_sigma_m**2 * np.eye(2)
         return covariance
 
-    def stop_clock(
-        self, tracks: TrackTable, points: Float32, kind: Int8, T_world_sensor: Float64, dt_s: float
-    ) -> None:
+    def stop_clock(self, tracks: TrackTable, nearest: Float32, T_world_sensor: Float64, dt_s: float) -> None:
         """Do not count a time step without a proposal of people in hiding, unless their position is too uncertain.
 
         Nobody steps out unseen: who is expected in view, one step out of hiding, stays where that step began.
 
         Args:
             tracks: after the update of the frame.
-            points: (N, 4) points of the frame, sensor frame.
-            kind: (N,) what each point is.
+            nearest: result of `Sight.look` for the frame.
             T_world_sensor: (4, 4) pose of the sensor.
             dt_s: time step [s].
         """
@@ -80,7 +77,7 @@ class Hiding:
         moved = tracks.x[rows, :2] - tracks.kdop_position[rows]
         box = tracks.box[np.tile(rows, 2)]
         box[:, :2] += np.concatenate([moved, moved - step])
-        hidden = self._sight.hides(points, kind, transform_boxes(inverse(T_world_sensor), box))
+        hidden = self._sight.hides(nearest, transform_boxes(inverse(T_world_sensor), box))
         is_hidden, was_hidden = hidden.reshape(2, -1)
         stays = was_hidden & ~is_hidden
         tracks.x[rows[stays], :2] -= step[stays]

@@ -36,7 +36,7 @@ HIDES = np.isin(np.arange(-128, 128), [PointKind.MEMBER, *OBSTACLES])
 
 
 class Sight:
-    """Finds bounded ends: the reference in NumPy.
+    """Finds bounded ends and hidden places: the reference in NumPy.
 
     Args:
         tuning: points that are looked at, and distance beyond which an end is free.
@@ -45,48 +45,27 @@ class Sight:
     def __init__(self, tuning: SightTuning = SightTuning()) -> None:
         self.tuning = tuning
 
-    def bounded_sides(self, points: Float32, proposals: Proposals, which: Int) -> Bool:
+    def look(self, points: Float32, kind: Int8) -> Float32:
+        """(BEARINGS, SLOPES) distance of the nearest return that stands above the ground [m], infinity if none does.
+
+        Args:
+            points: (N, 4) points of a frame, sensor frame.
+            kind: (N,) what each point is.
+        """
+        every = max(1, len(points) // self.tuning.rays) | 1  # odd, since beams may take turns in an even number
+        nearest = np.empty((BEARINGS, SLOPES), np.float32)
+        self._look(points, kind, every, nearest)
+        return nearest
+
+    def bounded_sides(self, nearest: Float32, proposals: Proposals, which: Int) -> Bool:
         """(R, 2) whether proposals `which` (R,) are bounded clockwise, and counter-clockwise.
 
         Args:
-            points: (N, 4) points of the frame, sensor frame.
-            proposals: proposals of the frame, with the kinds of its points.
+            nearest: result of `look` for the frame.
+            proposals: proposals of the frame.
             which: (R,) proposals that are looked at.
         """
-        if proposals.kind is None or not len(which):
-            return np.zeros((len(which), 2), np.bool_)
-        return self._bounded_sides(points, proposals.kind, self._every(points), proposals, which)
-
-    def hides(self, points: Float32, kind: Int8, box: Float64) -> Bool:
-        """(R,) whether something nearer hides at least half of the bearings at which objects are expected.
-
-        Args:
-            points: (N, 4) points of the frame, sensor frame.
-            kind: (N,) what each point is.
-            box: (R, 7) boxes where the objects are expected, sensor frame. The shorter side is taken for the width.
-        """
-        every = self._every(points)
-        range_m = np.hypot(box[:, 0], box[:, 1])
-        half_m = box[:, 3:5].min(axis=1) / 2
-        reach = (half_m / np.maximum(range_m, half_m) * BEARINGS / (2 * np.pi)).astype(np.int64)
-        solid = _solid(points, kind, every)
-        nearest = _nearest(solid[_before(solid, box, (reach + 2) * WIDEST_RAD)])
-        centre = _bearing(*box[:, :2].T.astype(np.float32))
-        hides = np.zeros(len(box), np.bool_)
-        for i, expected in enumerate(box):
-            low, high = _slopes(expected)
-            bearings = (centre[i] + np.arange(-reach[i], reach[i] + 1)) % BEARINGS
-            nearer = nearest[bearings, low:high].min(axis=1) < range_m[i] - self.tuning.margin_m
-            hides[i] = nearer.mean() >= 0.5
-        return hides
-
-    def _every(self, points: Float32) -> int:
-        """One of so many points is looked at."""
-        return max(1, len(points) // self.tuning.rays) | 1  # odd, since beams may take turns in an even number
-
-    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Bool:
-        """The same, looking at one of `every` points."""
-        nearest = _nearest(_solid(points, kind, every))
+        margin_m = np.float32(self.tuning.margin_m)
         sides = np.zeros((len(which), 2), np.bool_)
         for i, proposal in enumerate(which.tolist()):
             members = slice(*proposals.offsets[proposal : proposal + 2].tolist())
@@ -100,44 +79,44 @@ class Sight:
                 outermost = (sign * off).max()
                 end_m = range_m[sign * off == outermost].min()
                 beside = (centre + sign * (outermost + np.arange(1, BESIDE + 1))) % BEARINGS
-                sides[i, side] = nearest[beside, low:high].min(initial=np.inf) < end_m + np.float32(
-                    self.tuning.margin_m
-                )
+                sides[i, side] = nearest[beside, low:high].min() < end_m + margin_m
         return sides
 
+    def hides(self, nearest: Float32, box: Float64) -> Bool:
+        """(R,) whether something nearer hides at least half of the bearings at which objects are expected.
 
-def _solid(points: Float32, kind: Int8, every: int) -> Float32:
-    """(n, 4) points, one of `every`, that stand above the ground, and so hide what is behind them; all are finite."""
-    return points[::every][HIDES[kind[::every].astype(np.int64) + 128]]
+        Args:
+            nearest: result of `look` for the frame.
+            box: (R, 7) boxes where the objects are expected, sensor frame. The shorter side is taken for the width.
+        """
+        range_m = np.hypot(box[:, 0], box[:, 1])
+        half_m = box[:, 3:5].min(axis=1) / 2
+        reach = (half_m / np.maximum(range_m, half_m) * BEARINGS / (2 * np.pi)).astype(np.int64)
+        centre = _bearing(*box[:, :2].T.astype(np.float32))
+        hides = np.zeros(len(box), np.bool_)
+        for i, expected in enumerate(box):
+            low, high = _slopes(expected)
+            bearings = (centre[i] + np.arange(-reach[i], reach[i] + 1)) % BEARINGS
+            nearer = nearest[bearings, low:high].min(axis=1) < range_m[i] - self.tuning.margin_m
+            hides[i] = nearer.mean() >= 0.5
+        return hides
 
-
-def _before(points: Float32, box: Float64, half_rad: Float64) -> Int:
-    """(n,) points within angles (R,) of the directions of boxes (R, 7), beyond them too."""
-    x, y = np.ascontiguousarray(points[:, :2].T)
-    towards = np.zeros(len(points), np.bool_)
-    for box_x, box_y, tangent in zip(box[:, 0], box[:, 1], np.tan(np.minimum(half_rad, 1.5)), strict=True):
-        along = x * np.float32(box_x) + y * np.float32(box_y)
-        across = x * np.float32(box_y) - y * np.float32(box_x)
-        towards |= np.abs(across) <= np.float32(tangent) * along
-    return towards.nonzero()[0]
+    def _look(self, points: Float32, kind: Int8, every: int, nearest: Float32) -> None:
+        """Fill the grid `nearest`, looking at one of `every` points."""
+        above_ground = HIDES[kind[::every].astype(np.int64) + 128]
+        x, y, z = np.ascontiguousarray(points[::every][above_ground, :3].T)
+        range_m = np.maximum(np.sqrt(x * x + y * y), np.float32(1e-3))
+        slope = np.floor((z / range_m - LEAST_SLOPE) * PER_SLOPE)
+        inside = ((slope >= 0) & (slope < SLOPES)).nonzero()[0]
+        at = _bearing(x[inside], y[inside]), slope[inside].astype(np.int64)
+        nearest[:] = np.inf
+        np.minimum.at(nearest, at, range_m[inside])
 
 
 def _bearing(x: Float32, y: Float32) -> Int:
     """(n,) bearing of the grid."""
     bearing = (pseudo_angle(x, y) * np.float32(BEARINGS / 4)).astype(np.int64)
     return np.minimum(bearing, BEARINGS - 1)
-
-
-def _nearest(points: Float32) -> Float32:
-    """(BEARINGS, SLOPES) distance of the nearest of the points (n, 4) [m]."""
-    x, y, z = np.ascontiguousarray(points[:, :3].T)
-    range_m = np.maximum(np.sqrt(x * x + y * y), np.float32(1e-3))
-    slope = np.floor((z / range_m - LEAST_SLOPE) * PER_SLOPE)
-    inside = ((slope >= 0) & (slope < SLOPES)).nonzero()[0]
-    nearest = np.full((BEARINGS, SLOPES), np.inf, np.float32)
-    at = _bearing(x[inside], y[inside]), slope[inside].astype(np.int64)
-    np.minimum.at(nearest, at, range_m[inside])
-    return nearest
 
 
 def _slopes(box: Float64) -> tuple[int, int]:
@@ -151,25 +130,11 @@ def _slopes(box: Float64) -> tuple[int, int]:
 
 _L = ctypes.c_int64
 _SIGNATURES: Signatures = {
+    "modt_look": (None, (FLOAT32, INT8, _L, _L, OutputArgument)),
     "modt_bounded_sides": (
         None,
-        (
-            FLOAT32,
-            INT8,
-            _L,
-            _L,
-            FLOAT32,
-            _L,
-            INT64,
-            FLOAT64,
-            FLOAT64,
-            INT64,
-            _L,
-            ctypes.c_float,
-            FLOAT32,
-            OutputArgument,
-        ),
-    )
+        (FLOAT32, FLOAT32, _L, INT64, FLOAT64, FLOAT64, INT64, _L, ctypes.c_float, OutputArgument),
+    ),
 }
 
 
@@ -181,14 +146,11 @@ class NativeSight(Sight):
         declare(library, _SIGNATURES)
         self._library = library
 
-    def _bounded_sides(self, points: Float32, kind: Int8, every: int, proposals: Proposals, which: Int) -> Bool:
-        """The same, looking at one of `every` points."""
+    def bounded_sides(self, nearest: Float32, proposals: Proposals, which: Int) -> Bool:
+        """(R, 2) the same."""
         sides = np.empty((len(which), 2), np.bool_)
         self._library.modt_bounded_sides(
-            points,
-            kind,
-            len(points),
-            every,
+            nearest,
             proposals.coordinates,
             proposals.coordinates.shape[1],
             proposals.offsets,
@@ -197,10 +159,13 @@ class NativeSight(Sight):
             which,
             len(which),
             self.tuning.margin_m,
-            np.empty((BEARINGS, SLOPES), np.float32),
             sides,
         )
         return sides
+
+    def _look(self, points: Float32, kind: Int8, every: int, nearest: Float32) -> None:
+        """The same."""
+        self._library.modt_look(points, kind, len(points), every, nearest)
 
 
 def sight_of(kernels: GeometryKernels, tuning: SightTuning = SightTuning()) -> Sight:

@@ -133,15 +133,17 @@ class Tracker:
         frame = Associated(proposals, located.observations, matches)
         if self._extended:  # the paper takes proposals as they are
             frame = self._regrouping.regroup(self.tracks, frame, located.placement)
+        nearest = None
+        if self._extended and points is not None and proposals.kind is not None:
+            nearest = self._sight.look(points, proposals.kind)
         rows = frame.matches.rows
         box_before = self.tracks.box.take(rows, axis=0)
         self._associate(rows)
-        self._update(frame, dt_s, points)
+        self._update(frame, dt_s, nearest)
         proposals = self._keep_top(frame, box_before)
         self._observe_rest(rows)
-        if self._extended and points is not None and proposals.kind is not None:
-            T_world_sensor = located.placement.T_world_sensor
-            self._hiding.stop_clock(self.tracks, points, proposals.kind, T_world_sensor, dt_s)
+        if nearest is not None:
+            self._hiding.stop_clock(self.tracks, nearest, located.placement.T_world_sensor, dt_s)
         kept = self._expire()
         self._begin_tracks(kept, frame.matches, frame.observations)
         t = self.tracks
@@ -222,15 +224,15 @@ class Tracker:
         t.unseen_s[rows] = 0.0
         t.proposal[:] = NONE
 
-    def _update(self, frame: Associated, dt_s: float, points: Float32 | None) -> None:
+    def _update(self, frame: Associated, dt_s: float, nearest: Float32 | None) -> None:
         """Update the filter with the matched positions, and the extents with the matched proposals."""
         t = self.tracks
         matches = frame.matches
         rows = matches.rows
         if self._extended:
-            covariance = self._hiding.loosened(t, frame, points)
+            covariance = self._hiding.loosened(t, frame, nearest)
             log_ratio = self._motion_filter.update(t, rows, matches.position, covariance)
-            self._motion_filter.believe(t, rows, self._weighed(log_ratio, frame, points))
+            self._motion_filter.believe(t, rows, self._weighed(log_ratio, frame, nearest))
         else:
             self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         t.end_variance[rows] = matches.end_variance
@@ -238,7 +240,7 @@ class Tracker:
         self._update_extent(t, rows, matches.proposals, frame.observations, matches.position, dt_s)
         t.envelope[frame.joined] = known  # what is joined justifies no further joins
 
-    def _weighed(self, log_ratio: Float64, frame: Associated, points: Float32 | None) -> Float64:
+    def _weighed(self, log_ratio: Float64, frame: Associated, nearest: Float32 | None) -> Float64:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
 
         Where a proposal is bounded by what is nearer, or goes on there, its ends may move while the object rests.
@@ -250,11 +252,11 @@ class Tracker:
         known = self.tracks.object_class[frame.matches.rows] != ObjectClass.BACKGROUND.value
         weighed = np.where(flat & ~known, np.minimum(log_ratio, 0.0), log_ratio)
         claims = (weighed > 0).nonzero()[0]
-        if points is None or not len(claims):
+        if nearest is None or not len(claims):
             return weighed
         compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)
         kind = np.where(known, 2, compact)[claims]
-        sides = self._sight.bounded_sides(points, frame.proposals, frame.matches.proposals[claims])
+        sides = self._sight.bounded_sides(nearest, frame.proposals, frame.matches.proposals[claims])
         weighed[claims] *= self._weight_by_sides[kind, sides.sum(axis=1)]
         return weighed
 
