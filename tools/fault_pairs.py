@@ -4,8 +4,9 @@
 
 The stages of a live run process a simulated drive frame by frame. The second fault begins while the first one lasts,
 and ends after it. `ended` counts the pairs in which a frame raised an error, `silent` those in which a fault lasted
-for longer than its limit while the trust was good, `lost` the frames without a result. The exit status is 0 if all
-are none. Faults of the packets, the disk and the machine are tried by `tools.faults` and `tools.deploy.soak`.
+for longer than its limit while the trust was good, `stuck` those after which it was not good again within 5 s, `lost`
+the frames without a result. The exit status is 0 if all are none. Faults of the packets, the disk and the machine are
+tried by `tools.faults` and `tools.deploy.soak`.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from modt_simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 
 SENSOR = "vlp-16"
-SECONDS = 20.0
+SECONDS = 26.0
 FIRST = 60
 """Number of the frame from which on the first fault begins."""
 LASTING = (50, 70)
@@ -35,6 +36,8 @@ LASTING = (50, 70)
 SEEN_S = 2.0
 KNOCKED_S = 5.0
 """Time after which a fault has to be reported [s]: one of the whole view, and others."""
+BACK_S = 5.0
+"""Time after the last fault after which the trust has to be good [s]."""
 POSES = "poses"
 """Faults of the poses are not reported where what stands still is not in view, as under another fault."""
 
@@ -164,6 +167,13 @@ def silent(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: fl
     return [f"{e.change.name}: good in {int(part.sum())} of {len(part)} frames" for e, part in late if part.any()]
 
 
+def stuck(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: float) -> list[str]:
+    """What is to be said of a pair after which the trust is not good again; empty if it is."""
+    after = levels[max(e.end for e in pair) + round(BACK_S / period_s) :]
+    late = sum(level != TrustLevel.GOOD for level in after)
+    return [f"not good in {late} of {len(after)} frames after both"] if late else []
+
+
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--pairs", type=int, default=1000, help="number of pairs (default: %(default)s)")
@@ -174,7 +184,7 @@ def main() -> None:
     stream = SyntheticStream(given.scene, SENSOR, SECONDS, given.seed)
     frames = list(stream)
     rng = np.random.default_rng(given.seed)
-    found = Counter[str](ended=0, silent=0, lost=0)
+    found = Counter[str](ended=0, silent=0, stuck=0, lost=0)
     for _ in range(given.pairs):
         pair = drawn(rng)
         names = " and ".join(f"{e.change.name} ({e.begin} to {e.end})" for e in pair)
@@ -186,9 +196,11 @@ def main() -> None:
             continue
         found["lost"] += len(frames) - len(levels)
         unreported = silent(levels, pair, stream.info.period_s)
+        lasting = stuck(levels, pair, stream.info.period_s)
         found["silent"] += bool(unreported)
-        if unreported:
-            print(f"{names}: {'; '.join(unreported)}", flush=True)
+        found["stuck"] += bool(lasting)
+        if unreported or lasting:
+            print(f"{names}: {'; '.join([*unreported, *lasting])}", flush=True)
     print(f"{given.pairs} pairs: " + ", ".join(f"{number} {what}" for what, number in found.items()))
     sys.exit(bool(found.total()))
 

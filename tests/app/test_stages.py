@@ -13,6 +13,7 @@ from modt.app.inputs import Request
 from modt.app.stages import RANGE_SHARE, Stages
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
+from modt.trust.watch import TrustWatch
 from modt.types import NONE, UNLIMITED, Frame, TrustLevel
 from modt_simulation.synthetic_stream import SyntheticStream
 
@@ -242,3 +243,15 @@ def test_beams_that_the_source_knows_are_used_unless_a_sensor_is_asked_for(asked
         chosen = choose(asked, first, info)
         assert chosen.config.sensor.elevations_deg == beams
     assert chosen.sensor == sensor
+
+
+def test_a_displaced_sensor_keeps_its_profile_until_it_is_back(monkeypatch):
+    stages = stages_of()
+    frame = frames()[0]
+    monkeypatch.setattr(TrustWatch, "displaced", True)
+    stages.trust.watch.another_sensor = True
+    stages.watch(frame)
+    assert stages.recognising is None
+    monkeypatch.setattr(TrustWatch, "displaced", False)
+    stages.watch(frame)
+    stages.recognising.join()

@@ -14,21 +14,23 @@ from modt_simulation.synthetic_stream import SyntheticStream
 
 SENSOR = "vlp-16"
 ONSET, END = 40, 70
+SECOND = 55, 110
 SECONDS = 10.0
 
 
 @cache
-def drive(scene):
-    frames = SyntheticStream(scene, SENSOR, SECONDS, seed=11)
+def drive(scene, seconds=SECONDS):
+    frames = SyntheticStream(scene, SENSOR, seconds, seed=11)
     return [replace(frame, points=frame.points[::3]) for frame in frames]
 
 
-def judged(scene, fault=None, others=lambda k: {}):
-    """Trust after each frame of a drive with a fault from ONSET up to END."""
+def judged(scene, fault=None, others=lambda k: {}, second=None, seconds=SECONDS):
+    """Trust after each frame of a drive with a fault from ONSET up to END, and a second one that lasts SECOND."""
     watch = TrustWatch(load(SENSOR).sensor)
     trusts = []
-    for k, frame in enumerate(drive(scene)):
+    for k, frame in enumerate(drive(scene, seconds)):
         points = fault(frame.points, k) if fault and ONSET <= k < END else frame.points
+        points = second(points, k) if second and SECOND[0] <= k < SECOND[1] else points
         trusts.append(watch.add(replace(frame, points=points), frame.T_world_sensor, others(k)))
     return trusts
 
@@ -108,6 +110,22 @@ def test_a_knock_under_a_cover_is_reported_when_the_cover_is_gone():
         points = FAULTS["pitched by -8 deg"](points, k) if 50 <= k < 90 else points
         keys.append(watch.add(Frame(k, 0.1 * k, points), frame.T_world_sensor).keys)
     assert all("ground" in now for now in keys[66:90])
+
+
+@pytest.mark.parametrize(
+    ("name", "second", "key"),
+    [
+        ("turned by 90 deg", "rolled by 15 deg", "ground"),
+        ("rolled by 15 deg", "turned by 90 deg", "scene"),
+        ("a fifth farther", "turned by 90 deg", "scene"),
+    ],
+)
+def test_a_fault_that_begins_during_another_one_is_reported_by_itself_and_withdrawn(name, second, key):
+    """The robot drives on for 7 s, so the scene before both is out of view when they end."""
+    trusts = judged("street", FAULTS[name], second=FAULTS[second], seconds=15.0)
+    assert all(key in trust.keys for trust in trusts[SECOND[0] + 20 : SECOND[1]])
+    assert all(trust.keys == (key,) for trust in trusts[END + 30 : SECOND[1]])
+    assert not any(trust.keys for trust in trusts[SECOND[1] + 50 :])
 
 
 def test_reflectance_is_no_matter_of_trust():

@@ -136,16 +136,24 @@ class Stages:
         return findings
 
     def watch(self, frame: Frame) -> None:
-        """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it."""
+        """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it.
+
+        A sensor that was knocked or turned keeps its profile: one that fits the view from there would hide that.
+        """
         trust = self.trust.watch
         if self._recognised:
             self.misfits += 1
             self._first, chosen = self._recognised.pop()
             self._use(chosen)
-        elif self._live and trust.another_sensor and not (self.recognising and self.recognising.is_alive()):
+        elif trust.another_sensor and not trust.displaced and self._live and not self._recognises:
             trust.another_sensor = False
             self.recognising = Thread(target=self._recognise_again, args=(frame,), name="recognition", daemon=True)
             self.recognising.start()
+
+    @property
+    def _recognises(self) -> bool:
+        """Whether the thread that compares profiles runs."""
+        return self.recognising is not None and self.recognising.is_alive()
 
     def recover(self, *, anew: bool) -> None:
         """Restore the tracks of the last good frame; with `anew` make new stages without tracks."""

@@ -26,7 +26,7 @@ MIN_STEP_M = 0.08
 """Least limit of a change of the height [m], under a sensor that is low."""
 BACK_SHARE = 0.7
 """Share of the limits within which the ground is back."""
-UNSEEN_FACTOR = 2.5
+UNSEEN_FACTOR = 1.5
 """Multiple of the limits by which the ground has moved if the sensor went on while nothing was seen."""
 LEFT_SHARE = 0.25
 """Share of a step that another one may leave, as the ground has another shape elsewhere."""
@@ -68,6 +68,12 @@ class GroundCheck:
             self._known_looks = self._known_looks + 1 if on_it and below else 0
 
     @property
+    def present(self) -> Float64:
+        """(3,) the ground z = present @ (1, x, y) as it has moved."""
+        moved = self._before is not None and bool(np.isfinite(self._step).all())
+        return self.plane + self._step if moved else self.plane
+
+    @property
     def _known(self) -> bool:
         return self._known_looks >= KNOWN_LOOKS
 
@@ -86,7 +92,8 @@ class GroundCheck:
             self._add(pairs)
         if self._before is None:
             return
-        is_back = self._size(_step(self._before, now, known=True)) < BACK_SHARE
+        steps = (_step(self._before, now, known=True), self._from_plane(now))
+        is_back = min(self._size(step) for step in steps) < BACK_SHARE
         self._looks = self._looks + 1 if is_back else 0
         if self._looks >= back_looks or self._size(self._step) < max(1.0, LEFT_SHARE * self._greatest):
             self.moved = ""

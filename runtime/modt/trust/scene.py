@@ -7,7 +7,7 @@ mirror reverses the bearing (Fourier-Mellin).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,8 +90,13 @@ class SceneCheck:
         self._agreed = 1.0  # share of the obstacle points that stood still at the last look
         self._looks = 0  # in a row in which the scene is back
 
-    def look(self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int) -> None:
-        """Notice a scene that changes at once, and one that is back; arguments as those of the ground's check."""
+    def look(
+        self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int, *, may_scale: bool = True
+    ) -> None:
+        """Notice a scene that changes at once, and one that is back; arguments as those of the ground's check.
+
+        A ground that moved at the same time tells of a scale already, so then the scene need not (`may_scale`).
+        """
         if not pairs:
             return
         tuning = self._tuning
@@ -103,19 +108,25 @@ class SceneCheck:
             agreements = [(agreement(*pair, self.change), pair) for pair in pairs]
             least, pair = min(agreements, key=lambda each: each[0])
             if least < tuning.suspected:
-                self._explain(*pair, least)
+                self._explain(*pair, least, may_scale=may_scale)
         if self._before is None:
             return
-        is_back = agreement(self._before, now, SAME) >= tuning.back
+        is_back = agreement(self._before, now, SAME) >= tuning.back or self._moves_as_before(first, now)
         self._looks = self._looks + 1 if is_back else 0
         if self._looks >= back_looks or self.change.is_none:
             self.change = SAME
             self._before = None
 
-    def _explain(self, before: Sample, after: Sample, least: float) -> None:
+    def _moves_as_before(self, first: Sample, now: Sample) -> bool:
+        """Whether obstacles move by the pose as in a scene that is not changed, and not as in the changed one."""
+        return agreement(first, now, SAME) > agreement(first, now, self.change) + self._tuning.better
+
+    def _explain(self, before: Sample, after: Sample, least: float, *, may_scale: bool) -> None:
         """Note how the scene changed from one sweep to the next."""
         tuning = self._tuning
         change, share = explain(before, after, self.change)
+        if not may_scale:
+            change = replace(change, scaled=0)
         needed = tuning.explained if least < tuning.same else tuning.surely_explained
         if self.change.then(change).is_none:  # the way back
             needed = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -109,7 +109,7 @@ class TrustWatch:
             T_world_sensor: (4, 4) its pose.
             others: findings of other checks by their names.
         """
-        seen = sample(frame, T_world_sensor, self._sensor, self._ground.plane)
+        seen = sample(frame, T_world_sensor, self._sensor, self._ground.present)
         now_s = seen.time_s
         if self._began_s is None or now_s < self._samples[-1].time_s or now_s - self._samples[-1].time_s > GAP_S:
             self._began_s = now_s if self._began_s is None else self._began_s
@@ -165,10 +165,13 @@ class TrustWatch:
     def _follow(self) -> None:
         """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them."""
         pairs = [(a, b) for a, b in pairwise(self._samples) if b.time_s - a.time_s <= AT_ONCE_S]
-        had_moved = self._ground.moved
-        self._ground.look(self._samples[0], pairs, self._tuning.back_looks)
-        if not had_moved and not self._ground.moved:
-            self._scene.look(self._samples[0], pairs, self._tuning.back_looks)
+        first = self._samples[0]
+        ground = self._ground.present
+        self._ground.look(first, pairs, self._tuning.back_looks)
+        ground_moved = bool((self._ground.present != ground).any())
+        if ground_moved:  # the obstacles stand on it as it is after the step
+            pairs = [(first, replace(self._samples[-1], plane=self._ground.present))]
+        self._scene.look(first, pairs, self._tuning.back_looks, may_scale=not ground_moved)
 
     def _look_past(self, before: Sample, now: Sample) -> None:
         """Compare the sweeps before and after a time in which nothing was seen."""
