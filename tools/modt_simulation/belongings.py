@@ -147,3 +147,56 @@ def cone(rng: Generator) -> Solids:
         for k in range(4)
     ]
     return Solids.join(rings)
+
+
+def topped(rng: Generator) -> Solids:
+    """What is wide at the top and thin below: a letter box, a small sign, a lamp, or a clipped bush on its trunk."""
+    foot = rng.uniform(0.2, 0.7) if rng.random() < 0.6 else rng.uniform(0.7, 1.6)
+    radius = rng.uniform(0.02, 0.1) if foot < 0.7 else 0.02
+    semi = tuple((rng.uniform((0.15, 0.15, 0.25), (0.45, 0.4, 0.8)) / (1.0, 1.0, 2.0)).tolist())
+    middle = (0.0, 0.0, foot + semi[2])
+    post = cylinder((0.0, 0.0, foot / 2), radius, foot, Material.METAL)
+    if rng.random() < 0.5:
+        return Solids.join([post, box(middle, (2 * semi[0], 2 * semi[1], 2 * semi[2]), Material.METAL)])
+    return Solids.join([post, ellipsoid(middle, semi, Material.FOLIAGE, rng.uniform(3.0, 30.0))])
+
+
+def stone(rng: Generator) -> Solids:
+    """A stump, a stone, a plant pot, a grave stone or the end of a low wall."""
+    wide, deep = rng.uniform(0.2, 0.8, 2)
+    tall = rng.uniform(0.25, 1.2)
+    material = (Material.WALL, Material.BARK, Material.METAL)[rng.integers(3)]
+    kind = rng.integers(4)
+    if kind == 0:
+        return cylinder((0.0, 0.0, tall / 2), wide / 2, tall, material)
+    if kind == 1:
+        return ellipsoid((0.0, 0.0, 0.3 * tall), (wide / 2, deep / 2, 0.7 * tall), material)
+    if kind == 2:
+        pot = cylinder((0.0, 0.0, tall / 4), wide / 2, tall / 2, material)
+        semi = (0.5 * wide + 0.1, 0.5 * wide + 0.1, 0.4 * tall)
+        return Solids.join([pot, ellipsoid((0.0, 0.0, 0.8 * tall), semi, Material.FOLIAGE, rng.uniform(2.0, 12.0))])
+    return block((wide, deep, tall), material)
+
+
+def statue(rng: Generator) -> Solids:
+    """A low figure of stone without limbs: a trunk that leans, and a head or none."""
+    tall = rng.uniform(0.5, 1.3)
+    wide = rng.uniform(0.15, 0.3)
+    lean = rng.uniform(-0.2, 0.2)
+    parts = [ellipsoid((lean / 2, 0.0, 0.4 * tall), (0.8 * wide, wide, 0.45 * tall), Material.WALL)]
+    if rng.random() < 0.5:
+        radius = rng.uniform(0.25, 0.6) * wide
+        parts.append(ellipsoid((lean, 0.0, 0.9 * tall), (radius, radius, radius), Material.WALL))
+    return Solids.join(parts)
+
+
+def suitcase(rng: Generator) -> Solids:
+    """Luggage or boxes that nobody is near: one or two, on one another or side by side."""
+    parts = []
+    top = 0.03
+    for _ in range(rng.integers(1, 4)):
+        size = tuple(rng.uniform((0.2, 0.3, 0.25), (0.5, 0.7, 0.8)).tolist())
+        x, y = rng.normal(0.0, 0.08, 2)
+        parts.append(box((float(x), float(y), top + size[2] / 2), size, Material.CLOTH, rng.uniform(-0.3, 0.3)))
+        top = top + size[2] if rng.random() < 0.5 else 0.03
+    return Solids.join(parts)

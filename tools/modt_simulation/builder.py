@@ -92,6 +92,8 @@ LOW_M = {
     Posture.LIE: (1.9, 0.75, 0.32),
 }
 """Postures near the ground, and the length, width and height of a person in each."""
+SCOOTER_M = (1.85, 0.7, 1.15)
+"""Length, width and height of a motor scooter."""
 RIDER_M = 1.74
 """Standing height of a rider."""
 STRIP_M = 0.07
@@ -201,6 +203,20 @@ class SceneBuilder:
         size = (1.76, 0.6, 0.93 + 0.3 * height * np.cos(0.55) + 0.24 * height)
         bicycle = vehicles.bicycle(self.rng)
         self._person(kinds.CYCLIST, size, path, height, bicycle, 2 * np.pi * speed_mps / 4.5)
+
+    def parked_scooter(self, x: float, y: float, heading_rad: float) -> None:
+        """Add a motor scooter without a rider."""
+        path = Path.standing(x, y, heading_rad)
+        self.bodies.append(Body(kinds.BICYCLE, SCOOTER_M, path, vehicles.motor_scooter(self.rng)))
+
+    def scooter_rider(self, path: Path) -> None:
+        """Add a person on a motor scooter, who sits upright with the feet on the floorboard."""
+        height = clipped_normal(self.rng, 1.68, 0.08, 1.5, 1.9)
+        length, width, _ = SCOOTER_M
+        scooter = vehicles.motor_scooter(self.rng)
+        self._person(kinds.CYCLIST, (length, width, 0.8 + 0.5 * height), path, height, scooter, posture=Posture.RIDE)
+        lean = self.rng.normal(-0.4, 0.12)
+        self._people[-1] = self._people[-1]._replace(lean=lean, hips_x=-0.05, hips_z=-0.1, feet_x=0.1)
 
     def world(
         self,

@@ -1,4 +1,4 @@
-"""Cars, vans, trucks and bicycles of random proportions."""
+"""Cars, vans, trucks, bicycles and motor scooters of random proportions."""
 
 from __future__ import annotations
 
@@ -172,6 +172,33 @@ def bicycle(rng: Generator) -> Solids:
     if rng.random() < 0.35:
         parts.append(box((-0.5, 0.0, 0.82), (0.38, 0.35, 0.3), Material.RUBBER))
     parts.append(box((-base / 2 - 0.3, 0.0, 0.6), (0.02, 0.05, 0.05), Material.LAMP))
+    return Solids.join(parts)
+
+
+def motor_scooter(rng: Generator) -> Solids:
+    """A motor scooter; x ahead, origin on the ground between the wheels."""
+    radius = rng.uniform(0.2, 0.27)
+    base = rng.uniform(1.15, 1.32)
+    wide = rng.uniform(0.26, 0.4)
+    seat = rng.uniform(0.72, 0.82)
+    head = rng.uniform(0.95, 1.1)
+    paint = (Material.CAR_PAINT, Material.CAR_DARK, Material.CAR_BLACK)[rng.integers(3)]
+    wheels = [cylinder((s * base / 2, 0.0, radius), radius, 0.1, Material.RUBBER, axis=1) for s in (-1, 1)]
+    parts = [
+        *wheels,
+        box((-0.42, 0.0, (seat + 0.25) / 2 + 0.05), (0.75, wide, seat - 0.25), paint),
+        box((-0.38, 0.0, seat + 0.04), (0.7, 0.28, 0.1), Material.RUBBER),
+        box((0.1, 0.0, 0.28), (0.45, wide, 0.1), paint),
+        box((0.42, 0.0, 0.6), (0.12, wide + 0.05, 0.65), paint, rng.uniform(-0.05, 0.05)),
+        rod((base / 2, 0.0, radius), (0.42, 0.0, head - 0.05), 0.05, Material.METAL),
+        box((0.46, 0.0, head - 0.05), (0.2, 0.24, 0.22), paint),
+        rod((0.38, -0.33, head), (0.38, 0.33, head), 0.025, Material.RUBBER),
+    ]
+    if rng.random() < 0.7:
+        parts += [box((0.4, side * 0.36, head + 0.17), (0.03, 0.12, 0.09), Material.METAL) for side in (-1, 1)]
+    if rng.random() < 0.3:
+        parts.append(box((-0.85, 0.0, seat + 0.22), (0.32, 0.36, 0.3), Material.RUBBER))
+    parts.append(box((-0.82, 0.0, 0.55), (0.02, 0.16, 0.12), Material.RETRO))
     return Solids.join(parts)
 
 

@@ -33,6 +33,7 @@ from tools.train.labelled_scans import (
 from tools.train.near_scans import near_scans
 from tools.train.paste import cut_objects, paste_objects
 from tools.train.people_scans import people_scans
+from tools.train.rider_scans import rider_scans
 from tools.train.synthetic_scans import label_files, scans_from_labels
 
 SYNTHETIC_CELL_SCALES = (0.75, 1.0, 1.0, 1.4)
@@ -120,6 +121,12 @@ def people_crops(path: Path, worlds: int, seed: int) -> None:
     """Write crops of simulated sweeps of people in all postures, one sweep of each world."""
     scans = people_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
     _save_simulated(path, scans, {"people": worlds, "seed": seed})
+
+
+def rider_crops(path: Path, worlds: int, seed: int) -> None:
+    """Write crops of simulated sweeps of roads with rows of parked two-wheelers, one sweep of each world."""
+    scans = rider_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
+    _save_simulated(path, scans, {"riders": worlds, "seed": seed})
 
 
 def street_crops(path: Path, worlds: int, seed: int) -> None:

@@ -3,11 +3,11 @@
     python -m tools.train.build_models WORK_DIR [--kitti ROOT] [--scans FOLDER --profile PROFILE] [--further]
 
 Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/pointnet-kitti. With --further it trains
-the shipped ones on sweeps of heaps and of people alone (tools.train.train_further), which takes minutes. With --scans
-it builds WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data.
-The scans have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the
-validation. Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z
-forward).
+the shipped ones on sweeps of heaps, people and riders alone (tools.train.train_further), which takes minutes. With
+--scans it builds WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given,
+KITTI's data. The scans have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never
+split in the validation. Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x
+right, y down, z forward).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from tools.train.build_crops import (
     near_crops,
     own_crops,
     people_crops,
+    rider_crops,
     street_crops,
     synthetic_crops,
 )
@@ -35,12 +36,14 @@ NEAR_WORLDS = {1: 3000, 2: 550}
 """Seed and number of the worlds near the sensor, first for training, then for the card."""
 NEAR_STEPS = 4000
 """Training steps of the network for near crops."""
-FURTHER_STEPS = 1500
+FURTHER_STEPS = 1800
 """Training steps on sweeps of heaps and of people, at most."""
 BARE_WORLDS = {3: 880, 4: 110}
 """Seed and number of the worlds without objects, first for training, then for the card."""
-PEOPLE_WORLDS = {5: 500, 7: 500, 6: 220}
+PEOPLE_WORLDS = {5: 400, 7: 400, 6: 220}
 """Seed and number of the worlds of people in all postures, the last for the card, the others for training."""
+RIDER_WORLDS = {8: 220, 9: 60}
+"""Seed and number of the roads with rows of two-wheelers, first for training, then for the card."""
 STREET_WORLDS = {900_000: 44, 900_500: 44}
 """Seed and number of the simulated streets and crossings beside them."""
 KITTI_DATA = (
@@ -82,12 +85,26 @@ def build(crops: list[Path], work: Path, out: Path, steps: int, data: str, licen
     run("train_near", out, beside, *options, "--near", near, "--held", held, "--crops", *crops)
 
 
+def further_crops(work: Path) -> None:
+    """Write the crops of the further training."""
+    for name, write, worlds_of_seed in (
+        ("bare", bare_crops, BARE_WORLDS),
+        ("people", people_crops, PEOPLE_WORLDS),
+        ("rider", rider_crops, RIDER_WORLDS),
+        ("street", street_crops, STREET_WORLDS),
+    ):
+        for seed, worlds in worlds_of_seed.items():
+            write(work / f"{name}-{seed}.npz", worlds, seed)
+
+
 def train_further(crops: list[Path], work: Path, out: Path, steps: int) -> None:
     """Train a model on worlds without objects and on worlds of people. Its own data sets are `crops`."""
     bare = [work / f"bare-{seed}.npz" for seed in BARE_WORLDS]
     people = [work / f"people-{seed}.npz" for seed in PEOPLE_WORLDS]
+    riders = [work / f"rider-{seed}.npz" for seed in RIDER_WORLDS]
     streets = [work / f"street-{seed}.npz" for seed in STREET_WORLDS]
-    data: list[str | Path] = ["--bare", *bare, "--people", *people, "--streets", *streets, "--crops", *crops]
+    data: list[str | Path] = ["--bare", *bare, "--people", *people, "--riders", *riders]
+    data += ["--streets", *streets, "--crops", *crops]
     run("train_further", out, *data, "--steps", steps)
 
 
@@ -105,12 +122,7 @@ def main() -> None:
     placed = args.work / "placed.npz"
     real = args.work / "kitti.npz"
     scans = args.work / "scans.npz"
-    for seed, worlds in BARE_WORLDS.items():
-        bare_crops(args.work / f"bare-{seed}.npz", worlds, seed)
-    for seed, worlds in PEOPLE_WORLDS.items():
-        people_crops(args.work / f"people-{seed}.npz", worlds, seed)
-    for seed, worlds in STREET_WORLDS.items():
-        street_crops(args.work / f"street-{seed}.npz", worlds, seed)
+    further_crops(args.work)
     if not args.further:
         for seed, worlds in NEAR_WORLDS.items():
             near_crops(args.work / f"near-{seed}.npz", worlds, seed)

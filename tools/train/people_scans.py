@@ -264,6 +264,7 @@ def _heap(rng: Generator) -> Solids:
 THINGS: tuple[Callable[[Generator], Solids], ...] = (
     _shrub, _shrub, belongings.stake, belongings.stake, scenery.bin_, scenery.bin_, belongings.sack, belongings.sack,
     scenery.sign, belongings.board, belongings.bust, belongings.cone, _animal, _empty, _empty, _empty,
+    belongings.topped, belongings.topped, belongings.stone, belongings.stone, belongings.statue, belongings.suitcase,
     _heap, _heap, _heap,
     table, shelf, pallets, scenery.tree, scenery.pole,
 )  # fmt: skip

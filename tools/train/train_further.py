@@ -1,15 +1,17 @@
-"""Train a model further: heaps and branches are background, people in every posture are people (extra [train]).
+"""Train a model further: heaps, rows of scooters, and people in every posture (extra [train]).
 
     python -m tools.train.train_further MODEL.onnx --bare BARE.npz HELD.npz --people PEOPLE.npz... HELD.npz
-                         --streets STREETS.npz... --crops CROPS.npz... [--steps N]
+                         --riders RIDERS.npz HELD.npz --streets STREETS.npz... --crops CROPS.npz... [--steps N]
 
-Streets have no heaps, and their people stand and walk. A network that has seen nothing else takes a heap for a car,
-and who sits or crouches for background. The network is trained on with four kinds of crops beside one another: those
-of --bare are background, those of --people and of --streets have the labels of the simulator, and those of --crops,
-the data of the model, keep the posterior that the network gives them. So the class frequencies that the posteriors
-assume hold on streets. The box classifier is trained alike, without augmentation: the box of a car
-of which a part is cut off is the box of a heap. The model is replaced, and its card gets a section with the false
-objects and the people on the held data sets, on which nothing is trained.
+Streets have no heaps, few scooters, and their people stand and walk. A network that has seen nothing else takes a
+heap or a row of scooters for a car, and who sits or crouches for background. The network is trained on with five
+kinds of crops beside one another: those of --bare are background, those of --people, --riders and --streets have the
+labels of the simulator, and those of --crops, the data of the model, keep the posterior that the network gives them.
+So the class frequencies that the posteriors assume hold on streets. Crops of that data that are as narrow and low as
+a person are drawn oftener: bins, plants, signs and posts of streets stay background. The box classifier
+is trained alike, without augmentation: the box of a car of which a part is cut off is the box of a heap. The model is
+replaced, and its card gets a section with the false objects, the people and the riders on the held data sets, on
+which nothing is trained.
 """
 
 from __future__ import annotations
@@ -17,19 +19,23 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import onnx
 import torch
 from numpy.random import Generator
+from scipy.special import softmax
 
 from modt.classes import CLASS_NAMES, N_CLASSES, ObjectClass
+from modt.classification import box_classifier
 from modt.classification.crops import Crops
 from modt.types import Bool, Float64, Int
 from modt_training.augment import distance_m
 from modt_training.dataset import (
     BATCH_SIZE,
+    CLUSTERED,
     SEED,
     Dataset,
     dataset_features,
@@ -55,7 +61,7 @@ from modt_training.fine_tuning import (
 )
 from tools.options import make_torch_deterministic, parser
 
-BARE_SIZE = 32
+BARE_SIZE = 48
 """Number of bare crops of a step, beside BATCH_SIZE crops that keep their posterior."""
 BARE_BATCHES = 160
 """Batches of augmented bare crops."""
@@ -65,7 +71,7 @@ MIN_BARE_POINTS = 20
 """Least number of points of an augmented bare crop: fewer tell no heap from a part of a car."""
 MAX_RANGE_M = 45.0
 """Greatest distance of an augmented bare crop, for the same reason."""
-PEOPLE_SIZE = 64
+PEOPLE_SIZE = 160
 """Number of crops of people, and of things beside them, of a step: as many of the one as of the other."""
 PEOPLE_BATCHES = 250
 """Batches of such crops, half of them augmented."""
@@ -78,15 +84,45 @@ PEOPLE_SHARE = np.array([0.5, 0.001, 0.5, 0.001])
 MIN_PEOPLE_WORTH = 0.3
 """Least relative rate at which such a crop is drawn; the greatest is 1, for what the model is wrong about."""
 MIN_PEOPLE_POINTS = 12
-"""Least number of points of such a crop: fewer do not tell a low posture from a thing."""
+"""Least number of points of a person in such a crop: fewer do not tell a low posture from a thing."""
 MIN_PEOPLE_HEIGHT_M = 0.12
-"""Least height of such a crop of a person: what one beam sees of who lies is a kerb as well."""
+"""Least height of a person in such a crop: what one beam sees of who lies is a kerb as well."""
 MAX_PEOPLE_M = 18.0
-"""Greatest distance of such a crop, for the same reason."""
+"""Greatest distance of a person in such a crop, for the same reason."""
+MIN_FRAGMENT_M = 0.5
+"""Least height of a person in such a crop whose legs are hidden: less is a sign or a lamp as well."""
+MAX_FOOT_M = 0.7
+"""Height of the lowest point above ground from which the legs are hidden."""
+MIN_THING_POINTS = 6
+"""Least number of points of a thing in such a crop."""
+MAX_THING_M = 50.0
+"""Greatest distance of a thing in such a crop: far things of few points are things."""
+NARROW_SIZE = 160
+"""Number of narrow crops of the data of the model of a step, which keep their posterior."""
+NARROW_BATCHES = 320
+"""Batches of such crops, half of them augmented."""
+MAX_NARROW_TOP_M = 2.0
+"""Greatest height of their top above ground: that of a person."""
+MAX_NARROW_M = 1.3
+"""Greatest extent of their points along either axis."""
+RIDER_SIZE = 64
+"""Number of crops of roads with rows of two-wheelers of a step."""
+RIDER_BATCHES = 200
+"""Batches of such crops, half of them augmented."""
+RIDER_SHARE = np.array([0.5, 0.12, 0.13, 0.25])
+"""Share of the classes in such crops."""
+RIDER_FREQUENCY = np.array([0.89, 0.07, 0.03, 0.01])
+"""Frequency of the classes among proposals of such roads."""
+MIN_RIDER_POINTS = 10
+"""Least number of points of such a crop."""
 BOX_BARE_SIZE = 96
 """Number of bare crops of such a step."""
 BOX_PEOPLE_SIZE = 192
 """Number of crops of people and things of such a step."""
+BOX_NARROW_SIZE = 256
+"""Number of narrow crops of the data of the model of such a step."""
+BOX_RIDER_SIZE = 128
+"""Number of crops of roads with rows of two-wheelers of such a step."""
 MIN_BOX_POINTS = 10
 """Least number of points of bare crops for the box classifier."""
 CALLED = 0.5
@@ -118,23 +154,21 @@ def people_examples(model: Model, data: Dataset, rng: Generator) -> Examples:
     local = joined([changed, same])
     distance = np.append(distance_of_changed, distance_m(data.take(rows_of_same)))
     label = data.label[np.append(rows_of_changed, rows_of_same)]
-    kept = np.flatnonzero(_shows_posture(label, local.count, distance, _height_m(local)))
+    kept = np.flatnonzero(_shows_posture(label, local, distance, np.zeros(len(label))))
     wanted = one_hot(label[kept])
     return Examples(take(local, kept), wanted, PEOPLE_SIZE, np.log(PEOPLE_SHARE / PEOPLE_FREQUENCY))
 
 
-def _shows_posture(label: Int, count: Int, distance: Float64, height: Float64) -> Bool:
-    """(R,) crops that can tell a posture, by (R,) class, points, distance [m] and height [m]."""
-    is_flat = (label == ObjectClass.PEDESTRIAN) & (height < MIN_PEOPLE_HEIGHT_M)
-    return ~is_flat & (count >= MIN_PEOPLE_POINTS) & (distance < MAX_PEOPLE_M)
-
-
-def _height_m(crops: Crops) -> Float64:
-    """(R,) height of the points of each crop [m]."""
+def _shows_posture(label: Int, crops: Crops, distance: Float64, ground_z_m: Float64) -> Bool:
+    """(R,) crops that can tell a posture, by (R,) class, distance [m] and z of the ground beneath them [m]."""
     z = crops.xyz[:, 2]
     starts = crops.offsets[:-1]
-    height: Float64 = np.maximum.reduceat(z, starts) - np.minimum.reduceat(z, starts)
-    return height
+    foot = np.minimum.reduceat(z, starts)
+    height = np.maximum.reduceat(z, starts) - foot
+    least = np.where(foot - ground_z_m > MAX_FOOT_M, MIN_FRAGMENT_M, MIN_PEOPLE_HEIGHT_M)
+    person = (height >= least) & (crops.count >= MIN_PEOPLE_POINTS) & (distance < MAX_PEOPLE_M)
+    thing = (crops.count >= MIN_THING_POINTS) & (distance < MAX_THING_M)
+    return np.where(label == ObjectClass.PEDESTRIAN, person, thing)
 
 
 def people_and_things(data: Dataset) -> Int:
@@ -142,6 +176,59 @@ def people_and_things(data: Dataset) -> Int:
     is_person = data.label == ObjectClass.PEDESTRIAN
     is_thing = (data.label == ObjectClass.BACKGROUND) & ~data.unknown & (data.majority == ObjectClass.BACKGROUND)
     return np.flatnonzero(data.trainable & (is_person | is_thing))
+
+
+def narrow(data: Dataset) -> Int:
+    """Rows of whole objects and known background as narrow and low as a person, of real scans if there are any."""
+    xyz = data.crops.xyz
+    starts = data.crops.offsets[:-1]
+    extent = np.maximum.reduceat(xyz, starts) - np.minimum.reduceat(xyz, starts)
+    top = np.maximum.reduceat(xyz[:, 2], starts) - data.sensors.ground_z_m
+    fits = data.trainable & (top < MAX_NARROW_TOP_M) & (extent[:, :2].max(axis=1) < MAX_NARROW_M)
+    of_real = fits & (data.variant <= CLUSTERED)
+    return np.flatnonzero(of_real if of_real.any() else fits)
+
+
+def narrow_examples(model: Model, data: Dataset, rng: Generator) -> Examples:
+    """Narrow crops of the data of the model, each with the posterior that the network gives it."""
+    drawn = rng.choice(narrow(data), (NARROW_BATCHES, BATCH_SIZE))
+    local = joined([augmented(data, drawn[::2], rng)[0], unchanged(data, drawn[1::2], rng)[0]])
+    return Examples(local, model.network_posterior(local), NARROW_SIZE, np.zeros(N_CLASSES))
+
+
+def narrow_boxes(model: Model, data: Dataset) -> Boxes:
+    """Boxes of narrow crops of the data of the model, which keep the posterior of the box classifier."""
+    feature = dataset_features(data, narrow(data))
+    wanted = softmax(box_classifier.logits(model.boxes.layers, feature), axis=1)
+    return Boxes.of(feature, wanted, BOX_NARROW_SIZE, np.zeros(N_CLASSES))
+
+
+def _of_riders(riders: Dataset) -> Int:
+    """Rows of whole objects and background of roads with rows of two-wheelers."""
+    return np.flatnonzero(riders.trainable & (riders.crops.count >= MIN_RIDER_POINTS))
+
+
+def _drawn_riders(riders: Dataset, n: int, rng: Generator) -> Int:
+    """(n,) rows of such roads, classes by their shares."""
+    rows = _of_riders(riders)
+    share = (RIDER_SHARE / np.bincount(riders.label[rows], minlength=N_CLASSES))[riders.label[rows]]
+    return rng.choice(rows, n, p=share / share.sum())
+
+
+def rider_examples(riders: Dataset, rng: Generator) -> Examples:
+    """Crops of roads with rows of two-wheelers: riders, people, cars, and background beside them."""
+    drawn = _drawn_riders(riders, RIDER_BATCHES * BATCH_SIZE, rng).reshape(RIDER_BATCHES, BATCH_SIZE)
+    changed, _, rows_of_changed = augmented(riders, drawn[::2], rng)
+    same, rows_of_same = unchanged(riders, drawn[1::2], rng)
+    label = riders.label[np.append(rows_of_changed, rows_of_same)]
+    return Examples(joined([changed, same]), one_hot(label), RIDER_SIZE, np.log(RIDER_SHARE / RIDER_FREQUENCY))
+
+
+def rider_boxes(riders: Dataset, rng: Generator) -> Boxes:
+    """Boxes of such crops."""
+    drawn = _drawn_riders(riders, BOX_CROPS, rng)
+    wanted = one_hot(riders.label[drawn])
+    return Boxes.of(dataset_features(riders, drawn), wanted, BOX_RIDER_SIZE, np.log(RIDER_SHARE / RIDER_FREQUENCY))
 
 
 def bare_boxes(bare: Dataset) -> Boxes:
@@ -155,7 +242,8 @@ def people_boxes(people: Dataset, rng: Generator) -> Boxes:
     """Boxes of people and of things beside them, as many of each."""
     rows = people_and_things(people)
     crops = people.take(rows)
-    rows = rows[_shows_posture(people.label[rows], crops.count, distance_m(crops), _height_m(crops))]
+    ground_z_m = people.sensors.ground_z_m[rows]
+    rows = rows[_shows_posture(people.label[rows], crops, distance_m(crops), ground_z_m)]
     is_person = people.label[rows] == ObjectClass.PEDESTRIAN
     drawn = np.concatenate([rng.choice(rows[of_kind], BOX_CROPS) for of_kind in (is_person, ~is_person)])
     wanted = one_hot(people.label[drawn])
@@ -195,10 +283,49 @@ def people_called(before: Model, after: Model, held: Dataset) -> list[str]:
     return lines
 
 
-def section(before: Model, after: Model, held_people: Dataset, held_bare: Dataset, facts: Sequence[str]) -> str:
+def called_on_roads(before: Model, after: Model, held: Dataset) -> list[str]:
+    """Markdown of the objects called on roads with rows of two-wheelers, and of the false ones, by class."""
+    posteriors = [model.posterior(held) for model in (before, after)]
+    rows = _of_riders(held)
+    label = held.label[rows]
+    lines = ["| class | objects | called [%] | background called so |", "|---|---|---|---|"]
+    for c in range(1, N_CLASSES):
+        called = [posterior[rows, c] > CALLED for posterior in posteriors]
+        share = " / ".join(f"{100 * of_model[label == c].mean():.1f}" for of_model in called)
+        false = " / ".join(str(of_model[label == 0].sum()) for of_model in called)
+        lines.append(f"| {CLASS_NAMES[c]} | {(label == c).sum()} | {share} | {false} |")
+    return lines
+
+
+def narrow_called(before: Model, after: Model, data: Dataset) -> list[str]:
+    """Markdown of the narrow background of the data of the model called pedestrian, by sensor."""
+    rows = narrow(data)
+    rows = rows[data.label[rows] == ObjectClass.BACKGROUND]
+    lines = ["| sensor | background | called pedestrian | sum of the posteriors |", "|---|---|---|---|"]
+    posteriors = [model.posterior(data)[rows, ObjectClass.PEDESTRIAN] for model in (before, after)]
+    for number, name in enumerate(data.sensor_names):
+        of_sensor = data.sensor[rows] == number
+        if of_sensor.any():
+            called = " / ".join(str((p[of_sensor] > CALLED).sum()) for p in posteriors)
+            total = " / ".join(f"{p[of_sensor].sum():.0f}" for p in posteriors)
+            lines.append(f"| {name} | {of_sensor.sum()} | {called} | {total} |")
+    return lines
+
+
+@dataclass(frozen=True)
+class Held:
+    """Data sets that nothing is trained on, for the card."""
+
+    people: Dataset
+    bare: Dataset
+    riders: Dataset
+
+
+def section(before: Model, after: Model, held: Held, data: Dataset, facts: Sequence[str]) -> str:
     """Section of the card: how the model was trained, what it calls of held sweeps, and what it takes for objects."""
-    people_sweeps = held_people.provenance[0]["people"]
-    bare_sweeps = held_bare.provenance[0]["bare"]
+    people_sweeps = held.people.provenance[0]["people"]
+    bare_sweeps = held.bare.provenance[0]["bare"]
+    rider_sweeps = held.riders.provenance[0]["riders"]
     lines = [
         SECTION,
         "",
@@ -211,12 +338,21 @@ def section(before: Model, after: Model, held_people: Dataset, held_bare: Datase
         "People who stand, bend, sit, kneel, crouch and lie, children and adults, with loads and aids, and things",
         f"beside them, in {people_sweeps} sweeps that nothing was trained on: share with a posterior above {CALLED}.",
         "",
-        *people_called(before, after, held_people),
+        *people_called(before, after, held.people),
+        "",
+        "Background as narrow and low as a person among the data of the model, which were trained on.",
+        "",
+        *narrow_called(before, after, data),
+        "",
+        f"Roads with riders and with rows of parked scooters and bicycles, in {rider_sweeps} sweeps that nothing was",
+        f"trained on: proposals with a posterior above {CALLED}.",
+        "",
+        *called_on_roads(before, after, held.riders),
         "",
         "False objects a sweep among heaps, banks, boulders, rubble, stacks, bushes and young trees, in",
         f"{bare_sweeps} sweeps that nothing was trained on: proposals with an object posterior above {CALLED}.",
         "",
-        *false_objects(before, after, held_bare),
+        *false_objects(before, after, held.bare),
         "",
     ]
     return "\n".join(lines)
@@ -234,23 +370,37 @@ def main() -> None:
     options.add_argument(
         "--people", type=Path, nargs="+", required=True, help="sweeps of people; the last ones held out"
     )
+    options.add_argument("--riders", type=Path, nargs=2, required=True, help="sweeps of riders; others, held out")
     options.add_argument("--streets", type=Path, nargs="+", required=True, help="sweeps of simulated streets")
     options.add_argument("--crops", type=Path, nargs="+", required=True, help="data of the model")
-    options.add_argument("--steps", type=int, default=1500, help="of the training (default: %(default)s)")
+    options.add_argument("--steps", type=int, default=1800, help="of the training (default: %(default)s)")
     args = options.parse_args()
     make_torch_deterministic()
     started = time.process_time()
     before = Model.of(onnx.load(str(args.model)))
     data = load(*args.crops)
     bare, held_bare = (load(path) for path in args.bare)
+    riders, held_riders = (load(path) for path in args.riders)
     people = load(*args.people[:-1])
-    held_people = load(args.people[-1])
+    held = Held(load(args.people[-1]), held_bare, held_riders)
     streets = load(*args.streets)
     rng = np.random.default_rng(SEED)
     kept = kept_examples(before, data, rng)
-    others = bare_examples(before, bare, rng), people_examples(before, people, rng), street_examples(streets, rng)
+    others = [
+        bare_examples(before, bare, rng),
+        people_examples(before, people, rng),
+        street_examples(streets, rng),
+        narrow_examples(before, data, rng),
+        rider_examples(riders, rng),
+    ]
     after = train_network(before, kept, others, args.steps, SEED)
-    boxes = bare_boxes(bare), people_boxes(people, rng), street_boxes(streets)
+    boxes = [
+        bare_boxes(bare),
+        people_boxes(people, rng),
+        street_boxes(streets),
+        narrow_boxes(before, data),
+        rider_boxes(riders, rng),
+    ]
     after = train_boxes(after, data, boxes, BOX_STEPS * args.steps, SEED)
     first_sha256 = hashlib.sha256(args.model.read_bytes()).hexdigest()
     sha256 = save_model(args.model, after)
@@ -258,6 +408,7 @@ def main() -> None:
     crops = [
         _sources("of sweeps without objects", bare),
         _sources("of sweeps of people", people),
+        _sources("of roads with riders", riders),
         _sources("of streets", streets),
         _sources("of the data of the model, which keep their posteriors", data),
     ]
@@ -266,7 +417,7 @@ def main() -> None:
         f"torch {torch.__version__}, {seconds:.0f} s on one core",
         f"- crops: {'; '.join(crops)}",
     ]
-    told = section(before, after, held_people, held_bare, facts)
+    told = section(before, after, held, data, facts)
     card = args.model.with_suffix(".md")
     text = card.read_text(encoding="utf-8").partition(SECTION)[0].replace(first_sha256, sha256, 1)
     card.write_text(f"{text.rstrip()}\n\n{told}", encoding="utf-8")
