@@ -15,7 +15,7 @@ from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.tuning import ClassificationTuning
 from modt.config import FusionConfig
-from modt.types import NONE
+from modt.types import NONE, MotionState
 from tests.classification.scenes import ROW, Fused, with_points
 
 CONFIG = FusionConfig()
@@ -144,6 +144,20 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
             return  # the floor applies from here on
         expected = (1 - WEIGHTS.mismatch_probability) * expected + WEIGHTS.mismatch_probability * box
         assert_allclose(tracks.posterior[0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("motion", "is_weaker"), [(MotionState.STILL, True), (MotionState.MOVING, False), (MotionState.UNKNOWN, False)]
+)
+def test_a_view_of_few_points_says_less_than_the_same_view_of_many_of_what_is_still(motion, is_weaker):
+    posteriors = []
+    for points in (5, 20, 40):
+        subject = Fused(FurtherViews(CONFIG, ALIKE), points)
+        subject.tracks.motion[:] = motion
+        subject.fuse(*CLEARLY_A_CAR)
+        posteriors.append(subject.tracks.posterior[0, 1])
+    assert posteriors[1] == posteriors[2]
+    assert (posteriors[0] < posteriors[1]) == is_weaker
 
 
 @pytest.mark.parametrize("make", [FurtherViews, FirstViews])

@@ -9,7 +9,8 @@ The posterior of a track after t frames, with views Y, boxes B and motion M, is
     P(X | Y_1:t, B_1:t, M_t) ~ P(X) P(M_t | X) exp(n^view_exponent mean log P(Y | X) + box_weight mean log P(B | X))
 
 Views of one object are correlated (log-odds of consecutive views of a car by .8 to .87), so they are averaged, not
-multiplied: n of them weigh n^view_exponent. Both means forget the past; a view counts by the root of its points.
+multiplied: n of them weigh n^view_exponent. Both means forget the past; a view counts by the root of its points, and
+one of few points of what stands still less.
 Profile `paper` multiplies views as the paper writes it: `modt.classification.product_fusion`.
 
 Arrays of R tracks with a class in each of four rows, (4, R), are contiguous by class: arithmetic along axes of four
@@ -27,7 +28,7 @@ from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
 from modt.classification.tuning import FusionTuning
 from modt.config import FusionConfig
-from modt.types import Bool, Evidence, Float64, Int, Motion, Proposals
+from modt.types import Bool, Evidence, Float64, Int, Motion, MotionState, Proposals
 
 MIN_PROBABILITY = 1e-4
 """Floor of every likelihood and posterior: no class is excluded for good."""
@@ -157,6 +158,9 @@ class FusedTracks:
         prior = evidence.prior.take(rows, axis=0)
         assumed = pooled_prior(_log(prior), self._log_frequency, self._prior.pool_weight(proposals))
         view = np.log(normalise(likelihood)) - assumed
+        # Few points of what stands still tell little. Of what moves, the motion tells more.
+        is_still = motion.motion[rows] == MotionState.STILL.value
+        view *= np.where(is_still, np.minimum(1.0, points / self._weights.full_points), 1.0)[:, None]
         mean = evidence.view_evidence.take(rows, axis=0)
         weight = np.sqrt(points)
         total = self._weights.view_memory * evidence.view_weight[rows] + weight
