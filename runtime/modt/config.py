@@ -325,6 +325,17 @@ class SensorConfig(StageConfig):
         return beams * 360 / self.azimuth_step_deg
 
     @property
+    def beam_elevations_deg(self) -> tuple[float, ...]:
+        """Elevation of every beam, ascending; none if they are not known."""
+        if self.elevations_deg is not None:
+            return tuple(sorted(self.elevations_deg))
+        if self.elevation_span_deg is None:
+            return ()
+        low_deg, high_deg = self.elevation_span_deg
+        steps = max(round((high_deg - low_deg) / self.elevation_step_deg), 1)
+        return tuple(low_deg + k * (high_deg - low_deg) / steps for k in range(steps + 1))
+
+    @property
     def person_seen_from_m(self) -> float | None:
         """Distance from which a third of a person is in view [m]; None if the mount or the beams are unknown."""
         if self.height_m is None or self.span_deg is None:

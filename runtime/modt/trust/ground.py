@@ -172,10 +172,12 @@ def _fitted(cells: Int, values: Float32 | Float64) -> Float64:
     median = np.sort(off)[len(off) // 2]
     if median < NOTHING_M:
         return plane
+    heights = values.astype(np.float64)
+    places = _CELLS.take(cells, axis=1)
     for _ in range(ROUNDS):
-        rows = _CELLS.take(cells[off <= 2 * median], axis=1)
-        plane = np.linalg.solve(rows @ rows.T + 1e-6 * np.eye(3), rows @ values[off <= 2 * median])
-        off = np.abs(values - plane @ _CELLS.take(cells, axis=1))
+        close = places * (off <= 2 * median)
+        plane = np.linalg.solve(close @ places.T + _RIDGE, close @ heights)
+        off = np.abs(heights - plane @ places)
         median = np.sort(off)[len(off) // 2]
     return np.asarray(plane)
 
@@ -190,3 +192,4 @@ def _cell_centres() -> Float64:
 
 
 _CELLS = _cell_centres()
+_RIDGE = 1e-6 * np.eye(3)

@@ -83,11 +83,13 @@ class ReturnsCheck:
         expected = usual > np.maximum(tuning.usual_share * np.sort(usual)[SECTORS // 2], least)
         lost = expected & (self._count(samples[-1]).sum(axis=1) < tuning.lost_share * usual)
         n_expected = int(np.count_nonzero(expected))
-        blind = bool(np.count_nonzero(lost) >= tuning.blind_share * max(n_expected, 1))
-        if not blind and lost.any():
-            lost &= self._lost | self._ended(samples, usual, 1)
-        self._lost = lost
         n_lost = int(np.count_nonzero(lost))
+        blind = n_lost >= tuning.blind_share * max(n_expected, 1)
+        if not blind:  # few that are lost are none, whether they ended at once or not
+            enough = n_lost >= tuning.degraded_sectors
+            lost &= self._lost | self._ended(samples, usual, 1) if enough else self._lost
+            n_lost = int(np.count_nonzero(lost))
+        self._lost = lost
         if n_lost < tuning.degraded_sectors:
             return None
         where = "any direction" if n_lost >= 0.9 * n_expected else sides(lost)

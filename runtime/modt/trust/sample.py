@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -27,10 +27,12 @@ RINGS = 15
 """Rings of a metre in which the lowest point of each sector is kept."""
 
 
-@lru_cache(maxsize=8)
+_SPREAD = np.linspace(0.0, 1.0, SAMPLE)
+
+
 def _rows(n: int) -> Int:
     """(k,) rows of n points, evenly spread."""
-    return np.arange(n) if n <= SAMPLE else np.linspace(0, n - 1, SAMPLE).astype(np.int64)
+    return np.arange(n) if n <= SAMPLE else (_SPREAD * (n - 1)).astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ class Sample:
         weight: number of points for which one stands.
         plane: (3,) ground z = plane @ (1, x, y) as it was known before.
         T_world_sensor: (4, 4) pose.
+        R_level_sensor: (3, 3) from the sensor to the level frame, None if it is level.
     """
 
     time_s: float
@@ -52,6 +55,7 @@ class Sample:
     weight: float
     plane: Float64
     T_world_sensor: Float64
+    R_level_sensor: Float64 | None = None
 
     @cached_property
     def xyz(self) -> Float32:
@@ -65,6 +69,14 @@ class Sample:
         """(c,) horizontal ranges of the returns."""
         x, y, _ = self.xyz
         return np.asarray(np.sqrt(x * x + y * y))
+
+    @property
+    def tangent_in_sensor(self) -> Float32:
+        """(c,) tangents of the elevations of the returns in the sensor's own frame."""
+        if self.R_level_sensor is None:
+            return np.asarray(self.xyz[2] / self.range_m)
+        x, y, z = self.R_level_sensor.T.astype(np.float32) @ self.xyz
+        return np.asarray(z / np.sqrt(x * x + y * y))
 
     @cached_property
     def turn(self) -> Float32:
@@ -106,7 +118,8 @@ def sample(frame: Frame, T_world_sensor: Float64, sensor: SensorConfig, plane: F
     rows = _rows(n)
     weight = n / max(len(rows), 1)
     raw = frame.points.take(rows, axis=0)
-    return Sample(frame.time_s, raw, REACH_SHARE * sensor.max_range_m, weight, plane, T_world_sensor)
+    reach_m = REACH_SHARE * sensor.max_range_m
+    return Sample(frame.time_s, raw, reach_m, weight, plane, T_world_sensor, frame.R_level_sensor)
 
 
 def turn_of(x: Float32, y: Float32) -> Float32:

@@ -11,6 +11,7 @@ import numpy as np
 
 from modt.config import SensorConfig
 from modt.trust.ground import GroundCheck
+from modt.trust.lasting import BeamHistory, SectorHistory
 from modt.trust.returns import ReturnsCheck
 from modt.trust.sample import Sample, sample
 from modt.trust.scene import SceneCheck
@@ -20,6 +21,8 @@ from modt.types import Float64, Frame, Reason, Trust, TrustLevel
 CLEAN = "clean and uncover the sensor, and check what stands before it"
 MOUNT = "check the mount of the sensor, then start anew"
 DRIVER = "restart the sensor and its driver"
+REPAIR = "have the sensor repaired; things at that height are seen from nearer only"
+UNCOVER = "uncover the sensor, or state the sector in sensor.blind_sectors_deg if the robot hides it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +82,8 @@ class TrustWatch:
         self._returns = ReturnsCheck(tuning.returns)
         self._ground = GroundCheck(tuning.ground, sensor.height_m)
         self._scene = SceneCheck(tuning.scene)
+        self._beams = BeamHistory(sensor, tuning.lasting)
+        self._sectors = SectorHistory(sensor, tuning.lasting)
         self._samples: list[Sample] = []  # those since the last look, its own included
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
@@ -122,7 +127,8 @@ class TrustWatch:
             return self.trust
         learning = now_s - self._began_s < self._tuning.learn_s
         own = {} if learning else dict(self._findings(seen))
-        self._debounced.update({**others, **own}, now_s, AT_ONCE)
+        lasting = dict(self._lasting_findings(seen))
+        self._debounced.update({**others, **lasting, **own}, now_s, AT_ONCE)
         reasons = OWN & self._debounced.reasons.keys()
         self.another_sensor |= reasons != self._own or self._returns.gained
         self._own = reasons
@@ -161,6 +167,19 @@ class TrustWatch:
             yield "ground", Finding(TrustLevel.BLIND, self._ground.moved, MOUNT)
         if not change.is_none:
             yield "scene", Finding(TrustLevel.BLIND, f"the scene is {change} against the one before", MOUNT)
+
+    def _lasting_findings(self, seen: Sample) -> Iterator[tuple[str, Finding]]:
+        """Findings of the histories of beams and narrow sectors after another sweep."""
+        self._beams.add(seen)
+        self._sectors.add(seen)
+        if dead_deg := self._beams.dead_deg:
+            which = ", ".join(f"{each_deg:.1f}" for each_deg in dead_deg)
+            what = f"no returns from the beam{'s' * (len(dead_deg) > 1)} at {which} deg of elevation"
+            yield "beams", Finding(TrustLevel.DEGRADED, what, REPAIR)
+        if self._sectors.blocked_deg:
+            from_deg, to_deg = self._sectors.blocked_deg
+            what = f"no returns from {from_deg} to {to_deg} deg, counter-clockwise from ahead"
+            yield "sectors", Finding(TrustLevel.DEGRADED, what, UNCOVER)
 
     def _follow(self) -> None:
         """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them."""
