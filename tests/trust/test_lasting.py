@@ -76,6 +76,13 @@ def test_a_dead_beam_is_named_within_20_s(at_deg, from_s):
     assert found[-1][1] == (at_deg,)
 
 
+def test_a_beam_of_a_table_that_never_had_a_return_is_not_dead():
+    table = replace(SENSOR, elevations_deg=SENSOR.beam_elevations_deg)
+    assert dead_deg(BeamHistory(table, LastingTuning()), looks(without_beam(1.0)))[-1][1] == ()
+    later = dead_deg(BeamHistory(table, LastingTuning()), looks(without_beam(1.0), 9.0))
+    assert later[-1][1] == (1.0,)
+
+
 def test_two_dead_beams_side_by_side_are_named():
     both = lambda points: without_beam(1.0)(without_beam(-1.0)(points))  # noqa: E731
     assert dead_deg(BeamHistory(SENSOR, LastingTuning()), looks(both))[-1][1] == (1.0, -1.0)

@@ -25,7 +25,8 @@ class BeamHistory:
     """Returns of each beam over a window of time.
 
     A beam is dead if it has none where the beams above and below it have many. The outermost beams have a neighbour
-    on one side only, so nothing tells that they should have met anything.
+    on one side only, so nothing tells that they should have met anything. Beams of a table must have had returns
+    before, as a table that was found in a sweep may have one too many.
 
     Args:
         sensor: elevations of its beams.
@@ -37,6 +38,7 @@ class BeamHistory:
         self._elevation_deg = np.asarray(sensor.beam_elevations_deg)
         self._tangent = np.tan(np.deg2rad(self._elevation_deg))
         self._count = np.zeros((len(self._tangent), SECTORS))
+        self._exists: Bool = np.full(len(self._tangent), sensor.elevations_deg is None)
         self._n_on_beam = 0
         self._n_seen = 0
         self._began_s: float | None = None
@@ -69,7 +71,8 @@ class BeamHistory:
             return
         total = self._count.sum(axis=1)
         alive = np.flatnonzero(total)
-        dead = [b for b in range(len(total)) if self._is_dead(b, total[b], alive)]
+        self._exists[alive] = True
+        dead = [b for b in np.flatnonzero(self._exists).tolist() if self._is_dead(b, total[b], alive)]
         self.dead_deg = tuple(self._elevation_deg[dead[::-1]].tolist())
 
     def _is_dead(self, beam: int, n_returns: float, alive: Int) -> bool:
