@@ -7,7 +7,7 @@ mirror reverses the bearing (Fourier-Mellin).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -91,11 +91,12 @@ class SceneCheck:
         self._looks = 0  # in a row in which the scene is back
 
     def look(
-        self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int, *, may_scale: bool = True
+        self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int, *, on_moved_ground: bool = False
     ) -> None:
         """Notice a scene that changes at once, and one that is back; arguments as those of the ground's check.
 
-        A ground that moved at the same time tells of a scale already, so then the scene need not (`may_scale`).
+        On a ground that has moved, obstacles are less sure, so a change has to explain nearly all of them, and a scale
+        is told by the ground alone.
         """
         if not pairs:
             return
@@ -108,7 +109,7 @@ class SceneCheck:
             agreements = [(agreement(*pair, self.change), pair) for pair in pairs]
             least, pair = min(agreements, key=lambda each: each[0])
             if least < tuning.suspected:
-                self._explain(*pair, least, may_scale=may_scale)
+                self._explain(*pair, least, on_moved_ground=on_moved_ground)
         if self._before is None:
             return
         is_back = agreement(self._before, now, SAME) >= tuning.back or self._moves_as_before(first, now)
@@ -121,13 +122,14 @@ class SceneCheck:
         """Whether obstacles move by the pose as in a scene that is not changed, and not as in the changed one."""
         return agreement(first, now, SAME) > agreement(first, now, self.change) + self._tuning.better
 
-    def _explain(self, before: Sample, after: Sample, least: float, *, may_scale: bool) -> None:
+    def _explain(self, before: Sample, after: Sample, least: float, *, on_moved_ground: bool) -> None:
         """Note how the scene changed from one sweep to the next."""
         tuning = self._tuning
         change, share = explain(before, after, self.change)
-        if not may_scale:
-            change = replace(change, scaled=0)
-        needed = tuning.explained if least < tuning.same else tuning.surely_explained
+        if on_moved_ground and abs(change.scaled) > 1:
+            return
+        other_scene = least < tuning.same and not on_moved_ground
+        needed = tuning.explained if other_scene else tuning.surely_explained
         if self.change.then(change).is_none:  # the way back
             needed = 0.0
         if share >= max(needed, least + tuning.better) and not change.is_none:

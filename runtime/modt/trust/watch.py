@@ -187,10 +187,11 @@ class TrustWatch:
         first = self._samples[0]
         ground = self._ground.present
         self._ground.look(first, pairs, self._tuning.back_looks)
-        ground_moved = bool((self._ground.present != ground).any())
-        if ground_moved:  # the obstacles stand on it as it is after the step
+        moves = bool((self._ground.present != ground).any())
+        if moves:  # the obstacles stand on it as it is after the step
             pairs = [(first, replace(self._samples[-1], plane=self._ground.present))]
-        self._scene.look(first, pairs, self._tuning.back_looks, may_scale=not ground_moved)
+        on_moved_ground = moves or bool(self._ground.moved)
+        self._scene.look(first, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
 
     def _look_past(self, before: Sample, now: Sample) -> None:
         """Compare the sweeps before and after a time in which nothing was seen."""
