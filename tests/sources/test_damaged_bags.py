@@ -7,6 +7,8 @@ from contextlib import closing
 
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import CompressionType
+from zstandard import ZstdCompressor
 
 from modt.errors import ModtError
 from modt.sources.recognise import open_stream
@@ -72,8 +74,6 @@ def test_an_unfinished_transaction_is_undone_in_a_copy(tmp_path):
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("compression", ["zstd", ""])
 def test_a_damaged_chunk_costs_its_own_messages(tmp_path, closed, compression):
-    from mcap.writer import CompressionType
-
     kind = CompressionType.ZSTD if compression else CompressionType.NONE
     path = write_mcap(tmp_path / "drive", clouds(N), chunk_size=900, compression=kind)
     with path.open("rb") as file:
@@ -179,5 +179,63 @@ def test_a_damaged_summary_loses_nothing(tmp_path):
     raw[-60:] = b"\xaa" * 60
     path.write_bytes(raw)
     stream, frames = read(path)
+    assert frames == list(range(N))
+    assert not stream.faults.count
+
+
+def test_a_chunk_is_read_whose_index_of_one_topic_is_damaged(tmp_path):
+    path = write_mcap(tmp_path / "drive", by_time(clouds(N), poses("lidar")), compression=CompressionType.NONE)
+    raw = bytearray(path.read_bytes())
+    with path.open("rb") as file:
+        (chunk,) = make_reader(file).get_summary().chunk_indexes
+    points = max(chunk.message_index_offsets, key=chunk.message_index_offsets.get)
+    at = chunk.message_index_offsets[points]
+    path.write_bytes(raw[: at + 5])  # without the index of the second topic, and what follows it
+    assert read(path)[1] == list(range(N))
+
+
+def test_a_summary_without_channels_is_not_the_whole(tmp_path):
+    path = write_mcap(
+        tmp_path / "drive", clouds(N), repeat_channels=False, repeat_schemas=False, use_statistics=False
+    )
+    assert read(path)[1] == list(range(N))
+
+
+def test_a_topic_that_a_database_lists_twice_is_one(tmp_path):
+    (path,) = write_rosbag2(tmp_path / "drive", clouds(N)).glob("*.db3")
+    with closing(sqlite3.connect(path)) as database, database:
+        columns = ", ".join(row[1] for row in database.execute("PRAGMA table_info(topics)") if row[1] != "id")
+        database.execute(f"INSERT INTO topics(id, {columns}) SELECT 9, {columns} FROM topics")
+        database.execute("UPDATE messages SET topic_id = 9 WHERE id > 5")
+    stream, frames = read(path)
+    assert frames == list(range(N))
+    assert stream.info.n_frames == N
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_file_whose_compression_was_not_finished_is_read_once(tmp_path, listed):
+    recorded = clouds(N)
+    for k in range(3):
+        write_mcap(tmp_path / f"drive_{k}", recorded[4 * k : 4 * k + 4])
+    first, second, third = (tmp_path / f"drive_{k}.mcap" for k in range(3))
+    packed = {file: ZstdCompressor().compress(file.read_bytes()) for file in (first, second)}
+    first.with_name("drive_0.mcap.zstd").write_bytes(packed[first])
+    first.unlink()
+    second.with_name("drive_1.mcap.zstd").write_bytes(packed[second][:100])
+    if listed:
+        names = "".join(f"  - {name}\n" for name in ("drive_0.mcap.zstd", "drive_1.mcap.zstd", third.name))
+        (tmp_path / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:\n{names}")
+    stream, frames = read(tmp_path)
+    assert frames == list(range(N))
+    assert not stream.faults.count
+
+
+def test_a_recording_that_was_renamed_is_whole(tmp_path):
+    for k in range(2):
+        write_mcap(tmp_path / f"walk_{k}", clouds(N)[6 * k : 6 * k + 6])
+    (tmp_path / "metadata.yaml").write_text(
+        "rosbag2_bagfile_information:\n  relative_file_paths: [old/drive_0.mcap, old/drive_1.mcap]\n"
+    )
+    stream, frames = read(tmp_path)
     assert frames == list(range(N))
     assert not stream.faults.count

@@ -114,7 +114,7 @@ class BagFile(ABC):
         self.renew_allowance()
         with self._refusals():
             for topic, recorded_ns, data, flaw in self._messages(topics):
-                message = _message(data, min(self._left, MAX_RECORD_BYTES))
+                message = plain_message(data, min(self._left, MAX_RECORD_BYTES))
                 if len(message) != len(data):
                     self.spend(len(message))
                 yield BagMessage(topic, 1e-9 * recorded_ns, message, flaw)
@@ -199,7 +199,7 @@ def unpacked(compression: str, data: bytes, most: int) -> bytes:
     return b"".join(pieces)
 
 
-def _message(data: bytes, most: int) -> bytes:
+def plain_message(data: bytes, most: int) -> bytes:
     """Uncompressed message; one that cannot be unpacked is returned unchanged."""
     if data.startswith(ZSTD_MAGIC):
         whole = unpacked("zstd", data, most + 1)

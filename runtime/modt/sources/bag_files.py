@@ -9,7 +9,7 @@ from pathlib import Path
 
 from modt import profile
 from modt.errors import MisuseError, ModtError
-from modt.sources.bag_file import BagFile, BagMessage, BagTopic, kind_of
+from modt.sources.bag_file import ZSTD, BagFile, BagMessage, BagTopic, kind_of
 from modt.sources.database_file import DatabaseFile
 from modt.sources.mcap_file import McapFile
 
@@ -109,12 +109,15 @@ class Bag:
 def bag_in(folder: Path) -> list[Path]:
     """Files of the one recording in a folder, in their order; empty if there are none, or several recordings.
 
-    Files whose names differ by a number alone, as rosbag2 splits a recording, are one.
+    Files whose names differ by a number alone, as rosbag2 splits a recording, are one. A compressed file beside the
+    same file without compression is left out: a recorder that was killed has not finished it.
     """
     files = [file for file in folder.iterdir() if kind_of(file) in KINDS and file.is_file()]
+    names = {file.name for file in files}
+    files = [file for file in files if file.name.removesuffix(ZSTD) not in names - {file.name}]
     if len({_stem(file) for file in files}) > 1 and not (folder / METADATA).is_file():
         return []
-    return sorted(files, key=lambda file: (len(file.name), file.name))
+    return sorted(files, key=lambda file: (len(file.name.removesuffix(ZSTD)), file.name))
 
 
 def _missing(paths: list[Path]) -> list[int]:
@@ -144,12 +147,15 @@ def _listed(path: Path) -> tuple[list[Path], dict[str, int]]:
         counts = {topic["topic_metadata"]["name"]: int(topic["message_count"]) for topic in topics}
     except (OSError, UnicodeError, ModtError, LookupError, TypeError, ValueError, AttributeError):
         pass  # the files themselves tell as much
-    listed = [path / name for name in names if kind_of(Path(name)) in KINDS]
-    listed = [_as_stored(file) for file in listed]
-    return [*listed, *(file for file in there if file not in listed)], counts
+    listed = [_as_stored(path / name) for name in names if kind_of(Path(name)) in KINDS]
+    further = [file for file in there if file not in listed]
+    absent = [file for file in listed if not file.is_file()]
+    if len(further) == len(absent) == len(listed):  # a recording that was renamed
+        return further, counts
+    return [*listed, *further], counts
 
 
 def _as_stored(file: Path) -> Path:
-    """The file, or the same with or without the suffix of its compression, whichever there is."""
-    others = (file, file.with_name(f"{file.name}.zstd"), file.with_name(file.name.removesuffix(".zstd")))
-    return next((other for other in others if other.is_file()), file)
+    """The file without the suffix of its compression if it is there, else with it, else as it is listed."""
+    plain = file.with_name(file.name.removesuffix(ZSTD))
+    return next((other for other in (plain, plain.with_name(plain.name + ZSTD)) if other.is_file()), file)

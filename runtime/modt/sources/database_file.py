@@ -19,7 +19,7 @@ from urllib.parse import quote
 from modt.errors import ModtError
 from modt.ros2 import odometry, point_cloud2
 from modt.ros2.cdr import MessageError
-from modt.sources.bag_file import DAMAGED, MAX_RECORD_BYTES, REMEDY, BagFile, BagTopic, Stored
+from modt.sources.bag_file import DAMAGED, MAX_RECORD_BYTES, REMEDY, BagFile, BagTopic, Stored, plain_message
 from modt.sources.sqlite_pages import Pages
 
 PROVISIONAL = "/name_lost_"
@@ -71,9 +71,10 @@ class DatabaseFile(BagFile):
 
     def _topics(self) -> dict[str, BagTopic]:
         listing = self._listing
-        counts = Counter(topic for _, _, topic in listing.messages)
-        found = ((counts[number], *facts) for number, facts in listing.topics.items())
-        return {name: BagTopic(kind, count, encoding or "cdr") for count, name, kind, encoding in found}
+        counts = Counter(listing.topics[topic][0] for _, _, topic in listing.messages)  # a name may be listed twice
+        return {
+            name: BagTopic(kind, counts[name], encoding or "cdr") for name, kind, encoding in listing.topics.values()
+        }
 
     def _messages(self, topics: Collection[str]) -> Iterator[Stored]:
         listing = self._listing
@@ -122,7 +123,7 @@ class DatabaseFile(BagFile):
 
     def _kind_of(self, number: int) -> str:
         """Type of a message whose topic is lost, by its content; empty if it is none that is read."""
-        data = self._pages.blob(number) or b""
+        data = plain_message(self._pages.blob(number) or b"", MAX_RECORD_BYTES)
         for kind, read in KINDS.items():
             with suppress(MessageError):
                 read(data)

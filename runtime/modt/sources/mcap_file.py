@@ -51,6 +51,7 @@ class Piece:
         compression, unpacked_bytes: as in the chunk; a message outside of one has no unpacked bytes.
         indices: offsets in the file of the indices of its messages by channel; empty if there are none.
         channel: channel of a message outside of a chunk.
+        index_ends: the record behind its indices is there, so that none of them is missing.
     """
 
     start_ns: int
@@ -60,6 +61,7 @@ class Piece:
     unpacked_bytes: int = 0
     indices: Mapping[int, int] = field(default_factory=dict)
     channel: int | None = None
+    index_ends: bool = True
 
     @property
     def crc_at(self) -> int:
@@ -83,6 +85,10 @@ class Contents:
     pieces: list[Piece] = field(default_factory=list)
     counts: Counter[int] | None = None
     gaps: list[int] = field(default_factory=list)
+
+    def trusts_index_of(self, piece: Piece) -> bool:
+        """Whether the indices of a piece tell which channels it has messages of."""
+        return bool(piece.indices) and piece.index_ends and piece.indices.keys() <= self.channels.keys()
 
     def register(self, record: Any) -> None:
         """Add what a record states."""
@@ -123,7 +129,7 @@ class McapFile(BagFile):
         """Messages ordered by recorded time. A message waits until no later piece can hold an earlier one."""
         contents = self._contents
         wanted = {number for number, channel in contents.channels.items() if channel.topic in topics}
-        pieces = [piece for piece in contents.pieces if not piece.indices or wanted & {*piece.indices}]
+        pieces = [p for p in contents.pieces if not contents.trusts_index_of(p) or wanted & {*p.indices}]
         pieces.sort(key=lambda piece: (piece.start_ns, piece.at))
         next_ns = chain((piece.start_ns for piece in pieces[1:]), repeat(math.inf))
         waiting: list[tuple[int, int, Stored]] = []
@@ -231,7 +237,9 @@ class McapFile(BagFile):
         counts = Counter[int]()
         for piece in contents.pieces:
             numbers = [number for number, _ in self._indexed(piece).values()]
-            counts.update(numbers or [record.channel_id for record in self._found(contents, piece)[0].values()])
+            if not numbers or not contents.trusts_index_of(piece):
+                numbers = [record.channel_id for record in self._found(contents, piece)[0].values()]
+            counts.update(numbers)
         self.flaws.clear()  # a pass over the messages reports them
         self.renew_allowance()
         return counts
@@ -243,7 +251,9 @@ class McapFile(BagFile):
         with self.plain.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as view:
             with suppress(Exception):  # its bytes may be anything
                 contents = _summary(view)
-                if contents.pieces and all(piece.at + piece.size <= size for piece in contents.pieces):
+                within = all(piece.at + piece.size <= size for piece in contents.pieces)
+                named = contents.channels.keys() >= {number for piece in contents.pieces for number in piece.indices}
+                if contents.pieces and contents.channels and within and named:
                     return contents
             contents = _scanned(view)
         for piece in contents.pieces:  # a chunk states the channels that begin in it
@@ -304,11 +314,14 @@ def _scanned(view: View) -> Contents:
         except Exception:  # its bytes may be anything
             if not ended:  # behind the end of the data there is but a summary
                 contents.gaps.append(at)
+                _end_index(contents.pieces)
             end = _next_begin(view, before + 1 if view[before] == MESSAGE else at + 1)
         else:
             before = at
             ended = ended or opcode == DATA_END
         at = end
+    if not ended:
+        _end_index(contents.pieces)
     contents.pieces = _in_order(contents.pieces)
     return contents
 
@@ -388,6 +401,12 @@ MOST_APART_NS = 10**9 * 86_400 * 365
 def _add_index(pieces: list[Piece], number: int, at: int) -> None:
     """Add the index at an offset to the last piece."""
     pieces[-1] = replace(pieces[-1], indices={**pieces[-1].indices, number: at})
+
+
+def _end_index(pieces: list[Piece]) -> None:
+    """Note that indices of the last piece may be missing."""
+    if pieces:
+        pieces[-1] = replace(pieces[-1], index_ends=False)
 
 
 RECORD_HEAD = struct.Struct("<BQ")
