@@ -4,8 +4,9 @@
 
 Bytes are changed, erased, inserted or removed, files are cut off or lost. Other readers are the library `mcap` (by
 the index, and past bad chunks as in `mcap recover`), SQLite with its `.recover`, and a reader of PCAP that stops at
-the first damage. A sweep that others give must be read, a loss must be reported, counts must agree, and each recording
-has --limit seconds. Prints the sweeps given and read by form, and each broken promise; then the exit status is 1.
+the first damage. A sweep that others give must be read, a loss must be reported, counts must agree, and each
+recording has --limit seconds. Prints the sweeps given and read by form, and each broken promise; then the exit status
+is 1.
 """
 
 from __future__ import annotations

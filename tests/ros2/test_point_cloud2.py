@@ -116,14 +116,19 @@ def turning(*, turn_s=0.1, seam=np.pi, field="time", kind="f4", unit=1e-9, begin
 
 
 @pytest.mark.parametrize("turn_s", [0.1, -0.1, 0.05])
-@pytest.mark.parametrize(("kind", "unit"), [("f4", 1.0), ("u4", 1e-9), ("u4", 1e-6)])
+@pytest.mark.parametrize(("kind", "unit"), [("f4", 1.0), ("u4", 1e-9), ("u4", 1e-6), ("f4", 1e-3)])
 def test_a_turn_is_known_by_the_times_of_its_points(turn_s, kind, unit):
     cloud = turning(turn_s=turn_s, kind=kind, unit=unit)
     assert cloud.turn_s == pytest.approx(turn_s, rel=1e-2)
     assert cloud.stamp_s == pytest.approx(1000.0 + abs(turn_s) / 2, abs=1e-3)
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e-9])
+@pytest.mark.parametrize("field", ["t", "time_stamp", "offset_time", "point_time_offset", "stamps"])
+def test_the_field_of_the_times_of_points_has_many_names(field):
+    assert turning(field=field, kind="u4").turn_s == pytest.approx(0.1, rel=1e-2)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-9])
 def test_times_on_the_clock_of_the_header_are_not_added_to_it(unit):
     cloud = turning(field="timestamp", kind="f8", unit=unit, begin=1000.0)
     assert cloud.stamp_s == pytest.approx(1000.05, abs=1e-3)

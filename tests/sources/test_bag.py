@@ -103,6 +103,48 @@ def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
     assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
 
 
+def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(write, tmp_path):
+    raw = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S - 9))
+    stream = open_stream(write(tmp_path / "drive", [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(6)]))
+    assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
+    assert "all sweeps have the same stamp" in stream.info.notes[0]
+
+
+def test_a_sweep_that_is_recorded_twice_is_read_once(write, tmp_path):
+    twice = by_time(clouds(6), [(topic, kind, s + 1e-3, data) for topic, kind, s, data in clouds(6)])
+    stream = open_stream(write(tmp_path / "drive", twice))
+    assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
+    assert stream.faults.left_out == {"has the stamp of the last sweep: recorded twice?": 6}
+
+
+@pytest.mark.parametrize("asked", [None, "rear"])
+def test_one_of_two_sensors_in_a_topic_is_read_and_the_other_counted(write, tmp_path, asked):
+    sweeps = {frame: messages.cloud(messages.xyzi(20), frame_id=frame) for frame in ("front", "rear")}
+    recorded = []
+    for k in range(12):
+        sweep = sweeps["rear" if k % 2 else "front"]
+        sweep.header.stamp.sec = int(BEGAN_S)
+        sweep.header.stamp.nanosec = 50_000_000 * k
+        recorded.append(("/points", CLOUD, BEGAN_S + k / 20, messages.encode(sweep)))
+    path = write(tmp_path / "drive", recorded)
+    stream = open_stream(path, capture={} if asked is None else {"frame": asked})
+    frames = list(stream)
+    assert [frame.stamp_s for frame in frames] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
+    assert stream.reading.frame_id == (asked or "front")
+    other = "front" if asked else "rear"
+    assert stream.faults.left_out == {f"messages are of another sensor, in the frame {other}": 6}
+    assert "several sensors share the topic" in stream.info.notes[0]
+    with pytest.raises(MisuseError, match=r"frames of points: front, rear"):
+        open_stream(path, capture={"frame": "left"})
+
+
+@pytest.mark.parametrize(("frame_id", "note"), [("camera_init", "record what"), ("eye_optical_frame", "of a camera")])
+def test_points_that_are_not_in_the_axes_of_a_sensor_are_noted(write, tmp_path, frame_id, note):
+    raw = [messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + k, frame_id=frame_id)) for k in (0, 1)]
+    stream = open_stream(write(tmp_path / "drive", [("/points", CLOUD, BEGAN_S + k, raw[k]) for k in (0, 1)]))
+    assert note in stream.info.notes[0]
+
+
 @pytest.mark.parametrize("lying", [lambda k, s: s + 3600 * (k == 3), lambda k, s: s + 3600 * (k == 0)])
 def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
     recorded = []

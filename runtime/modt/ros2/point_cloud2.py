@@ -24,8 +24,11 @@ REFLECTANCES = ("reflectivity", "reflectance", "remission", "remissions", "inten
 _PREFIX = re.compile(r"^(?:(?:scalar|field|vertex|lidar)[_ .])+")
 """Prefixes of CloudCompare and others, as in `scalar_Intensity` and `Scalar_field_intensity`."""
 TIMES = ("time", "t", "timestamp", "offset_time", "time_stamp")
-FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint"})
-"""Conventional names of frames that do not belong to a sensor (REP 105)."""
+"""Names of the field of the times of points, by preference; else another one with `time` or `stamp` in its name."""
+FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint", "camera_init"})
+"""Conventional names of frames that do not belong to a sensor (REP 105), and that of LOAM's world."""
+OPTICAL = "_optical_frame"
+"""End of the name of a frame whose x axis points right, y down and z forward (REP 103)."""
 MAX_FIELDS = 64
 MAX_DELAY_S = 1.0
 """Greatest difference of the times of points from the header's stamp [s]. Beyond it they count from that stamp."""
@@ -95,7 +98,8 @@ def cloud_of(stamp_s: float, frame_id: str, table: Table) -> PointCloud:
     """
     fields: Mapping[str, Any] = table.rows.dtype.fields or {}
     points = _points(table.rows, fields)
-    name = next((name for name in TIMES if name in fields), None)
+    others = (name for name in fields if "time" in name or "stamp" in name)
+    name = next((name for name in TIMES if name in fields), None) or next(others, None)
     if name is None:
         return PointCloud(stamp_s, frame_id, points, began_s=stamp_s, corrected=table.corrected)
     with np.errstate(all="ignore"):  # times may be any numbers
@@ -247,7 +251,7 @@ TURN_SAMPLES = 512
 """Number of points that the motion is estimated from."""
 SPANS_S = (0.02, 0.5)
 """Shortest and longest sweep [s]. The unit of the times is the one in which their span lies between these."""
-UNITS_S = (1.0, 1e-6, 1e-9)
+UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
 MAX_RESIDUAL = 0.03
 """Share of a turn by which most points may deviate from the line of time over the angle that the head has turned."""
 FIRST_SHARE = 0.05
@@ -275,7 +279,7 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | str:
 
     Args:
         points: (N, 4) points of the sweep; those at the origin are ignored.
-        times: (N,) times of the points, in seconds, microseconds or nanoseconds; few of them may be wild.
+        times: (N,) times of the points, in s, ms, µs or ns; few of them may be wild.
     """
     chosen = slice(None, None, max(1, len(points) // TURN_SAMPLES))
     x, y, _, _ = points[chosen].T.astype(np.float64)

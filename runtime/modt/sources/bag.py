@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import logging
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, islice, pairwise
@@ -28,7 +29,7 @@ PEEKED = 50
 """Greatest number of messages that are searched for the first usable sweeps."""
 COMPARED = 4
 """Number of first sweeps whose stamps are compared. The first stamp that fits a later one begins the stream."""
-OPTIONS = frozenset({"topic", "odometry"})
+OPTIONS = frozenset({"topic", "odometry", "frame"})
 """Options of `open_bag`."""
 ROS1 = "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDER"
 
@@ -48,6 +49,9 @@ class BagStream:
         began: tuple[float, float],
         poses: PoseTopic | None,
         parts: TurnParts | None = None,
+        sensor: str | None = None,
+        *,
+        stamped: bool = True,
     ) -> None:
         """Read a topic.
 
@@ -58,6 +62,8 @@ class BagStream:
             began: stamp and recorded time of the first sweep whose stamp is accepted [s].
             poses: topic of poses.
             parts: joins messages that are parts of a turn; None where a message is a sweep.
+            sensor: frame of the points that are read where several sensors share the topic; None for one sensor.
+            stamped: whether the stamps of the sweeps are their times; otherwise these are the recorded ones.
         """
         self.info = info
         self.faults = Faults()
@@ -68,6 +74,8 @@ class BagStream:
         self._began = began
         self._poses = poses
         self._parts = parts
+        self._sensor = sensor
+        self._stamped = stamped
         self._first = 0
         self._last: int | None = None
 
@@ -115,6 +123,7 @@ class BagStream:
         """Frames in their order; None after a message of a pose, or one without a frame."""
         stamps = StampCheck(self._began)
         parts = copy.deepcopy(self._parts)
+        others = Counter[str]()  # messages of other sensors by their frames
         index = -1
         for message in self._bag.messages({self._topic} | poses.topics):
             if message.topic != self._topic:
@@ -123,6 +132,9 @@ class BagStream:
                 else:
                     poses.add(message)
                 yield None
+                continue
+            if (other := self._other_sensor(message)) is not None:
+                others[other] += 1
                 continue
             if self._parts is None:
                 index += 1
@@ -140,7 +152,23 @@ class BagStream:
             yield None if cloud is None or index < self._first else self._frame(index, cloud, message, stamps)
         if parts is not None and (cloud := parts.finish()) is not None:
             yield self._frame(index + 1, cloud, message, stamps)
+        for other, number in others.items():
+            reason = f"messages are of another sensor, in the frame {other}"
+            self.faults.leave_out(self.reading.messages, self._topic, reason, number)
         self._account_for_damage()
+
+    def _other_sensor(self, message: BagMessage) -> str | None:
+        """Frame of a message of another sensor; None for those that are read."""
+        if self._sensor is None or message.flaw:
+            return None
+        try:
+            frame_id = _read(message, self._encoding).frame_id
+        except MessageError:
+            return None
+        return None if frame_id == self._sensor else frame_id
+
+    def _stamp_s(self, cloud: PointCloud, message: BagMessage) -> float:
+        return (cloud.stamp_s if self._stamped else 0.0) or message.recorded_s
 
     def _account_for_damage(self) -> None:
         """Count what the recording promises and does not hold, once it is read to its end."""
@@ -173,13 +201,13 @@ class BagStream:
     def _frame(self, index: int, cloud: PointCloud, message: BagMessage, stamps: StampCheck) -> Frame | None:
         self.reading.sweeps += 1
         self.reading.times[cloud.times] += 1
-        sweep = Sweep(_stamp_s(cloud, message), cloud.points, cloud.turn_s, mid_rad=cloud.mid_rad)
+        sweep = Sweep(self._stamp_s(cloud, message), cloud.points, cloud.turn_s, mid_rad=cloud.mid_rad)
         return stamps.frame(sweep, message.recorded_s, index, self._topic, self.faults, began_s=self._began[0])
 
     def _pass_over(self, message: BagMessage, stamps: StampCheck) -> None:
         """Follow the stamp of a sweep before the first one asked for."""
         stamp_s = message.recorded_s
-        if self._encoding == "cdr" and not message.flaw:
+        if self._stamped and self._encoding == "cdr" and not message.flaw:
             try:
                 stamp_s = CdrReader(message.data).stamp_s() or stamp_s
             except MessageError:
@@ -190,7 +218,8 @@ class BagStream:
 def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingProxyType({})) -> BagStream:
     """Stream of a rosbag2 folder, a .db3 or an .mcap file; `period_s` holds for a recording of a single sweep.
 
-    The options are `topic`, of point clouds, and `odometry`, a topic of odometry or of transforms.
+    The options are `topic`, of point clouds, `frame`, of the sensor where several share the topic, and `odometry`,
+    a topic of odometry or of transforms.
 
     Raises:
         MisuseError: no topic of point clouds, several and none is chosen, or no library to read the file.
@@ -201,27 +230,54 @@ def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingPr
     topics = bag.topics()
     chosen = _choose(path, topics, options.get("topic"))
     began = _first_clouds(path, bag, chosen, topics[chosen].encoding)
-    stamps = [(_stamp_s(cloud, message), message.recorded_s) for cloud, message in began[:COMPARED]]
+    sensors = [*dict.fromkeys(cloud.frame_id for cloud, _ in began)]
+    sensor = _sensor(path, sensors, options.get("frame"))
+    began = [(cloud, message) for cloud, message in began if cloud.frame_id == sensor]
+    stamped = len({cloud.stamp_s for cloud, _ in began}) > 1 or len(began) < COMPARED
+    stamps = [((c.stamp_s if stamped else 0.0) or m.recorded_s, m.recorded_s) for c, m in began[:COMPARED]]
     first = next((a for a, b in combinations(stamps, 2) if not StampCheck(a).doubt(*b)), stamps[0])
     steps_s = (b[0] - a[0] for a, b in pairwise(stamps) if b[0] > a[0] and not StampCheck(a).doubt(*b))
-    poses, notes = find_poses(bag, began[0][0].frame_id, options.get("odometry"))
+    poses, notes = find_poses(bag, sensor, options.get("odometry"))
     parts = TurnParts.of([(cloud, message.recorded_s) for cloud, message in began])
-    count = topics[chosen].count
+    known = parts is None and len(sensors) == 1  # how many sweeps there are
+    count = topics[chosen].count if known else None
     info = StreamInfo(
         name=path.stem if path.is_file() else path.name,
         layout="rosbag2",
-        n_frames=count if parts is None else None,
+        n_frames=count,
         period_s=next(steps_s, period_s) if parts is None else round(abs(parts.turn_s), 3),
         has_poses=poses is not None,
-        notes=(*_frame_note(began[0][0].frame_id), *(() if parts is None else (parts.note(),))),
+        notes=(*_notes(sensors, sensor, stamped=stamped), *(() if parts is None else (parts.note(),))),
         pose_notes=notes,
-        end=count if parts is None else None,
+        end=count,
     )
-    return BagStream(info, bag, chosen, first, poses, parts)
+    return BagStream(info, bag, chosen, first, poses, parts, sensor if len(sensors) > 1 else None, stamped=stamped)
+
+
+def _sensor(path: Path, sensors: list[str], asked: str | None) -> str:
+    """Frame of the sensor that is read.
+
+    Raises:
+        MisuseError: none of the sensors has the frame that is asked for.
+    """
+    if asked is not None and asked not in sensors:
+        raise MisuseError(path, f"no points in the frame {asked}", f"frames of points: {', '.join(sensors)}")
+    return sensors[0] if asked is None else asked
+
+
+def _notes(sensors: list[str], sensor: str, *, stamped: bool) -> Iterator[str]:
+    """Lines about the frames and the stamps of the points."""
+    yield from _frame_note(sensor)
+    if others := ", ".join(other for other in sensors if other != sensor):
+        yield f"several sensors share the topic: {sensor} is read; --capture frame=NAME chooses among it and {others}"
+    if not stamped:
+        yield "all sweeps have the same stamp: their times are those of the recording"
 
 
 def _frame_note(frame_id: str) -> tuple[str, ...]:
     """A line about points that are not in the frame of a sensor."""
+    if frame_id.endswith(point_cloud2.OPTICAL):
+        return (f"points are in {frame_id!r}, with the axes of a camera: modt takes x as forward and z as up",)
     if frame_id.rpartition("/")[2] not in point_cloud2.FOREIGN_FRAMES:
         return ()
     return (f"points are in the frame {frame_id!r}, not in the sensor's: record what its driver publishes",)
@@ -285,7 +341,3 @@ def _first_clouds(path: Path, bag: Bag, topic: str, encoding: str) -> list[tuple
         remedy = "record sensor_msgs/PointCloud2 in CDR, with x, y, z [m] as float32"
         raise ModtError(path, f"no usable sweep at the begin of {topic} ({refused})", remedy)
     return clouds
-
-
-def _stamp_s(cloud: PointCloud, message: BagMessage) -> float:
-    return cloud.stamp_s or message.recorded_s

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from modt.errors import ScanError
 from modt.sources.scan_file import sanitised
 from modt.sources.stream import Faults, Sweep
@@ -13,6 +15,7 @@ STEP_S = 1.0
 """Time by which a stamp may differ from the arrivals [s]; a stamp beyond it, or before the last one, is doubted."""
 DOUBT_S = 0.5
 """Time for which doubtful stamps are refused [s]. If they keep coming, a clock was set, and they are followed."""
+REPEATED = "has the stamp of the last sweep: recorded twice?"
 FIRST_STEP_S = 0.1
 """Assumed time between two messages until two are accepted [s]."""
 
@@ -42,6 +45,7 @@ class StampCheck:
         self._arrived_s = last[1] if last else 0.0  # arrival of the latest message
         self._step_s = FIRST_STEP_S
         self._doubted_s: float | None = None  # time since the first doubtful stamp
+        self._framed = (np.nan, np.nan)  # stamp and arrival of the sweep that was the latest frame
 
     @property
     def doubting(self) -> bool:
@@ -109,6 +113,9 @@ class StampCheck:
         """
         steps = self.steps
         cause = self.doubt(sweep.stamp_s, arrived_s)
+        framed_stamp_s, framed_s = self._framed
+        if not cause and sweep.stamp_s == framed_stamp_s and arrived_s - framed_s < self._step_s / 2:
+            cause = REPEATED
         if not cause:
             try:
                 points, broken = sanitised(sweep.points, subject)
@@ -120,5 +127,6 @@ class StampCheck:
         flaws = [*broken, *flaws, *["a clock was set: stamps go on evenly"] * (self.steps > steps)]
         if flaws:
             faults.report(index, subject, "; ".join(flaws), skipped=False)
+        self._framed = (sweep.stamp_s, arrived_s)
         stamp_s = sweep.stamp_s + self.shift_s - began_s
         return Frame(index, stamp_s, points, turn_s=sweep.turn_s, mid_rad=sweep.mid_rad)

@@ -44,6 +44,13 @@ def test_points_in_the_frame_of_a_robot_or_map_are_warned_of(caplog, frame_id, w
     assert ("not in the sensor's: subscribe to what its driver publishes" in caplog.text) is warned
 
 
+def test_a_second_sensor_in_the_topic_is_refused_and_reported_once(caplog):
+    sweeps, reader = read([cloud(5.0, "front"), cloud(5.05, "rear"), cloud(5.1, "front"), cloud(5.15, "rear")])
+    assert [sweep.frame_id for sweep in sweeps] == ["front", "front"]
+    assert reader.reception.refused == {"another_sensor": 2}
+    assert caplog.text.count("the topic has points in the frame 'rear' too") == 1
+
+
 def test_messages_that_cannot_be_used_are_counted_by_their_reason_and_logged_once(caplog):
     huge = messages.encode(dataclasses.replace(messages.cloud(messages.xyzi(20)), width=2**32 - 1))
     sweeps, reader = read([b"", cloud(n=0), huge, huge, cloud()])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import deque
 from statistics import fmean
 
@@ -11,7 +12,7 @@ from modt.address import Address
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
-from modt.ros2.point_cloud2 import FOREIGN_FRAMES, TYPE, PointCloud, read_cloud
+from modt.ros2.point_cloud2 import FOREIGN_FRAMES, OPTICAL, TYPE, PointCloud, read_cloud
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.stream import Reception, StreamInfo, Sweep
 from modt.sources.turn_parts import TurnParts
@@ -49,6 +50,8 @@ log = logging.getLogger(__name__)
 
 WATCHED = 8
 """Number of messages by which it is known whether they are parts of turns."""
+SILENT_S = 1.0
+"""Time without messages of a sensor after which those of another one, in another frame, are followed [s]."""
 DEPTH = 5
 """Number of sweeps that wait to be read, as in ROS 2's QoS for sensors."""
 
@@ -63,6 +66,7 @@ class PointCloudReader:
         self._subscription: Subscription | None = subscription
         self._name = name
         self._missing = MissingSweeps()
+        self._seen_s = -math.inf  # time of the latest message of the sensor
         self._first: (
             list[tuple[PointCloud, float]] | None
         ) = []  # until it is known whether messages are parts of turns
@@ -122,14 +126,17 @@ class PointCloudReader:
     def _cloud(self, message: Message) -> PointCloud | None:
         try:
             cloud = read_cloud(message.data)
+            if cloud.frame_id != self.reception.frame_id and message.sent_s - self._seen_s < SILENT_S:
+                raise MessageError("another_sensor", f"the topic has points in the frame {cloud.frame_id!r} too")
         except MessageError as error:
             if self.reception.refuse(error.reason):
                 what = f"message refused ({error.reason}): {error}"
                 log.warning("%s: %s; later ones are only counted", self._name, what)
             return None
+        self._seen_s = message.sent_s
         if cloud.frame_id != self.reception.frame_id:
             self.reception.frame_id = cloud.frame_id
-            foreign = cloud.frame_id.lstrip("/") in FOREIGN_FRAMES
+            foreign = cloud.frame_id.lstrip("/") in FOREIGN_FRAMES or cloud.frame_id.endswith(OPTICAL)
             remedy = ", not in the sensor's: subscribe to what its driver publishes" if foreign else ""
             level = logging.WARNING if foreign else logging.INFO
             log.log(level, "%s: points are in the frame %r%s", self._name, cloud.frame_id, remedy)
