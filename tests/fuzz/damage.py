@@ -21,6 +21,7 @@ from modt.errors import ModtError
 from modt.sources.recognise import open_stream
 from tests.ros2 import messages
 from tests.sources.bags import BEGAN_S, CLOUD, UP, write_mcap, write_rosbag2
+from tests.sources.packets import pcapng
 from tests.sources.packets.simulated import packets
 from tools.send.pcap_writer import write_capture
 
@@ -107,6 +108,12 @@ def _capture(folder):
     return path
 
 
+def _capture_in_blocks(folder):
+    path = folder / "drive.pcapng"
+    path.write_bytes(pcapng.captured(packets("vlp-16", TURNS), 2368))
+    return path
+
+
 WRITERS: dict[str, Callable[[Path], Path]] = {
     "mcap zstd": _mcap(),
     "mcap lz4": _mcap(compression=CompressionType.LZ4),
@@ -120,6 +127,7 @@ WRITERS: dict[str, Callable[[Path], Path]] = {
     "compressed db3": _database("file"),
     "split db3": _split("db3"),
     "pcap": _capture,
+    "pcapng": _capture_in_blocks,
 }
 """Writers of a recording into a folder by the form of the recording."""
 
@@ -231,8 +239,16 @@ def _given(path):
 
 
 def _turns_given(path):
-    """Number of turns in the records of a capture up to the first that is none, as tcpdump reads them."""
+    """Number of turns in a capture up to the first bytes that are no record, as tcpdump reads it."""
     raw = path.read_bytes()
+    clean = path.with_name("clean" + path.suffix)
+    clean.write_bytes(raw[: _records_end(raw) if path.suffix == ".pcap" else _blocks_end(raw)])
+    with suppress(ModtError):
+        return sum(1 for _ in open_stream(clean))
+    return 0
+
+
+def _records_end(raw):
     at = PCAP_HEAD
     while at + RECORD_HEAD <= len(raw):
         second, fraction, size, original = struct.unpack_from("<IIII", raw, at)
@@ -240,11 +256,17 @@ def _turns_given(path):
         if size > 262_144 or end > len(raw) or size > original or fraction >= 10**6 or abs(second - 1.6e9) > 1e5:
             break
         at = end
-    clean = path.with_name("clean.pcap")
-    clean.write_bytes(raw[:at])
-    with suppress(ModtError):
-        return sum(1 for _ in open_stream(clean))
-    return 0
+    return at
+
+
+def _blocks_end(raw):
+    at = 0
+    while at + 12 <= len(raw):
+        size = int.from_bytes(raw[at + 4 : at + 8], "little")
+        if size < 12 or at + size > len(raw) or raw[at + 4 : at + 8] != raw[at + size - 4 : at + size]:
+            break
+        at += size
+    return at
 
 
 @dataclass
@@ -263,7 +285,7 @@ class Judgement:
 
 def judged(path):
     """Read a damaged recording: nothing that others give is lost, and what is lost is counted."""
-    return _judged_capture(path) if path.suffix == ".pcap" else _judged_bag(path)
+    return _judged_capture(path) if path.suffix in (".pcap", ".pcapng") else _judged_bag(path)
 
 
 def _judged_capture(path):

@@ -86,7 +86,7 @@ class BagFile(ABC):
         self.missing: Counter[str] = Counter()
         self._most = ALLOWANCE_BYTES + MAX_EXPANSION * path.stat().st_size
         self._left = self._most
-        if path.suffix == ZSTD:
+        if path.suffix.lower() == ZSTD:
             with self._refusals():
                 handle, name = tempfile.mkstemp(suffix=kind_of(path))
                 weakref.finalize(self, os.unlink, name)
@@ -174,8 +174,8 @@ class BagFile(ABC):
 
 
 def kind_of(path: Path) -> str:
-    """Suffix of a file without that of its compression."""
-    return Path(path.name.removesuffix(ZSTD)).suffix
+    """Suffix of a file without that of its compression, in small letters."""
+    return Path(path.name.lower().removesuffix(ZSTD)).suffix
 
 
 def unpacked(compression: str, data: bytes, most: int) -> bytes:

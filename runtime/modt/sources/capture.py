@@ -90,7 +90,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     name of the capture.
 
     Raises:
-        MisuseError: no PCAP file, no packets of a sensor, no whole sweep; an invalid option, a missing extra.
+        MisuseError: no capture, no packets of a sensor, no whole sweep; an invalid option, a missing extra.
     """
     capture = PcapFile(path)
     capture.flow = _asked(capture, options)
@@ -105,6 +105,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         any(d.source == capture.flow[0] and decoder.describe(d.payload) for d in everything)
     _, first = next(_decoded(capture, decoder), (0.0, None))
     if first is None:
+        _refuse_cut(capture)
         refused = decoder.reception.refused
         why, _, remedy = max(refused, key=refused.__getitem__, default="").partition("; ")
         cause = f"no whole sweep ({driver.maker})" + (f", packets are refused: {why}" if why else "")
@@ -192,8 +193,20 @@ def _driver_of(capture: PcapFile, options: Mapping[str, str]) -> Driver:
 def _without_packets(capture: PcapFile, maker: str, remedy: str) -> MisuseError:
     """Error of a capture without packets of a maker, with what it holds instead."""
     seen = Counter(f"{len(d.payload)} bytes to port {d.port}" for d in capture)
+    _refuse_cut(capture)
     there = f"{seen.total()} UDP datagrams, mostly of {seen.most_common(1)[0][0]}" if seen else "no UDP datagram"
     return MisuseError(capture.path, f"no packets of a {maker} ({there})", remedy)
+
+
+def _refuse_cut(capture: PcapFile) -> None:
+    """Refuse a capture whose datagrams were cut short, once they were read.
+
+    Raises:
+        MisuseError: some were.
+    """
+    if capture.cut:
+        cause = f"the ends of {capture.cut} UDP datagrams were not captured (a snapshot length that is too short)"
+        raise MisuseError(capture.path, cause, "record whole packets: tcpdump -s 0 -w FILE udp")
 
 
 def _decoded(capture: PcapFile, decoder: PacketDecoder) -> Iterator[tuple[float, Sweep]]:

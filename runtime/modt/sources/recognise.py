@@ -11,7 +11,7 @@ from modt.sources.scan_file import PERIOD_S, SUFFIXES, ScanStream
 from modt.sources.stream import Stream
 
 CAPTURES = frozenset({".pcap", ".cap", ".pcapng"})
-"""Suffixes of captures; for the last one `PcapFile` raises an error with its conversion."""
+"""Suffixes of captures, in small letters as those of recordings."""
 BAGS = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 """Suffixes of the files of ROS 2 recordings."""
 _LAS = ("is a LAS file", "convert it: pdal translate FILE scans/000000.ply, one file a sweep, and give scans")
@@ -47,7 +47,7 @@ def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, st
         MisuseError: the path does not exist or holds no stream, or an option does not apply.
         ModtError: the recording cannot be read.
     """
-    if path.is_file() and path.suffix in CAPTURES:
+    if path.is_file() and path.suffix.lower() in CAPTURES:
         from modt.sources.capture import CHOICES, open_capture
         from modt.sources.drivers import all_drivers
 
@@ -146,8 +146,8 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
 def _is_bag(path: Path) -> bool:
     """Whether a path is a recording: a file, or a folder of the files of one recording without scans."""
     if not path.is_dir():
-        return path.is_file() and path.name.endswith(BAGS)
-    if not any(file.name.endswith(BAGS) for file in path.iterdir()):
+        return path.is_file() and path.name.lower().endswith(BAGS)
+    if not any(file.name.lower().endswith(BAGS) for file in path.iterdir()):
         return False
     from modt.sources.bag_files import METADATA, bag_in
 

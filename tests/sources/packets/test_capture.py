@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from modt.errors import MisuseError
 from modt.sources.packets.ip_packets import Fragments
 from modt.sources.packets.pcap_file import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, PcapFile
+from tests.sources.packets import pcapng
 from tools.send.pcap_writer import ethernet, ipv4, udp
 
 PAYLOADS = [b"first", b"", bytes(range(256)) * 5]
@@ -132,7 +133,6 @@ def test_a_file_is_read_up_to_its_broken_end(tmp_path, end, flaw):
         (b"", "no PCAP"),
         (b"\xd4\xc3\xb2\xa1", "no PCAP"),
         (b"garbage" * 10, "no PCAP"),
-        (b"\x0a\x0d\x0d\x0a" + bytes(30), "editcap"),
         (struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65_535, 105), "link type 105"),
     ],
 )
@@ -160,3 +160,52 @@ def test_records_behind_a_damaged_one_are_read(tmp_path, at, value):
     read = {d.payload[:1] for d in capture if len(d.payload) == 40}
     assert read >= {bytes([k]) for k in range(9)} - {b"\4", b"\5"}
     assert len(read) >= 8 or capture.flaws
+
+
+def pcapng_file(path, *parts):
+    path.write_bytes(b"".join(parts))
+    return path
+
+
+FRAMES = [ethernet(ipv4(udp(p, 2368))) for p in PAYLOADS]
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize(
+    ("options", "per_s", "offset_s"),
+    [
+        ((), 10**6, 0),
+        (((9, b"\x09"),), 10**9, 0),
+        (((2, b"eth0"), (9, b"\x8a")), 2**10, 0),
+        (((14, struct.pack("<q", 100)),), 10**6, 100),
+    ],
+)
+def test_pcapng_in_either_byte_order_and_any_unit(tmp_path, order, options, per_s, offset_s):
+    options = [(code, value[::-1] if code == 14 and order == ">" else value) for code, value in options]
+    packets = [pcapng.packet(7 * per_s + per_s // 4, frame, order) for frame in FRAMES]
+    statistics = pcapng.block(5, bytes(12), order)
+    begin = pcapng.section(order, options=options)
+    read = list(PcapFile(pcapng_file(tmp_path / "a.pcapng", begin, packets[0], statistics, *packets[1:])))
+    assert [d.payload for d in read] == PAYLOADS
+    assert [d.stamp_s for d in read] == pytest.approx([7.25 + offset_s] * 3)
+
+
+def test_each_interface_and_section_of_pcapng_has_its_own_link(tmp_path):
+    raw_ip = pcapng.block(1, struct.pack("<HHI", RAW_IP, 0, 0))
+    first = [pcapng.section(), raw_ip, pcapng.packet(0, FRAMES[0]), pcapng.packet(1, DATAGRAM, interface=1)]
+    second = [pcapng.section(">", link=RAW_IP), pcapng.packet(2, DATAGRAM, ">"), pcapng.packet(3, b"", ">", 5)]
+    assert payloads(pcapng_file(tmp_path / "a.pcapng", *first, *second)) == [PAYLOADS[0], b"payload", b"payload"]
+
+
+def test_pcapng_is_read_on_behind_damaged_bytes(tmp_path):
+    packets = [pcapng.packet(k, FRAMES[k % 3]) for k in range(6)]
+    packets[2] = b"\xee" * 30 + packets[2][30:]
+    capture = PcapFile(pcapng_file(tmp_path / "a.pcapng", pcapng.section(), *packets, packets[0][:-9]))
+    assert [d.payload for d in capture] == [PAYLOADS[k % 3] for k in (0, 1, 3, 4, 5)]
+    assert [flaw.split(" at")[0].split(" from")[0] for flaw in capture.flaws] == ["damaged", "truncated or damaged"]
+
+
+def test_datagrams_that_were_cut_short_are_counted(tmp_path):
+    capture = PcapFile(file_of(tmp_path / "a.pcap", [frame[:100] for frame in FRAMES]))
+    assert len(list(capture)) == 3
+    assert capture.cut == 1

@@ -38,6 +38,24 @@ def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
     assert "frame 3: truncated within a record" in caplog.text
 
 
+def test_a_capture_whose_packets_were_cut_short_is_refused_for_that(path):
+    whole = path.read_bytes()
+    cut = whole[:24]
+    at = 24
+    while at < len(whole):
+        size = int.from_bytes(whole[at + 8 : at + 12], "little")
+        cut += whole[at : at + 8] + (96).to_bytes(4, "little") + whole[at + 12 : at + 16 + 96]
+        at += 16 + size
+    path.write_bytes(cut)
+    with pytest.raises(MisuseError, match=r"the ends of \d+ UDP datagrams were not captured.*tcpdump -s 0"):
+        open_stream(path)
+
+
+def test_suffixes_may_have_capitals(path):
+    renamed = path.rename(path.with_name("DRIVE.PCAP"))
+    assert len(list(open_stream(renamed))) == 3
+
+
 def test_missing_and_refused_packets_are_faults_and_a_clock_that_is_set_is_none(path):
     timed = [*packets()]
     del timed[110:113]

@@ -1,4 +1,4 @@
-"""UDP datagrams in PCAP files.
+"""UDP datagrams in PCAP and pcapng files.
 
 Files of either byte order with stamps in µs or ns are read; IPv4 and IPv6 over Ethernet, Linux cooked, loopback or
 raw IP. Behind damaged bytes reading goes on at the next record.
@@ -14,6 +14,7 @@ from typing import BinaryIO
 
 from modt.errors import MisuseError
 from modt.sources.packets.ip_packets import Fragments
+from modt.sources.packets.pcapng_blocks import SECTION, Blocks, Captured
 
 MAGICS = {
     b"\xd4\xc3\xb2\xa1": ("<", 1e-6),
@@ -22,8 +23,6 @@ MAGICS = {
     b"\xa1\xb2\x3c\x4d": (">", 1e-9),
 }
 """Byte order and unit of the stamps [s]."""
-PCAPNG = b"\x0a\x0d\x0d\x0a"
-"""First bytes of a pcapng file, which is not read."""
 HEADER_BYTES = 24
 """Size of the header of a file."""
 ETHERNET = 1
@@ -84,6 +83,7 @@ class PcapFile:
     Attributes:
         flow: source and port of the datagrams wanted; None selects all.
         flaws: bytes that the last pass could not read, one line each.
+        cut: number of datagrams of the last pass whose ends were not captured.
     """
 
     def __init__(self, path: Path) -> None:
@@ -95,13 +95,16 @@ class PcapFile:
         self.path = path
         self.flow: tuple[str, int] | None = None
         self.flaws: list[str] = []
+        self.cut = 0
+        self._blocks: Blocks | None = None  # those of a pcapng file
         try:
             with path.open("rb") as file:
                 head = file.read(HEADER_BYTES)
         except OSError as error:
             raise MisuseError(path, f"cannot be read ({error.strerror})", "give a PCAP file") from None
-        if head[:4] == PCAPNG:
-            raise MisuseError(path, "is a pcapng file", "convert it: editcap -F pcap IN OUT")
+        if head[:4] == SECTION:
+            self._blocks = Blocks(path)
+            return
         if head[:4] not in MAGICS or len(head) < HEADER_BYTES:
             raise MisuseError(path, "is no PCAP file", "record one: tcpdump -w FILE udp")
         self._order, self._unit_s = MAGICS[head[:4]]
@@ -111,20 +114,31 @@ class PcapFile:
 
     def __iter__(self) -> Iterator[Datagram]:
         self.flaws = []
+        self.cut = 0
         fragments = Fragments()
+        for stamp_s, link, frame in self._captured():
+            start = _start_of_ip(link, frame)
+            packet = None if start is None else fragments.whole(frame[start:])
+            if packet is None:
+                continue
+            source, protocol, payload = packet
+            if protocol != UDP or len(payload) < UDP_BYTES:
+                continue
+            port, length = struct.unpack_from(">HH", payload, 2)
+            if self.flow in (None, (source, port)):
+                self.cut += len(payload) < length
+                yield Datagram(stamp_s, source, port, payload[UDP_BYTES : length or None])
+
+    def _captured(self) -> Iterator[Captured]:
+        """Captured packets of the file."""
+        if self._blocks is not None:
+            yield from self._blocks
+            self.flaws = self._blocks.flaws
+            return
         with self.path.open("rb") as file:
             file.seek(HEADER_BYTES)
             for stamp_s, frame in self._records(file):
-                start = self._start_of_ip(frame)
-                packet = None if start is None else fragments.whole(frame[start:])
-                if packet is None:
-                    continue
-                source, protocol, payload = packet
-                if protocol != UDP or len(payload) < UDP_BYTES:
-                    continue
-                port, length = struct.unpack_from(">HH", payload, 2)
-                if self.flow in (None, (source, port)):
-                    yield Datagram(stamp_s, source, port, payload[UDP_BYTES : length or None])
+                yield Captured(stamp_s, self._link, frame)
 
     def _records(self, file: BinaryIO) -> Iterator[tuple[float, bytes]]:
         """Stamp [s] and bytes of each record."""
@@ -179,15 +193,16 @@ class PcapFile:
                 return start + at
         return None
 
-    def _start_of_ip(self, frame: bytes) -> int | None:
-        """Offset of the IP header, None where there is none."""
-        if self._link in IP_AT:
-            return IP_AT[self._link]
-        protocol_at, start = LINK_HEADERS[self._link]
-        while len(frame) >= start:
-            protocol = int.from_bytes(frame[protocol_at : protocol_at + 2], "big")
-            if protocol not in VLAN_TAGS:
-                return start if protocol in IP_PROTOCOLS else None
-            protocol_at = start + 2
-            start += 4
-        return None
+
+def _start_of_ip(link: int, frame: bytes) -> int | None:
+    """Offset of the IP header in a frame of a type of link, None where there is none."""
+    if link in IP_AT:
+        return IP_AT[link]
+    protocol_at, start = LINK_HEADERS.get(link, (0, len(frame) + 1))
+    while len(frame) >= start:
+        protocol = int.from_bytes(frame[protocol_at : protocol_at + 2], "big")
+        if protocol not in VLAN_TAGS:
+            return start if protocol in IP_PROTOCOLS else None
+        protocol_at = start + 2
+        start += 4
+    return None
