@@ -156,6 +156,20 @@ def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
     assert x_of(frames) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
 
 
+def test_poses_that_a_localisation_gives_seconds_later_are_those_of_their_stamps(write, tmp_path):
+    late = [(topic, kind, recorded_s + 1.5, data) for topic, kind, recorded_s, data in poses()]
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), late)))
+    assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+    assert stream.reading.without_pose == 0
+
+
+def test_frames_without_a_pose_are_counted(write, tmp_path):
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(12), poses()[:20])))
+    frames = list(stream)
+    assert [frame.T_world_sensor is None for frame in frames] == [False] * 5 + [True] * 7
+    assert stream.reading.without_pose == 7
+
+
 def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(write, tmp_path):
     late = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + 3600))
     recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())

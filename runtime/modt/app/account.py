@@ -61,6 +61,7 @@ def account(loop: Loop) -> dict[str, Any]:
         "shift_in_a_sweep_m": round(skewed_m, 2),
         "corrected": dict(reading.corrected),
         "frame_id": reading.frame_id,
+        "without_pose": reading.without_pose if own else 0,
         "poses": (reading.poses or "registration") if own else poses.name,
     }
 
@@ -71,6 +72,8 @@ def closing_lines(read: Mapping[str, Any]) -> list[str]:
     if read["left_out"]:
         what = "; ".join(f"{number} x {reason}" for reason, number in read["left_out"].items())
         lines.append(f"not all was read: {read['used']} frames of {read['messages']} messages; left out: {what}")
+    if read["without_pose"]:
+        lines.append(f"{read['without_pose']} frames have no pose of {read['poses']} near them: they are registered")
     kinds = read["not_deskewed"]
     if kinds and read["shift_in_a_sweep_m"] >= SEEN_M:
         why = ", ".join(kinds)

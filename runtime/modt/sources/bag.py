@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import logging
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, islice, pairwise
@@ -29,6 +29,8 @@ PEEKED = 50
 """Greatest number of messages that are searched for the first usable sweeps."""
 COMPARED = 4
 """Number of first sweeps whose stamps are compared. The first stamp that fits a later one begins the stream."""
+MAX_HELD = 20
+"""Greatest number of frames that wait for their poses, which a localisation may give seconds later."""
 OPTIONS = frozenset({"topic", "odometry", "frame"})
 """Options of `open_bag`."""
 ROS1 = "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDER"
@@ -37,7 +39,7 @@ ROS1 = "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDE
 class BagStream:
     """Frames of a recording; stamps count from its first usable sweep.
 
-    A frame is held back until a pose at least as late or the next sweep is read, so that its pose is interpolated.
+    A frame is held back until a pose at least as late is read, so that its pose is interpolated.
     Messages that are parts of a turn are joined. Unusable ones are counted and skipped, the first ones are logged.
     """
 
@@ -88,16 +90,11 @@ class BagStream:
         poses = RecordedPoses(self._poses, self._began)
         self.reading = Reading(poses=str(self._poses or ""))
         used = 0
-        held: Frame | None = None
-        for frame in self._frames(poses):
-            if held is not None and (frame is not None or poses.newest_s >= held.stamp_s):
-                used += 1
-                yield poses.place(held)
-                held = None
-            held = frame or held
-        if held is not None:
+        for frame in self._held(poses):
             used += 1
-            yield poses.place(held)
+            placed = poses.place(frame)
+            self.reading.without_pose += bool(poses.topics) and placed.T_world_sensor is None
+            yield placed
         if poses.lost:
             self.faults.leave_out(self.reading.messages, self._poses, "messages of poses cannot be read", poses.lost)
         if not used and self.reading.messages:
@@ -106,6 +103,16 @@ class BagStream:
             raise ModtError(
                 self.info.name, cause, "have the driver write x, y, z [m] as float32 in the sensor's frame"
             )
+
+    def _held(self, poses: RecordedPoses) -> Iterator[Frame]:
+        """Frames, each once a pose at least as late is read, or after MAX_HELD later frames."""
+        held: deque[Frame] = deque()
+        for frame in self._frames(poses):
+            if frame is not None:
+                held.append(frame)
+            while held and (poses.newest_s >= held[0].stamp_s or len(held) > MAX_HELD):
+                yield held.popleft()
+        yield from held
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; others are not decoded, unless they come in parts."""

@@ -22,6 +22,8 @@ from modt.types import Float64, Frame
 
 READ_TRANSFORMS = 2000
 """Number of messages of transforms by which the frames of a robot and the fixed ones among them are known."""
+LATE_S = 5.0
+"""Time that a localisation may need for a pose [s]; a stamp farther back is on another clock than the sweeps."""
 CONTINUOUS = "odom"
 """Last part of the name of the frame in which poses never jump (REP 105)."""
 
@@ -157,9 +159,6 @@ class RecordedPoses:
 
     def add(self, message: BagMessage) -> None:
         """Add the poses of a message; one that is wrong or out of order is left out."""
-        if self._stamps is None:  # the clock of the poses is that of the sweeps
-            began_s = message.recorded_s - STEP_S / 2
-            self._stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
         if self._topic is None:
             return
         try:
@@ -167,12 +166,21 @@ class RecordedPoses:
         except MessageError:
             self.lost += 1
             return
+        if self._stamps is None and poses:
+            self._stamps = self._begin(poses[0][0], message.recorded_s)
         for pose_s, T_world_sensor in poses:
-            if self._stamps.doubt(pose_s, message.recorded_s):
+            if self._stamps is None or self._stamps.doubt(pose_s, message.recorded_s):
                 continue
             stamp_s = pose_s + self._stamps.shift_s - self._began[0]
             if stamp_s > self.newest_s:
                 self._buffer.add(stamp_s, T_world_sensor)
+
+    def _begin(self, pose_s: float, recorded_s: float) -> StampCheck:
+        """Check of the stamps, by that of the first pose. Their clock is that of the sweeps, or follows it."""
+        begin_s = recorded_s - STEP_S / 2
+        clock_s = self._began[0] - self._began[1]  # the clock of the sweeps relative to that of the recording
+        late_s = recorded_s + clock_s - pose_s
+        return StampCheck((pose_s, recorded_s) if 0 <= late_s < LATE_S else (clock_s + begin_s, begin_s))
 
     def place(self, frame: Frame) -> Frame:
         """The frame with its pose, None where the latest poses are too old."""

@@ -116,6 +116,7 @@ class Reading:
     )  # messages by what they say of their layout and is not so
     frame_id: str = ""  # frame of the points, where messages name it
     poses: str = ""  # where the poses are from
+    without_pose: int = 0  # frames that have none of these poses
 
 
 class Stream(Protocol):
