@@ -170,6 +170,23 @@ def test_frames_without_a_pose_are_counted(write, tmp_path):
     assert stream.reading.without_pose == 7
 
 
+@pytest.mark.parametrize("back_s", [0.5, 3600.0])
+@pytest.mark.parametrize("options", [None, {}, {"chunk_size": 1500}, {"use_chunking": False}])
+def test_what_is_recorded_after_the_clock_was_set_back_comes_later(tmp_path, options, back_s):
+    recorded = by_time(clouds(12), poses(), poses(topic="/wheels"))
+    recorded = [(*m[:2], m[2] - back_s * (k >= len(recorded) // 2), m[3]) for k, m in enumerate(recorded)]
+    path = tmp_path / "drive"
+    path = write_rosbag2(path, recorded) if options is None else write_mcap(path, recorded, **options)
+    stream = open_stream(path, capture={"odometry": "odom"})
+    assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(12)], abs=1e-6)
+    assert not stream.faults.count
+
+
+def test_topics_that_a_converter_wrote_one_after_the_other_are_merged(write, tmp_path):
+    stream = open_stream(write(tmp_path / "drive", [*clouds(), *poses()]))
+    assert x_of(stream) == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+
+
 def test_a_wrong_stamp_of_the_first_sweep_costs_it_alone(write, tmp_path):
     late = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S + 3600))
     recorded = by_time([(*clouds()[0][:3], late)], clouds()[1:], poses())

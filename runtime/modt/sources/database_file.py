@@ -207,13 +207,26 @@ class DatabaseFile(BagFile):
 
 
 def _by_time(rows: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
-    """Rows, given in the order of their numbers, by their times; a time far from those around it is damaged."""
+    """Rows, given in the order of their numbers, by their times; a time far from those around it is damaged.
+
+    Where the clock of the recorder was set back, the times of a topic fall, and what was recorded later comes later.
+    """
     times = [row[0] for row in rows]
     for k in range(1, len(times) - 1):
         before, now, after = times[k - 1 : k + 2]
         if 0 <= after - before < MOST_APART_NS and min(abs(now - before), abs(after - now)) > MOST_APART_NS:
             times[k] = before
-    return sorted((time, number, topic) for time, (_, number, topic) in zip(times, rows, strict=True))
+    latest: dict[int, int] = {}  # time of the latest message of each topic
+    times_set = 0
+    sections = []
+    for time, (_, _, topic) in zip(times, rows, strict=True):
+        if time < latest.get(topic, time) - MOST_APART_NS:
+            times_set += 1
+            latest = {}
+        latest[topic] = max(time, latest.get(topic, time))
+        sections.append(times_set)
+    timed = zip(sections, times, rows, strict=True)
+    return [row for _, row in sorted((section, (time, *row[1:])) for section, time, row in timed)]
 
 
 def _are(kind: type, *values: Any) -> bool:

@@ -8,13 +8,14 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from heapq import heappop, heappush
 from io import BytesIO
 from itertools import chain, count, repeat
+from operator import attrgetter
 from typing import Any
 
 from modt.errors import ModtError
@@ -35,6 +36,10 @@ MESSAGE_INDEX = 7
 LAST_OPCODE = DATA_END = 15
 CHUNK_BYTES = 40
 """Size of a chunk without the name of its compression and without its records."""
+SET_BACK_NS = 2 * 10**8
+"""Time by which the messages of a channel fall back where the clock of the recorder was set [ns]."""
+COMPARED = 8
+"""Number of pieces before such a place that are compared with those behind it."""
 COMPRESSIONS = ("", "zstd", "lz4")
 LEAST_MESSAGE_BYTES = 22
 _BEGIN = re.compile(rb"[\x05\x06](?=.{4}\0{4})", re.DOTALL)
@@ -126,21 +131,14 @@ class McapFile(BagFile):
         return topics
 
     def _messages(self, topics: Collection[str]) -> Iterator[Stored]:
-        """Messages ordered by recorded time. A message waits until no later piece can hold an earlier one."""
+        """Messages ordered by recorded time, but for those before and behind a clock that was set back."""
         contents = self._contents
         wanted = {number for number, channel in contents.channels.items() if channel.topic in topics}
         pieces = [p for p in contents.pieces if not contents.trusts_index_of(p) or wanted & {*p.indices}]
-        pieces.sort(key=lambda piece: (piece.start_ns, piece.at))
-        next_ns = chain((piece.start_ns for piece in pieces[1:]), repeat(math.inf))
-        waiting: list[tuple[int, int, Stored]] = []
-        order = count()
         seen = Counter[str]()
         promised = contents.counts
-        for piece, until_ns in zip(pieces, next_ns, strict=False):
-            for message in self._stored(contents, piece, wanted):
-                heappush(waiting, (message.recorded_ns, next(order), message))
-            while waiting and waiting[0][0] < until_ns:
-                _, _, message = heappop(waiting)
+        for section in self._sections(pieces):
+            for message in self._merged(contents, section, wanted):
                 seen[message.topic] += 1
                 yield message
         for at in contents.gaps:
@@ -149,6 +147,49 @@ class McapFile(BagFile):
             for number in wanted:
                 self.missing[contents.channels[number].topic] += promised[number]
             self.missing -= seen
+
+    def _sections(self, pieces: Sequence[Piece]) -> Iterator[list[Piece]]:
+        """Pieces between the places at which the recorder's clock was set back, so that times of a channel fall."""
+        pieces = sorted(pieces, key=attrgetter("at"))
+        first = 0  # piece that begins the section
+        fallen = 0  # piece since which all begin earlier than one before them
+        newest_ns = 0  # latest begin of a piece before that one
+        for k, piece in enumerate(pieces):
+            if piece.start_ns >= newest_ns - SET_BACK_NS:
+                newest_ns = max(newest_ns, piece.start_ns)
+                fallen = k + 1
+            elif any(self._falls(before, piece) for before in pieces[max(first, fallen - COMPARED) : fallen]):
+                yield pieces[first:fallen]
+                first = fallen
+                fallen = k + 1
+                newest_ns = piece.start_ns
+        yield pieces[first:]
+
+    def _falls(self, before: Piece, piece: Piece) -> bool:
+        """Whether the times of a channel fall from one piece to another."""
+        last_ns = dict(self._times_of(before))
+        return any(time_ns < last_ns.get(number, 0) - SET_BACK_NS for number, time_ns in self._times_of(piece))
+
+    def _times_of(self, piece: Piece) -> Collection[tuple[int, int]]:
+        """Channel and time [ns] of its messages as far as they are indexed."""
+        return self._indexed(piece).values() if piece.channel is None else [(piece.channel, piece.start_ns)]
+
+    def _merged(self, contents: Contents, pieces: list[Piece], wanted: Collection[int]) -> Iterator[Stored]:
+        """Messages of pieces by their times. A message waits until no later piece can hold an earlier one."""
+        pieces.sort(key=lambda piece: (piece.start_ns, piece.at))
+        next_ns = chain((piece.start_ns for piece in pieces[1:]), repeat(math.inf))
+        waiting: list[tuple[int, int, int, Stored]] = []  # number of set backs before it, time, order, and message
+        order = count()
+        times_set = 0
+        for piece, until_ns in zip(pieces, next_ns, strict=False):
+            latest_ns: dict[str, int] = {}  # time of the latest message of the piece by topic
+            for message in self._stored(contents, piece, wanted):
+                if not message.flaw:
+                    times_set += message.recorded_ns < latest_ns.get(message.topic, 0) - SET_BACK_NS
+                    latest_ns[message.topic] = message.recorded_ns
+                heappush(waiting, (times_set, message.recorded_ns, next(order), message))
+            while waiting and waiting[0][:2] < (times_set, until_ns):
+                yield heappop(waiting)[-1]
 
     def _stored(self, contents: Contents, piece: Piece, wanted: Collection[int]) -> Iterator[Stored]:
         """Messages of a piece, and those that its index names and its bytes no longer hold."""
