@@ -239,3 +239,26 @@ def test_a_recording_that_was_renamed_is_whole(tmp_path):
     stream, frames = read(tmp_path)
     assert frames == list(range(N))
     assert not stream.faults.count
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_files_beside_a_recording_are_no_part_of_it(tmp_path, listed):
+    for k in range(2):
+        write_mcap(tmp_path / f"drive_{k}", clouds(N)[6 * k : 6 * k + 6])
+        (tmp_path / f"._drive_{k}.mcap").write_bytes(b"copied by another system")
+    if listed:
+        write_mcap(tmp_path / "results", clouds(N, "/modt/points"))
+        (tmp_path / "metadata.yaml").write_text(
+            "rosbag2_bagfile_information:\n  relative_file_paths: [drive_0.mcap, drive_1.mcap]\n"
+        )
+    stream, frames = read(tmp_path)
+    assert frames == list(range(N))
+    assert not stream.faults.count
+
+
+def test_an_empty_file_is_named(tmp_path):
+    write_mcap(tmp_path / "drive_0", clouds(N))
+    (tmp_path / "drive_1.db3").write_bytes(b"")
+    stream, frames = read(tmp_path)
+    assert frames == list(range(N))
+    assert stream.faults.left_out == {"drive_1.db3 is empty": 1}

@@ -76,5 +76,16 @@ def test_a_lost_part_costs_no_other_turn():
     assert sorted(len(turn.points) for turn in made)[0] == pytest.approx(N * 7 / 8, abs=80)
 
 
+@pytest.mark.parametrize("per_turn", [2, 4, 8])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_two_parts_in_the_wrong_order_cost_no_turn(per_turn, way):
+    messages = parts(12, per_turn, way)
+    at = 6 * per_turn
+    messages[at], messages[at + 1] = messages[at + 1], messages[at]
+    _, made = joined(messages)
+    assert len(made) == 12
+    assert [len(turn.points) for turn in made] == pytest.approx([N] * 12, abs=80)
+
+
 def test_few_points_tell_no_arc():
     assert arc_of(np.ones((10, 4), np.float32)).extent_rad == pytest.approx(2 * np.pi)

@@ -86,6 +86,8 @@ class Bag:
         """
         if not path.is_file():
             raise ModtError(path, "is not there", "copy the whole folder")
+        if not path.stat().st_size:
+            raise ModtError(path, "is empty", "its recorder was killed, or the disk was full")
         file = KINDS[kind_of(path)](path)
         file.topics()
         self.files.append(file)
@@ -113,6 +115,7 @@ def bag_in(folder: Path) -> list[Path]:
     same file without compression is left out: a recorder that was killed has not finished it.
     """
     files = [file for file in folder.iterdir() if kind_of(file) in KINDS and file.is_file()]
+    files = [file for file in files if not file.name.startswith(".")]  # such as those that macOS adds to a copy
     names = {file.name for file in files}
     files = [file for file in files if file.name.removesuffix(ZSTD) not in names - {file.name}]
     if len({_stem(file) for file in files}) > 1 and not (folder / METADATA).is_file():
@@ -148,11 +151,12 @@ def _listed(path: Path) -> tuple[list[Path], dict[str, int]]:
     except (OSError, UnicodeError, ModtError, LookupError, TypeError, ValueError, AttributeError):
         pass  # the files themselves tell as much
     listed = [_as_stored(path / name) for name in names if kind_of(Path(name)) in KINDS]
+    stems = {_stem(file) for file in listed}
     further = [file for file in there if file not in listed]
     absent = [file for file in listed if not file.is_file()]
     if len(further) == len(absent) == len(listed):  # a recording that was renamed
         return further, counts
-    return [*listed, *further], counts
+    return [*listed, *(file for file in further if not stems or _stem(file) in stems)], counts
 
 
 def _as_stored(file: Path) -> Path:

@@ -18,7 +18,11 @@ _LAS = ("is a LAS file", "convert it: pdal translate FILE scans/000000.ply, one 
 _TO_ROWS = "[:, :4].astype('f4').tofile('scans/000000.bin'), columns x, y, z, reflectance"
 _TEXT = ("is a table of text", f"convert it: numpy.loadtxt(FILE){_TO_ROWS}")
 _LIVOX = ("is a recording of Livox Viewer", "record the packets instead: tcpdump -w FILE.pcap udp port 56301")
+_PACKED = ("is compressed", "unpack it and give what was in it")
 FOREIGN = {
+    ".gz": _PACKED,
+    ".zip": _PACKED,
+    ".tar": _PACKED,
     ".bag": ("is a recording of ROS 1", "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDER"),
     ".las": _LAS,
     ".laz": _LAS,

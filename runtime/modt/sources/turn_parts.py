@@ -27,7 +27,9 @@ TOLERANCE_SHARE = 0.25
 MARGIN_RAD = 0.1
 """Angle before the begin of a part in which points still belong to it [rad]."""
 MAX_GAP_TURNS = 1.5
-"""Time without a message after which a turn is not continued [turns]."""
+"""Time without a message after which a turn is not continued, if messages have no stamps [turns]."""
+MAX_PHASE = 2.5 * np.pi
+"""Phase that the head has reached by the stamp of a part if it has begun another turn [rad]."""
 CLOCKWISE = 1.0
 
 
@@ -89,6 +91,7 @@ class TurnParts:
     @classmethod
     def of(cls, messages: Sequence[tuple[PointCloud, float]]) -> TurnParts | None:
         """Joiner of the messages of a source, by the first ones and their arrivals [s]; None if they are no parts."""
+        messages = sorted(messages, key=lambda message: message[0].began_s or message[1])
         clouds = [cloud for cloud, _ in messages]
         one_sensor = len({cloud.frame_id for cloud in clouds}) == 1
         if len(clouds) <= MIN_PAIRS or not one_sensor or not cls.may_be(clouds):
@@ -122,9 +125,18 @@ class TurnParts:
         phase = float(np.mod(np.pi - self._way * arc.begin_rad(self._way), 2 * np.pi))
         done = None
         if self._marks:
-            last_s, last_phase = self._marks[-1]
-            if phase < last_phase - MARGIN_RAD or time_s - last_s > MAX_GAP_TURNS * turn_s:
-                done = self._turn(cloud.frame_id)
+            last_s, last_phase = max(self._marks)
+            since_turns = (time_s - last_s) / turn_s
+            reached = last_phase + 2 * np.pi * since_turns  # phase that the head has reached by the stamp
+            if since_turns < 0:  # a late part, of this turn or the one before
+                phase -= 2 * np.pi * np.rint((phase - reached) / (2 * np.pi))
+                if phase < -MARGIN_RAD:
+                    return None
+                phase = max(phase, 0.0)
+            else:
+                passed = reached > MAX_PHASE if cloud.began_s else since_turns > MAX_GAP_TURNS
+                if passed or phase < last_phase - MARGIN_RAD:
+                    done = self._turn(cloud.frame_id)
         bearing = np.arctan2(cloud.points[:, 1], cloud.points[:, 0]).astype(np.float64)
         since_begin = np.mod(np.pi - self._way * bearing - phase + MARGIN_RAD, 2 * np.pi) - MARGIN_RAD
         beyond = phase + since_begin >= 2 * np.pi
