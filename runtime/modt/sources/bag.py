@@ -107,7 +107,7 @@ class BagStream:
     def _held(self, poses: RecordedPoses) -> Iterator[Frame]:
         """Frames, each once a pose at least as late is read, or after MAX_HELD later frames."""
         held: deque[Frame] = deque()
-        for frame in self._frames(poses):
+        for frame in self._frames(poses, StampCheck(self._began)):
             if frame is not None:
                 held.append(frame)
             while held and (poses.newest_s >= held[0].stamp_s or len(held) > MAX_HELD):
@@ -126,23 +126,16 @@ class BagStream:
             part.info = replace(self.info, n_frames=max(end - part._first, 0), end=end)
         return part
 
-    def _frames(self, poses: RecordedPoses) -> Iterator[Frame | None]:
+    def _frames(self, poses: RecordedPoses, stamps: StampCheck) -> Iterator[Frame | None]:
         """Frames in their order; None after a message of a pose, or one without a frame."""
-        stamps = StampCheck(self._began)
         parts = copy.deepcopy(self._parts)
-        others = Counter[str]()  # messages of other sensors by their frames
+        last: BagMessage | None = None
         index = -1
-        for message in self._bag.messages({self._topic} | poses.topics):
-            if message.topic != self._topic:
-                if message.flaw:
-                    poses.lost += 1
-                else:
-                    poses.add(message)
+        for message in self._messages(poses):
+            if message is None:
                 yield None
                 continue
-            if (other := self._other_sensor(message)) is not None:
-                others[other] += 1
-                continue
+            last = message
             if self._parts is None:
                 index += 1
                 if self._last is not None and index >= self._last:
@@ -157,12 +150,24 @@ class BagStream:
                 if self._last is not None and index >= self._last:
                     return
             yield None if cloud is None or index < self._first else self._frame(index, cloud, message, stamps)
-        if parts is not None and (cloud := parts.finish()) is not None:
-            yield self._frame(index + 1, cloud, message, stamps)
+        if parts is not None and last is not None and (cloud := parts.finish()) is not None:
+            yield self._frame(index + 1, cloud, last, stamps)
+        self._account_for_damage()
+
+    def _messages(self, poses: RecordedPoses) -> Iterator[BagMessage | None]:
+        """Messages of the sensor; None after one of a pose. Those of other sensors in the topic are counted."""
+        others = Counter[str]()  # by their frames
+        for message in self._bag.messages({self._topic} | poses.topics):
+            if message.topic != self._topic:
+                poses.add(message)
+                yield None
+            elif (other := self._other_sensor(message)) is not None:
+                others[other] += 1
+            else:
+                yield message
         for other, number in others.items():
             reason = f"messages are of another sensor, in the frame {other}"
             self.faults.leave_out(self.reading.messages, self._topic, reason, number)
-        self._account_for_damage()
 
     def _other_sensor(self, message: BagMessage) -> str | None:
         """Frame of a message of another sensor; None for those that are read."""

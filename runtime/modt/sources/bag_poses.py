@@ -159,7 +159,8 @@ class RecordedPoses:
 
     def add(self, message: BagMessage) -> None:
         """Add the poses of a message; one that is wrong or out of order is left out."""
-        if self._topic is None:
+        if message.flaw or self._topic is None:
+            self.lost += 1
             return
         try:
             poses = [*self._topic.poses(message.data)]

@@ -330,28 +330,13 @@ def _summary(view: View) -> Contents:
 
 def _scanned(view: View) -> Contents:
     """Contents by a walk from record to record. Behind damaged bytes it goes on at the next chunk or message."""
-    from mcap.records import ChunkIndex
-
     contents = Contents()
     at = MAGIC_BYTES
     before = at
     ended = False
     while at + HEAD_BYTES <= len(view):
-        opcode = view[at]
-        end = at + HEAD_BYTES + _length(view, at)
         try:
-            if opcode == CHUNK:
-                piece = _chunk_at(view, at)
-                contents.pieces.append(piece)
-                end = piece.at + piece.size
-            elif opcode == MESSAGE:
-                contents.pieces.append(_message_at(view, at))
-            else:
-                record, _ = record_at(view, at)
-                if opcode == MESSAGE_INDEX and contents.pieces:
-                    _add_index(contents.pieces, record.channel_id, at)
-                elif not isinstance(record, ChunkIndex) and _consistent(record):
-                    contents.register(record)
+            end = _scan(view, at, contents)
         except Exception:  # its bytes may be anything
             if not ended:  # behind the end of the data there is but a summary
                 contents.gaps.append(at)
@@ -359,12 +344,34 @@ def _scanned(view: View) -> Contents:
             end = _next_begin(view, before + 1 if view[before] == MESSAGE else at + 1)
         else:
             before = at
-            ended = ended or opcode == DATA_END
+            ended = ended or view[at] == DATA_END
         at = end
     if not ended:
         _end_index(contents.pieces)
     contents.pieces = _in_order(contents.pieces)
     return contents
+
+
+def _scan(view: View, at: int, contents: Contents) -> int:
+    """Add the record at an offset to the contents, and return the offset of its end.
+
+    Raises:
+        Exception: the bytes are no record.
+    """
+    from mcap.records import ChunkIndex
+
+    opcode = view[at]
+    if opcode in (CHUNK, MESSAGE):
+        piece = _chunk_at(view, at) if opcode == CHUNK else _message_at(view, at)
+        contents.pieces.append(piece)
+        return piece.at + piece.size
+    record, end = record_at(view, at)
+    if opcode == MESSAGE_INDEX and contents.pieces:
+        last = contents.pieces[-1]
+        contents.pieces[-1] = replace(last, indices={**last.indices, record.channel_id: at})
+    elif not isinstance(record, ChunkIndex) and _consistent(record):
+        contents.register(record)
+    return end
 
 
 def _consistent(record: Any) -> bool:
@@ -437,11 +444,6 @@ def _message_at(view: View, at: int) -> Piece:
 
 MOST_APART_NS = 10**9 * 86_400 * 365
 """Greatest difference of the two times of a message [ns]; beyond it, bytes are no message."""
-
-
-def _add_index(pieces: list[Piece], number: int, at: int) -> None:
-    """Add the index at an offset to the last piece."""
-    pieces[-1] = replace(pieces[-1], indices={**pieces[-1].indices, number: at})
 
 
 def _end_index(pieces: list[Piece]) -> None:

@@ -123,20 +123,11 @@ class TurnParts:
         turn_s = abs(self.turn_s)
         arc = arc_of(cloud.points)
         phase = float(np.mod(np.pi - self._way * arc.begin_rad(self._way), 2 * np.pi))
-        done = None
-        if self._marks:
-            last_s, last_phase = max(self._marks)
-            since_turns = (time_s - last_s) / turn_s
-            reached = last_phase + 2 * np.pi * since_turns  # phase that the head has reached by the stamp
-            if since_turns < 0:  # a late part, of this turn or the one before
-                phase -= 2 * np.pi * np.rint((phase - reached) / (2 * np.pi))
-                if phase < -MARGIN_RAD:
-                    return None
-                phase = max(phase, 0.0)
-            else:
-                passed = reached > MAX_PHASE if cloud.began_s else since_turns > MAX_GAP_TURNS
-                if passed or phase < last_phase - MARGIN_RAD:
-                    done = self._turn(cloud.frame_id)
+        phase, another = self._place(cloud, time_s, phase)
+        if phase < -MARGIN_RAD:
+            return None  # a late part of the turn before
+        phase = max(phase, 0.0)
+        done = self._turn(cloud.frame_id) if another else None
         bearing = np.arctan2(cloud.points[:, 1], cloud.points[:, 0]).astype(np.float64)
         since_begin = np.mod(np.pi - self._way * bearing - phase + MARGIN_RAD, 2 * np.pi) - MARGIN_RAD
         beyond = phase + since_begin >= 2 * np.pi
@@ -147,6 +138,18 @@ class TurnParts:
             self._points.append(cloud.points[beyond])
             self._marks.append((time_s + (2 * np.pi - phase) / (2 * np.pi) * turn_s, 0.0))
         return done
+
+    def _place(self, cloud: PointCloud, time_s: float, phase: float) -> tuple[float, bool]:
+        """Phase at the begin of a part in the turn of those before, and whether it begins another turn [rad]."""
+        if not self._marks:
+            return phase, False
+        last_s, last_phase = max(self._marks)
+        since_turns = (time_s - last_s) / abs(self.turn_s)
+        reached = last_phase + 2 * np.pi * since_turns  # phase that the head has reached by the stamp
+        if since_turns < 0:
+            return float(phase - 2 * np.pi * np.rint((phase - reached) / (2 * np.pi))), False
+        passed = reached > MAX_PHASE if cloud.began_s else since_turns > MAX_GAP_TURNS
+        return phase, passed or phase < last_phase - MARGIN_RAD
 
     def finish(self) -> PointCloud | None:
         """The last turn, if only the message after it is missing."""
