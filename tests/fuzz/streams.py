@@ -19,6 +19,7 @@ from modt.sources.recognise import open_stream
 from tests.fuzz.target import of_file, target, targets_of_files
 from tests.ros2 import messages
 from tests.sources import bags, layouts
+from tests.sources.packets import pcapng
 from tests.sources.packets.robosense_packets import WRITTEN
 from tests.sources.packets.simulated import packets
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration
@@ -49,7 +50,8 @@ def pcap(folder):
     parts = [ipv4(datagram[at : at + 40], identity=7, offset=at, more=not at) for at in (0, 40)]
     frames = [ethernet(part) for part in parts]
     fragmented = whole[:24] + b"".join(struct.pack("<IIII", 1, 0, len(f), len(f)) + f for f in frames)
-    return of_file(path, lambda: list(PcapFile(path)), whole, fragmented)
+    blocks = pcapng.captured([(1.5, b"first"), (2.5, bytes(100))], 2368)
+    return of_file(path, lambda: list(PcapFile(path)), whole, fragmented, blocks)
 
 
 @target()

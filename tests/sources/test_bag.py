@@ -103,11 +103,15 @@ def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
     assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
 
 
-def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(write, tmp_path):
-    raw = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=BEGAN_S - 9))
-    stream = open_stream(write(tmp_path / "drive", [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(6)]))
+@pytest.mark.parametrize("unit_s", [0.0, 1e-3])
+def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(write, tmp_path, unit_s):
+    recorded = []
+    for k in range(6):
+        cloud = messages.cloud(messages.xyzi(20), stamp_s=1000.0 + k / 10 * unit_s)
+        recorded.append(("/points", CLOUD, BEGAN_S + k / 10, messages.encode(cloud)))
+    stream = open_stream(write(tmp_path / "drive", recorded))
     assert [frame.stamp_s for frame in stream] == pytest.approx([k / 10 for k in range(6)], abs=1e-6)
-    assert "all sweeps have the same stamp" in stream.info.notes[0]
+    assert "the stamps of the sweeps stand still" in stream.info.notes[0]
 
 
 def test_a_sweep_that_is_recorded_twice_is_read_once(write, tmp_path):

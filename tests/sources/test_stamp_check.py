@@ -33,6 +33,7 @@ SET = {  # changes of the stamps and of the arrivals, by a step from a message o
     "the clock of the sensor": (lambda step_s: step_s, lambda step_s: 0.0, MOST_LOST),
     "the clock of the arrivals": (lambda step_s: 0.0, lambda step_s: step_s, 0),
     "a clock that both share, back": (lambda step_s: -abs(step_s), lambda step_s: -abs(step_s), 0),
+    "a clock that both share, far ahead": (lambda step_s: 1e5 + abs(step_s), lambda step_s: 1e5 + abs(step_s), 0),
 }
 
 

@@ -18,7 +18,7 @@ from modt.ros2.point_cloud2 import PointCloud
 from modt.sources.bag_file import BagMessage, BagTopic
 from modt.sources.bag_files import Bag
 from modt.sources.bag_poses import PoseTopic, RecordedPoses, find_poses
-from modt.sources.stamp_check import StampCheck
+from modt.sources.stamp_check import STEP_S, StampCheck
 from modt.sources.stream import Faults, Reading, StreamInfo, Sweep, reason_of
 from modt.sources.turn_parts import TurnParts
 from modt.types import Frame, Self
@@ -31,6 +31,8 @@ COMPARED = 4
 """Number of first sweeps whose stamps are compared. The first stamp that fits a later one begins the stream."""
 MAX_HELD = 20
 """Greatest number of frames that wait for their poses, which a localisation may give seconds later."""
+STANDING_SHARE = 0.01
+"""Stamps that pass by less than this share of the recorded times are no times in seconds, or stand still."""
 OPTIONS = frozenset({"topic", "odometry", "frame"})
 """Options of `open_bag`."""
 ROS1 = "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDER"
@@ -245,7 +247,7 @@ def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingPr
     sensors = [*dict.fromkeys(cloud.frame_id for cloud, _ in began)]
     sensor = _sensor(path, sensors, options.get("frame"))
     began = [(cloud, message) for cloud, message in began if cloud.frame_id == sensor]
-    stamped = len({cloud.stamp_s for cloud, _ in began}) > 1 or len(began) < COMPARED
+    stamped = _pass(began)
     stamps = [((c.stamp_s if stamped else 0.0) or m.recorded_s, m.recorded_s) for c, m in began[:COMPARED]]
     first = next((a for a, b in combinations(stamps, 2) if not StampCheck(a).doubt(*b)), stamps[0])
     steps_s = (b[0] - a[0] for a, b in pairwise(stamps) if b[0] > a[0] and not StampCheck(a).doubt(*b))
@@ -266,6 +268,14 @@ def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingPr
     return BagStream(info, bag, chosen, first, poses, parts, sensor if len(sensors) > 1 else None, stamped=stamped)
 
 
+def _pass(clouds: list[tuple[PointCloud, BagMessage]]) -> bool:
+    """Whether the stamps of the first sweeps pass, as their recorded times do."""
+    stamps = [cloud.stamp_s for cloud, _ in clouds]
+    steps_s = (b.recorded_s - a.recorded_s for (_, a), (_, b) in pairwise(clouds))
+    recorded_s = sum(step_s for step_s in steps_s if 0 < step_s < STEP_S)  # but for clocks that were set
+    return len(clouds) < COMPARED or not recorded_s or max(stamps) - min(stamps) >= STANDING_SHARE * recorded_s
+
+
 def _sensor(path: Path, sensors: list[str], asked: str | None) -> str:
     """Frame of the sensor that is read.
 
@@ -283,7 +293,7 @@ def _notes(sensors: list[str], sensor: str, *, stamped: bool) -> Iterator[str]:
     if others := ", ".join(other for other in sensors if other != sensor):
         yield f"several sensors share the topic: {sensor} is read; --capture frame=NAME chooses among it and {others}"
     if not stamped:
-        yield "all sweeps have the same stamp: their times are those of the recording"
+        yield "the stamps of the sweeps stand still: their times are those of the recording"
 
 
 def _frame_note(frame_id: str) -> tuple[str, ...]:

@@ -16,6 +16,8 @@ STEP_S = 1.0
 DOUBT_S = 0.5
 """Time for which doubtful stamps are refused [s]. If they keep coming, a clock was set, and they are followed."""
 REPEATED = "has the stamp of the last sweep: recorded twice?"
+MAX_PAUSE_S = 86_400.0
+"""Longest pause of a source [s]; after a longer one, by stamps and arrivals, the clock that they share was set."""
 FIRST_STEP_S = 0.1
 """Assumed time between two messages until two are accepted [s]."""
 
@@ -68,7 +70,8 @@ class StampCheck:
                 return cause
             else:
                 self.steps += 1
-                self.shift_s += max(self.waited_s, self._step_s) - self.passed_s
+                waited_s = self._step_s if self.waited_s > MAX_PAUSE_S else self.waited_s
+                self.shift_s += max(waited_s, self._step_s) - self.passed_s
         self._last = (stamp_s, arrived_s)
         self._doubted_s = None
         return ""
@@ -81,7 +84,7 @@ class StampCheck:
         """Whether the latest stamp fits its arrival."""
         if self._live and (self._late or self.passed_s == 0):
             return False
-        return 0 <= self.passed_s <= max(self.waited_s, 0.0) + STEP_S
+        return 0 <= self.passed_s <= min(max(self.waited_s, 0.0), MAX_PAUSE_S) + STEP_S
 
     def _refusal(self, since_s: float) -> str:
         """Reason to refuse a doubtful stamp `since_s` after the message before; empty if a clock was set."""
@@ -89,7 +92,8 @@ class StampCheck:
             self._doubted_s = 0.0
         else:
             self._doubted_s += since_s if since_s > 0 else self._step_s
-        both_set = self.waited_s < 0 and abs(self.passed_s - self.waited_s) <= STEP_S
+        impossible = self.waited_s < 0 or self.waited_s > MAX_PAUSE_S
+        both_set = impossible and abs(self.passed_s - self.waited_s) <= STEP_S
         if both_set or self._doubted_s >= DOUBT_S:
             return ""
         order = "before" if self.passed_s < 0 else "after"
