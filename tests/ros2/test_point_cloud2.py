@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.ros2.cdr import MessageError
-from modt.ros2.point_cloud2 import read_cloud, write_cloud
+from modt.ros2.point_cloud2 import read_cloud, turn_of, write_cloud
 from modt.types import UNRECORDED
 from tests.ros2 import messages
 
@@ -132,6 +132,15 @@ def test_the_field_of_the_times_of_points_has_many_names(field):
 def test_times_on_the_clock_of_the_header_are_not_added_to_it(unit):
     cloud = turning(field="timestamp", kind="f8", unit=unit, begin=1000.0)
     assert cloud.stamp_s == pytest.approx(1000.05, abs=1e-3)
+
+
+def test_bearings_that_fit_no_turn_at_all_are_of_no_head():
+    rng = np.random.default_rng(3)
+    bearing = rng.choice([0, 0, 1, 2, 3], 100) * rng.uniform(0.5, 3)
+    points = np.zeros((100, 4), np.float32)
+    points[:, 0] = 5 * np.cos(bearing)
+    points[:, 1] = 5 * np.sin(bearing)
+    assert turn_of(points, np.linspace(0, 0.1, 100)) == "their points' times are of no turning head"
 
 
 @pytest.mark.parametrize("odd", [{"turn_s": 3.0, "unit": 1.0}, {"turn_s": 0.0}])

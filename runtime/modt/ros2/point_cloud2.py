@@ -312,6 +312,8 @@ def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None
     inside = np.ones(len(turned), bool)
     slope = offset_s = 0.0
     for _ in range(2):  # the second time with the seam where the first fit has it
+        if not inside.any():
+            return None, np.inf
         centred = turned[inside] - turned[inside].mean()
         slope = float(centred @ since_s[inside] / max(centred @ centred, 1e-9))
         offset_s = float(since_s[inside].mean() - slope * turned[inside].mean())
