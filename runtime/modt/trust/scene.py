@@ -95,8 +95,8 @@ class SceneCheck:
     ) -> None:
         """Notice a scene that changes at once, and one that is back; arguments as those of the ground's check.
 
-        On a ground that has moved, obstacles are less sure, so a change has to explain nearly all of them, and a scale
-        is told by the ground alone.
+        On a ground that has moved, obstacles are less sure, so a change has to explain nearly all of them. A scale is
+        told by the ground alone.
         """
         if not pairs:
             return
