@@ -156,14 +156,11 @@ def _run_missing(engine: Engine, dataset: Dataset, tasks: Sequence[Task], *, qui
     if not quiet and len(missing) < len(tasks):
         _say(f"{len(tasks) - len(missing)} of {len(tasks)} runs are there already")
     failures = []
-    terminal = sys.stderr.isatty()
-    with bar(len(missing), "run", shown=not quiet and terminal) as step:
-        for number, (task, outcome) in enumerate(engine.outcomes(process, missing), 1):
+    with bar(len(missing), "run", shown=not quiet) as step:
+        for task, outcome in engine.outcomes(process, missing):
             if isinstance(outcome, Exception):
                 failures.append((task.name, str(outcome) or type(outcome).__name__))
             step(task.name)
-            if not quiet and not terminal:
-                _say(f"{number} of {len(missing)}: {task.name}")
     return failures
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,7 +36,7 @@ def add_options(p: argparse.ArgumentParser) -> None:
     jobs = options.bounded(int, 1, 1024, "processes")
     g.add_argument("--jobs", type=jobs, default=1, metavar="N", help="number of processes (default: %(default)s)")
     g.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler (extra batch)")
-    g.add_argument("--quiet", action="store_true", help="no progress bar")
+    g.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -66,10 +65,9 @@ def run(arguments: argparse.Namespace) -> int:
     base = tuple(arguments.profile)
     profiles = [base, *((*base, name) for name in arguments.beside)]
     study = Study(experiments, drives, profiles)
-    shown = not arguments.quiet and sys.stderr.isatty()
     with (
         Engine(arguments.jobs, arguments.scheduler) as engine,
-        bar(len(study.tasks()), "replay", shown=shown) as tick,
+        bar(len(study.tasks()), "replay", shown=not arguments.quiet) as tick,
     ):
         rows = study.rows(engine, tick)
     if not rows:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from modt import host
@@ -45,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
         meter_name=arguments.meter,
         prediction=arguments.against,
         core=core,
-        progress=lambda turns: bar(turns, "turn", shown=sys.stderr.isatty()),
+        progress=lambda turns: bar(turns, "turn", shown=True),
     )
     document = compare_document(tree)
     if arguments.html is not None:

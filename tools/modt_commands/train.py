@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         kept_seeds=seeds,
     )
     try:
-        with bar(request.n_pieces, "step", shown=not arguments.quiet and sys.stderr.isatty()) as step:
+        with bar(request.n_pieces, "step", shown=not arguments.quiet) as step:
             lines = train(request, step)
     except OSError as error:
         cause = f"cannot be written ({error.strerror or error})"

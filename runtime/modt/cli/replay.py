@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     shown = not arguments.quiet
     if shown and (notes := [*info.notes, *info.pose_notes]):
         print("\n".join(f"modt: {note}" for note in notes), file=sys.stderr)
-    with bar(info.n_frames, "frame", shown=shown and sys.stderr.isatty()) as step:
+    with bar(info.n_frames, "frame", shown=shown) as step:
         summary = loop.run(notifier, lambda r: step(f"{len(r.proposals)} proposals, {len(r.classified)} classified"))
     if shown:
         print(summary_text(summary))
