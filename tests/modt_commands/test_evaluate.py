@@ -105,6 +105,10 @@ def test_results_are_written_as_a_table_and_a_document(tmp_path):
     assert [row["profile"] for row in rows].count("default") == len(rows) / 2
     page = (tmp_path / "results.md").read_text()
     assert all(f"## {title}" in page for title in ("Table IV", "Fig. 11", "Fig. 12"))
+    charts = (tmp_path / "results.html").read_text()
+    assert all(f"<h2>{title}" in charts for title in ("Table IV", "Fig. 11", "Fig. 12"))
+    assert "AP pedestrian, 2 simulated drives</h3>" in charts
+    assert all(words in charts for words in ("paper, with_trk", "paper, best", "paper, ten times Fig. 8"))
 
 
 @pytest.mark.parametrize(

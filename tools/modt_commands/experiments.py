@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,7 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_evaluation.experiments.catalogue import chosen
     from modt_evaluation.experiments.drives import Drive, completed, kitti_drives, simulated_drives
     from modt_evaluation.experiments.markdown import markdown, sources
+    from modt_evaluation.experiments.results_page import results_page
     from modt_evaluation.experiments.study import Study
+    from modt_profiling.reporting.view_extra import save
 
     experiments = chosen(arguments.experiment)
     recorded = [] if arguments.kitti is None else kitti_drives(arguments.kitti)
@@ -77,9 +80,15 @@ def run(arguments: argparse.Namespace) -> int:
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
         _write_table(out / "results.csv", rows)
-        text = markdown(_command(arguments), sources(profiles), experiments, rows)
-        (out / "results.md").write_text(text, encoding="utf-8")
-    print(f"{len(rows)} figures: {out / 'results.md'}, {out / 'results.csv'}")
+        made_of = (_command(arguments), sources(profiles), experiments, rows)
+        (out / "results.md").write_text(markdown(*made_of), encoding="utf-8")
+    written = [out / "results.md", out / "results.csv"]
+    try:
+        save(out / "results.html", results_page(*made_of))
+        written.insert(0, out / "results.html")
+    except MisuseError as error:
+        print(f"modt: no page: {error}", file=sys.stderr)
+    print(f"{len(rows)} figures: {', '.join(map(str, written))}")
     return 0
 
 

@@ -13,8 +13,8 @@ from modt_evaluation.experiments.study import Row
 
 _MOST = 6
 """Greatest number of values of a sweep in a table. The CSV file has all."""
-_CURVES = "precision "
-"""Beginning of quantities that only the CSV file has."""
+CURVES = "precision "
+"""Beginning of quantities that no table shows."""
 _NOT_THERE = "-"
 
 
@@ -24,35 +24,42 @@ def markdown(command: str, sources: str, experiments: Sequence[Experiment], rows
 
 
 def _head(command: str, sources: str, rows: Sequence[Row]) -> Iterator[str]:
+    yield from ("# Results", "", f"{ABOUT}:", "", f"    {command}", "", f"{sources}. {reading(rows)}", "")
+
+
+ABOUT = "The paper's tables and figures (its section VI), made by this command"
+
+
+def reading(rows: Sequence[Row]) -> str:
+    """Sentences on how the results are read."""
     development = ", ".join(sorted({row.streams for row in rows if row.development})) or "none"
-    yield from (
-        "# Results",
-        "",
-        "The paper's tables and figures (its section VI), made by this command:",
-        "",
-        f"    {command}",
-        "",
-        f"{sources}. In brackets: the 95 % interval of a bootstrap over objects (beta, false alarms: over tracks), "
-        "not given of a single one; *paper*: what the paper states, over its eight drives where not of the drive "
-        "itself. Simulated drives and KITTI's stand apart; drives that choices of this project were confirmed on "
-        f"come last: {development}. Curves and whole sweeps are in results.csv beside this file.",
-        "",
+    return (
+        "In brackets: the 95 % interval of a bootstrap over objects (beta, false alarms: over tracks), "
+        'not given of a single one; after "paper": what the paper states, over its eight drives where not of '
+        "the drive itself. Simulated drives and KITTI's stand apart; drives that choices of this project were "
+        f"confirmed on come last: {development}. Curves and whole sweeps are in results.csv beside this file."
     )
 
 
 def _body(experiments: Sequence[Experiment], rows: Sequence[Row]) -> Iterator[str]:
     for experiment in experiments:
-        made = (row for row in rows if row.experiment == experiment.name)
-        listed = [row for row in made if not row.quantity.startswith(_CURVES)]
+        listed = tabulated(experiment, rows)
         if not listed:
             continue
         yield from ("", f"## {experiment.title}", "", *([experiment.note, ""] if experiment.note else []))
-        for cells in _table(experiment, listed):
+        head, *lines = table(experiment, listed)
+        for cells in (head, ["---"] * len(head), *lines):
             yield f"| {' | '.join(cells)} |"
 
 
-def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str]]:
-    """Heading, rule and lines. The columns are quantities, or the values of a sweep."""
+def tabulated(experiment: Experiment, rows: Sequence[Row]) -> list[Row]:
+    """The rows of an experiment that its table shows, which are all but its curves."""
+    made = (row for row in rows if row.experiment == experiment.name)
+    return [row for row in made if not row.quantity.startswith(CURVES)]
+
+
+def table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str]]:
+    """Heading and lines. The columns are quantities, or the values of a sweep."""
     several = len({row.profile for row in rows}) > 1
     swept = sorted({row.at for row in rows if row.at is not None})
     lines: dict[tuple[str, ...], dict[str | float | None, str]] = {}
@@ -69,7 +76,7 @@ def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str
     else:
         columns.update((row.quantity, row.quantity) for row in rows)
     head = ("streams", "variant", *(["quantity"] if swept else []), *columns.values())
-    yield from (head, ["---"] * len(head))
+    yield head
     for line, cell in lines.items():
         yield (*line, *(cell.get(column, _NOT_THERE) for column in columns))
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 ALL_DRIVES = "the paper's eight drives"
 DRIVES = ("0001", "0005", "0014", "0019", "0020", "0035", "0059", "0084")
 _TABLE_III = (32.4, 34.9, 27.1, 46.3, 56.6, 36.4, 61.9, 51.7)
@@ -42,3 +45,70 @@ def figure(experiment: str, streams: str, variant: str, at: float | None, quanti
     else:
         found = _OF_ALL.get((experiment, variant, quantity))
     return None if found is None else (found, ALL_DRIVES)
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """What the paper states about a figure, whose curve is an image there and known at few places.
+
+    Attributes:
+        words: what it is.
+        at: value that is swept, None for a level all along.
+        value: value of the quantity, None for a place alone.
+    """
+
+    words: str
+    at: float | None
+    value: float | None
+
+
+_TENFOLD = 10.0
+"""Calls of the network with a real detector over those with an ideal one, "about ten times"."""
+_OPTIMA = {"AP pedestrian": 0.16, "AP cyclist": 0.22}
+"""Best alpha of a class; that of cars hardly matters."""
+_BEST_START = 4.0
+"""Starting frame that discards the first three frames."""
+_TABLE_OF = {"fig9": "table4", "fig10": "table4", "fig11": "table4", "fig14": "table5"}
+"""Table that has the average precision of the curves of a figure."""
+
+
+def marks(experiment: str, quantity: str) -> Iterator[Mark]:
+    """What the paper states about a quantity of a figure."""
+    if quantity == "beta":
+        yield from _betas(experiment)
+    table = _TABLE_OF.get(experiment)
+    name = quantity.removeprefix("precision ")
+    if table is None:
+        return
+    for method in ("det_only", "with_trk"):
+        value = _OF_ALL.get((table, method, quantity))
+        if value is not None:
+            yield Mark(f"paper, {method}", None, value)
+        elif name != quantity:
+            area = _OF_ALL[table, method, f"AP {name}"]
+            yield Mark(f"The area below the paper's curve {method} is {area:.3f}", None, None)
+    if experiment == "fig10" and quantity in _OPTIMA:
+        yield Mark("paper, best", _OPTIMA[quantity], None)
+    if experiment == "fig11":
+        yield Mark("paper, best", _BEST_START, None)
+
+
+def _betas(experiment: str) -> Iterator[Mark]:
+    if experiment in ("fig8", "fig12"):
+        times = 1.0 if experiment == "fig8" else _TENFOLD
+        words = "paper" if experiment == "fig8" else "paper, ten times Fig. 8"
+        for (_, range_m, _), beta in _OF_RANGE.items():
+            yield Mark(words, range_m, times * beta)
+    elif experiment == "fig13":
+        yield Mark("paper, 1 / N_go of Table VI", None, _tracks() / _followed())
+
+
+def _tracks() -> float:
+    """Tracks of objects in Table VI."""
+    return float(sum(_TABLE_VI["objects"]) + sum(_TABLE_VI["discontinuities"]))
+
+
+def _followed() -> float:
+    """Frames in which objects are followed in Table VI."""
+    columns = (_TABLE_VI[name] for name in ("objects", "discontinuities", "N_go of objects"))
+    return float(sum((objects + breaks) * n_go for objects, breaks, n_go in zip(*columns, strict=True)))
