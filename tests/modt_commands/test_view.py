@@ -154,6 +154,34 @@ def test_the_page_answers_first_what_is_around_and_what_moves(run, records, chro
         tab.until("state.details && element('states').checkVisibility()")
 
 
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_in_perspective_boxes_stand_where_their_feet_are(run, chromium, width, height):
+    size = {"width": width, "height": height}
+    above = chromium.opened(run / "view.html", "slide:9", **size)
+    with chromium.tab((run / "view.html").as_uri(), **size) as tab:
+        tab.value(f"go(9).then(() => {SETTLED})")
+        tab.value("element('deep').click()")
+        tab.until("state.deep")
+        tab.value(SETTLED)
+        assert not tab.value(WIDE)
+        assert tab.value("new Set(new Uint32Array(image.data.buffer)).size") > 4, "points have their heights"
+        walls = tab.value("drawn.filter(([name]) => name === 'fill').length") - above["boxes"]
+        assert walls == 5 * tab.value("rowsAt[9].filter((row) => row.class > 0).length")
+        near = (
+            "rowsAt[9].filter((row) => row.class && row.seen && row.x > 5).sort((a, b) => rangeOf(a) - rangeOf(b))[0]"
+        )
+        feet, head = tab.value(f"(() => {{ const row = {near}; return [outline(row), outline(row, row.h)] }})()")
+        for foot, top in zip(feet, head, strict=True):
+            assert top[1] < foot[1], "what is higher is higher on the screen"
+            assert top[2] < foot[2], "and nearer to an eye above it"
+        at = [sum(corner[axis] for corner in [*feet, *head]) / 8 for axis in range(2)]
+        assert tab.value(f"trackAt({at[0]}, {at[1]}) === {near}.id")
+        tab.value("drag(100, 40), zoom(2), draw()")
+        tab.press("0")
+        tab.press("v")
+        tab.until("!state.deep")
+
+
 def test_keys_step_and_hide(run, records, chromium):
     keys = ["key:ArrowRight", "key:ArrowRight", "key:p"]
     shown = chromium.opened(run / "view.html", *keys, dark=True)

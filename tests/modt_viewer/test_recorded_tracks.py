@@ -8,7 +8,7 @@ from modt.geometry import rotation_zyx, se3
 from modt.profile import load
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.viewer import theme
-from modt.viewer.packed import PLAIN, SIDE
+from modt.viewer.packed import LEVELS, PLAIN, SIDE
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_evaluation.recorded_result import recorded_result
@@ -87,7 +87,7 @@ def test_a_room_is_shown_larger_than_a_street(table, reach):
     assert reach_m(table) == reach
 
 
-def test_a_cell_shows_its_highest_point_and_ground_as_such():
+def test_a_cell_has_the_heights_of_its_points_the_highest_on_top_and_ground_as_such():
     config = load("vlp-16")
     points = next(iter(SyntheticStream("street", "vlp-16", 0.1, seed=2))).points
     grid = Grid(config)
@@ -96,9 +96,11 @@ def test_a_cell_shows_its_highest_point_and_ground_as_such():
     pole[:, 2] = -config.sensor.height_m + np.array([0.5, 2.0, 1.0, 1.5, 0.7])
     without, cells = (grid.cells(given) for given in (points, np.concatenate([points, pole])))
     column, row = (int(np.floor(v * 100 / grid.step_cm)) + SIDE // 2 for v in (9.01, -4.01))
-    (level,) = cells.level[cells.cell == SIDE * row + column]
+    levels = cells.level[cells.cell == SIDE * row + column]
+    assert len(levels) == len(pole)
+    level = levels[-1]
     assert 18 <= level <= 22
-    assert (np.diff(cells.cell) > 0).all()
+    assert (np.diff((cells.cell * (PLAIN + 1) + cells.group) * LEVELS + cells.level) > 0).all()
     ground = without.level == 0
     assert 0.2 < ground.mean() < 0.9
     x = ((without.cell % SIDE) + 0.5 - SIDE / 2) * grid.step_cm / 100

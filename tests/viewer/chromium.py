@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.viewer.browser import Browser, Tab, browser, find
+from tools.docs.browser import Browser, Tab, browser, find
 
 RECORD = """
 const drawn = [];

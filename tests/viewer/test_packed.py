@@ -30,6 +30,9 @@ def test_every_kind_has_its_look_and_ground_is_below_everything():
     names = [*(entry["name"] for entry in theme.kinds()), "plain"]
     assert len(names) - 1 == PLAIN
     looks = np.where(cells.level == 0, "ground", np.array(names)[cells.group])
+    on_top = np.append(np.diff(cells.cell) > 0, True)
+    assert (looks[~on_top] == "ground").all()
+    looks = looks[on_top]
     assert dict(zip(kinds, looks.tolist(), strict=True)) == {
         PointKind.MEMBER: "plain",
         PointKind.GROUND: "ground",
@@ -48,7 +51,8 @@ def test_a_person_under_a_ceiling_is_shown():
     kind = np.array([PointKind.OVERHEAD, PointKind.MEMBER, PointKind.STRUCTURE], np.int8)
     nowhere = np.zeros(3, np.float32)
     cells = occupied(nowhere, nowhere, np.array([30, 17, 20]), group_of(kind), 100)
-    assert (cells.level.tolist(), cells.group.tolist()) == ([17], [PLAIN])
+    assert (cells.level[-1], cells.group[-1]) == (17, PLAIN), "the last one is drawn over the others"
+    assert cells.level.tolist() == [30, 20, 17], "and in perspective each is shown at its height"
 
 
 def test_packed_cells_come_back_with_their_groups():

@@ -99,8 +99,9 @@ def _points(axes: Axes, cells: Cells, step_cm: int, kinds: list[theme.Entry]) ->
     size = max(_LEAST_PT, 72 * SIZE_IN[0] / axes.viewLim.width * step_cm / 100)
     style = {"markersize": size, "markeredgewidth": 0, "rasterized": True, "zorder": 0.5}
     is_ground = cells.level == 0
-    layers = [(LINE, is_ground), (SOFT, ~is_ground & (cells.group >= len(kinds)))]
+    layers = [(LINE, is_ground)]
     layers += [(entry["colour"], ~is_ground & (cells.group == group)) for group, entry in enumerate(kinds)]
+    layers += [(SOFT, ~is_ground & (cells.group >= len(kinds)))]
     for colour, shown in layers:
         axes.plot(x[shown], y[shown], "s", color=colour, **style)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from modt.energy.ledger import PIPELINE
 from modt.viewer import theme
-from modt.viewer.packed import SIDE
+from modt.viewer.packed import LEVEL_M, SIDE
 from modt.viewer.theme import REACH_M, THEME
 from modt.viewer.track_rows import COLUMNS, SCALE
 
@@ -29,7 +29,7 @@ def content(states: list[theme.Entry], budget: str | None, step_cm: int | None) 
         "pipeline": PIPELINE,
         "kinds": theme.kinds(),
         "budget": budget,
-        "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},
+        "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm, "level_m": LEVEL_M},
         "reach_m": REACH_M,
         "frames": [],
     }

@@ -58,7 +58,7 @@ _GROUPS = {
     PointKind.AIRBORNE: 1,
     PointKind.STRUCTURE: 2,
 }
-"""Kinds that are drawn alike, as in `theme.kinds`; others are PLAIN. In a cell the greatest group is shown."""
+"""Kinds that are drawn alike, as in `theme.kinds`; others are PLAIN. A greater group is drawn over a smaller one."""
 
 
 def group_of(kind: Int8) -> Int:
@@ -70,7 +70,10 @@ def group_of(kind: Int8) -> Int:
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """The occupied cells of a sweep, ordered by their numbers."""
+    """The occupied cells of a sweep, each once for every height and group of its points.
+
+    They are ordered by their numbers, then by group and height: what is drawn last lies on top.
+    """
 
     cell: Int  # (n,) SIDE * row + column, ascending; column and row count from -x and -y, the sensor at SIDE / 2
     level: Int  # (n,) height above ground [LEVEL_M], 0 for ground
@@ -88,10 +91,8 @@ class Cells:
 
 
 def occupied(x: Float32, y: Float32, level: Int, group: Int, step_cm: int) -> Cells:
-    """Cells of points x, y [m] within the grid, each with the highest level of its points of the greatest group."""
+    """Cells of points x, y [m] within the grid."""
     column, row = (np.floor(v * (100 / step_cm)).astype(np.int64) + SIDE // 2 for v in (x, y))
-    # Sorted by cell, then by group and height: the last of each cell is shown.
-    cell, look = np.divmod(np.sort((SIDE * row + column) * LOOKS + LEVELS * group + level), LOOKS)
-    shown = np.append(np.diff(cell) > 0, True)[: len(cell)]
-    group, level = np.divmod(look[shown], LEVELS)
-    return Cells(cell[shown], level, group)
+    cell, look = np.divmod(np.unique((SIDE * row + column) * LOOKS + LEVELS * group + level), LOOKS)
+    group, level = np.divmod(look, LEVELS)
+    return Cells(cell, level, group)

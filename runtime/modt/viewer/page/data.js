@@ -11,7 +11,8 @@ const state = {
   ready: false, // whether a frame has been read
   at: 0, playing: false, hovered: null, kept: null,
   points: true, kinds: false, trails: true, background: false, labels: true, details: false,
-  up: true, metre: 10, x: 0, y: 0, // pixels a metre, and where the sensor is on the canvas
+  up: true, metre: 10, x: 0, y: 0, // from above: pixels a metre, and where the sensor is on the canvas
+  deep: false, turn: 0, tilt: 0, away: 0, // in perspective: direction of the view [rad], its angle downward, distance [m]
 };
 
 async function inflated(packed) {

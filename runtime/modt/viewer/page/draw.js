@@ -17,20 +17,34 @@ function theme() {
     return (255 << 24) | (b << 16) | (g << 8) | r;
   };
   const byHeight = (look) => mixed(look & 63 ? 0.35 + 0.5 * Math.min((look & 63) / 25, 1) : 0.15);
+  const quiet = (look) => mixed(look & 63 ? 0.3 + 0.2 * Math.min((look & 63) / 25, 1) : 0.12); // boxes stand out in it
   const byKind = (look) => (look & 63 && run.kinds[look >> 6] ? mixed(1, rgb(run.kinds[look >> 6].colour)) : byHeight(look));
   const shades = (shade) => Int32Array.from({ length: 256 }, (_, look) => shade(look));
-  palettes = { false: shades(byHeight), true: shades(byKind) };
+  palettes = { false: shades(byHeight), true: shades(byKind), quiet: shades(quiet) };
   colours.paperPixel = mixed(0);
 }
 
-function screen(x, y) {
+// Place on the canvas of a point [m, sensor frame, height above ground]. Behind the eye it is NaN.
+function screen(x, y, z = 0) {
   const { metre, up } = state;
+  if (state.deep) return projected(x, y, z, eye());
   return up ? [state.x - metre * y, state.y - metre * x] : [state.x + metre * x, state.y - metre * y];
 }
 
-function place(px, py) {
-  const u = (px - state.x) / state.metre, v = (state.y - py) / state.metre;
-  return state.up ? [v, -u] : [u, v];
+const NEAREST_M = 0.5; // depth from which points are drawn
+const LOOKS_AT_M = 6; // point ahead of the sensor about which the view turns
+
+// The camera of the perspective: sines and cosines of its angles, distance, and size of a unit of tangent [pixel].
+const eye = () => ({
+  c: Math.cos(state.turn), s: Math.sin(state.turn), down: Math.sin(state.tilt), along: Math.cos(state.tilt),
+  away: state.away, focal: Math.max(canvas.height, 0.6 * canvas.width), x: canvas.width / 2, y: canvas.height / 2,
+});
+
+function projected(x, y, z, { c, s, down, along, away, focal, x: px, y: py }) {
+  const ahead = c * (x - LOOKS_AT_M) + s * y, left = c * y - s * (x - LOOKS_AT_M);
+  const depth = away + ahead * along - z * down;
+  if (depth < NEAREST_M) return [NaN, NaN, depth];
+  return [px - focal * left / depth, py - focal * (ahead * down + z * along) / depth, depth];
 }
 
 function drawPoints() {
@@ -38,7 +52,8 @@ function drawPoints() {
   if (!pixels || pixels.width !== width || pixels.height !== height) pixels = context.createImageData(width, height);
   const out = new Int32Array(pixels.data.buffer);
   out.fill(colours.paperPixel);
-  if (sweep && state.points) {
+  if (sweep && state.points && state.deep) drawDeepPoints(out);
+  else if (sweep && state.points) {
     const { x, y, look } = sweep, { metre, up } = state, palette = palettes[state.kinds];
     const size = Math.max(1, Math.min(4, Math.round((metre * run.points.step_cm) / 100)));
     const [xx, xy] = up ? [0, -metre] : [metre, 0], [yx, yy] = up ? [-metre, 0] : [0, -metre];
@@ -54,15 +69,47 @@ function drawPoints() {
   context.putImageData(pixels, 0, 0);
 }
 
+function drawDeepPoints(out) {
+  const { width, height } = canvas, { x, y, look } = sweep, palette = palettes[state.kinds || "quiet"], camera = eye();
+  const { level_m, step_cm } = run.points;
+  for (const ground of [true, false])
+    for (let k = 0; k < x.length; k++) {
+      const level = look[k] & 63;
+      if ((level === 0) !== ground) continue;
+      const [u, v, depth] = projected(x[k], y[k], level * level_m, camera);
+      const size = Math.max(1, Math.min(4, Math.round(camera.focal * step_cm / (100 * depth))));
+      const px = u | 0, py = v | 0;
+      if (depth < NEAREST_M || px < 0 || py < 0 || px + size > width || py + size > height) continue;
+      for (let dy = 0; dy < size; dy++) out.fill(palette[look[k]], (py + dy) * width + px, (py + dy) * width + px + size);
+    }
+}
+
+// Lines through points; those behind the eye are left out.
 function path(points, closed) {
+  let drawn = false;
   context.beginPath();
-  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  for (const [x, y] of points) {
+    if (drawn) context.lineTo(x, y);
+    else context.moveTo(x, y);
+    drawn = !isNaN(x);
+  }
   if (closed) context.closePath();
 }
 
-function outline({ x, y, l, w, yaw }) {
+// The corners of a box at a height above ground.
+function outline({ x, y, l, w, yaw }, z = 0) {
   const c = Math.cos(yaw), s = Math.sin(yaw);
-  return [[l, w], [-l, w], [-l, -w], [l, -w]].map(([u, v]) => screen(x + (c * u - s * v) / 2, y + (s * u + c * v) / 2));
+  const sides = [[l, w], [-l, w], [-l, -w], [l, -w]];
+  return sides.map(([u, v]) => screen(x + (c * u - s * v) / 2, y + (s * u + c * v) / 2, z));
+}
+
+// All corners of a box that are drawn: in perspective also those of its top.
+const shape = (row) => (state.deep && row.h ? [...outline(row), ...outline(row, row.h)] : outline(row));
+
+// Sides and top of a box in perspective; its bottom is drawn as from above.
+function walls(row) {
+  const low = outline(row), high = outline(row, row.h);
+  return [high, ...low.map((_, k) => [low[k], low[(k + 1) % 4], high[(k + 1) % 4], high[k]])];
 }
 
 function stroke(colour, width, dash = []) {
@@ -111,7 +158,7 @@ function places(width, [left, top, right, bottom]) {
 // It is left out where there is no room, unless it is needed.
 function write(text, corners, colour, needed) {
   const own = bounds(corners), x = (own[0] + own[2]) / 2;
-  if (x < 0 || x > canvas.width || own[3] < 0 || own[1] > canvas.height) return;
+  if (!(x >= 0 && x <= canvas.width && own[3] >= 0 && own[1] <= canvas.height)) return;
   const all = places(context.measureText(text).width, own);
   const free = all.filter((place) => !taken.some((other) => overlap(place, other)));
   const place = free.find((place) => !boxes.some((box) => overlap(place, box))) ?? free[0] ?? (needed && all[0]);
@@ -160,6 +207,15 @@ function drawTrack(row) {
   context.globalAlpha = object || chosen ? 1 : row.seen ? 0.5 : 0.3;
   const shown = chosen ? colours.ink : mark?.colour ?? edge;
   stroke(shown, chosen || mark ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
+  if (state.deep && object) {
+    for (const wall of walls(row)) {
+      path(wall, true);
+      context.globalAlpha = 0.1;
+      context.fill();
+      context.globalAlpha = 0.8;
+      stroke(shown, chosen || mark ? 2 : 1, row.seen ? [] : [4, 3]);
+    }
+  }
   if (mark) {
     for (const corner of [0, 1]) {
       path([box[corner], box[corner + 2]], false);
@@ -178,41 +234,48 @@ function drawTrack(row) {
   context.globalAlpha = 1;
 }
 
+const CIRCLE = Array.from({ length: 121 }, (_, k) => [Math.cos(k * Math.PI / 60), Math.sin(k * Math.PI / 60)]);
+
 function drawRings() {
   context.font = `${11 * dot}px system-ui,sans-serif`;
   context.fillStyle = colours.soft;
-  const step = [1, 2, 5, 10, 20].find((metres) => metres * state.metre > 110 * dot) || 50;
+  const step = state.deep ? 10 : [1, 2, 5, 10, 20].find((metres) => metres * state.metre > 110 * dot) || 50;
   for (let range = step; range <= 10 * step; range += step) {
-    context.beginPath();
-    context.arc(state.x, state.y, range * state.metre, 0, 7);
+    path(CIRCLE.map(([c, s]) => screen(range * c, range * s)), false);
     stroke(colours.line, 1);
-    const text = `${range} m`, left = state.x + 4 * dot, foot = state.y - range * state.metre;
+    const text = `${range} m`, [x, foot] = state.deep || state.up ? screen(range, 0) : screen(0, range), left = x + 4 * dot;
+    const room = [left, foot - 14 * dot, left + context.measureText(text).width, foot];
+    if (taken.some((other) => overlap(room, other))) continue;
     context.fillText(text, left, foot - 3 * dot);
-    taken.push([left, foot - 14 * dot, left + context.measureText(text).width, foot]);
+    taken.push(room);
   }
-  const size = (10 * dot) / state.metre;
+  const size = state.deep ? 0.6 : (10 * dot) / state.metre;
   path([[1, 0], [-0.7, 0.6], [-0.7, -0.6]].map(([x, y]) => screen(size * x, size * y)), true);
   context.fillStyle = colours.ink;
   context.fill();
 }
 
+const depthOf = (row) => projected(row.x, row.y, 0, eye())[2];
+
 function draw() {
   dot = devicePixelRatio || 1;
-  taken = [[state.x - 10 * dot, state.y - 8 * dot, state.x + 10 * dot, state.y + 8 * dot]]; // the sensor
+  const [x, y] = screen(0, 0);
+  taken = [[x - 10 * dot, y - 8 * dot, x + 10 * dot, y + 8 * dot]]; // the sensor
   drawPoints();
   drawRings();
   if (!state.ready) return;
   const frame = frames[state.at], chosen = state.kept ?? state.hovered;
   const shown = (rowsAt[state.at] || []).filter((row) => isShown(row) || row.id === chosen);
-  boxes = shown.filter((row) => row.class).map((row) => bounds(outline(row)));
+  boxes = shown.filter((row) => row.class).map((row) => bounds(shape(row)));
   shown.sort((a, b) => a.class - b.class || a.seen - b.seen);
+  if (state.deep) shown.sort((a, b) => depthOf(b) - depthOf(a));
   shown.forEach(drawTrack);
   context.font = `${12 * dot}px system-ui,sans-serif`;
   drawMore(frame);
   for (const row of shown.reverse())
     if ((state.labels && row.class) || row.id === chosen) {
       const { text, colour } = markOf(row) || { text: "", colour: colours.ink };
-      write(text + label(row), outline(row), colour, row.id === chosen);
+      write(text + label(row), shape(row), colour, row.id === chosen);
     }
   canvas.dataset.frame = frame.frame;
 }

@@ -26,25 +26,33 @@ function reset() {
   state.metre = Math.min(canvas.width, canvas.height) / (1.55 * run.reach_m);
   state.x = canvas.width * (state.up ? 0.5 : 0.35);
   state.y = canvas.height * (state.up ? 0.65 : 0.5);
+  Object.assign(state, { turn: 0, tilt: 0.45, away: 22 });
 }
 
 function zoom(factor, px = canvas.width / 2, py = canvas.height / 2) {
+  if (state.deep) return void (state.away = Math.max(4, Math.min(150, state.away / factor)));
   const metre = Math.max(1, Math.min(400, state.metre * factor));
   state.x = px + (state.x - px) * metre / state.metre;
   state.y = py + (state.y - py) * metre / state.metre;
   state.metre = metre;
 }
 
+// Turn the view in perspective, or move it from above, by a way on the canvas.
+function drag(dx, dy) {
+  if (!state.deep) return void ([state.x, state.y] = [state.x + dx, state.y + dy]);
+  state.turn += 3 * dx / canvas.width;
+  state.tilt = Math.max(0.08, Math.min(1.5, state.tilt + 2 * dy / canvas.height));
+}
+
 // The nearest box at a place of the canvas; where several lie there, an object before background, a seen one before a lost one.
 function trackAt(px, py) {
-  const [x, y] = place(px, py), near = 12 / state.metre;
+  const near = 12 * dot;
   let best = null, least = Infinity;
   const rows = [...(rowsAt[state.at] || [])].sort((a, b) => Boolean(b.class) - Boolean(a.class) || b.seen - a.seen);
   for (const row of rows) {
     if (!isShown(row)) continue;
-    const dx = x - row.x, dy = y - row.y, c = Math.cos(row.yaw), s = Math.sin(row.yaw);
-    const u = Math.abs(c * dx + s * dy), v = Math.abs(c * dy - s * dx);
-    const off = Math.hypot(Math.max(u - row.l / 2, 0), Math.max(v - row.w / 2, 0));
+    const [left, top, right, bottom] = bounds(shape(row));
+    const off = Math.hypot(Math.max(left - px, px - right, 0), Math.max(top - py, py - bottom, 0));
     if (off < near && off < least) [best, least] = [row.id, off];
   }
   return best;
@@ -66,7 +74,7 @@ canvas.onpointermove = (event) => {
     const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
     const away = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]);
     if (other) zoom(away(now) / Math.max(away(before), 1), ...other);
-    else [state.x, state.y] = [state.x + now[0] - before[0], state.y + now[1] - before[1]];
+    else drag(now[0] - before[0], now[1] - before[1]);
     moved ||= Math.hypot(now[0] - before[0], now[1] - before[1]) > 2;
     pointers.set(event.pointerId, now);
   }
@@ -86,6 +94,10 @@ canvas.onwheel = (event) => {
 };
 
 const toggle = (name) => () => (state[name] = !state[name]);
+const deepen = () => {
+  state.deep = !state.deep;
+  element("deep").textContent = state.deep ? "2D" : "3D";
+};
 const KEYS = {
   " ": () => play(),
   ArrowLeft: (event) => go(state.at - (event.shiftKey ? 10 : 1)),
@@ -95,7 +107,7 @@ const KEYS = {
   "+": () => zoom(1.25),
   "-": () => zoom(0.8),
   0: reset,
-  r: toggle("up"), p: toggle("points"), k: toggle("kinds"), t: toggle("trails"), b: toggle("background"), l: toggle("labels"),
+  v: deepen, r: toggle("up"), p: toggle("points"), k: toggle("kinds"), t: toggle("trails"), b: toggle("background"), l: toggle("labels"),
   d: () => (element("details").open = !element("details").open),
   Escape: () => (state.kept = state.hovered = null),
 };
@@ -109,6 +121,7 @@ document.onkeydown = (event) => {
 
 slider.oninput = () => go(Number(slider.value));
 element("play").onclick = (event) => { event.currentTarget.blur(); play(); }; // or Space would press it, too
+element("deep").onclick = (event) => { event.currentTarget.blur(); deepen(); redraw(); };
 element("details").ontoggle = (event) => { state.details = event.target.open; redraw(); };
 new ResizeObserver(() => { fit(); redraw(); }).observe(canvas);
 matchMedia("(prefers-color-scheme: dark)").onchange = () => { theme(); redraw(); };
