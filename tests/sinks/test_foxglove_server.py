@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import re
 import select
 import socket
 import struct
@@ -12,7 +13,7 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sink
-from modt.sinks.foxglove_sinks import FoxgloveServer
+from modt.sinks.foxglove_sinks import REFUSED, FoxgloveServer
 from modt.sinks.topics import TopicOptions, topics
 from tests.results import with_kinds
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
@@ -26,13 +27,14 @@ FRAME = with_kinds(moving(3))
 class Client:
     """A WebSocket client that knows as much of the protocol as is needed."""
 
-    def __init__(self, port):
+    def __init__(self, port, protocol="foxglove.sdk.v1"):
         self.socket = socket.create_connection(("127.0.0.1", port), 10.0)
         self.stream = self.socket.makefile("rb")
         key = base64.b64encode(os.urandom(16)).decode()
         lines = ["GET / HTTP/1.1", "Host: here", "Upgrade: websocket", "Connection: Upgrade"]
         lines += [f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13"]
-        self.socket.sendall("\r\n".join([*lines, "Sec-WebSocket-Protocol: foxglove.sdk.v1", "", ""]).encode())
+        self.socket.sendall("\r\n".join([*lines, f"Sec-WebSocket-Protocol: {protocol}", "", ""]).encode())
+        self.accepted = b"101" in self.stream.readline()
         while self.stream.readline() != b"\r\n":
             pass
 
@@ -110,6 +112,19 @@ def test_a_client_sees_objects_points_and_energy(server):
     assert decoded["/modt/energy/watts"].data == 0.5
     assert seen["/modt/energy/watts"][4:] == struct.pack("<d", 0.5)
     assert seen["/modt/cpu_ms/tracking"][4:] == struct.pack("<d", 2.0)
+
+
+def test_the_log_says_where_it_is_and_which_protocol_is_refused(caplog):
+    background = open_sink("foxglove://:0")
+    (line,) = (record.message for record in caplog.records if "Foxglove connects to" in record.message)
+    port = int(re.search(r"ws://127.0.0.1:(\d+) ", line)[1])
+    assert REFUSED in line
+    for protocol, accepted in (("foxglove.sdk.v1", True), (REFUSED, False)):
+        client = Client(port, protocol)
+        assert client.accepted is accepted
+        client.stream.close()
+        client.socket.close()
+    background.close()
 
 
 def listening():

@@ -26,11 +26,14 @@ from modt.sinks.output import writing
 from modt.sinks.topics import PREFIX, WORLD_FRAME_ID, TopicOptions, topics
 from modt.types import FrameResult
 
+log = logging.getLogger(__name__)
 logging.getLogger("foxglove").setLevel(logging.ERROR)  # its warnings of each unwritten message are counted instead
 
 BACKLOG = 16
 """Messages that may wait for a client. A slow client misses the oldest."""
 PORT = 8765
+REFUSED = "foxglove.websocket.v1"
+"""Protocol of viewers that the SDK's server refuses."""
 NUMBER = "std_msgs/Float64"
 TEXT = "std_msgs/String"
 FIGURES = {
@@ -115,10 +118,14 @@ def open_foxglove(address: Address) -> FoxgloveServer:
     """
     try:
         port = PORT if address.port is None else address.port
-        return FoxgloveServer(address.host or "127.0.0.1", port, _options(address))
+        host = address.host or "127.0.0.1"
+        opened = FoxgloveServer(host, port, _options(address))
     except RuntimeError as error:
         remedy = "give a host of this machine and a free port"
         raise MisuseError(address.text, f"cannot be bound ({error})", remedy) from None
+    where = f"[{host}]" if ":" in host else host
+    log.warning("Foxglove connects to ws://%s:%d (foxglove.sdk.v1; not the older %s)", where, opened.port, REFUSED)
+    return opened
 
 
 FLUSH_S = 1.0
