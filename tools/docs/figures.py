@@ -1,6 +1,7 @@
 """Write the figures of README.md and docs/paper.md, all at one commit.
 
     python -m tools.docs.figures KITTI_ROOT [--further FILE] [--pandaset FOLDER] [--only readme|weather|paper]
+        [--jobs N]
 
 KITTI_ROOT holds drive 0005 (2011_09_26) with its tracklets, FILE is the table of objects that these leave out
 (docs/evaluation.md), FOLDER a labelled PandaSet sequence. README.md takes four minutes of CPU time, half of them for
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -61,23 +63,23 @@ SIMULATED_S = 2.0
 """Duration of each of them [s]."""
 
 
-def readme(kitti: Path, further: Path | None, pandaset: Path | None) -> str:
+def readme(engine: Engine, kitti: Path, further: Path | None, pandaset: Path | None) -> str:
     """Section of README.md: a row for each sensor, and two sentences on the KITTI drive."""
     lines = _head()
     for sensor, name in SENSORS.items():
-        lines.append(_row(f"{name}, simulated", _simulated(sensor)))
+        lines.append(_row(f"{name}, simulated", _simulated(engine, sensor)))
     if pandaset is not None:
         drive = drives.labelled(pandaset, PANDASET_PROFILE)
         lines.append(_row("Pandar64, PandaSet (development)", evaluation([drives.judged(drive, MODE)])))
     return "\n".join([*lines, "", *on_kitti(drives.labelled(kitti, further=further))])
 
 
-def weather() -> str:
+def weather(engine: Engine) -> str:
     """Section of README.md on weather and gait: the scenes and seeds of the first table, with one sensor."""
     lines = _head()
     for about, (option, condition) in WEATHERS.items():
         name = f"{SENSORS[WEATHER_SENSOR]}, {about}: `--{option} {condition}`"
-        lines.append(_row(name, _simulated(WEATHER_SENSOR, **{option: condition})))
+        lines.append(_row(name, _simulated(engine, WEATHER_SENSOR, **{option: condition})))
     return "\n".join(lines)
 
 
@@ -86,10 +88,14 @@ def _head() -> list[str]:
     return [f"| at commit `{commit()}` | {' | '.join(kinds)} |", "|---|" + "---|" * len(kinds)]
 
 
-def _simulated(sensor: str, **conditions: str) -> Evaluation:
+def _simulated(engine: Engine, sensor: str, **conditions: str) -> Evaluation:
     """All simulated drives of a sensor in the same conditions, those of SyntheticStream."""
-    made = [drives.simulated(scene, sensor, SECONDS, seed, **conditions) for seed in SEEDS for scene in SCENES]
-    return evaluation([drives.judged(drive, MODE, k) for k, drive in enumerate(made)])
+    runs = [
+        drives.SimulatedRun(scene, sensor, SECONDS, seed, (MODE,), number, conditions)
+        for number, (seed, scene) in enumerate(product(SEEDS, SCENES))
+    ]
+    judged = {run.number: rows for run, (rows,) in engine.results(drives.judged_simulated, runs)}
+    return evaluation([judged[run.number] for run in runs])
 
 
 def on_kitti(drive: drives.Drive) -> Iterator[str]:
@@ -132,13 +138,13 @@ def _shares(values: Sequence[float | None]) -> str:
     return " / ".join("-" if share is None else f"{100 * share:.0f}" for share in values)
 
 
-def paper_page(drive: KittiDrive, further: Path | None) -> str:
+def paper_page(engine: Engine, drive: KittiDrive, further: Path | None) -> str:
     """Section of docs/paper.md."""
     shown: list[Drive] = [drive, *simulated_drives(SIMULATED, SIMULATED_S)]
     if further is not None:
         shown.insert(1, completed([drive], further))
     about = f"{sources(PROFILES)}; made by `python -m tools.docs.figures`."
-    return section(Study(chosen(NAMES), shown, PROFILES).rows(Engine(), lambda name: None), about)
+    return section(Study(chosen(NAMES), shown, PROFILES).rows(engine, lambda name: None), about)
 
 
 def main() -> None:
@@ -147,17 +153,19 @@ def main() -> None:
     options.add_argument("--further", type=Path, metavar="FILE")
     options.add_argument("--pandaset", type=Path, metavar="FOLDER")
     options.add_argument("--only", choices=("readme", "weather", "paper"))
+    options.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (default: 1)")
     args = options.parse_args()
     host.pin_to_core(None)
     drive = next((d for d in kitti_drives(args.kitti) if d.number == DRIVE and d.scans), None)
     if drive is None:
         options.error(f"{args.kitti}: no drive {DRIVE} with labels and sweeps")
-    if args.only in (None, "readme"):
-        _write(ROOT / "README.md", MARK, readme(drive.path, args.further, args.pandaset))
-    if args.only in (None, "readme", "weather"):
-        _write(ROOT / "README.md", WEATHER_MARK, weather())
-    if args.only in (None, "paper"):
-        _write(ROOT / "docs" / "paper.md", MARK, paper_page(drive, args.further))
+    with Engine(args.jobs) as engine:
+        if args.only in (None, "readme"):
+            _write(ROOT / "README.md", MARK, readme(engine, drive.path, args.further, args.pandaset))
+        if args.only in (None, "readme", "weather"):
+            _write(ROOT / "README.md", WEATHER_MARK, weather(engine))
+        if args.only in (None, "paper"):
+            _write(ROOT / "docs" / "paper.md", MARK, paper_page(engine, drive, args.further))
 
 
 def _write(page: Path, mark: str, made: str) -> None:

@@ -1,6 +1,6 @@
 """Write the section of docs/paper.md on what tracking adds, on the same simulated drives for every mode.
 
-    python -m tools.docs.paired_modes
+    python -m tools.docs.paired_modes [--jobs N]
 
 It takes ten minutes of CPU time.
 """
@@ -8,15 +8,18 @@ It takes ten minutes of CPU time.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 
 import numpy as np
 
 from modt.classes import CLASS_NAMES
 from modt.types import Float64
 from modt_evaluation.class_score import class_scores
+from modt_evaluation.engine import Engine
 from modt_evaluation.evaluation import DriveRows
 from modt_evaluation.experiments.markdown import commit
-from tools.docs.sections import DOCS, replace_section, write
+from tools.docs.sections import DOCS, replace_section
+from tools.options import parser
 from tools.study import drives
 
 PAGE = DOCS / "paper.md"
@@ -39,9 +42,9 @@ Rows = Mapping[str, Sequence[DriveRows]]
 """Judged drives of each mode, in one order."""
 
 
-def table() -> Iterator[str]:
+def table(engine: Engine) -> Iterator[str]:
     """The mean over sensors with its 95 % interval, and each sensor, as Markdown."""
-    judged = {sensor: _judged(sensor) for sensor in SENSORS}
+    judged = {sensor: _judged(engine, sensor) for sensor in SENSORS}
     yield f"Commit {commit()}; made by `python -m {MARK}`."
     yield ""
     number = len(SEEDS) * len(SCENES)
@@ -83,20 +86,24 @@ def _precisions(rows: Sequence[DriveRows]) -> Float64:
     return np.array([100.0 * (scores[name].average_precision or 0.0) for name in CLASS_NAMES[1:]])
 
 
-def _judged(sensor: str) -> Rows:
+def _judged(engine: Engine, sensor: str) -> Rows:
     """Judged drives of a sensor in every mode."""
-    found: dict[str, list[DriveRows]] = {mode: [] for mode in (BASELINE, *MODES)}
-    for number, (seed, scene) in enumerate((seed, scene) for seed in SEEDS for scene in SCENES):
-        drive = drives.simulated(scene, sensor, SECONDS, seed)
-        for mode, rows in found.items():
-            rows.append(drives.judged(drive, mode, number))
-    return found
+    modes = (BASELINE, *MODES)
+    runs = [
+        drives.SimulatedRun(scene, sensor, SECONDS, seed, modes, number)
+        for number, (seed, scene) in enumerate(product(SEEDS, SCENES))
+    ]
+    judged = {run.number: rows for run, rows in engine.results(drives.judged_simulated, runs)}
+    return {mode: [judged[run.number][k] for run in runs] for k, mode in enumerate(modes)}
 
 
-def document() -> str:
-    """The page with its section made anew."""
-    return replace_section(PAGE.read_text(encoding="utf-8"), MARK, "\n".join(table()))
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (default: 1)")
+    with Engine(options.parse_args().jobs) as engine:
+        made = "\n".join(table(engine))
+    PAGE.write_text(replace_section(PAGE.read_text(encoding="utf-8"), MARK, made), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    write(__doc__, PAGE, document)
+    main()

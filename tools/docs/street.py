@@ -22,7 +22,7 @@ from tools.docs.sections import DOCS
 from tools.options import parser
 
 FILM = DOCS / "street.webp"
-SIZE = (840, 470)
+SIZE = (840, 400)
 """Width and height [pixel]."""
 FRAMES = range(6, 36)
 """Frames of the film, after tracks have begun."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -60,6 +60,32 @@ def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None)
     fov = FieldOfView() if stream.info.camera is None else FieldOfView.of_camera(stream.info.camera)
     frames = [(frame, truth.frames[frame.index]) for frame in stream if frame.index in truth.frames]
     return Drive(path.name, load(profile), frames, truth.rules, fov)
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedRun:
+    """A simulated drive and the modes to run on it, as a task of an engine.
+
+    Attributes:
+        scene, sensor, seconds, seed: as of SyntheticStream.
+        modes: modes of the method.
+        number: number of the drive among those that are pooled.
+        conditions: further arguments of SyntheticStream.
+    """
+
+    scene: str
+    sensor: str
+    seconds: float
+    seed: int
+    modes: tuple[str, ...]
+    number: int = 0
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+
+
+def judged_simulated(run: SimulatedRun) -> list[DriveRows]:
+    """The drive judged in each of the modes."""
+    drive = simulated(run.scene, run.sensor, run.seconds, run.seed, **run.conditions)
+    return [judged(drive, mode, run.number) for mode in run.modes]
 
 
 Step = Callable[[Frame], FrameResult]

@@ -22,9 +22,8 @@ import textwrap
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, is_dataclass, replace
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise, product
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +36,7 @@ from modt.classes import CLASS_NAMES
 from modt.cli.options import frames as number_range
 from modt.types import Float64
 from modt_evaluation.class_score import class_scores
+from modt_evaluation.engine import Engine
 from modt_evaluation.evaluation import collect
 from modt_evaluation.experiments.markdown import commit
 from modt_evaluation.frame import JudgedFrame
@@ -175,11 +175,22 @@ def summary(difference: Float64) -> str:
     return f"{mean:+.1f}" if difference.any() else "0"
 
 
-def run(drives: Sequence[Drive], few: Sequence[Constant]) -> list[dict[str, Any]]:
+@cache
+def _simulated(*drive: Any) -> Drive:
+    """A drive by the arguments of `simulated`, once in each process."""
+    return simulated(*drive)
+
+
+def run(wanted: Sequence[tuple[Any, ...]], few: Sequence[Constant]) -> list[dict[str, Any]]:
     """Differences that some constants make, lowered and raised, by the sign of the change; or why one cannot be run.
 
     The shipped values are run beside them, since CPU times drift.
+
+    Args:
+        wanted: arguments of `simulated` for each drive.
+        few: constants.
     """
+    drives = [_simulated(*drive) for drive in wanted]
     shipped = [score(drive, tuning.MethodTuning()) for drive in drives]
     return [{"name": constant.name} | _both_ways(drives, constant, shipped) for constant in few]
 
@@ -267,13 +278,10 @@ def main() -> None:
     wanted = [one for one in constants(tuning.MethodTuning()) if one.name.startswith(asked.only)]
     missing = [one for one in wanted if one.name not in results]
     if missing:
-        seeds = range(*asked.seeds)
-        drives = [
-            simulated(scene, s, asked.seconds, seed) for s, scene, seed in product(SENSORS, asked.scenes, seeds)
-        ]
-        with get_context("fork").Pool(asked.jobs) as pool:
-            few = [missing[k : k + TOGETHER] for k in range(0, len(missing), TOGETHER)]
-            for found in pool.imap_unordered(partial(run, drives), few):
+        drives = tuple(product(asked.scenes, SENSORS, (asked.seconds,), range(*asked.seeds)))
+        few = [missing[k : k + TOGETHER] for k in range(0, len(missing), TOGETHER)]
+        with Engine(asked.jobs) as engine:
+            for _, found in engine.results(partial(run, drives), few):
                 results |= {result["name"]: result for result in found}
                 asked.results.write_text(json.dumps(results))
                 for result in found:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from modt_evaluation.engine import Engine
 from modt_evaluation.evaluation import DriveRows
 from modt_evaluation.experiments.drives import kitti_drives
 from modt_evaluation.experiments.study import DEFAULT, Row
@@ -51,7 +52,7 @@ def test_the_table_has_a_row_for_each_sensor_and_the_text_the_cpu_time_of_the_mo
     monkeypatch.setattr(figures, "SEEDS", [2])
     monkeypatch.setattr(figures, "SECONDS", 0.4)
     (drive,) = kitti_drives(tmp_path)
-    table, _, text = figures.readme(drive.path, None, None).partition("\n\n")
+    table, _, text = figures.readme(Engine(), drive.path, None, None).partition("\n\n")
     heads, _, row = (line.strip("| ").split(" | ") for line in table.splitlines())
     assert len(heads) == len(row)
     assert "VLP-16" in row[0]
@@ -84,6 +85,6 @@ def perfect(drive: DriveRows) -> DriveRows:
 def test_the_table_of_weather_names_the_options_that_made_each_row(monkeypatch):
     monkeypatch.setattr(figures, "SEEDS", [2])
     monkeypatch.setattr(figures, "SECONDS", 0.4)
-    _, _, *rows = figures.weather().splitlines()
+    _, _, *rows = figures.weather(Engine()).splitlines()
     made_by = [re.search(r"`(.*)`", row).group(1) for row in rows]
     assert made_by == ["--weather snow:2.5", "--weather fog:50", "--weather dust:1.5", "--gait 6"]
