@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import modt
+from tests.tools.deploy import debian_root
 from tools.deploy import deb, dist
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -61,3 +62,22 @@ def test_the_image_runs_modt():
     subprocess.run(["docker", "build", "--tag", "modt-test", str(ROOT)], check=True)
     done = subprocess.run(["docker", "run", "--rm", "modt-test", "--version"], check=True, capture_output=True)
     assert done.stdout.decode() == f"modt {modt.__version__}\n"
+
+
+@pytest.mark.install
+def test_the_steps_of_the_image_make_a_debian_system_run_modt(tmp_path):
+    if has_daemon():
+        pytest.skip("the image itself is built here")
+    if reason := debian_root.reason_against():
+        pytest.skip(reason)
+    root = tmp_path / "root"
+    try:
+        if not debian_root.make(root):
+            pytest.skip("Debian's mirror does not answer")
+        user = debian_root.build(root, ROOT)
+        assert user == "modt"
+        assert debian_root.run(root, "modt --version", user) == f"modt {modt.__version__}\n"
+        debian_root.run(root, "cd /runs; modt replay --frames 0:2 --core none --quiet --out /runs/try", user)
+        assert len((root / "runs/try/tracks.jsonl").read_text().splitlines()) == 2
+    finally:
+        shutil.rmtree(root, ignore_errors=True)  # a gigabyte
