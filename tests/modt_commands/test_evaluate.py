@@ -111,6 +111,17 @@ def test_results_are_written_as_a_table_and_a_document(tmp_path):
     assert all(words in charts for words in ("paper, with_trk", "paper, best", "paper, ten times Fig. 8"))
 
 
+@pytest.mark.slow
+def test_runs_judged_by_several_processes_have_the_same_figures(drives, capsys):
+    pytest.importorskip("distributed")
+    pairs = [path for pair in drives.values() for path in pair]
+    found = []
+    for jobs in (1, 2):
+        assert here("evaluate", *pairs, "--jobs", jobs, "--quiet", "--json") == 0
+        found.append(capsys.readouterr().out)
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [

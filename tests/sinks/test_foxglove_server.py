@@ -122,8 +122,7 @@ def test_the_log_says_where_it_is_and_which_protocol_is_refused(caplog):
     for protocol, accepted in (("foxglove.sdk.v1", True), (REFUSED, False)):
         client = Client(port, protocol)
         assert client.accepted is accepted
-        client.stream.close()
-        client.socket.close()
+        client.close()
     background.close()
 
 

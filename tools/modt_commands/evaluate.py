@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from modt.cli.options import add_examples
+from modt.cli.progress import bar
 from modt.errors import MisuseError
 from modt_commands import experiments
 from modt_evaluation.rules import IGNORABLE
 
 if TYPE_CHECKING:
+    from modt_evaluation.evaluation import DriveRows
     from modt_evaluation.run_record import RunRecord
     from modt_evaluation.truth import Truth
 
@@ -110,17 +114,28 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     from dataclasses import asdict
 
     from modt.sources.nuscenes import read_scene, tables_of
-    from modt_evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
+    from modt_evaluation.engine import Engine
+    from modt_evaluation.evaluation import SCHEMA, evaluation
     from modt_evaluation.nuscenes_results import scores_of_runs as nuscenes_scores
     from modt_evaluation.report import report
+    from modt_evaluation.run_record import RunRecord
 
+    pairs = [*zip(arguments.pairs[::2], arguments.pairs[1::2], strict=True)]
+    judged: dict[int, tuple[str, DriveRows]] = {}
+    with (
+        Engine(arguments.jobs, arguments.scheduler) as engine,
+        bar(len(pairs), "run", shown=not arguments.quiet) as tick,
+    ):
+        for drive, rows_of_sensor in engine.results(partial(_judged, arguments, pairs), range(len(pairs))):
+            judged[drive] = rows_of_sensor
+            tick(str(pairs[drive][0]))
     by_sensor: dict[str, list[DriveRows]] = {}
     of_scenes = []
-    for drive, pair in enumerate(zip(arguments.pairs[::2], arguments.pairs[1::2], strict=True)):
-        record, truth = opened(arguments, *pair)
-        if (tables := tables_of(pair[1].resolve())) is not None:
-            of_scenes.append((read_scene(*tables), record))
-        by_sensor.setdefault(record.sensor, []).append(collect(record.frames(truth), truth.rules, drive))
+    for drive, (run, labels) in enumerate(pairs):
+        sensor, rows = judged[drive]
+        by_sensor.setdefault(sensor, []).append(rows)
+        if (tables := tables_of(labels.resolve())) is not None:
+            of_scenes.append((read_scene(*tables), RunRecord.open(run)))
     sensors = {name: evaluation(drives) for name, drives in by_sensor.items()}
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
@@ -138,6 +153,14 @@ def judge_runs(arguments: argparse.Namespace) -> None:
         print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))
     else:
         print(report(sensors, benchmark))
+
+
+def _judged(arguments: argparse.Namespace, pairs: Sequence[tuple[Path, Path]], drive: int) -> tuple[str, DriveRows]:
+    """Sensor and judged rows of a run and its labels."""
+    from modt_evaluation.evaluation import collect
+
+    record, truth = opened(arguments, *pairs[drive])
+    return record.sensor, collect(record.frames(truth), truth.rules, drive)
 
 
 def list_unlabelled(arguments: argparse.Namespace) -> None:

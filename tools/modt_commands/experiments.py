@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # NumPy is imported once the process is pinned
 
 
 def add_options(p: argparse.ArgumentParser) -> None:
-    """Options of the experiments."""
+    """Options of the experiments, and those that the evaluation of runs shares with them."""
     g = p.add_argument_group("experiments", "the paper's tables and figures on KITTI and simulated drives")
     which = "experiments by name, or all (docs/evaluation.md)"
     g.add_argument("--experiment", nargs="+", metavar="NAME", help=which)
@@ -35,9 +35,9 @@ def add_options(p: argparse.ArgumentParser) -> None:
     out = "directory of the results (default: %(default)s)"
     g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help=out)
     jobs = options.bounded(int, 1, 1024, "processes")
-    g.add_argument("--jobs", type=jobs, default=1, metavar="N", help="number of processes (default: %(default)s)")
-    g.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler (extra batch)")
-    g.add_argument("--quiet", action="store_true", help="no progress")
+    p.add_argument("--jobs", type=jobs, default=1, metavar="N", help="number of processes (default: %(default)s)")
+    p.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler (extra batch)")
+    p.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(arguments: argparse.Namespace) -> int:
