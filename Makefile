@@ -9,7 +9,7 @@ BIN    := $(VENV)/bin
 .PHONY: replay test quick check format hooks clean
 
 replay: $(VENV)/.run
-	$(BIN)/modt replay --out runs/embedded
+	$(BIN)/modt replay --frames 0:60 --out runs/embedded
 	$(BIN)/modt-profile report runs/embedded
 	$(BIN)/modt view runs/embedded
 	@echo "To look at it: open runs/embedded/view.html in a browser"
@@ -46,7 +46,7 @@ $(BIN)/python:
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
 $(VENV)/.run: $(BIN)/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --editable '.[progress,view]'
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[progress,view]'
 	@touch $@
 
 $(VENV)/.test: $(BIN)/python pyproject.toml

@@ -93,6 +93,7 @@ class Cells:
 def occupied(x: Float32, y: Float32, level: Int, group: Int, step_cm: int) -> Cells:
     """Cells of points x, y [m] within the grid."""
     column, row = (np.floor(v * (100 / step_cm)).astype(np.int64) + SIDE // 2 for v in (x, y))
-    cell, look = np.divmod(np.unique((SIDE * row + column) * LOOKS + LEVELS * group + level), LOOKS)
+    code = np.sort((SIDE * row + column) * LOOKS + LEVELS * group + level)  # np.unique takes six times as long
+    cell, look = np.divmod(code[np.append(True, np.diff(code) > 0)[: len(code)]], LOOKS)
     group, level = np.divmod(look, LEVELS)
     return Cells(cell, level, group)
