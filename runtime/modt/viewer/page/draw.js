@@ -37,7 +37,7 @@ const LOOKS_AT_M = 6; // point ahead of the sensor about which the view turns
 // The camera of the perspective: sines and cosines of its angles, distance, and size of a unit of tangent [pixel].
 const eye = () => ({
   c: Math.cos(state.turn), s: Math.sin(state.turn), down: Math.sin(state.tilt), along: Math.cos(state.tilt),
-  away: state.away, focal: Math.max(canvas.height, 0.6 * canvas.width), x: canvas.width / 2, y: canvas.height / 2,
+  away: state.away, focal: Math.max(canvas.height, 0.6 * canvas.width), x: canvas.width / 2, y: 0.6 * canvas.height,
 });
 
 function projected(x, y, z, { c, s, down, along, away, focal, x: px, y: py }) {
