@@ -59,7 +59,7 @@ def main() -> None:
     parser(__doc__).parse_args()
     with TemporaryDirectory() as folder:
         run = Path(folder) / "run"
-        modt(["replay", "--frames", f"0:{FRAMES.stop}", "--quiet", "--out", str(run)])
+        modt(["replay", "--frames", f"0:{FRAMES.stop}", "--quiet", "--core", "none", "--out", str(run)])
         modt(["view", str(run)])
         first, *others = pictures(run / "view.html")
     first.save(FILM, save_all=True, append_images=others, duration=PERIOD_MS, loop=0, quality=QUALITY, method=6)
