@@ -47,7 +47,7 @@ def declared_layouts() -> dict[str, Layout]:
 def c_structures() -> dict[str, list[tuple[str, str, str, tuple[int, ...]]]]:
     """Members of the structures of the C sources: name, kind, C type and the sizes in brackets."""
     source = "".join(path.read_text() for path in sorted(build.FOLDER.glob("*.[ch]")))
-    source = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
+    source = re.sub(r"/\*.*?\*/| SHAPE\(.*?\)", "", source, flags=re.DOTALL)
     structures = {}
     for body, name in re.findall(r"typedef struct \{(.*?)\} (\w+);", source, re.DOTALL):
         members = structures[name] = []

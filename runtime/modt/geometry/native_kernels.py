@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from array import array
-from dataclasses import fields
 from functools import lru_cache
 
 import numpy as np
@@ -13,109 +12,15 @@ from numpy import float32, float64, int64
 from modt.geometry.kdop import PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
 from modt.geometry.tuning import ShapeTuning
-from modt.native.library import (
-    FLOAT32,
-    FLOAT64,
-    INT64,
-    Array,
-    Layout,
-    Number,
-    OutputArgument,
-    Signatures,
-    declare,
-)
+from modt.native.declarations import signatures, structure
+from modt.native.library import declare
 from modt.types import Float32, Float64, Int
 
-_D = ctypes.c_double
-_L = ctypes.c_int64
-
-_TUNING = Layout("ShapeTuning", **{field.name: Number(float64) for field in fields(ShapeTuning)})
-_WEIGHTS = Layout("PairWeights", **{name: Number(float64) for name in PairWeights._fields})
-_SHAPES = Layout(
-    "Shapes",
-    kdop=Array(float64, 8, "n"),
-    log_width=Array(float64, 4, "n"),
-    bottom=Array(float64, "n"),
-    top=Array(float64, "n"),
-    log_points=Array(float64, "n"),
-    n=Number(int64),
-)
-_ASSIGNMENT = Layout(
-    "Assignment",
-    cost=Array(float64, "rows", "columns"),
-    row_potential=Array(float64, "rows"),
-    column_potential=Array(float64, "columns"),
-    distance=Array(float64, "columns"),
-    column_of_row=Array(int64, "rows"),
-    row_of_column=Array(int64, "columns"),
-    row_before=Array(int64, "columns"),
-    to_visit=Array(int64, "columns"),
-    rows=Number(int64),
-    columns=Number(int64),
-)
-_SIGNATURES: Signatures = {
-    "modt_upright_boxes": (
-        None,
-        (*[FLOAT32] * 3, INT64, _L, FLOAT64, OutputArgument, OutputArgument, OutputArgument),
-    ),
-    "modt_kdop_ends": (None, (*[FLOAT32] * 3, INT64, _L, FLOAT32, OutputArgument)),
-    "modt_group_sums": (None, (FLOAT32, _L, _L, INT64, _L, OutputArgument)),
-    "modt_copy_runs": (
-        None,
-        (INT64, FLOAT32, _L, INT64, INT64, _L, OutputArgument, OutputArgument, _L),
-    ),
-    "modt_overlapping_pairs": (
-        _L,
-        (FLOAT64, _L, FLOAT64, _L, OutputArgument, _L, _L, OutputArgument, OutputArgument),
-    ),
-    "modt_coverage": (None, (FLOAT64, _L, FLOAT64, _L, INT64, INT64, _L, _TUNING, OutputArgument)),
-    "modt_measured": (
-        None,
-        (FLOAT64, FLOAT64, FLOAT64, _L, _D, FLOAT64, _TUNING, OutputArgument, OutputArgument, OutputArgument),
-    ),
-    "modt_pair_costs": (
-        None,
-        (
-            _SHAPES,
-            _SHAPES,
-            FLOAT64,
-            _D,
-            INT64,
-            INT64,
-            _L,
-            _WEIGHTS,
-            _TUNING,
-            OutputArgument,
-            OutputArgument,
-            OutputArgument,
-        ),
-    ),
-    "modt_certain_pairs": (
-        None,
-        (
-            INT64,
-            INT64,
-            FLOAT64,
-            _L,
-            _D,
-            _L,
-            _L,
-            OutputArgument,
-            OutputArgument,
-            OutputArgument,
-            OutputArgument,
-            OutputArgument,
-        ),
-    ),
-    "modt_settle_pairs": (
-        ctypes.c_int,
-        (INT64, INT64, FLOAT64, _L, _D, OutputArgument, OutputArgument, _ASSIGNMENT, OutputArgument),
-    ),
-    "modt_sort_members": (
-        None,
-        (INT64, FLOAT32, _L, INT64, _L, INT64, INT64, INT64, _L, _L, *[OutputArgument] * 4),
-    ),
-}
+_TUNING = structure("ShapeTuning")
+_WEIGHTS = structure("PairWeights")
+_SHAPES = structure("Shapes")
+_ASSIGNMENT = structure("Assignment")
+_SIGNATURES = signatures("geometry.c", "groups.c", "assignment.c")
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
 _BLOCK = 16

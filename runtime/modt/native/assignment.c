@@ -67,12 +67,14 @@ EXPORT void modt_certain_pairs(const i64 *rows, const i64 *columns, const double
 
 /* An assignment of `rows` rows to `columns` columns, at least as many. */
 typedef struct {
-    double *cost;                                   /* (rows, columns) */
-    double *row_potential, *column_potential;       /* (rows,), (columns,) of the dual problem */
-    double *distance;                               /* (columns,) length of the shortest path to each column */
-    i64 *column_of_row, *row_of_column;             /* (rows,), (columns,) partners, NONE while free */
-    i64 *row_before;                                /* (columns,) row before each column on its path */
-    i64 *to_visit;                                  /* (columns,) columns to visit, then those visited */
+    double *cost SHAPE(rows, columns);
+    double *row_potential SHAPE(rows);       /* of the dual problem */
+    double *column_potential SHAPE(columns); /* the same */
+    double *distance SHAPE(columns);         /* length of the shortest path to each column */
+    i64 *column_of_row SHAPE(rows);          /* partner, NONE while free */
+    i64 *row_of_column SHAPE(columns);       /* the same */
+    i64 *row_before SHAPE(columns);          /* row before each column on its path */
+    i64 *to_visit SHAPE(columns);            /* columns to visit, then those visited */
     i64 rows, columns;
 } Assignment;
 

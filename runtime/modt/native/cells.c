@@ -5,9 +5,9 @@
 
 /* Cells of cells.py: n occupied cells of a square grid. */
 typedef struct {
-    i32 *row, *column;  /* (n,) */
-    float *low, *high;  /* (n,) least and greatest height of the points above ground [m] */
-    i64 *entries;       /* (n,) points in each */
+    i32 *row, *column SHAPE(n);
+    float *low, *high SHAPE(n); /* least and greatest height of the points above ground [m] */
+    i64 *entries SHAPE(n);      /* points in each */
 } Cells;
 
 /* --------------------------------------------------------------------------------------- occupied cells of points */
@@ -16,7 +16,7 @@ typedef struct {
 typedef struct {
     float cells_per_unit;
     i32 centre, side;
-    i32 *table; /* (side * side,) scratch: a number for each cell */
+    i32 *table SHAPE(side, side); /* scratch: a number for each cell */
 } Grid;
 
 /* Place of a cell in the table of a grid whose side is a multiple of four. Blocks of 4x4 cells share a cache line,
@@ -124,10 +124,10 @@ static ALWAYS_INLINE float columns_at(float window_rays, float sqrt_range)
 /* Square part of a grid around the sensor that holds all cells that are looked at, with those beside them. Between
  * calls all are empty. */
 typedef struct {
-    i32 side, first;   /* cells of a side; row and column of the first in the grid */
-    i32 *returns;      /* (side, side) points of each cell, 0 of an empty one */
-    float *low, *high; /* (side, side) least and greatest height in each [m], infinite and -infinite of an empty one */
-    float *solidity;   /* (side, side) 0 of an empty one */
+    i32 side, first;                     /* cells of a side; row and column of the first in the grid */
+    i32 *returns SHAPE(side, side);      /* points of each cell, 0 of an empty one */
+    float *low, *high SHAPE(side, side); /* least and greatest height in each [m], infinite and -infinite of an empty one */
+    float *solidity SHAPE(side, side);   /* 0 of an empty one */
 } NearCells;
 
 /* Place of a cell among the near ones, or NONE */
@@ -580,9 +580,9 @@ static i64 connect(const Cells *cells, i64 n_used, int shift, i32 side, const Cl
 
 /* ClusterSizes of cells.py. */
 typedef struct {
-    i64 *points, *cell;                                         /* (n,) */
-    float *extent_m, *bottom_m, *top_m, *sqrt_range, *beam_m;   /* (n,) */
-    uint8_t *of_oversized;                                      /* (n,) */
+    i64 *points, *cell SHAPE(n);
+    float *extent_m, *bottom_m, *top_m, *sqrt_range, *beam_m SHAPE(n);
+    uint8_t *of_oversized SHAPE(n);
 } ClusterSizes;
 
 /* ClusterSizes.of_cells of n clusters, given one point of each cell, and the cluster of each used one, by rank. */
@@ -824,8 +824,8 @@ enum { DIRECTION, RANGE, HEIGHT, ELEVATION, VIEW }; /* rows of the bounds, as in
 
 /* ViewBounds of strips.py. */
 typedef struct {
-    float *min[4], *max[4]; /* (n,) each */
-    float *scale_m;         /* (n,) */
+    float *min[4], *max[4] SHAPE(4, n);
+    float *scale_m SHAPE(n);
 } ViewBounds;
 
 /* view_bounds: bounds of n strips, given the number of each cluster among them, or NONE. `height` is that of the

@@ -160,9 +160,9 @@ typedef struct {
 } ShapeTuning;
 
 typedef struct {
-    const double *kdop;      /* (8, n) [m] */
-    const double *log_width; /* (4, n) */
-    const double *bottom, *top, *log_points;
+    const double *kdop SHAPE(8, n); /* [m] */
+    const double *log_width SHAPE(4, n);
+    const double *bottom, *top, *log_points SHAPE(n);
     i64 n;
 } Shapes;
 

@@ -16,14 +16,14 @@
 
 /* GroundEstimator, GroundTuning, PolarGrid and Bounds: values by the names that they have there. */
 typedef struct {
-    const float *edge_m;           /* (rings + 1,) range of the edges of the rings */
-    const float *flat_m, *depth_m; /* (rings,) height range above which something stands in a cell; way looked at */
+    const float *edge_m SHAPE(edges);           /* range of the edges of the rings, one more than there are rings */
+    const float *flat_m, *depth_m SHAPE(rings); /* height range above which something stands in a cell; way looked at */
     i32 rings, sectors, flank_sectors, bonnet_ring; /* sectors are a power of two */
     float far_m;                                    /* points as far away have no position */
     float rings_per_unit, ring_step;                /* of the square root of range */
     float max_slope, hill_slope, ramp_slope, near_m, slope_length_m, noise_m, max_gap_m, flank_m;
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
-    const i32 *low_sectors; /* (near_rings,) sectors to the left and right that a low thing does not reach */
+    const i32 *low_sectors SHAPE(near_rings); /* sectors to the left and right that a low thing does not reach */
     i32 near_rings, quarters;
     float low_m, clear_m, foot_share, min_foot_m;
 } Ground;
@@ -77,11 +77,11 @@ EXPORT i64 modt_ground_scratch(const Ground *g, i64 n)
 }
 
 typedef struct {
-    i64 *rows;         /* (room,) of the points kept; room for one more than there are points */
-    float *kept[5];    /* (room,) x, y, z, square root of range, and height above ground */
-    uint8_t *is_clear; /* (room,) low points that are clear of the roughness of the ground */
-    float *top;        /* (rings, sectors) highest return of each polar cell */
-    int8_t *kind;      /* (room,) PointKind of all points */
+    i64 *rows SHAPE(room);           /* of the points kept; room for one more than there are points */
+    float *kept[5] SHAPE(5, room);   /* x, y, z, square root of range, and height above ground */
+    uint8_t *is_clear SHAPE(room);   /* low points that are clear of the roughness of the ground */
+    float *top SHAPE(rings, sectors); /* highest return of each polar cell */
+    int8_t *kind SHAPE(room);        /* PointKind of all points */
 } AboveGround;
 
 /* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */

@@ -80,8 +80,9 @@ EXPORT void modt_sort_members(const i64 *members, const float *xyz, i64 n_member
 
 /* Members of cells.py: m points by cluster, where there is room for all points. */
 typedef struct {
-    i64 *offsets, *index; /* (n + 1,) and (m,) */
-    float *columns;       /* (4, m) x, y, z, and z of the ground beneath */
+    i64 *offsets SHAPE(ends);       /* one more than there are clusters */
+    i64 *index SHAPE(room);
+    float *columns SHAPE(4, room);  /* x, y, z, and z of the ground beneath */
 } Members;
 
 /* Counts the points of clusters into `count`, of each. */

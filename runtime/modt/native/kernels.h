@@ -19,6 +19,7 @@
 #endif
 
 #define EXPORT __attribute__((visibility("default")))
+#define SHAPE(...) /* sizes of the arrays that a structure of Python's points to; declarations.py reads them */
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 #define NONE (-1)
 #define AHEAD 64 /* entries whose memory is on its way into the cache */
@@ -60,14 +61,14 @@ static ALWAYS_INLINE void transpose(const u4 row[4], u4 column[4])
 
 /* PointColumns of grids.py: n points [m, sensor frame], and square roots of their ranges. */
 typedef struct {
-    float *x, *y, *z, *sqrt_range; /* (n,) */
+    float *x, *y, *z, *sqrt_range SHAPE(n);
 } PointColumns;
 
 /* Clusters of cells.py: n clusters of n_points points in n_cells cells. */
 typedef struct {
-    i64 *cell_of_point;             /* (n_points,) */
-    i64 *cluster_of_cell, *entries; /* (n_cells,) cluster or NONE, and number of points */
-    int8_t *kind_of_cell;           /* (n_cells,) PointKind of its points */
+    i64 *cell_of_point SHAPE(n_points);
+    i64 *cluster_of_cell, *entries SHAPE(n_cells); /* cluster or NONE, and number of points */
+    int8_t *kind_of_cell SHAPE(n_cells);           /* PointKind of its points */
     i64 n_points, n_cells, n;
 } Clusters;
 

@@ -10,23 +10,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.class_sizes import PersonSize
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.geometry.tuning import ShapeTuning
-from modt.native.library import (
-    BOOL,
-    FLOAT32,
-    INT64,
-    Array,
-    Filled,
-    Layout,
-    Member,
-    Number,
-    OutputArgument,
-    Rows,
-    Signatures,
-    declare,
-)
+from modt.native.declarations import signatures, structure
+from modt.native.library import Filled, Layout, declare
 from modt.segmentation.cells import AirOfCells, CellClusterer, Cells, Clusters, ClusterSizes, Members
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import QUARTERS, GroundEstimator
@@ -38,160 +25,23 @@ from modt.segmentation.tuning import HeadTuning, StripTuning
 from modt.types import N_REFLECTANCE, Bool, Float32, Float64, Int, Int8
 
 T = TypeVar("T", Cells, PointColumns, ClusterSizes)
-_f32, _f64 = map(np.dtype, (np.float32, np.float64))
-_i8, _i32, _i64 = map(np.dtype, (np.int8, np.int32, np.int64))
-
-
-def _members(kind: Member, *names: str) -> dict[str, Member]:
-    """Members of one kind."""
-    return dict.fromkeys(names, kind)
-
-
-GROUND = Layout(
-    "Ground",
-    edge_m=Array(_f32, "edges"),
-    **_members(Array(_f32, "rings"), "flat_m", "depth_m"),
-    **_members(Number(_i32), "rings", "sectors", "flank_sectors", "bonnet_ring"),
-    **_members(Number(_f32), "far_m", "rings_per_unit", "ring_step", "max_slope", "hill_slope", "ramp_slope"),
-    **_members(Number(_f32), "near_m", "slope_length_m", "noise_m", "max_gap_m", "flank_m"),
-    **_members(Number(_f32), *Bounds._fields),
-    low_sectors=Array(_i32, "near_rings"),
-    **_members(Number(_i32), "near_rings", "quarters"),
-    **_members(Number(_f32), "low_m", "clear_m", "foot_share", "min_foot_m"),
-)
-ABOVE_GROUND = Layout(
-    "AboveGround",
-    rows=Array(_i64, "room"),
-    kept=Rows(_f32, 5, "room"),
-    is_clear=Array(np.bool_, "room"),
-    top=Array(_f32, "rings", "sectors"),
-    kind=Array(_i8, "room"),
-)
-POINT_COLUMNS = Layout("PointColumns", **_members(Array(_f32, "n"), "x", "y", "z", "sqrt_range"))
-GRID = Layout(
-    "Grid", cells_per_unit=Number(_f32), **_members(Number(_i32), "centre", "side"), table=Array(_i32, "side", "side")
-)
-CELLS = Layout(
-    "Cells",
-    **_members(Array(_i32, "n"), "row", "column"),
-    **_members(Array(_f32, "n"), "low", "high"),
-    entries=Array(_i64, "n"),
-)
-POROSITY_RULES = Layout(
-    "PorosityRules",
-    **_members(Number(_f32), "min_solidity", "reach_m", "reach_beams", "max_sqrt_range", "point_sqrt_range"),
-)
-NEAR_CELLS = Layout(
-    "NearCells",
-    **_members(Number(_i32), "side", "first"),
-    returns=Array(_i32, "side", "side"),
-    **_members(Array(_f32, "side", "side"), "low", "high", "solidity"),
-)
-PERSON_SIZE = Layout("PersonSize", **_members(Number(_f32), *(f.name for f in fields(PersonSize))))
-CLUSTER_RULES = Layout(
-    "ClusterRules",
-    **_members(Number(_i32), "coarse_side", "fine_side"),
-    **_members(Number(_f32), "max_gap_m", "max_gap_beams", "max_extent_m", "min_extent_m", "max_split_sqrt_range"),
-    min_points=Number(_i64),
-    step=Number(_f64),
-)
-STRUCTURE_RULES = Layout(
-    "StructureRules",
-    **_members(Number(_f64), "thickness_m", "max_gap_m", "min_length_m", "min_filled", "piece_gap", "min_piece_m"),
-    **_members(Number(_f64), "beside_m", "min_hanging"),
-    **_members(Number(_f32), "min_base_m", "min_extent_m", "oversized_m", "min_before_m", "max_behind_m"),
-    **_members(Number(_f32), "min_across_m", "max_bottom_m", "min_part_extent_m", "min_part_top_m", "hanging_m"),
-    max_range_m=Number(_f32),
-    min_part_points=Number(_i64),
-    **_members(Number(_i32), "max_lines", "max_cells", "min_cells", "refinements"),
-)
-HEAD_TUNING = Layout(
-    "HeadTuning",
-    **_members(Number(_f64), "min_top_m", "reach_m", "max_apart_m", "min_dip_m", "head_height_m", "max_head_m"),
-    **_members(Number(_f64), "max_bottom_m", "load_m", "min_load_top_m"),
-    min_points=Number(_i64),
-)
-CLUSTER_SIZES = Layout(
-    "ClusterSizes",
-    **_members(Array(_i64, "n"), "points", "cell"),
-    **_members(Array(_f32, "n"), "extent_m", "bottom_m", "top_m", "sqrt_range", "beam_m"),
-    of_oversized=Array(np.bool_, "n"),
-)
-VIEW_BOUNDS = Layout("ViewBounds", **_members(Rows(_f32, 4, "n"), "min", "max"), scale_m=Array(_f32, "n"))
-STRIP_RULES = Layout(
-    "StripRules",
-    **_members(
-        Number(_f32), "max_diagonal_m", "min_width_m", "max_width_m", "min_top_m", "max_top_m", "max_bottom_m"
-    ),
-    **_members(Number(_f32), "max_gap_m", "min_gap_beams", "max_gap_beams"),
-)
-CLUSTERS = Layout(
-    "Clusters",
-    cell_of_point=Array(_i64, "n_points"),
-    **_members(Array(_i64, "n_cells"), "cluster_of_cell", "entries"),
-    kind_of_cell=Array(_i8, "n_cells"),
-    **_members(Number(_i64), "n_points", "n_cells", "n"),
-)
-MEMBERS = Layout("Members", offsets=Array(_i64, "ends"), index=Array(_i64, "room"), columns=Array(_f32, 4, "room"))
-
-_F, _I, _L = ctypes.c_float, ctypes.c_int32, ctypes.c_int64
-_SIGNATURES: Signatures = {
-    "modt_ground_scratch": (_L, (GROUND, _L)),
-    "modt_above_ground": (None, (GROUND, FLOAT32, _L, _F, OutputArgument, ABOVE_GROUND, OutputArgument)),
-    "modt_occupied_cells": (
-        _L,
-        (POINT_COLUMNS, FLOAT32, _L, GRID, OutputArgument, POINT_COLUMNS, OutputArgument, CELLS),
-    ),
-    "modt_air": (_L, (POROSITY_RULES, NEAR_CELLS, CELLS, FLOAT32, FLOAT32, _F, _I, *[OutputArgument] * 4)),
-    "modt_mean_solidity": (None, (INT64, FLOAT32, INT64, _L, _L, OutputArgument, OutputArgument)),
-    "modt_airborne_points": (
-        None,
-        (
-            POROSITY_RULES,
-            GRID,
-            CELLS,
-            FLOAT32,
-            FLOAT32,
-            BOOL,
-            _F,
-            _I,
-            INT64,
-            INT64,
-            FLOAT32,
-            *[OutputArgument] * 3,
-        ),
-    ),
-    "modt_cluster_scratch": (_L, (_L, _I)),
-    "modt_cluster": (
-        _L,
-        (
-            CLUSTER_RULES,
-            STRUCTURE_RULES,
-            PERSON_SIZE,
-            CELLS,
-            POINT_COLUMNS,
-            FLOAT32,
-            _L,
-            OutputArgument,
-            OutputArgument,
-            CLUSTER_SIZES,
-        ),
-    ),
-    "modt_find_people": (None, (HEAD_TUNING, *[FLOAT32] * 4, INT64, _L, *[OutputArgument] * 3)),
-    "modt_view_bounds": (None, (CELLS, POINT_COLUMNS, FLOAT32, INT64, INT64, _L, INT64, _L, VIEW_BOUNDS)),
-    "modt_merge_strips": (
-        None,
-        (STRIP_RULES, PERSON_SIZE, VIEW_BOUNDS, FLOAT32, _L, INT64, OutputArgument, VIEW_BOUNDS, OutputArgument),
-    ),
-    "modt_group": (_L, (INT64, _L, _L, OutputArgument, OutputArgument)),
-    "modt_members": (None, (CLUSTERS, CLUSTERS, INT64, POINT_COLUMNS, FLOAT32, INT64, OutputArgument, MEMBERS)),
-    "modt_low_points": (
-        _L,
-        (GRID, POINT_COLUMNS, BOOL, CLUSTERS, CELLS, FLOAT32, INT64, _L, _F, *[OutputArgument] * 3),
-    ),
-    "modt_best_headings": (None, (FLOAT32, FLOAT32, INT64, INT64, _L, _L, FLOAT32, FLOAT32, _I, _F, OutputArgument)),
-    "modt_reflectance_statistics": (None, (FLOAT32, _L, INT64, INT64, _L, _F, _F, OutputArgument)),
-}
+GROUND = structure("Ground")
+ABOVE_GROUND = structure("AboveGround")
+POINT_COLUMNS = structure("PointColumns")
+GRID = structure("Grid")
+CELLS = structure("Cells")
+POROSITY_RULES = structure("PorosityRules")
+NEAR_CELLS = structure("NearCells")
+PERSON_SIZE = structure("PersonSize")
+CLUSTER_RULES = structure("ClusterRules")
+STRUCTURE_RULES = structure("StructureRules")
+HEAD_TUNING = structure("HeadTuning")
+CLUSTER_SIZES = structure("ClusterSizes")
+VIEW_BOUNDS = structure("ViewBounds")
+STRIP_RULES = structure("StripRules")
+CLUSTERS = structure("Clusters")
+MEMBERS = structure("Members")
+_SIGNATURES = signatures("ground.c", "cells.c", "heads.c", "groups.c")
 
 
 def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:

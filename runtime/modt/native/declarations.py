@@ -1,0 +1,70 @@
+"""Structures and functions of the C sources, as they are declared there.
+
+In a structure that Python fills, `SHAPE(sizes)` follows the arrays of a declaration.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from modt.native import build
+from modt.native.library import ArrayArgument, Layout, Member, OutputArgument, Signatures
+
+NUMBERS: dict[str, Any] = {
+    "double": np.float64,
+    "float": np.float32,
+    "u4": np.float32,
+    "int": np.intc,
+    "i32": np.int32,
+    "i64": np.int64,
+    "int8_t": np.int8,
+    "uint8_t": np.bool_,
+}
+"""Type in NumPy of the elements of each numeric type. Four floats are one vector (u4)."""
+
+
+@cache
+def _code(pattern: str) -> str:
+    """Text of the source files of a name, without comments."""
+    text = "".join(path.read_text() for path in sorted(build.FOLDER.glob(pattern)))
+    return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+
+
+@cache
+def structure(name: str) -> Layout:
+    """Layout of a structure of the C sources."""
+    (body,) = re.findall(rf"typedef struct {{([^}}]*)}} {name};", _code("*.[ch]"))
+    members = {}
+    for declaration in body.split(";")[:-1]:
+        text, _, shape = declaration.replace("const ", "").rstrip(" )").partition(" SHAPE(")
+        sizes = tuple(int(size) if size.isdecimal() else size for size in shape.split(", "))
+        kind, declarators = text.split(maxsplit=1)
+        for pointer, member, rows in re.findall(r"(\(?\*)?(\w+)\)?(\[\w+\])*", declarators):
+            form = "number" if not pointer else "rows" if pointer == "*" and rows else "array"
+            members[member] = Member(form, np.dtype(NUMBERS[kind]), sizes if pointer else ())
+    return Layout(name, **members)
+
+
+def signatures(*files: str) -> Signatures:
+    """Types of the result and of the arguments of each function that these files export, by its name."""
+    found = re.findall(r"EXPORT (\w+) (\w+)\(([^{;]*)\)\s*{", "".join(map(_code, files)))
+    return {name: (_number(result), [*map(_argument, given.split(","))]) for result, name, given in found}
+
+
+def _argument(declaration: str) -> Any:
+    """Type of an argument. Arrays that a function writes are made for the call, so their type is not checked."""
+    kind = declaration.replace("const ", "").split()[0]
+    if "*" not in declaration and "[" not in declaration:
+        return _number(kind)
+    if kind[0].isupper():
+        return structure(kind)
+    return ArrayArgument(NUMBERS[kind]) if "const " in declaration else OutputArgument
+
+
+def _number(kind: str) -> Any:
+    """Type of a number; None for `void`."""
+    return None if kind == "void" else np.ctypeslib.as_ctypes_type(NUMBERS[kind])
