@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 import socket
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,13 +13,12 @@ from struct import Struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modt.errors import MisuseError
 from modt.sources.drivers import Driver
-from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, TurnDecoder
+from modt.sources.packets.turn_decoder import TURN, Entry, TurnDecoder, points_of, strongest
 from modt.sources.text_file import read_lines
-from modt.types import Float32, Float64, Int
+from modt.types import Float32, Float64
 
 log = logging.getLogger(__name__)
 
@@ -194,9 +192,7 @@ class HesaiDecoder(TurnDecoder):
         self._model = MODELS[0]
         self.elevations_deg = None if angles_deg is None else tuple(angles_deg[:, 0].tolist())
 
-    def _recognise(self, payloads: Sequence[bytes]) -> Model | None:
-        senders = Counter(sender for payload in payloads if (sender := model_of(payload)))
-        ((model, _),) = senders.most_common(1)
+    def _recognise(self, model: Model, _payloads: Sequence[bytes]) -> Model | None:
         angles_deg = self._given_deg
         if angles_deg is None and model.elevations_deg:
             log.warning("%s: beams as of any %s; %s", self.name, model.name, REMEDY)
@@ -224,8 +220,7 @@ class HesaiDecoder(TurnDecoder):
         firings = model.blocks // self._returns(payload)
         time_s = self._clock.unwrapped(sent_s, received_s) - (firings - 1) * model.firing_us * 1e-6
         first, *_, last = model.azimuths.unpack_from(payload)
-        phase = (first + AHEAD) % TURN
-        return Entry(time_s, phase, phase + (last - first) % TURN, payload[: model.tail + model.layout.mode + 1])
+        return Entry.of(time_s, first, last, payload[: model.tail + model.layout.mode + 1])
 
     def _returns(self, payload: bytes) -> int:
         """Number of returns a firing, each in one of as many consecutive blocks."""
@@ -235,34 +230,19 @@ class HesaiDecoder(TurnDecoder):
 
     def _table(self, entries: Sequence[Entry]) -> Float32:
         model = self._model
-        if not entries:
-            return np.zeros((0, 4), np.float32)
         returns = self._returns(entries[0].packet)
         unit_mm = UNIT_MM if model.layout.unit is None else entries[0].packet[model.layout.unit]
         raw = b"".join(entry.packet[: model.tail] for entry in entries)
         blocks = np.frombuffer(raw, model.body)["blocks"].reshape(-1, returns)
-        cells = blocks["cells"]  # (firings, returns, channels)
-        best = cells["reflectance"].argmax(axis=1)[:, None]
-        distance = np.take_along_axis(cells["distance"], best, axis=1)[:, 0]
-        reflectance = np.take_along_axis(cells["reflectance"], best, axis=1)[:, 0]
-        firing, channel = np.nonzero(distance)
-        azimuth_deg = blocks["azimuth"][firing, 0] * np.float32(0.01)
-        distance_m = distance[firing, channel] * np.float32(unit_mm / 1000)
-        return self._cartesian(channel, azimuth_deg, distance_m, reflectance[firing, channel])
-
-    def _cartesian(
-        self, channel: Int, azimuth_deg: Float32, distance_m: Float32, reflectance: NDArray[np.uint8]
-    ) -> Float32:
-        """(N, 4) points of (N,) returns, by channel, azimuth of the head, distance and reflectance in bytes."""
-        azimuth = np.deg2rad(azimuth_deg + self._azimuth_deg[channel])
+        cells = strongest(blocks["cells"])
+        firing, channel = np.nonzero(cells["distance"])
+        seen = cells[firing, channel]
+        azimuth = np.deg2rad(blocks["azimuth"][firing, 0] * np.float32(0.01) + self._azimuth_deg[channel])
+        distance_m = seen["distance"] * np.float32(unit_mm / 1000)
         across_m = distance_m * self._cos[channel]
-        points = np.empty((len(distance_m), 4), np.float32)
-        points[:, 0] = across_m * np.cos(azimuth)
-        points[:, 1] = -across_m * np.sin(azimuth)
-        points[:, 2] = distance_m * self._sin[channel]
-        points[:, 3] = reflectance
-        points[:, 3] *= np.float32(1 / 255)
-        return points
+        x = across_m * np.cos(azimuth)
+        y = -across_m * np.sin(azimuth)
+        return points_of(x, y, distance_m * self._sin[channel], seen["reflectance"])
 
 
 def _decoder(name: str, options: Mapping[str, str], host: str) -> HesaiDecoder:

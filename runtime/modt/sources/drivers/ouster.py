@@ -15,6 +15,7 @@ from modt.errors import MisuseError
 from modt.sources.drivers import Driver
 from modt.sources.packets.device_clock import DeviceClock
 from modt.sources.packets.packet_decoder import PacketDecoder, import_extra, one_line
+from modt.sources.packets.turn_decoder import points_of
 from modt.sources.stream import Sweep
 from modt.sources.text_file import read_text
 from modt.types import Bool, Float32
@@ -160,11 +161,8 @@ class OusterDecoder(PacketDecoder):
     def _points(self) -> Float32:
         distance = self._frame.field("RANGE")
         kept = np.flatnonzero(distance)
-        points = np.empty((len(kept), 4), np.float32)
-        points[:, :3] = self._project(distance).reshape(-1, 3)[kept]
-        points[:, 3] = self._frame.field("REFLECTIVITY").reshape(-1)[kept]
-        points[:, 3] *= np.float32(1 / 255)
-        return points
+        x, y, z = self._project(distance).reshape(-1, 3)[kept].T
+        return points_of(x, y, z, self._frame.field("REFLECTIVITY").reshape(-1)[kept])
 
 
 def _asked(host: str) -> str:

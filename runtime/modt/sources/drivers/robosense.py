@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,14 +16,13 @@ from struct import Struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modt.errors import MisuseError
 from modt.sources.drivers import Driver
-from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, Turn, TurnDecoder
+from modt.sources.packets.turn_decoder import TURN, Entry, Turn, TurnDecoder, points_of, strongest
 from modt.sources.stream import Sweep
 from modt.sources.text_file import read_lines
-from modt.types import Float32, Float64, Int
+from modt.types import Float32, Float64
 
 log = logging.getLogger(__name__)
 
@@ -204,9 +202,7 @@ class RobosenseDecoder(TurnDecoder):
                 self._take(angles_deg)
         return True
 
-    def _recognise(self, payloads: Sequence[bytes]) -> Model | None:
-        senders = Counter(sender for payload in payloads if (sender := signature_of(payload)))
-        ((model, _),) = senders.most_common(1)
+    def _recognise(self, model: Model | str, _payloads: Sequence[bytes]) -> Model | None:
         if not isinstance(model, Model):
             self.unknown = "of a RoboSense that is not decoded; give the point clouds of its driver, ros2:///TOPIC"
             return None
@@ -245,8 +241,7 @@ class RobosenseDecoder(TurnDecoder):
             sent_s += int.from_bytes(stamp[6:8], "big") * 1e-3 + int.from_bytes(stamp[8:], "big") * 1e-6
         time_s = self._clock.unwrapped(sent_s % self.wrap_s, received_s - self._packet_s)
         first, *_, last = self._model.azimuths.unpack_from(payload)
-        phase = (first + AHEAD) % TURN
-        return Entry(time_s, phase, phase + (last - first) % TURN, payload)
+        return Entry.of(time_s, first, last, payload)
 
     def _returns(self, payload: bytes) -> int:
         """Number of returns of a firing."""
@@ -266,23 +261,22 @@ class RobosenseDecoder(TurnDecoder):
         return sweeps
 
     def _table(self, entries: Sequence[Entry]) -> Float32:
-        if not entries:
-            return np.zeros((0, 4), np.float32)
         model = self._model
         returns = self._returns(entries[0].packet)
         slots = max(len(self._angles_deg), model.channels // returns)  # of a return, in a block or a firing's blocks
         raw = b"".join(entry.packet[HEADER_BYTES : HEADER_BYTES + model.table.itemsize] for entry in entries)
         blocks = np.frombuffer(raw, model.table.base)
-        cells = blocks["cells"].reshape(-1, returns, slots)
-        best = cells["reflectance"].argmax(axis=1)[:, None]
-        distance = np.take_along_axis(cells["distance"], best, axis=1)[:, 0]
-        reflectance = np.take_along_axis(cells["reflectance"], best, axis=1)[:, 0]
-        firing, slot = np.nonzero(distance)
+        cells = strongest(blocks["cells"].reshape(-1, returns, slots))
+        firing, slot = np.nonzero(cells["distance"])
+        seen = cells[firing, slot]
         begin, step = _turned(blocks["azimuth"][:: len(blocks) // len(cells)].astype(np.float32))
         head = np.deg2rad((begin[firing] + step[firing] * self._shares(slots)[slot]) * np.float32(0.01))
-        distance_m = distance[firing, slot] * np.float32(self._unit_m(entries[0].packet))
-        beam = slot % len(self._angles_deg)
-        return self._cartesian(beam, head, distance_m, reflectance[firing, slot])
+        distance_m = seen["distance"] * np.float32(self._unit_m(entries[0].packet))
+        elevation, aside = np.deg2rad(self._angles_deg[slot % len(self._angles_deg)].T).astype(np.float32)
+        across_m = distance_m * np.cos(elevation)
+        x = across_m * np.cos(head + aside) + model.forward_m * np.cos(head)
+        y = -across_m * np.sin(head + aside) - model.forward_m * np.sin(head)
+        return points_of(x, y, distance_m * np.sin(elevation) + model.up_m, seen["reflectance"])
 
     def _shares(self, slots: int) -> Float32:
         """(slots,) time of each slot since its block begins, as a share of that to the next block."""
@@ -292,19 +286,6 @@ class RobosenseDecoder(TurnDecoder):
         firings = slots // beams
         slot_us = np.tile(fired_us, firings) + np.repeat(np.arange(firings) * model.firing_us, beams)
         return (slot_us / (firings * model.firing_us)).astype(np.float32)
-
-    def _cartesian(self, beam: Int, head: Float32, distance_m: Float32, reflectance: NDArray[np.uint8]) -> Float32:
-        """(N, 4) points of (N,) returns, by beam, azimuth of the head [rad], distance and reflectance in bytes."""
-        model = self._model
-        elevation, aside = np.deg2rad(self._angles_deg[beam].T).astype(np.float32)
-        across_m = distance_m * np.cos(elevation)
-        points = np.empty((len(beam), 4), np.float32)
-        points[:, 0] = across_m * np.cos(head + aside) + model.forward_m * np.cos(head)
-        points[:, 1] = -across_m * np.sin(head + aside) - model.forward_m * np.sin(head)
-        points[:, 2] = distance_m * np.sin(elevation) + model.up_m
-        points[:, 3] = reflectance
-        points[:, 3] *= np.float32(1 / 255)
-        return points
 
 
 def _turned(azimuths: Float32) -> tuple[Float32, Float32]:

@@ -17,7 +17,7 @@ import numpy as np
 from modt.errors import MisuseError, refuse_pipe
 from modt.sources.drivers import Driver
 from modt.sources.packets.packet_decoder import import_extra, one_line
-from modt.sources.packets.turn_decoder import AHEAD, TURN, Entry, TurnDecoder
+from modt.sources.packets.turn_decoder import TURN, Entry, TurnDecoder
 from modt.types import Float32
 
 log = logging.getLogger(__name__)
@@ -180,7 +180,7 @@ class VelodyneDecoder(TurnDecoder):
         except Exception as error:  # errors of the library's YAML parser have no common type
             raise MisuseError(calibration, f"no calibration ({one_line(error)})", remedy) from None
 
-    def _recognise(self, payloads: Sequence[bytes]) -> Signature | None:
+    def _recognise(self, _signature: Signature, payloads: Sequence[bytes]) -> Signature | None:
         model, signature = recognised(payloads, self.name, self._declared)
         if model is None:
             return None
@@ -200,10 +200,9 @@ class VelodyneDecoder(TurnDecoder):
         stamp_s = int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little") * 1e-6
         time_s = self._clock.unwrapped(stamp_s, received_s - self._packet_s)  # it is sent when it is full
         first, last = azimuths(payload)
-        phase = (first + AHEAD) % TURN
         if self._identity is not None:  # the library refuses packets with a wrong identity
             payload = payload[:IDENTITY_AT] + self._identity
-        return Entry(time_s, phase, phase + (last - first) % TURN, self._library.VelodynePacket(time_s, payload))
+        return Entry.of(time_s, first, last, self._library.VelodynePacket(time_s, payload))
 
     def _points(self, entries: Sequence[Entry]) -> Float32:
         table = super()._points(entries)
@@ -214,8 +213,6 @@ class VelodyneDecoder(TurnDecoder):
 
     def _table(self, entries: Sequence[Entry]) -> Float32:
         """(N, 8) table of the library."""
-        if not entries:  # the library would crash
-            return np.zeros((0, 8), np.float32)
         packets = self._library.PacketVector([entry.packet for entry in entries])
         return np.asarray(self._decoder.decode(packets)[1])
 

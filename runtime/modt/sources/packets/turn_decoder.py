@@ -1,4 +1,4 @@
-"""Cutting of a rotating head's packets into turns, shared by the decoders of Velodyne and Hesai."""
+"""Cutting of a rotating head's packets into turns, shared by the decoders of Velodyne, Hesai and RoboSense."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import logging
 import math
 from abc import abstractmethod
 from bisect import bisect
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.sources.packets.device_clock import DeviceClock
 from modt.sources.packets.packet_decoder import PacketDecoder
@@ -45,6 +47,12 @@ class Entry:
     phase: int
     end: int
     packet: Any
+
+    @classmethod
+    def of(cls, time_s: float, first: int, last: int, packet: Any) -> Entry:
+        """Entry by the azimuths of the first and the last block of a packet, clockwise from ahead [0.01 deg]."""
+        phase = (first + AHEAD) % TURN
+        return cls(time_s, phase, phase + (last - first) % TURN, packet)
 
     def turned(self, by: int) -> Entry:
         """Same packet as part of a neighbouring turn."""
@@ -177,8 +185,11 @@ class TurnDecoder(PacketDecoder):
         """Value that all packets of one model share; None if a payload is no packet of points of this maker."""
 
     @abstractmethod
-    def _recognise(self, payloads: Sequence[bytes]) -> object:
-        """Prepare for the model of most of the packets, and return its signature; None with a reason in `unknown`."""
+    def _recognise(self, signature: Any, payloads: Sequence[bytes]) -> object:
+        """Prepare for a model, and return its signature; None with a reason in `unknown`.
+
+        `signature` is that of most of the packets.
+        """
 
     @abstractmethod
     def _entry(self, received_s: float, payload: bytes) -> Entry:
@@ -236,7 +247,9 @@ class TurnDecoder(PacketDecoder):
         """Recognise the model by the packets kept, and decode them."""
         timed = self._unrecognised
         self._unrecognised = []
-        self._signature = self._recognise([payload for _, payload in timed])
+        payloads = [payload for _, payload in timed]
+        ((signature, _),) = Counter(map(self.signature, payloads)).most_common(1)
+        self._signature = self._recognise(signature, payloads)
         if self._signature is None:
             for _ in timed:
                 self.refuse(self.unknown)
@@ -336,7 +349,29 @@ class TurnDecoder(PacketDecoder):
         """Table of a turn, without the points that its first and last packets have beyond the seam."""
         begin = self._reach
         end = TURN - self._reach
-        first = self._table([entry for entry in entries if entry.phase < begin])
-        middle = self._table([entry for entry in entries if entry.phase >= begin and entry.end <= end])
-        last = self._table([entry for entry in entries if entry.end > end])
-        return np.concatenate([first[first[:, 1] >= 0], middle, last[last[:, 1] < 0]])
+        tables = []
+        if first := [entry for entry in entries if entry.phase < begin]:
+            table = self._table(first)
+            tables.append(table[table[:, 1] >= 0])
+        if middle := [entry for entry in entries if entry.phase >= begin and entry.end <= end]:
+            tables.append(self._table(middle))
+        if last := [entry for entry in entries if entry.end > end]:
+            table = self._table(last)
+            tables.append(table[table[:, 1] < 0])
+        return np.concatenate(tables)
+
+
+def strongest(cells: NDArray[Any]) -> NDArray[Any]:
+    """(firings, channels) cells of the return with the greatest reflectance, of (firings, returns, channels)."""
+    return np.take_along_axis(cells, cells["reflectance"].argmax(axis=1)[:, None], axis=1)[:, 0]
+
+
+def points_of(x: Float32, y: Float32, z: Float32, reflectance: NDArray[np.uint8]) -> Float32:
+    """(N, 4) points of their coordinates [m, sensor frame] and of reflectances in bytes."""
+    points = np.empty((len(x), 4), np.float32)
+    points[:, 0] = x
+    points[:, 1] = y
+    points[:, 2] = z
+    points[:, 3] = reflectance
+    points[:, 3] *= np.float32(1 / 255)
+    return points
