@@ -1,8 +1,8 @@
 """The table of object classes: everything that is known of a class outside the trained models.
 
-Rows of your own follow the four of modt. They stand in the JSON file that the environment variable MODT_CLASSES names
-(docs/own-classes.md). The table is read once, before anything is sized by it, so a class of your own costs a frame no
-more than a column.
+The four of modt stand in classes.json. Rows of your own follow them, in the same form, from the JSON file that the
+environment variable MODT_CLASSES names (docs/own-classes.md). The table is read once, before anything is sized by it,
+so a class of your own costs a frame no more than a column.
 """
 
 from __future__ import annotations
@@ -86,71 +86,14 @@ class ClassSpec:
         return self.kind in (ClassKind.WALKER, ClassKind.RIDER)
 
 
-SHIPPED = (
-    # Background has the size of a car, because it may be a car that is not recognised yet.
-    ClassSpec(
-        name="background",
-        kind=ClassKind.OTHER,
-        kitti=(),
-        max_length_m=6.0,
-        max_width_m=2.7,
-        missed_cost=0.0,
-        point_change=0.5,
-        colour="#8a8f98",
-        usual_m=(4.2, 1.8, 1.6),
-        spread_m=(0.45, 0.13, 0.13),
-    ),
-    ClassSpec(
-        name="car",
-        kind=ClassKind.VEHICLE,
-        kitti=("Car", "Van"),
-        labels=("car", "vehicle.car", "REGULAR_VEHICLE", "Pickup Truck", "TYPE_VEHICLE"),
-        semantic_kitti=(10, 252),
-        autoware=1,
-        max_length_m=6.0,
-        max_width_m=2.7,
-        missed_cost=1.5,
-        colour="#2f6fde",
-        usual_m=(4.2, 1.8, 1.6),
-        spread_m=(0.45, 0.13, 0.13),
-    ),
-    ClassSpec(
-        name="pedestrian",
-        kind=ClassKind.WALKER,
-        kitti=("Pedestrian", "Person", "Person_sitting"),
-        labels=(
-            *("human.pedestrian.adult", "human.pedestrian.child", "human.pedestrian.construction_worker"),
-            *("human.pedestrian.police_officer", "PEDESTRIAN", "OFFICIAL_SIGNALER", "pedestrian"),
-            *("Pedestrian with Object", "TYPE_PEDESTRIAN"),
-        ),
-        semantic_kitti=(30, 254),
-        autoware=7,
-        max_length_m=1.1,
-        max_width_m=1.1,
-        point_change=0.16,
-        colour="#d9480f",
-        usual_m=(0.65, 0.68, 1.75),
-        spread_m=(0.2, 0.12, 0.1),
-    ),
-    ClassSpec(
-        name="cyclist",
-        kind=ClassKind.RIDER,
-        kitti=("Cyclist",),
-        labels=(
-            *("vehicle.bicycle", "vehicle.motorcycle", "BICYCLIST", "MOTORCYCLIST", "WHEELED_RIDER", "cyclist"),
-            *("Rider", "Motorcycle", "TYPE_CYCLIST"),
-        ),
-        semantic_kitti=(31, 253),
-        autoware=6,
-        max_length_m=2.2,
-        max_width_m=1.1,
-        point_change=0.22,
-        colour="#2b8a3e",
-        usual_m=(1.8, 0.65, 1.75),
-        spread_m=(0.25, 0.12, 0.1),
-    ),
-)
-"""The classes of modt in the order of their values."""
+def _spec(row: Mapping[str, Any]) -> ClassSpec:
+    """Class of a row of JSON. The keys are the attributes of `ClassSpec`; `kitti` defaults to `labels`."""
+    plain: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
+    return ClassSpec(**{"kitti": plain.get("labels"), **plain, "kind": ClassKind(row["kind"])})
+
+
+SHIPPED = tuple(map(_spec, json.loads(Path(__file__).with_suffix(".json").read_bytes())))
+"""The classes of modt in the order of their values. Background has the size of a car: it may be one, unrecognised."""
 N_SHIPPED = len(SHIPPED)
 
 
@@ -192,9 +135,7 @@ def _row(row: Any, taken: set[str], place: str) -> ClassSpec:
     for key, value in row.items():
         if key != "kind" and (value == [] or not _fits(str(form[key].type), value)):
             raise MisuseError(place, f"{key} {value!r} is no {form[key].type}", "correct it")
-    plain: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
-    plain |= {"kind": ClassKind(row["kind"]), "kitti": plain["labels"]}
-    return ClassSpec(**plain)
+    return _spec(row)
 
 
 def _fits(kind: str, value: Any) -> bool:
