@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,11 @@ def open_sensor(text: str, cores: frozenset[int] | None = None) -> LiveStream:
     """
     stream: LiveStream = open_address(text, SENSORS, cores)
     return stream
+
+
+def open_sinks(texts: Iterable[str]) -> dict[str, Sink]:
+    """Sinks by their addresses, each opened once; raises as `open_sink` does."""
+    return {text: open_sink(text) for text in dict.fromkeys(texts)}
 
 
 def open_sink(text: str) -> Sink:

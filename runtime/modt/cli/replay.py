@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from modt import host
 from modt.cli import options
 from modt.cli.command import INTERRUPTED
 
 if TYPE_CHECKING:
+    from modt.app.loop import Loop
     from modt.sinks.run_directory import RunDirectory
 
 
@@ -52,16 +54,15 @@ def run(arguments: argparse.Namespace) -> int:
     """
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.app.account import PARTLY, closing_lines
     from modt.app.build import replay
     from modt.app.inputs import Request
     from modt.app.systemd import notifier_of
     from modt.cli.progress import bar
     from modt.reporting.summary import summary_text
-    from modt.schemes import open_sink
+    from modt.schemes import open_sinks
 
     notifier = notifier_of(os.environ)
-    sinks = {address: open_sink(address) for address in dict.fromkeys(arguments.sink)}
+    sinks = open_sinks(arguments.sink)
     loop = replay(Request.of(arguments), sinks, arguments.out, pinned, ["modt", *sys.argv[1:]])
     info = loop.stages.info
     shown = not arguments.quiet
@@ -72,15 +73,26 @@ def run(arguments: argparse.Namespace) -> int:
     if shown:
         print(summary_text(summary))
         print(_place(loop.recording.directory))
-    for line in closing_lines(summary["read"]):
-        print(f"modt: {line}", file=sys.stderr)
+    return _ended(loop, summary)
+
+
+def _ended(loop: Loop, summary: Mapping[str, Any]) -> int:
+    """Say what was left out and what has ended the replay; returns the exit status."""
+    from modt.app.account import PARTLY, closing_lines
+
+    _say(closing_lines(summary["read"]))
     signal = loop.stop.signal
     if signal:
         whole = f"{summary['frames']} frames: {loop.recording.directory.path} is whole"
-        print(f"modt: stopped by {signal} after {whole}", file=sys.stderr)
+        _say([f"stopped by {signal} after {whole}"])
     if signal == "SIGINT":
         return INTERRUPTED
     return PARTLY if summary["read"]["left_out"] else 0
+
+
+def _say(lines: Sequence[str]) -> None:
+    for line in lines:
+        print(f"modt: {line}", file=sys.stderr)
 
 
 def _place(directory: RunDirectory) -> str:

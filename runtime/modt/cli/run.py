@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from modt.cli import options
 from modt.cli.command import INTERRUPTED
 
 if TYPE_CHECKING:
+    from modt.app.loop import Service
     from modt.app.status import Status
     from modt.sinks.recording import RecordingHealth
 
@@ -53,11 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.app.account import closing_lines
-    from modt.app.build import service
-    from modt.app.inputs import Request, live_source
     from modt.app.log_output import LogOutput
     from modt.app.systemd import notifier_of
-    from modt.schemes import open_sink
 
     notifier = notifier_of(os.environ)
     with host.threads_on(cores):
@@ -68,18 +67,28 @@ def run(arguments: argparse.Namespace) -> int:
             log.warning("%s", refusal)
         # The receiver and the writers start their threads here, on the cores that the loop leaves free.
         with host.threads_on(cores):
-            source, path = live_source(arguments.source, cores)
-            addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
-            sinks = {address: open_sink(address) for address in dict.fromkeys(addresses)}
-            request = replace(Request.of(arguments), path=path)
-            command = ["modt", *sys.argv[1:]]
-            loop = service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, refusals)
+            loop = _service(arguments, cores, pinned, refusals)
         loop.writers["log"] = output.writer
         status = loop.run(notifier)["status"]
         for line in closing_lines(loop.summary["read"]):
             output.say(f"modt: {line}")
         output.say(f"modt: {_last_words(status, loop.recording.health(), arguments.out)}")
     return INTERRUPTED if loop.stop.signal == "SIGINT" else 0
+
+
+def _service(
+    arguments: argparse.Namespace, cores: frozenset[int] | None, pinned: int | None, refusals: Sequence[str]
+) -> Service:
+    """The service that was asked for; its receiver runs on `cores`."""
+    from modt.app.build import service
+    from modt.app.inputs import Request, live_source
+    from modt.schemes import open_sinks
+
+    source, path = live_source(arguments.source, cores)
+    sinks = open_sinks([*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])])
+    request = replace(Request.of(arguments), path=path)
+    command = ["modt", *sys.argv[1:]]
+    return service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, refusals)
 
 
 def _last_words(status: Status, recording: RecordingHealth, out: Path) -> str:

@@ -179,12 +179,10 @@ def _table(cdr: CdrReader, height: int, width: int, kinds: dict[str, tuple[str, 
     shape = (height, width)
     steps = (row_step, point_step)
     rows = _rows(data, kinds, shape, steps, big=big)
-    if _sensible(rows):
-        return Table(rows, corrected)
-    swapped = _rows(data, kinds, shape, steps, big=not big)
-    if not _sensible(swapped):
-        return Table(rows, corrected)
-    return Table(swapped, "; ".join(filter(None, [corrected, f"is_bigendian is {str(big).lower()}, which is wrong"])))
+    if not _sensible(rows) and _sensible(swapped := _rows(data, kinds, shape, steps, big=not big)):
+        rows = swapped
+        corrected = "; ".join(filter(None, [corrected, f"is_bigendian is {str(big).lower()}, which is wrong"]))
+    return Table(rows, corrected)
 
 
 def _rows(
@@ -329,9 +327,14 @@ def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None
     if residual > MAX_RESIDUAL:
         return None, residual
     # The middle of what the head has swept by the time of the last point, which is a whole turn or less.
-    swept = (float(since_s[inside].max()) / 2 - offset_s) / slope
+    middle_s = float(since_s[inside].max()) / 2
+    return _turned(way, begin_rad, (middle_s - offset_s) / slope, slope, offset_s), residual
+
+
+def _turned(way: float, begin_rad: float, swept: float, slope: float, offset_s: float) -> Turn:
+    """Turn of a head that has swept an angle [rad] from its begin to its middle, at a time of `slope` a radian."""
     mid_rad = float(np.angle(np.exp(1j * (begin_rad - way * swept))))
     if abs(mid_rad) < AHEAD_RAD:
         swept += way * mid_rad
         mid_rad = 0.0
-    return Turn(way * 2 * np.pi * slope, mid_rad, 0.0, float(offset_s + slope * swept)), residual
+    return Turn(way * 2 * np.pi * slope, mid_rad, 0.0, float(offset_s + slope * swept))

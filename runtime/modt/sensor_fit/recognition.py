@@ -93,9 +93,7 @@ class Recognition:
 def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     """Compare (N, 4) points of a sweep with a profile; a sweep of few points fits every profile."""
     points = points[(points[:, 0] != 0) | (points[:, 1] != 0)]
-    pattern = find_beams([points], COARSE_ORIGINS_M)
-    if pattern is not None and pattern.contrast < CLEAR_CONTRAST:
-        pattern = _untwisted_pattern(points) or pattern
+    pattern = _pattern(points)
     if pattern is None:
         return Recognition((), None, config)
     expected = config.sensor
@@ -119,6 +117,14 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     nearest = nearest_profile(found, tangent) if of_sensor else None
     recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg, not of_sensor)
     return replace(recognition, fitted=recognition.mounted(fitted))
+
+
+def _pattern(points: Float32) -> BeamPattern | None:
+    """Beams of (N, 4) points; None if they are too few."""
+    pattern = find_beams([points], COARSE_ORIGINS_M)
+    if pattern is not None and pattern.contrast < CLEAR_CONTRAST:
+        return _untwisted_pattern(points) or pattern
+    return pattern
 
 
 def _untwisted_pattern(points: Float32) -> BeamPattern | None:

@@ -66,12 +66,16 @@ class PacketStream:
             flaws = [f"{missing} packets are missing"] if missing else []
             if frame := stamps.frame(sweep, arrived_s, index, path, self.faults, flaws):
                 yield frame
-        if index + 1 != self.info.end:  # the file was read to its end
-            self.reading.messages = self.reception.messages
-            for reason, count in self.reception.refused.items():
-                self.faults.report(index + 1, path, f"{count} packets refused: {reason}", skipped=False)
-            for flaw in self.capture.flaws:
-                self.faults.leave_out(index + 1, path, flaw)
+        if index + 1 != self.info.end:
+            self._account(index + 1, path)
+
+    def _account(self, n_sweeps: int, path: str) -> None:
+        """Report what was refused and what is damaged, once the file is read to its end."""
+        self.reading.messages = self.reception.messages
+        for reason, count in self.reception.refused.items():
+            self.faults.report(n_sweeps, path, f"{count} packets refused: {reason}", skipped=False)
+        for flaw in self.capture.flaws:
+            self.faults.leave_out(n_sweeps, path, flaw)
 
     def between(self, first: int, last: int | None) -> Self:
         """Frames with first <= index < last; the file is read up to the last one."""

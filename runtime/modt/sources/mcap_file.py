@@ -220,17 +220,16 @@ class McapFile(BagFile):
             return before, True
         n_flaws = len(self.flaws)
         data, whole = self._unpacked(piece)
-        resume = self._indexed(piece) if not whole else {}
+        indexed: Iterator[int] | None = None  # offsets at which reading can go on behind a damage
         found = {}
         at = 0
         while at < len(data):
             try:
                 record, end = record_at(data, at)
             except Exception:  # its bytes may be anything
-                if whole:
-                    whole = False
-                    resume = self._indexed(piece)
-                at = min((place for place in resume if place > at), default=len(data))
+                whole = False
+                indexed = indexed or iter(self._indexed(piece))
+                at = next((place for place in indexed if place > at), len(data))
                 continue
             if not isinstance(record, Message):
                 contents.register(record)

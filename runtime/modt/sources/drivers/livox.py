@@ -7,12 +7,13 @@ from struct import Struct
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.sources.drivers import Driver
 from modt.sources.packets.device_clock import DeviceClock
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.stream import Sweep
-from modt.types import Float32
+from modt.types import Float32, Float64
 
 HEADER = Struct("<BHHH3xB13x4xQ")
 """Version, number of bytes, time from the first to the last point [0.1 us], number of points, data type, time of the
@@ -191,17 +192,18 @@ def _points(payload: bytes) -> Float32:
         best = best[sure]
         angles = angles[sure]
     points = np.empty((len(best), 4), np.float32)
-    if "depth" in names:
-        zenith = np.deg2rad(angles["zenith"] * 0.01)
-        azimuth = np.deg2rad(angles["azimuth"] * 0.01)
-        across = best["depth"] * np.sin(zenith)
-        columns = [across * np.cos(azimuth), across * np.sin(azimuth), best["depth"] * np.cos(zenith)]
-    else:
-        columns = [best[axis] for axis in _AXES]
-    for i, column in enumerate(columns):
+    for i, column in enumerate(_xyz(best, angles) if "depth" in names else (best[axis] for axis in _AXES)):
         points[:, i] = column * unit_m
     points[:, 3] = best["reflectance"] / 255
     return points[points[:, :3].any(axis=1)]
+
+
+def _xyz(best: NDArray[Any], angles: NDArray[Any]) -> tuple[Float64, Float64, Float64]:
+    """Coordinates of returns by their depth and angles."""
+    zenith = np.deg2rad(angles["zenith"] * 0.01)
+    azimuth = np.deg2rad(angles["azimuth"] * 0.01)
+    across = best["depth"] * np.sin(zenith)
+    return across * np.cos(azimuth), across * np.sin(azimuth), best["depth"] * np.cos(zenith)
 
 
 DRIVER = Driver(

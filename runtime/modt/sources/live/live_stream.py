@@ -105,8 +105,7 @@ class LiveStream:
         self._error: Exception | None = None
         self._ended = False
         self._silent = False
-        self._last_s = clock()  # arrival of the latest sweep
-        self._looked_s = self._last_s  # when `take` last looked for one
+        self._await()
         self.period_s = info.period_s
         self._stamp_s = math.inf  # of the last sweep
         self._index = 0
@@ -122,9 +121,13 @@ class LiveStream:
 
     def start(self) -> None:
         """Start receiving."""
-        self._last_s = self._clock()
-        self._looked_s = self._last_s
+        self._await()
         self._thread.start()
+
+    def _await(self) -> None:
+        """Begin to wait for the first sweep."""
+        self._last_s = self._clock()  # arrival of the latest sweep
+        self._looked_s = self._last_s  # when `take` last looked for one
 
     def take(self, timeout_s: float) -> Received | None:
         """Wait at most `timeout_s` for the newest sweep that was not taken; None without one.
