@@ -11,6 +11,7 @@ tried by `tools.faults` and `tools.deploy.soak`.
 
 from __future__ import annotations
 
+import argparse
 import logging
 import sys
 from collections import Counter
@@ -124,10 +125,16 @@ class Episode:
 def drawn(rng: np.random.Generator) -> tuple[Episode, Episode]:
     """Two faults; the second one begins while the first one lasts, and ends after it."""
     one, other = rng.choice(len(CHANGES), 2, replace=False)
+    first, second = overlapping(rng)
+    return Episode(CHANGES[one], *first), Episode(CHANGES[other], *second)
+
+
+def overlapping(rng: np.random.Generator) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Begin and end of two faults; the second one begins while the first one lasts, and ends after it."""
     lengths = rng.integers(*LASTING, 2)
     begin = FIRST + int(rng.integers(1, lengths[0]))
-    end = max(begin + int(lengths[1]), FIRST + int(lengths[0]))
-    return Episode(CHANGES[one], FIRST, FIRST + int(lengths[0])), Episode(CHANGES[other], begin, end)
+    end = FIRST + int(lengths[0])
+    return (FIRST, end), (begin, max(begin + int(lengths[1]), end))
 
 
 def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode, Episode]) -> list[TrustLevel]:
@@ -174,12 +181,17 @@ def stuck(levels: list[TrustLevel], pair: tuple[Episode, Episode], period_s: flo
     return [f"not good in {late} of {len(after)} frames after both"] if late else []
 
 
-def main() -> None:
-    options = parser(__doc__)
+def pair_options(description: str | None) -> argparse.ArgumentParser:
+    """Options of a tool that tries pairs."""
+    options = parser(description)
     options.add_argument("--pairs", type=int, default=1000, help="number of pairs (default: %(default)s)")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--scene", default="street", help="simulated scene (default: %(default)s)")
-    given = options.parse_args()
+    return options
+
+
+def main() -> None:
+    given = pair_options(__doc__).parse_args()
     logging.disable(logging.CRITICAL)
     stream = SyntheticStream(given.scene, SENSOR, SECONDS, given.seed)
     frames = list(stream)

@@ -33,8 +33,7 @@ from modt.types import Frame
 from modt_simulation.synthetic_stream import SyntheticStream
 from tools.deploy.faults import FAULTS
 from tools.deploy.sender import Faulty
-from tools.fault_pairs import CHANGES, FIRST, LASTING, SECONDS, SENSOR, Change, moved_by
-from tools.options import parser
+from tools.fault_pairs import CHANGES, SECONDS, SENSOR, Change, moved_by, overlapping, pair_options
 from tools.send.ideal_packets import packets_of
 from tools.send.loops import VelodyneStamps
 
@@ -105,10 +104,8 @@ def drawn(rng: np.random.Generator) -> tuple[LiveEpisode, LiveEpisode]:
         one, other = (LIVE_FAULTS[k] for k in rng.choice(len(LIVE_FAULTS), 2, replace=False))
         if not (one.name in NETWORK and other.name in NETWORK):
             break
-    lengths = rng.integers(*LASTING, 2)
-    begin = FIRST + int(rng.integers(1, lengths[0]))
-    end = max(begin + int(lengths[1]), FIRST + int(lengths[0]))
-    return LiveEpisode(one, FIRST, FIRST + int(lengths[0])), LiveEpisode(other, begin, end)
+    first, second = overlapping(rng)
+    return LiveEpisode(one, *first), LiveEpisode(other, *second)
 
 
 class Sender:
@@ -323,10 +320,7 @@ def _tried_number(frames: Sequence[Frame], seed: int, number: int) -> list[str] 
 
 
 def main() -> None:
-    options = parser(__doc__)
-    options.add_argument("--pairs", type=int, default=1000, help="number of pairs (default: %(default)s)")
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--scene", default="street", help="simulated scene (default: %(default)s)")
+    options = pair_options(__doc__)
     options.add_argument("--parallel", type=int, default=1, help="runs at once (default: %(default)s)")
     options.add_argument("--out", type=Path, default=Path("runs/pairs.jsonl"), help="results, one line a pair")
     given = options.parse_args()

@@ -15,15 +15,18 @@ not finite. Every twentieth is segmented by both kernels.
 
 from __future__ import annotations
 
+import argparse
 import logging
 import math
 import sys
 import time
 import warnings
+from typing import Any
 
 from tools.options import parser
 
 BLOCK = 250
+LIVE_BLOCK = 20
 """Sequences between two lines of progress."""
 
 
@@ -39,24 +42,31 @@ def main() -> None:
     if given.sweeps:
         _feed_sweeps(given.sweeps, given.seed)
         return
-    from hypothesis import HealthCheck, Phase, seed, settings
-    from hypothesis.stateful import run_state_machine_as_test
-
+    machine: type[Any]
     if given.live is not None:
-        from tests.sequences.live_machine import SOURCES
-        from tests.sequences.live_machine import LiveSequences as Sequences
+        from tests.sequences.live_machine import SOURCES, LiveSequences
 
         if unknown := set(given.live) - set(SOURCES):
             options.error(f"no source {', '.join(sorted(unknown))}; there are {', '.join(SOURCES)}")
         SOURCES[:] = given.live or SOURCES
+        machine = LiveSequences
     else:
-        from tests.sequences.machine import Sequences  # type: ignore[assignment]
+        from tests.sequences.machine import Sequences
+
+        machine = Sequences
 
     warnings.simplefilter("error")
     logging.lastResort = None
     logging.disable(logging.CRITICAL if given.live is None else logging.NOTSET)
+    _feed(machine, given, BLOCK if given.live is None else LIVE_BLOCK)
+
+
+def _feed(machine: type[Any], given: argparse.Namespace, block: int) -> None:
+    """Run the sequences of a state machine, block by block."""
+    from hypothesis import HealthCheck, Phase, seed, settings
+    from hypothesis.stateful import run_state_machine_as_test
+
     began_s = time.monotonic()
-    block = BLOCK if given.live is None else 20
     for done in range(0, given.n, block):
         if time.process_time() > given.seconds:
             break
@@ -68,9 +78,9 @@ def main() -> None:
             phases=(Phase.generate, Phase.shrink),
             suppress_health_check=list(HealthCheck),
         )
-        machine = seed(1_000_000 * given.seed + done)(type("Sequences", (Sequences,), {}))
+        seeded = seed(1_000_000 * given.seed + done)(type("Sequences", (machine,), {}))
         try:
-            run_state_machine_as_test(machine, settings=chosen)
+            run_state_machine_as_test(seeded, settings=chosen)
         except Exception as broken:
             print("\n".join(["broken:", *getattr(broken, "__notes__", []), f"{type(broken).__name__}: {broken}"]))
             sys.exit(1)

@@ -14,6 +14,7 @@ and open descriptors stay flat.
 
 from __future__ import annotations
 
+import argparse
 import logging
 import os
 import resource
@@ -254,6 +255,15 @@ def main(arguments: list[str] | None = None) -> int:
     options.add_argument("--fifo", action="store_true", help="with the priority of a service")
     given = options.parse_args(arguments)
     logging.basicConfig(level=logging.ERROR, format="%(message)s", stream=sys.stderr)
+    wrong = soak(given)
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"peak memory {peak_mb:.0f} MB")
+    print("verdict: " + ("; ".join(wrong) or "good"))
+    return int(bool(wrong))
+
+
+def soak(given: argparse.Namespace) -> list[str]:
+    """Run the service under faults and print the figures; returns the broken promises."""
     core = host.last_core()
     others = host.other_cores(core)
     host.pin_to_core(core)
@@ -278,11 +288,7 @@ def main(arguments: list[str] | None = None) -> int:
         sender.kill()
         sender.wait()
     reader.ask()
-    wrong = judge(log, reader.episodes, service)
-    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"peak memory {peak_mb:.0f} MB")
-    print("verdict: " + ("; ".join(wrong) or "good"))
-    return int(bool(wrong))
+    return judge(log, reader.episodes, service)
 
 
 if __name__ == "__main__":

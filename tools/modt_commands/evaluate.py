@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from modt.cli.options import add_examples
 from modt.cli.progress import bar
@@ -110,9 +110,6 @@ def judge_runs(arguments: argparse.Namespace) -> None:
         MisuseError: a run or its labels cannot be used, or do not belong together.
         ModtError: the page cannot be written.
     """
-    import json
-    from dataclasses import asdict
-
     from modt.sources.nuscenes import read_scene, tables_of
     from modt_evaluation.engine import Engine
     from modt_evaluation.evaluation import SCHEMA, evaluation
@@ -145,14 +142,21 @@ def judge_runs(arguments: argparse.Namespace) -> None:
         from modt_viewer.evaluation_page import evaluation_page
 
         save(arguments.html, evaluation_page(sensors))
-    if arguments.json:
-        found = {"schema": SCHEMA, "sensors": {name: asdict(scores) for name, scores in sensors.items()}}
-        if benchmark:
-            found["nuscenes"] = {name: asdict(score) for name, score in benchmark.items()}
-        text = json.dumps(found)
-        print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))
-    else:
-        print(report(sensors, benchmark))
+    print(_json(sensors, benchmark) if arguments.json else report(sensors, benchmark))
+
+
+def _json(sensors: Mapping[str, Evaluation], benchmark: Mapping[str, Any]) -> str:
+    """The scores as JSON."""
+    import json
+    from dataclasses import asdict
+
+    from modt_evaluation.evaluation import SCHEMA
+
+    found = {"schema": SCHEMA, "sensors": {name: asdict(scores) for name, scores in sensors.items()}}
+    if benchmark:
+        found["nuscenes"] = {name: asdict(score) for name, score in benchmark.items()}
+    text = json.dumps(found)
+    return json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1)
 
 
 def _judged(arguments: argparse.Namespace, pairs: Sequence[tuple[Path, Path]], drive: int) -> tuple[str, DriveRows]:

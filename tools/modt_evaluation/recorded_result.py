@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,28 @@ SEMANTIC = np.array([(*spec.semantic_kitti, 0)[0] for spec in CLASSES])
 NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
 
 
+def _symmetric(row: dict[str, Any]) -> list[list[float]]:
+    xx, xy, yy = row.get("velocity_covariance", [0.0] * 3)
+    return [[xx, xy], [xy, yy]]
+
+
+_COLUMNS: dict[str, Callable[[dict[str, Any]], Any]] = {
+    **{name: itemgetter(name) for name in ("id", "final", "points", "age", "missed", "posterior")},
+    "key_points": itemgetter("viewed"),
+    "object_class": lambda row: CLASS_NAMES.index(row["class"]),
+    "motion_evidence": lambda row: row.get("witness", [0.0] * len(CLASS_NAMES)),
+    "size_m": lambda row: row.get("size", [0.0] * 3),
+    "motion": lambda row: MOTION_NAMES.index(row.get("motion", "unknown")),
+    "moving_probability": lambda row: row.get("moving", 0.5),
+    "velocity": lambda row: row.get("velocity", [0.0] * 2),
+    "velocity_covariance": _symmetric,
+    "heading_known": lambda row: row.get("heading_known", False),
+    "proposal": lambda row: NONE if row["proposal"] is None else row["proposal"],
+    "x": lambda row: [row["world"][key] for key in WORLD_KEYS],
+}
+"""Entry of each column that a recorded track has; runs of earlier versions lack those with a default."""
+
+
 @np.errstate(over="raise", invalid="raise")
 def recorded_result(record: dict[str, Any]) -> FrameResult:
     """The result that a line of tracks.jsonl records.
@@ -34,32 +58,18 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     T_world_sensor = recorded_pose(record)
     names = tuple(sorted({row["state"] for row in rows}))
     tracks = Tracks.blank(len(rows))
-    same = {"id": tracks.id, "viewed": tracks.key_points, "final": tracks.final, "points": tracks.points}
-    same |= {"age": tracks.age, "missed": tracks.missed}
-    for key, column in same.items():
-        column[:] = [row[key] for row in rows]
     tracks.state[:] = [names.index(row["state"]) for row in rows]
-    tracks.object_class[:] = [CLASS_NAMES.index(row["class"]) for row in rows]
-    tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
-    silent = [0.0] * len(CLASS_NAMES)  # runs of earlier versions have no "witness"
-    tracks.motion_evidence[:] = np.array([row.get("witness", silent) for row in rows]).reshape(
-        tracks.motion_evidence.shape
-    )
-    tracks.size_m[:] = np.array([row.get("size", [0.0] * 3) for row in rows]).reshape(tracks.size_m.shape)
-    tracks.motion[:] = [MOTION_NAMES.index(row.get("motion", "unknown")) for row in rows]
-    tracks.moving_probability[:] = [row.get("moving", 0.5) for row in rows]
-    tracks.velocity[:] = np.array([row.get("velocity", [0.0] * 2) for row in rows]).reshape(-1, 2)
-    tracks.heading_known[:] = [row.get("heading_known", False) for row in rows]
-    covariance = np.array([row.get("velocity_covariance", [0.0] * 3) for row in rows]).reshape(-1, 3)
-    tracks.velocity_covariance[:] = covariance[:, [[0, 1], [1, 2]]]
-    tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]
+    for name, entry in _COLUMNS.items():
+        column = getattr(tracks, name)
+        entries = np.array([entry(row) for row in rows])
+        column[:] = entries if column.ndim == 1 else entries.reshape(column.shape)
     if (tracks.proposal < NONE).any():
         raise ValueError("a track's proposal is none of the frame's")
-    tracks.x[:] = _table([row["world"] for row in rows], WORLD_KEYS)
     seen = np.flatnonzero(tracks.proposal != NONE)
-    whole = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
+    in_view = [row for row in rows if row["proposal"] is not None]
+    whole = _boxes([row["box"] for row in in_view])
     tracks.whole_box[seen] = transform_boxes(T_world_sensor, whole)
-    boxes = _table([seen_box(row) for row in rows if row["proposal"] is not None], BOX_KEYS)
+    boxes = _boxes([seen_box(row) for row in in_view])
     tracks.box[seen] = transform_boxes(T_world_sensor, boxes)
     proposals = _proposals(int(record["proposals"]))
     proposals.box[tracks.proposal[seen]] = boxes
@@ -75,8 +85,9 @@ def seen_box(row: dict[str, Any]) -> dict[str, float]:
     return seen
 
 
-def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:
-    return np.array([[row[key] for key in keys] for row in rows], np.float64).reshape(-1, len(keys))
+def _boxes(rows: list[dict[str, float]]) -> Float64:
+    """(R, 7) recorded boxes."""
+    return np.array([[row[key] for key in BOX_KEYS] for row in rows], np.float64).reshape(-1, len(BOX_KEYS))
 
 
 def _proposals(n: int) -> Proposals:
