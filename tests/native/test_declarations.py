@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,8 +23,8 @@ typedef struct {
     i32 n;
 } Shapes;
 EXPORT void modt_forward(const Shapes *s);
-EXPORT i64 modt_fit(const Shapes *s, const double (*position)[2], const u4 *points, i64 n, float *fits, i64 count[2],
-                    void *memory)
+EXPORT i64 modt_fit(const Shapes *s, const double (*position)[2], const u4 *points, i64 n, double (*fits)[2],
+                    float *best, i64 count[2], void *memory)
 {
 }
 """
@@ -32,11 +34,8 @@ EXPORT i64 modt_fit(const Shapes *s, const double (*position)[2], const u4 *poin
 def _source(tmp_path, monkeypatch):
     (tmp_path / "shapes.c").write_text(SOURCE)
     monkeypatch.setattr(build, "FOLDER", tmp_path)
-    for cached in (declarations._code, declarations.structure):
-        cached.cache_clear()
-    yield
-    for cached in (declarations._code, declarations.structure):
-        cached.cache_clear()
+    for name in ("_code", "structure"):  # with caches of their own
+        monkeypatch.setattr(declarations, name, cache(getattr(declarations, name).__wrapped__))
 
 
 @pytest.mark.usefixtures("_source")
@@ -56,12 +55,12 @@ def test_members_have_the_types_and_sizes_of_the_declaration():
 
 @pytest.mark.usefixtures("_source")
 def test_functions_have_the_types_of_their_definition():
-    ((name, (result, arguments)),) = declarations.signatures("shapes.c").items()
-    shapes, position, points, n, *written = arguments
-    assert (name, result, n) == ("modt_fit", ctypes.c_int64, ctypes.c_int64)
+    library = SimpleNamespace(modt_fit=SimpleNamespace())
+    declarations.declare(library, "shapes.c")
+    shapes, position, points, n, fits, *written = library.modt_fit.argtypes
+    assert library.modt_fit.restype is n is ctypes.c_int64
     assert shapes is declarations.structure("Shapes")
-    assert isinstance(position, ArrayArgument)
-    assert isinstance(points, ArrayArgument)
+    assert {type(table) for table in (position, points, fits)} == {ArrayArgument}
     position.from_param(np.zeros((1, 2)))
     points.from_param(np.zeros((1, 4), np.float32))
     assert written == [OutputArgument] * 3

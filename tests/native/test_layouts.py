@@ -3,74 +3,21 @@
 from __future__ import annotations
 
 import re
-from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import modt
-from modt.native import build
-from modt.native.library import Array, Layout, Number, Rows
+from modt.native.library import Layout, Member
 
-PACKAGE = Path(modt.__file__).parent
-C_TYPES = {
-    "double": np.float64,
-    "float": np.float32,
-    "i32": np.int32,
-    "int32_t": np.int32,
-    "i64": np.int64,
-    "int64_t": np.int64,
-    "int8_t": np.int8,
-    "uint8_t": np.uint8,
-}
+NUMBER = Member("number", np.dtype(np.int64))
 SHAPES = Layout(
     "Shapes",
-    kdop=Array(np.float64, 8, "n"),
-    top=Array(np.float32, "n"),
-    xy=Rows(np.float32, 2, "k"),
-    pad_m=Number(np.float64),
-    n=Number(np.int64),
+    kdop=Member("array", np.dtype(np.float64), (8, "n")),
+    top=Member("array", np.dtype(np.float32), ("n",)),
+    xy=Member("rows", np.dtype(np.float32), (2, "k")),
+    pad_m=Member("number", np.dtype(np.float64)),
+    n=NUMBER,
 )
-
-
-def declared_layouts() -> dict[str, Layout]:
-    """Layouts of all modules that declare one, by the name of the C structure."""
-    layouts = []
-    for path in PACKAGE.rglob("*.py"):
-        if re.search(r"^\w+ = Layout\(", path.read_text(), re.MULTILINE):
-            module = import_module(".".join(("modt", *path.relative_to(PACKAGE).with_suffix("").parts)))
-            layouts += [value for value in vars(module).values() if isinstance(value, Layout)]
-    return {layout.name: layout for layout in layouts}
-
-
-def c_structures() -> dict[str, list[tuple[str, str, str, tuple[int, ...]]]]:
-    """Members of the structures of the C sources: name, kind, C type and the sizes in brackets."""
-    source = "".join(path.read_text() for path in sorted(build.FOLDER.glob("*.[ch]")))
-    source = re.sub(r"/\*.*?\*/| SHAPE\(.*?\)", "", source, flags=re.DOTALL)
-    structures = {}
-    for body, name in re.findall(r"typedef struct \{(.*?)\} (\w+);", source, re.DOTALL):
-        members = structures[name] = []
-        for declaration in body.split(";")[:-1]:
-            c_type, declarators = re.fullmatch(r"\s*(?:const )?(\w+) (.*)", declaration, re.DOTALL).groups()
-            for declarator in declarators.split(","):
-                star, name_, sizes = re.fullmatch(r"\s*(\(?\*?)(\w+)\)?((?:\[\w+\])*)\s*", declarator).groups()
-                kind = "number" if not star else "rows" if star == "*" and sizes else "array"
-                members.append((name_, kind, c_type, tuple(map(int, re.findall(r"\d+", sizes)))))
-    return structures
-
-
-def test_layouts_are_those_of_the_c_sources():
-    structures = c_structures()
-    for name, layout in declared_layouts().items():
-        given = structures[name]
-        assert [member[0] for member in given] == list(layout.members), name
-        for member_name, kind, c_type, sizes in given:
-            member = layout.members[member_name]
-            dtype = np.dtype(np.uint8) if member.dtype == np.bool_ else member.dtype
-            assert (kind, np.dtype(C_TYPES[c_type])) == (member.kind, dtype), f"{name}.{member_name}"
-            known = member.shape[:1] if kind == "rows" else member.shape[1:]
-            assert not sizes or sizes == known, f"{name}.{member_name}"
 
 
 def values(n=3, k=4):
@@ -118,12 +65,14 @@ def test_a_missing_member_and_another_structure_are_refused():
     del given["top"]
     with pytest.raises(TypeError, match=r"Shapes\.top is missing"):
         SHAPES(**given)
-    other = Layout("Other", n=Number(np.int64))
+    other = Layout("Other", n=NUMBER)
     with pytest.raises(TypeError, match="a structure Shapes is needed, not Other"):
         SHAPES.from_param(other(n=1))
 
 
 def test_room_has_the_declared_sizes():
-    layout = Layout("Room", cost=Array(np.float64, "rows", 2), next=Array(np.int64, "rows"), rows=Number(np.int64))
-    cost, following = layout.allocate(rows=3).arrays
-    assert (cost.shape, cost.dtype, following.shape, following.dtype) == ((3, 2), np.float64, (3,), np.int64)
+    cost = Member("array", np.dtype(np.float64), ("rows", 2))
+    following = Member("array", np.dtype(np.int64), ("rows",))
+    layout = Layout("Room", cost=cost, next=following, rows=NUMBER)
+    room = layout.allocate(rows=3).arrays
+    assert [(array.shape, array.dtype) for array in room] == [((3, 2), np.float64), ((3,), np.int64)]

@@ -12,15 +12,13 @@ from numpy import float32, float64, int64
 from modt.geometry.kdop import PairWeights, Shapes
 from modt.geometry.kernels import GeometryKernels
 from modt.geometry.tuning import ShapeTuning
-from modt.native.declarations import signatures, structure
-from modt.native.library import declare
+from modt.native.declarations import declare, structure
 from modt.types import Float32, Float64, Int
 
 _TUNING = structure("ShapeTuning")
 _WEIGHTS = structure("PairWeights")
 _SHAPES = structure("Shapes")
 _ASSIGNMENT = structure("Assignment")
-_SIGNATURES = signatures("geometry.c", "groups.c", "assignment.c")
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
 _BLOCK = 16
@@ -37,7 +35,7 @@ class NativeGeometryKernels(GeometryKernels):
 
     def __init__(self, library: ctypes.CDLL, tuning: ShapeTuning = ShapeTuning()) -> None:
         super().__init__(tuning)
-        declare(library, _SIGNATURES)
+        declare(library, "geometry.c", "groups.c", "assignment.c")
         self.library: ctypes.CDLL = library
         self._tuning = _TUNING.of(tuning)
         self._weights = lru_cache(_WEIGHTS.of)

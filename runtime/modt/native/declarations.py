@@ -5,6 +5,7 @@ In a structure that Python fills, `SHAPE(sizes)` follows the arrays of a declara
 
 from __future__ import annotations
 
+import ctypes
 import re
 from functools import cache
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from modt.native import build
-from modt.native.library import ArrayArgument, Layout, Member, OutputArgument, Signatures
+from modt.native.library import ArrayArgument, Layout, Member, OutputArgument
 
 NUMBERS: dict[str, Any] = {
     "double": np.float64,
@@ -49,20 +50,23 @@ def structure(name: str) -> Layout:
     return Layout(name, **members)
 
 
-def signatures(*files: str) -> Signatures:
-    """Types of the result and of the arguments of each function that these files export, by its name."""
-    found = re.findall(r"EXPORT (\w+) (\w+)\(([^{;]*)\)\s*{", "".join(map(_code, files)))
-    return {name: (_number(result), [*map(_argument, given.split(","))]) for result, name, given in found}
+def declare(library: ctypes.CDLL, *files: str) -> None:
+    """Tell the library what the functions that these files export take and return."""
+    for result, name, arguments in re.findall(r"EXPORT (\w+) (\w+)\(([^{;]*)\)\s*{", "".join(map(_code, files))):
+        function = getattr(library, name)
+        function.restype = _number(result)
+        function.argtypes = [*map(_argument, arguments.split(","))]
 
 
 def _argument(declaration: str) -> Any:
-    """Type of an argument. Arrays that a function writes are made for the call, so their type is not checked."""
+    """Type of an argument. The plain arrays that a function writes are made for the call, and not checked."""
     kind = declaration.replace("const ", "").split()[0]
     if "*" not in declaration and "[" not in declaration:
         return _number(kind)
     if kind[0].isupper():
         return structure(kind)
-    return ArrayArgument(NUMBERS[kind]) if "const " in declaration else OutputArgument
+    checked = kind in NUMBERS and ("const " in declaration or "(*" in declaration)
+    return ArrayArgument(NUMBERS[kind]) if checked else OutputArgument
 
 
 def _number(kind: str) -> Any:

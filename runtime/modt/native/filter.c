@@ -286,19 +286,23 @@ EXPORT void modt_combine_motion(const double (*moving)[N_STATE], const double (*
 
 /* Columns of the track table, an entry a track; k-DOPs [m, world], envelope and mean about the position [m]. */
 typedef struct {
-    double (*kdop)[8], (*lagged_kdop)[8], (*envelope)[8], (*mean_kdop)[8], (*box)[7], (*size_m)[3];
-    double (*kdop_position)[2];
-    double *moved_m, *observed_s, *bottom, *top;
-    i64 *proposal, *points;
-    const i64 *hits, *object_class;
-    const uint8_t *final;
+    double (*kdop)[8], (*lagged_kdop)[8], (*envelope)[8], (*mean_kdop)[8] SHAPE(m, 8);
+    double (*box)[7] SHAPE(m, 7);
+    double (*size_m)[3] SHAPE(m, 3);
+    double (*kdop_position)[2] SHAPE(m, 2);
+    double *moved_m, *observed_s, *bottom, *top SHAPE(m);
+    i64 *proposal, *points SHAPE(m);
+    const i64 *hits, *object_class SHAPE(m);
+    const uint8_t *final SHAPE(m);
 } TrackColumns;
 
 /* The n proposals of a frame in the world: kdop is eight rows of n. Since the frame before dt_s have passed, in which
  * a lagged k-DOP moves by the share lag_gain of a displacement. */
 typedef struct {
-    const double *kdop, (*box)[7], *bottom, *top;
-    const i64 *count;
+    const double *kdop SHAPE(8, n);
+    const double (*box)[7] SHAPE(n, 7);
+    const double *bottom, *top SHAPE(n);
+    const i64 *count SHAPE(n);
     i64 n;
     double dt_s, lag_gain;
 } Observations;
@@ -310,7 +314,7 @@ typedef struct {
 
 /* Limits of tracking.extent, by class where they are arrays. */
 typedef struct {
-    const double *max_length_m, *confirmed_growth;
+    const double *max_length_m, *confirmed_growth SHAPE(n_classes);
     i64 n_classes;
     double agreement_m;
 } ExtentLimits;

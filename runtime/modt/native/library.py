@@ -5,29 +5,19 @@ from __future__ import annotations
 import ctypes
 import platform
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from modt.native import build
 
-Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
-"""Types of the result and of the arguments of each function, by its name."""
 _start: Any = (ctypes.c_char * 0).from_buffer
 """Start of a contiguous, writable array: several times faster than what NumPy offers for it."""
-
-
-def declare(library: ctypes.CDLL, signatures: Signatures) -> None:
-    """Tell the library what its functions take and return."""
-    for name, (result, arguments) in signatures.items():
-        function = getattr(library, name)
-        function.restype = result
-        function.argtypes = arguments
 
 
 class ArrayArgument:
@@ -50,10 +40,6 @@ class OutputArgument:
     """An argument that is an array made for the call: result, scratch, or a structure."""
 
     from_param = staticmethod(_start)
-
-
-FLOAT32, FLOAT64, BOOL = map(ArrayArgument, (np.float32, np.float64, np.bool_))
-INT8, INT32, INT64 = map(ArrayArgument, (np.int8, np.int32, np.int64))
 
 
 def address(numbers: Any) -> int:
@@ -112,21 +98,6 @@ class Member:
         return f"{self.dtype} ({', '.join(map(str, self.shape))})" if self.shape else str(self.dtype)
 
 
-def Number(dtype: DTypeLike) -> Member:
-    """A number, as in `i64 n`. If a size of the layout has its name, it is that size."""
-    return Member("number", np.dtype(dtype))
-
-
-def Array(dtype: DTypeLike, *shape: int | str) -> Member:
-    """A pointer to a contiguous array, as in `double *a`, or in `double (*a)[7]` if a row has seven elements."""
-    return Member("array", np.dtype(dtype), shape)
-
-
-def Rows(dtype: DTypeLike, *shape: int | str) -> Member:
-    """A pointer to each row of a contiguous array, as in `float *a[3]`; the number of rows is a constant."""
-    return Member("rows", np.dtype(dtype), shape)
-
-
 def _picker(places: list[int]) -> Callable[[tuple[int, ...]], tuple[int, ...]]:
     """Function that picks the entries at some places of a tuple; a comprehension takes several times as long."""
     if len(places) == 1:
@@ -143,15 +114,6 @@ class Filled(bytes):
 
 class Layout:
     """A structure of the C sources. It fills such structures, and is the type of an argument that points to one.
-
-    The C declaration
-
-        typedef struct {
-            const double *kdop, *top; /* (8, n), (n,) */
-            i64 n;
-        } Shapes;
-
-    is `Layout("Shapes", kdop=Array(np.float64, 8, "n"), top=Array(np.float64, "n"), n=Number(np.int64))`.
 
     Args:
         name: name of the structure in C.

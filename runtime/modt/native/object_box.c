@@ -12,19 +12,27 @@ static const double MIN_RANGE_M2 = 1e-6, UNKNOWN_RAD2 = 1e6;
 
 /* Columns of the track table: those of ObjectBoxes, which are written, and those of the tracker and the decision. */
 typedef struct {
-    double (*whole_box)[7], (*heading)[2], *heading_variance, *axis_evidence, (*known_m)[3], (*centre_offset)[2];
-    uint8_t *heading_known, *estimated;
-    const double (*box)[7], (*x)[4], (*velocity)[2], (*velocity_covariance)[4], *moved_m;
-    const i64 *proposal, *motion, *object_class;
+    double (*whole_box)[7] SHAPE(m, 7);
+    double (*heading)[2], (*centre_offset)[2] SHAPE(m, 2);
+    double (*known_m)[3] SHAPE(m, 3);
+    double *heading_variance, *axis_evidence SHAPE(m);
+    uint8_t *heading_known, *estimated SHAPE(m);
+    const double (*box)[7] SHAPE(m, 7);
+    const double (*x)[4], (*velocity_covariance)[4] SHAPE(m, 4);
+    const double (*velocity)[2] SHAPE(m, 2);
+    const double *moved_m SHAPE(m);
+    const i64 *proposal, *motion, *object_class SHAPE(m);
     i64 m;
 } ObjectBoxColumns;
 
 /* The proposals of a frame [sensor], and the pose of the sensor: rows of the rotation and place [world]. */
 typedef struct {
-    const i64 *offsets;
-    const float *coordinates[3];
-    const double (*box)[7], (*centroid)[3], *ground_z_m; /* infinite where not known */
-    const double (*T_world_sensor)[4];
+    const i64 *offsets SHAPE(n_offsets);
+    const float *coordinates[3] SHAPE(3, n_points);
+    const double (*box)[7] SHAPE(n, 7);
+    const double (*centroid)[3] SHAPE(n, 3);
+    const double *ground_z_m SHAPE(n); /* infinite where not known */
+    const double (*T_world_sensor)[4] SHAPE(4, 4);
     i64 n;
     double forward_x, forward_y;
 } VisibleProposals;
@@ -32,15 +40,16 @@ typedef struct {
 /* Unit vectors of the headings at which rectangles are fitted, and the sides at these: x and y of the headings, then of
  * what lies to the left of them. */
 typedef struct {
-    const double (*heading)[2];
-    const float *sides[2];
+    const double (*heading)[2] SHAPE(n, 2);
+    const float *sides[2] SHAPE(2, n_sides);
     i64 n;
 } FitHeadings;
 
 /* Sizes of the classes, and whether they are people. */
 typedef struct {
-    const double (*usual_m)[3], (*spread_m)[3], (*max_m)[2];
-    const uint8_t *is_person, *is_walker;
+    const double (*usual_m)[3], (*spread_m)[3] SHAPE(n_classes, 3);
+    const double (*max_m)[2] SHAPE(n_classes, 2);
+    const uint8_t *is_person, *is_walker SHAPE(n_classes);
     i64 n_classes;
 } ClassSizes;
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.geometry.tuning import ShapeTuning
-from modt.native.declarations import signatures, structure
-from modt.native.library import Filled, Layout, declare
+from modt.native.declarations import declare, structure
+from modt.native.library import Filled, Layout
 from modt.segmentation.cells import AirOfCells, CellClusterer, Cells, Clusters, ClusterSizes, Members
 from modt.segmentation.grids import FAR_M, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import QUARTERS, GroundEstimator
@@ -41,7 +41,6 @@ VIEW_BOUNDS = structure("ViewBounds")
 STRIP_RULES = structure("StripRules")
 CLUSTERS = structure("Clusters")
 MEMBERS = structure("Members")
-_SIGNATURES = signatures("ground.c", "cells.c", "heads.c", "groups.c")
 
 
 def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
@@ -102,7 +101,7 @@ class NativeKernels(NativeGeometryKernels, Kernels):
 
     def __init__(self, library: ctypes.CDLL, instructions: str, tuning: ShapeTuning = ShapeTuning()) -> None:
         super().__init__(library, tuning)
-        declare(library, _SIGNATURES)
+        declare(library, "ground.c", "cells.c", "heads.c", "groups.c")
         self.name = f"native ({instructions})"
         self._structures: dict[Hashable, Filled] = {}
         self._scratch = np.empty(0, np.uint8)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-from dataclasses import fields
 
 import numpy as np
 
@@ -12,7 +11,8 @@ from modt.class_sizes import IS_PERSON, MAX_SIZE_M
 from modt.classes import N_CLASSES, ObjectClass
 from modt.geometry.kdop import DIRECTIONS
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT64, INT64, Array, Filled, Layout, Number, declare
+from modt.native.declarations import declare, structure
+from modt.native.library import Filled
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import ExtentTuning
@@ -118,45 +118,8 @@ class ExtentUpdate:
         return 1.0 - math.exp(-dt_s / self.tuning.lag_s)
 
 
-_COLUMNS = Layout(
-    "TrackColumns",
-    kdop=Array(np.float64, "m", 8),
-    lagged_kdop=Array(np.float64, "m", 8),
-    envelope=Array(np.float64, "m", 8),
-    mean_kdop=Array(np.float64, "m", 8),
-    box=Array(np.float64, "m", 7),
-    size_m=Array(np.float64, "m", 3),
-    kdop_position=Array(np.float64, "m", 2),
-    moved_m=Array(np.float64, "m"),
-    observed_s=Array(np.float64, "m"),
-    bottom=Array(np.float64, "m"),
-    top=Array(np.float64, "m"),
-    proposal=Array(np.int64, "m"),
-    points=Array(np.int64, "m"),
-    hits=Array(np.int64, "m"),
-    object_class=Array(np.int64, "m"),
-    final=Array(np.bool_, "m"),
-)
-_OBSERVATIONS = Layout(
-    "Observations",
-    kdop=Array(np.float64, 8, "n"),
-    box=Array(np.float64, "n", 7),
-    bottom=Array(np.float64, "n"),
-    top=Array(np.float64, "n"),
-    count=Array(np.int64, "n"),
-    n=Number(np.int64),
-    dt_s=Number(np.float64),
-    lag_gain=Number(np.float64),
-)
-_TUNING = Layout("ExtentTuning", **{field.name: Number(np.float64) for field in fields(ExtentTuning)})
-_LIMITS = Layout(
-    "ExtentLimits",
-    max_length_m=Array(np.float64, "n_classes"),
-    confirmed_growth=Array(np.float64, "n_classes"),
-    n_classes=Number(np.int64),
-    agreement_m=Number(np.float64),
-)
-_ARGUMENTS = (_COLUMNS, _OBSERVATIONS, INT64, INT64, ctypes.c_int64, FLOAT64, FLOAT64, _TUNING, _LIMITS)
+_COLUMNS = structure("TrackColumns")
+_OBSERVATIONS = structure("Observations")
 
 
 class NativeExtentUpdate(ExtentUpdate):
@@ -164,10 +127,10 @@ class NativeExtentUpdate(ExtentUpdate):
 
     def __init__(self, library: ctypes.CDLL, tuning: ExtentTuning, agreement_m: float) -> None:
         super().__init__(tuning, agreement_m)
-        declare(library, {"modt_update_extent": (None, _ARGUMENTS)})
+        declare(library, "filter.c")
         self._library = library
-        self._tuning = _TUNING.of(tuning)
-        self._limits = _LIMITS.of(self, max_length_m=MAX_LENGTH_M, n_classes=N_CLASSES)
+        self._tuning = structure("ExtentTuning").of(tuning)
+        self._limits = structure("ExtentLimits").of(self, max_length_m=MAX_LENGTH_M, n_classes=N_CLASSES)
         # Filled once a table: it is the same from the births of one frame to those of the next.
         self._table: TrackTable | None = None
         self._columns: Filled | None = None

@@ -15,7 +15,7 @@ import numpy as np
 
 from modt.geometry import wrap
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT64, INT64, OutputArgument, Signatures, declare
+from modt.native.declarations import declare
 from modt.tracking.tuning import FilterTuning
 from modt.types import Float64, Int
 
@@ -186,23 +186,12 @@ def _heading(x: Float64, speed_variance: Float64, z: Float64) -> Float64:
     return heading
 
 
-_D = ctypes.c_double
-_L = ctypes.c_int64
-_SIGNATURES: Signatures = {
-    "modt_predict": (None, (FLOAT64, FLOAT64, _L, OutputArgument, OutputArgument, _D, _D, _D, _D)),
-    "modt_update": (
-        None,
-        (FLOAT64, FLOAT64, INT64, _L, OutputArgument, OutputArgument, OutputArgument, FLOAT64, FLOAT64),
-    ),
-}
-
-
 class NativeFilter(Filter):
     """`Filter` in C (`modt.native`)."""
 
     def __init__(self, library: ctypes.CDLL, tuning: FilterTuning) -> None:
         super().__init__(tuning)
-        declare(library, _SIGNATURES)
+        declare(library, "filter.c")
         self._library = library
 
     def predict(self, x: Float64, P: Float64, dt_s: float) -> None:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT64, INT64, OutputArgument, Signatures, declare
+from modt.native.declarations import declare
 from modt.tracking.kalman import HEADING, SPEED, X, Y
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import MotionFilterTuning
@@ -237,22 +237,12 @@ def _filtered(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, 
     return x + (gain_x * off_x + gain_y * off_y), symmetric, Fit(distance, determinant)
 
 
-_D = ctypes.c_double
-_L = ctypes.c_int64
-_STATE = (FLOAT64, FLOAT64, FLOAT64, FLOAT64)
-_SIGNATURES: Signatures = {
-    "modt_predict_motion": (None, (*_STATE, _L, OutputArgument, OutputArgument, *[_D] * 5)),
-    "modt_update_motion": (None, (*_STATE, INT64, _L, FLOAT64, FLOAT64, OutputArgument)),
-    "modt_combine_motion": (None, (*_STATE, _L, FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64)),
-}
-
-
 class NativeMotionFilter(MotionFilter):
     """`MotionFilter` in C (`modt.native`)."""
 
     def __init__(self, library: ctypes.CDLL, tuning: MotionFilterTuning) -> None:
         super().__init__(tuning)
-        declare(library, _SIGNATURES)
+        declare(library, "filter.c")
         self._library = library
 
     def _predict(self, tracks: TrackTable, step: Step, resting_share: Float64, moving_share: Float64) -> None:

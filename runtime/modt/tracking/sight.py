@@ -14,7 +14,7 @@ import numpy as np
 
 from modt.geometry import pseudo_angle
 from modt.geometry.kernels import GeometryKernels
-from modt.native.library import FLOAT32, FLOAT64, INT8, INT64, OutputArgument, Signatures, declare
+from modt.native.declarations import declare
 from modt.tracking.tuning import SightTuning
 from modt.types import OBSTACLES, Bool, Float32, Float64, Int, Int8, PointKind, Proposals
 
@@ -128,22 +128,12 @@ def _slopes(box: Float64) -> tuple[int, int]:
     return int(min(max(low, 0.0), SLOPES - 1)), int(min(max(high, 0.0), SLOPES - 1)) + 1
 
 
-_L = ctypes.c_int64
-_SIGNATURES: Signatures = {
-    "modt_look": (None, (FLOAT32, INT8, _L, _L, OutputArgument)),
-    "modt_bounded_sides": (
-        None,
-        (FLOAT32, FLOAT32, _L, INT64, FLOAT64, FLOAT64, INT64, _L, ctypes.c_float, OutputArgument),
-    ),
-}
-
-
 class NativeSight(Sight):
     """`Sight` in C (`modt.native`)."""
 
     def __init__(self, library: ctypes.CDLL, tuning: SightTuning) -> None:
         super().__init__(tuning)
-        declare(library, _SIGNATURES)
+        declare(library, "sight.c")
         self._library = library
 
     def bounded_sides(self, nearest: Float32, proposals: Proposals, which: Int) -> Bool:
