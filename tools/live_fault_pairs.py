@@ -165,22 +165,13 @@ class Sender:
         given = self._given()
         drive = [payload for _, payload in packets_of(given, SENSOR, PERIOD_S)]
         waiting = [payload for _, payload in packets_of(self._waiting(), SENSOR, PERIOD_S)]
-        first_s = time.time()
         with (
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as packets,
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as poses,
         ):
             packets.connect(("127.0.0.1", self._ports[0]))
             poses.connect(("127.0.0.1", self._ports[1]))
-            n = 0
-            while n < MOST_WAITING * len(waiting) and not (n and self._ready()):
-                for payload in waiting:
-                    if n % PACKETS_PER_SWEEP == 0:
-                        self._send_poses(poses, [self._frames[0]] * 2, first_s + n * PACKET_S)
-                    at_s = first_s + n * PACKET_S
-                    self._send_packet(packets, _stamped(payload, at_s), at_s)
-                    n += 1
-            self.began_s = first_s + n * PACKET_S
+            self.began_s = self._wait(packets, poses, waiting)
             said = 0
             times_s = (self.began_s + k * PACKET_S for k in range(len(drive)))
             timed = ((at_s, _stamped(payload, at_s)) for at_s, payload in zip(times_s, drive, strict=True))
@@ -193,6 +184,19 @@ class Sender:
                     self._send_poses(poses, given[said : said + 2], self.began_s + said * PERIOD_S)
                     said += 1
                 self._send_packet(packets, payload, at_s)
+
+    def _wait(self, packets: socket.socket, poses: socket.socket, waiting: Sequence[bytes]) -> float:
+        """Send sweeps of the beginning until the run is ready; returns the stamp of the next packet."""
+        at_s = first_s = time.time()
+        n = 0
+        while n < MOST_WAITING * len(waiting) and not (n and self._ready()):
+            for payload in waiting:
+                if n % PACKETS_PER_SWEEP == 0:
+                    self._send_poses(poses, [self._frames[0]] * 2, at_s)
+                self._send_packet(packets, _stamped(payload, at_s), at_s)
+                n += 1
+                at_s = first_s + n * PACKET_S
+        return at_s
 
     def _send_packet(self, to: socket.socket, payload: bytes, at_s: float) -> None:
         """Send a packet at its time."""

@@ -104,14 +104,19 @@ def street(seed, n):
     return points
 
 
+def make_hostile(points, rng, share):
+    """Replace a share of the coordinates."""
+    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), (len(points), 3))]
+    np.copyto(points[:, :3], values, where=rng.random(values.shape) < share)
+
+
 @pytest.mark.slow
 @given(seed=SEEDS, n=st.integers(0, 3000), front=st.booleans(), share=st.just(0.0) | st.floats(0, 1))
 @settings(max_examples=160, deadline=None)
 def test_random_sweeps_with_a_share_of_hostile_coordinates(kernels, seed, n, front, share):
     sensor = SensorConfig(reflectance="hdl-64e", height_m=(None, 1.73)[seed % 2])
-    rng, points = np.random.default_rng(seed), street(seed, n)
-    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), (n, 3))]
-    np.copyto(points[:, :3], values, where=rng.random((n, 3)) < share)
+    points = street(seed, n)
+    make_hostile(points, np.random.default_rng(seed), share)
     with np.errstate(all="ignore"):
         both(kernels, points, sensor, FRONT if front else FULL)
 

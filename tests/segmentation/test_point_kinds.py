@@ -13,7 +13,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.types import NONE, Frame, PointKind
 from tests.results import result as made_up_result
 from tests.segmentation import scans
-from tests.segmentation.test_native_kernels import HOSTILE, street
+from tests.segmentation.test_native_kernels import make_hostile, street
 from tests.segmentation.test_segmenter import AHEAD, PERSON
 
 SENSOR = SensorConfig(min_range_m=1.0)
@@ -50,8 +50,7 @@ SCENES = {"street": lambda rng, n: street(int(rng.integers(1000)), n), "fog": fo
 def test_every_point_has_one_kind(fov, seed, n, scene, hostile):
     rng = np.random.default_rng(seed)
     points = SCENES[scene](rng, n)
-    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), (n, 3))]
-    np.copyto(points[:, :3], values, where=rng.random((n, 3)) < hostile)
+    make_hostile(points, rng, hostile)
     with np.errstate(all="ignore"):
         proposals = Segmenter(SegmentationConfig(), SENSOR, fov or FieldOfView()).segment(points)
     is_member = proposals.label(n) != NONE

@@ -21,6 +21,9 @@ STAMPS_S = st.sampled_from([0.0, 5e-324, -1e300, 1e300, 1.7e308, -5.0, 5.0, 59.0
 PLACES_M = st.sampled_from([0.0, 0.4, 5.0, -80.0, 458_000.0, 5_430_000.0, 9.9e7, -1e8, 1e9, np.nan, np.inf])
 
 
+_of_packets = precondition(lambda self: self.world.maker is not None)
+
+
 class LiveSequences(RuleBasedStateMachine):
     """A robot that lives through anything."""
 
@@ -78,7 +81,7 @@ class LiveSequences(RuleBasedStateMachine):
         self.world.drive(turns)
         self.check()
 
-    @precondition(lambda self: self.world.maker is not None)
+    @_of_packets
     @rule(seed=SEED, share=st.sampled_from([0.01, 0.3, 0.9]), turns=st.sampled_from([1, 5]))
     def packets_are_lost_doubled_and_overtaken(self, seed, share, turns) -> None:
         rng = np.random.default_rng(seed)
@@ -92,7 +95,7 @@ class LiveSequences(RuleBasedStateMachine):
         self.world.drive(turns, faults=faults)
         self.check()
 
-    @precondition(lambda self: self.world.maker is not None)
+    @_of_packets
     @rule(
         seed=SEED,
         scale_s=st.sampled_from([0.0, 1e-6, 0.001, 0.05, 0.3, 3.0, 3600.0]),
@@ -123,7 +126,7 @@ class LiveSequences(RuleBasedStateMachine):
         world.take()
         self.check()
 
-    @precondition(lambda self: self.world.maker is not None)
+    @_of_packets
     @rule(model=st.integers(0, 1), n=st.sampled_from([1, 19, 20, 60]))
     def packets_of_some_model(self, model, n) -> None:
         models = turns(self.world.source)
@@ -132,7 +135,7 @@ class LiveSequences(RuleBasedStateMachine):
             self.world.packet(self.world.stamped(payload))
         self.check()
 
-    @precondition(lambda self: self.world.maker is not None)
+    @_of_packets
     @rule(
         at=st.integers(0, 5),
         value=st.sampled_from([0, 1, 2, 3, 6, 0x10, 0x21, 0x22, 0x28, 0x37, 0x39, 0x3D, 0xA1, 0xEE, 0xFF]),
@@ -147,7 +150,7 @@ class LiveSequences(RuleBasedStateMachine):
             self.world.packet(bytes(changed))
         self.check()
 
-    @precondition(lambda self: self.world.maker is not None)
+    @_of_packets
     @rule(seed=SEED, at_ns=st.integers(0, 2**64 - 1), n=st.sampled_from([1, 50]))
     def bytes_of_packets_change(self, seed, at_ns, n) -> None:
         rng = np.random.default_rng(seed)
@@ -161,7 +164,7 @@ class LiveSequences(RuleBasedStateMachine):
         world.take()
         self.check()
 
-    @precondition(lambda self: self.world.maker is not None)
+    @_of_packets
     @rule(seed=SEED, length=st.sampled_from([0, 1, 35, 36, 1205, 1206, 65_000]), n=st.sampled_from([1, 50]))
     def garbage(self, seed, length, n) -> None:
         rng = np.random.default_rng(seed)

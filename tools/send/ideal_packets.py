@@ -7,9 +7,11 @@ import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
+from typing import ClassVar
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from modt.types import Float32, Float64, Frame
 
@@ -39,6 +41,7 @@ class Layout:
     blocks: int = 12
     lasers: int = 32
     unit_m: float = UNIT_M
+    cell: ClassVar = np.dtype([("distance", "<u2"), ("reflectance", "u1")])
 
     @property
     def firings(self) -> int:
@@ -47,23 +50,28 @@ class Layout:
 
     def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
         """Packet for the azimuths of its blocks [0.01 deg], and (blocks, lasers, 2) distances and reflectances."""
-        table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1")]))
-        table["distance"] = cells[..., 0]
-        table["reflectance"] = cells[..., 1]
+        table = self._table(cells)
         body = b""
         for i, azimuth in enumerate(azimuths):
             body += self.headers[i % len(self.headers)] + struct.pack("<H", azimuth) + table[i].tobytes()
         return body + struct.pack("<I", round(at_us) % HOUR_US) + self.tail
 
+    def _table(self, cells: Float64) -> NDArray[np.void]:
+        """Cells as they stand in a packet."""
+        table = np.zeros(cells.shape[:2], self.cell)
+        table["distance"] = cells[..., 0]
+        table["reflectance"] = cells[..., 1]
+        return table
+
 
 class HesaiLayout(Layout):
     """Layout of the firings in an XT-32's packets."""
 
+    cell: ClassVar = np.dtype([("distance", "<u2"), ("reflectance", "u1"), ("none", "u1")])
+
     def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
         """Packet as in Layout, stamped with the time of the last firing since midnight."""
-        table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1"), ("none", "u1")]))
-        table["distance"] = cells[..., 0]
-        table["reflectance"] = cells[..., 1]
+        table = self._table(cells)
         head = bytes((0xEE, 0xFF, 6, 1, 0, 0, self.lasers, self.blocks, 1, round(1000 * self.unit_m), 1, 1))
         body = b"".join(struct.pack("<H", a) + row.tobytes() for a, row in zip(azimuths, table, strict=True))
         second, micros = divmod(round(at_us + (self.firings - 1) * self.firing_us) % DAY_US, 1_000_000)

@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+import pytest
 
 from modt.types import Float32
 from modt_simulation.synthetic_stream import SyntheticStream
@@ -27,6 +28,23 @@ def decoded(decoder, timed):
     """Sweeps of packets, and the counts of the decoder."""
     sweeps = [sweep for at_s, payload in timed for sweep in decoder.decode(at_s, payload)]
     return [*sweeps, *decoder.finish()], decoder.reception
+
+
+def assert_whole_turn(sweep, reception, turn_s, ahead_s):
+    """A sweep without faults, of a reflectance of 0.2, is stamped when the head looks straight ahead."""
+    assert (reception.lost, reception.refused) == (0, {})
+    assert sweep.complete
+    assert sweep.turn_s == pytest.approx(turn_s, rel=1e-3)
+    assert sweep.stamp_s == pytest.approx(ahead_s, abs=1e-3)
+    assert sweep.points[:, 3] == pytest.approx(0.2)
+
+
+def clockwise_rad(x, y):
+    """Bearings of the returns of a beam, which is cut where it looks backwards itself."""
+    bearing = np.unwrap(np.arctan2(y, x))
+    assert np.all(np.diff(bearing) < 0)
+    assert bearing[0] == pytest.approx(np.pi, abs=0.03)
+    return bearing
 
 
 def bearing_deg(points):

@@ -182,14 +182,19 @@ def _table(run: gamma.RunCosts) -> dict[str, Any]:
     """Counts and costs of every frame, for predictions of other streams."""
     return {
         "counts": {name: run.counts[:, k].tolist() for k, name in enumerate(COUNTS)},
-        "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
+        "cpu_ms": _cpu_ms(run),
     }
+
+
+def _cpu_ms(run: gamma.RunCosts) -> dict[str, list[float]]:
+    """CPU time of every frame [ms] by stage."""
+    return {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)}
 
 
 def _series(run: gamma.RunCosts, energy: EnergySums, lengths: Histogram) -> dict[str, Any]:
     return {
         "stage_W": energy.stage_watts(STAGES),
-        "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
+        "cpu_ms": _cpu_ms(run),
         "proposals": run.counts[:, COUNTS.index("proposals")].tolist(),
         "classified": run.counts[:, COUNTS.index("classified")].tolist(),
         "lives": lengths.occurrences(),
