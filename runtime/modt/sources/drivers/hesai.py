@@ -234,15 +234,14 @@ class HesaiDecoder(TurnDecoder):
         unit_mm = UNIT_MM if model.layout.unit is None else entries[0].packet[model.layout.unit]
         raw = b"".join(entry.packet[: model.tail] for entry in entries)
         blocks = np.frombuffer(raw, model.body)["blocks"].reshape(-1, returns)
-        cells = strongest(blocks["cells"])
-        firing, channel = np.nonzero(cells["distance"])
-        seen = cells[firing, channel]
+        distance, reflectance = strongest(blocks["cells"])
+        firing, channel = np.nonzero(distance)
         azimuth = np.deg2rad(blocks["azimuth"][firing, 0] * np.float32(0.01) + self._azimuth_deg[channel])
-        distance_m = seen["distance"] * np.float32(unit_mm / 1000)
+        distance_m = distance[firing, channel] * np.float32(unit_mm / 1000)
         across_m = distance_m * self._cos[channel]
         x = across_m * np.cos(azimuth)
         y = -across_m * np.sin(azimuth)
-        return points_of(x, y, distance_m * self._sin[channel], seen["reflectance"])
+        return points_of(x, y, distance_m * self._sin[channel], reflectance[firing, channel])
 
 
 def _decoder(name: str, options: Mapping[str, str], host: str) -> HesaiDecoder:

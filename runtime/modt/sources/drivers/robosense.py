@@ -266,17 +266,16 @@ class RobosenseDecoder(TurnDecoder):
         slots = max(len(self._angles_deg), model.channels // returns)  # of a return, in a block or a firing's blocks
         raw = b"".join(entry.packet[HEADER_BYTES : HEADER_BYTES + model.table.itemsize] for entry in entries)
         blocks = np.frombuffer(raw, model.table.base)
-        cells = strongest(blocks["cells"].reshape(-1, returns, slots))
-        firing, slot = np.nonzero(cells["distance"])
-        seen = cells[firing, slot]
-        begin, step = _turned(blocks["azimuth"][:: len(blocks) // len(cells)].astype(np.float32))
+        distance, reflectance = strongest(blocks["cells"].reshape(-1, returns, slots))
+        firing, slot = np.nonzero(distance)
+        begin, step = _turned(blocks["azimuth"][:: len(blocks) // len(distance)].astype(np.float32))
         head = np.deg2rad((begin[firing] + step[firing] * self._shares(slots)[slot]) * np.float32(0.01))
-        distance_m = seen["distance"] * np.float32(self._unit_m(entries[0].packet))
+        distance_m = distance[firing, slot] * np.float32(self._unit_m(entries[0].packet))
         elevation, aside = np.deg2rad(self._angles_deg[slot % len(self._angles_deg)].T).astype(np.float32)
         across_m = distance_m * np.cos(elevation)
         x = across_m * np.cos(head + aside) + model.forward_m * np.cos(head)
         y = -across_m * np.sin(head + aside) - model.forward_m * np.sin(head)
-        return points_of(x, y, distance_m * np.sin(elevation) + model.up_m, seen["reflectance"])
+        return points_of(x, y, distance_m * np.sin(elevation) + model.up_m, reflectance[firing, slot])
 
     def _shares(self, slots: int) -> Float32:
         """(slots,) time of each slot since its block begins, as a share of that to the next block."""

@@ -7,7 +7,7 @@ import math
 from abc import abstractmethod
 from bisect import bisect
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any
@@ -361,9 +361,10 @@ class TurnDecoder(PacketDecoder):
         return np.concatenate(tables)
 
 
-def strongest(cells: NDArray[Any]) -> NDArray[Any]:
-    """(firings, channels) cells of the return with the greatest reflectance, of (firings, returns, channels)."""
-    return np.take_along_axis(cells, cells["reflectance"].argmax(axis=1)[:, None], axis=1)[:, 0]
+def strongest(cells: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """(firings, channels) distance and reflectance of the brightest return, of (firings, returns, channels) cells."""
+    best = cells["reflectance"].argmax(axis=1)[:, None]
+    return (np.take_along_axis(cells[name], best, axis=1)[:, 0] for name in ("distance", "reflectance"))
 
 
 def points_of(x: Float32, y: Float32, z: Float32, reflectance: NDArray[np.uint8]) -> Float32:
