@@ -23,7 +23,7 @@ SCHEMA = "modt.batch/1"
 PAGES = 10
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("batch", help="replay many recordings into one Parquet dataset with a report")
     each = "paths as for modt replay, or addresses of fsspec, such as s3://BUCKET/DRIVES/*"

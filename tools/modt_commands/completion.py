@@ -15,7 +15,7 @@ from modt_commands import profile as modt_profile
 SHELLS = ("bash", "zsh", "fish")
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser(
         "completion", help="print a script by which a shell completes modt and modt-profile (extra completion)"

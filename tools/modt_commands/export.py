@@ -9,7 +9,7 @@ from modt.cli import options
 from modt.errors import MisuseError
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("export", help="write a recorded run in the formats of others")
     p.add_argument("directory", type=Path, metavar="RUN", help="directory of the run")

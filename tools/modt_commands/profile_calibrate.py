@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from modt_profiling.comparison.window_fit_calibration import Calibration
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     seconds = options.bounded(float, 0.01, 600, "seconds")
     p = commands.add_parser("calibrate", help="fit the energy of this board's units of work, and write its profile")

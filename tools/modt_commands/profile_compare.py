@@ -10,7 +10,7 @@ from modt import host
 from modt.cli import options
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     count = options.bounded(int, 1, 1000, "a count")
     p = commands.add_parser("compare", help="run all modes on the same stream, interleaved")

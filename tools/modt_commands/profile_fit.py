@@ -12,7 +12,7 @@ MOST_FRAMES = 1000
 """Frames of a recording of which the sweeps are taken."""
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("fit", help="fit a profile to a recording of an unknown sensor")
     stream = "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, or PCAP file; best of a drive that moves"

@@ -13,7 +13,7 @@ from modt.cli.command import show_help
 from modt_commands import profile_fit, profile_schema
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the group with its commands, and the list."""
     what = "profiles of sensors and boards"
     beside = "For the energy of runs see `modt-profile`."

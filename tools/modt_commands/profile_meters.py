@@ -14,7 +14,7 @@ from modt.energy.meters.meter import Candidate, Kind, MeterLostError
 SCHEMA = "modt.meters/1"
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("meters", help="list the energy meters of this machine")
     options.add(p, "profile", help=f"board (default: {profile.DEFAULT})")

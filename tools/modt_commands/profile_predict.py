@@ -10,7 +10,7 @@ from modt import host
 from modt.cli import options
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("predict", help="predict energy and gamma of the modes from other streams")
     options.add_stream_options(p)

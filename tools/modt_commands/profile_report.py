@@ -10,7 +10,7 @@ from modt.cli import options
 from modt.errors import MisuseError
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("report", help="report energy and savings of a run, which may still be running")
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")

@@ -64,7 +64,7 @@ FILE = "profile.schema.json"
 """Name of the schema in profiles/."""
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command."""
     p = commands.add_parser("schema", help="print the JSON Schema of a profile, for editors")
     options.add_examples(

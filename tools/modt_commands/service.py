@@ -21,7 +21,7 @@ HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 MARK = "# installed by modt service install\n"
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     group = commands.add_parser("service", help="install or remove the systemd unit of modt run")
     actions = group.add_subparsers(dest="action", required=True, metavar="COMMAND")

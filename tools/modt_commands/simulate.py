@@ -9,7 +9,7 @@ from modt.cli import options
 from modt.errors import MisuseError, ModtError
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("simulate", help="write a synthetic drive with its ground truth")
     p.add_argument("--scene", default="street", metavar="NAME", help="name of the scene (default: %(default)s)")

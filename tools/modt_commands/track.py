@@ -9,7 +9,7 @@ from pathlib import Path
 from modt.cli import options
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("track", help="track the boxes of another detector")
     p.add_argument("detections", type=Path, nargs="+", metavar="DETECTIONS", help="file of a sequence, or a folder")

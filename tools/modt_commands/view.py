@@ -8,7 +8,7 @@ from pathlib import Path
 from modt.cli import options
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("view", help="show a recorded run from above, with the points of its source")
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")

@@ -8,7 +8,7 @@ from modt import host
 from modt.cli import options
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("check", help="check this machine, and a sensor, for modt run; print remedies")
     source = "address of the sensor to listen to, or a recording (default: none)"

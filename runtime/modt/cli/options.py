@@ -6,13 +6,15 @@ import argparse
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from modt import host
 from modt.profile import DEFAULT
 from modt.schemes import SINKS
 
 Parser = argparse.ArgumentParser
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[Parser]  # to which a command adds its parser
 MODES = ("conventional", "efficient", "accurate")
 OUT = Path("runs/live")
 """Run directory of a service."""

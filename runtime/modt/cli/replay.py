@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from modt.sinks.run_directory import RunDirectory
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("replay", help="process a recorded stream, or the built-in synthetic one")
     options.add_stream_options(p)

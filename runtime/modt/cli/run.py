@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("run", help="follow a live source: the service of a robot")
     source = "address of a sensor, or a recording to play: PATH, PATH?loop=yes (default: a synthetic stream)"

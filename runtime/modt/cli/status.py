@@ -21,7 +21,7 @@ PERIOD_S = 1.0
 CLEAR = "\x1b[H\x1b[2J"
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: options.Commands) -> None:
     """Declare both commands and their options."""
     p = commands.add_parser("status", help="print the status of a running service")
     q = commands.add_parser("top", help="show the status of a running service, until Ctrl-C is pressed")
