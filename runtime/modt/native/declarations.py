@@ -37,7 +37,10 @@ def _code(pattern: str) -> str:
 
 @cache
 def structure(name: str) -> Layout:
-    """Layout of a structure of the C sources."""
+    """Layout of a structure of the C sources.
+
+    A name alone is a number, `*name[k]` a pointer to each of k rows of an array, and any other pointer an array.
+    """
     (body,) = re.findall(rf"typedef struct {{([^}}]*)}} {name};", _code("*.[ch]"))
     members = {}
     for declaration in body.split(";")[:-1]:
