@@ -34,7 +34,7 @@ EXPORT i64 modt_fit(const Shapes *s, const double (*position)[2], const u4 *poin
 def _source(tmp_path, monkeypatch):
     (tmp_path / "shapes.c").write_text(SOURCE)
     monkeypatch.setattr(build, "FOLDER", tmp_path)
-    for name in ("_code", "structure"):  # with caches of their own
+    for name in ("_code", "_bodies", "structure"):  # with caches of their own
         monkeypatch.setattr(declarations, name, cache(getattr(declarations, name).__wrapped__))
 
 

@@ -36,14 +36,19 @@ def _code(pattern: str) -> str:
 
 
 @cache
+def _bodies() -> dict[str, str]:
+    """Declarations of the members of every structure, by its name."""
+    return {name: body for body, name in re.findall(r"typedef struct {([^}]*)} (\w+);", _code("*.[ch]"))}
+
+
+@cache
 def structure(name: str) -> Layout:
     """Layout of a structure of the C sources.
 
     A name alone is a number, `*name[k]` a pointer to each of k rows of an array, and any other pointer an array.
     """
-    (body,) = re.findall(rf"typedef struct {{([^}}]*)}} {name};", _code("*.[ch]"))
     members = {}
-    for declaration in body.split(";")[:-1]:
+    for declaration in _bodies()[name].split(";")[:-1]:
         text, _, shape = declaration.replace("const ", "").rstrip(" )").partition(" SHAPE(")
         sizes = tuple(int(size) if size.isdecimal() else size for size in shape.split(", "))
         kind, declarators = text.split(maxsplit=1)
