@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from modt_commands import experiments
 from modt_evaluation.rules import IGNORABLE
 
 if TYPE_CHECKING:
-    from modt_evaluation.evaluation import DriveRows
+    from modt_evaluation.evaluation import DriveRows, Evaluation
     from modt_evaluation.run_record import RunRecord
     from modt_evaluation.truth import Truth
 
@@ -112,7 +112,7 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     """
     from modt.sources.nuscenes import read_scene, tables_of
     from modt_evaluation.engine import Engine
-    from modt_evaluation.evaluation import SCHEMA, evaluation
+    from modt_evaluation.evaluation import evaluation
     from modt_evaluation.nuscenes_results import scores_of_runs as nuscenes_scores
     from modt_evaluation.report import report
     from modt_evaluation.run_record import RunRecord
