@@ -115,3 +115,18 @@ def test_what_rested_may_move_by_an_error_of_the_scale_of_a_turn(turn_rad, wrong
     )
     assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
     assert check.drifted(1.0, static_tracks(kdop + step), pose(0.0, 0.0, turn_rad)) == drifted
+
+
+@pytest.mark.parametrize(
+    ("n_resting", "wrong_m", "drifted"),
+    [(8, 0.0, False), (8, 0.25, True), (2, 0.0, True)],
+    ids=["right pose", "pose of twice the way", "nearly all move with the sensor"],
+)
+def test_parts_of_walls_that_move_with_the_sensor_say_nothing_of_its_pose(n_resting, wrong_m, drifted):
+    """A pose that moves by half a metre, and 12 parts of a wall that follow the sensor."""
+    check = PoseCheck()
+    kdop = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (n_resting + 12, 1))
+    along = np.array([1.0, np.sqrt(0.5), 0.0, -np.sqrt(0.5), -1.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)])
+    moved_m = np.repeat([wrong_m, 0.5], [n_resting, 12])
+    assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    assert check.drifted(1.0, static_tracks(kdop + moved_m[:, None] * along), pose(0.5, 0.0, 0.0)) == drifted

@@ -12,7 +12,7 @@ from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations, StaticTracks
 from modt.odometry.registration import Landmarks
 from modt.odometry.tuning import PoseCheckTuning
-from modt.types import Float64, Int
+from modt.types import Bool, Float64, Int
 
 
 class Anchors(NamedTuple):
@@ -94,21 +94,38 @@ class PoseCheck:
         if anchors is not None and now_s - anchors.time_s < 2 * self._tuning.anchor_s:
             _, before, now = np.intersect1d(anchors.id, tracks.id, assume_unique=True, return_indices=True)
             seen = tracks.observed[now]
-            motion = inverse(anchors.T_world_sensor) @ T_world_sensor
-            if self._moved_alike(anchors.kdop[before[seen]].T, tracks.kdop[now[seen]].T, T_world_sensor, motion):
+            if self._moved_alike(
+                anchors.kdop[before[seen]].T, tracks.kdop[now[seen]].T, anchors.T_world_sensor, T_world_sensor
+            ):
                 return True
         rests = tracks.stationary & tracks.observed
         self._anchors = Anchors(now_s, tracks.id[rests], tracks.kdop[rests], T_world_sensor)
         return False
 
-    def _moved_alike(self, were: Float64, are: Float64, T_world_sensor: Float64, motion: Float64) -> bool:
-        """Whether k-DOPs (8, k) have moved by more than the errors of a motion (4, 4), most of them."""
-        if were.shape[1] < self._tuning.min_landmarks:
+    def _moved_alike(self, were: Float64, are: Float64, T_before: Float64, T_now: Float64) -> bool:
+        """Whether k-DOPs (8, k) have moved by more than the errors of the motion between two poses, most of them.
+
+        What moved with the sensor is left out, unless nearly all did: the part of a wall that certain rays meet.
+        """
+        step_m = shift_between(were, are, self._kernels.shape_tuning)
+        carried = self._carried(were, step_m, T_now @ inverse(T_before))
+        counted = ~carried
+        if np.count_nonzero(counted) < self._tuning.min_landmarks:
+            counted = np.ones(len(step_m), np.bool_)
+        if len(step_m) < self._tuning.min_landmarks:
             return False
-        step_m = np.median(shift_between(were, are, self._kernels.shape_tuning), axis=0)
-        range_m = float(np.median(np.hypot(*(centres(are)[:2] - T_world_sensor[:2, 3, None]))))
+        median_m = np.median(step_m[counted], axis=0)
+        range_m = float(np.median(np.hypot(*(_places(are)[:, counted] - T_now[:2, 3, None]))))
+        motion = inverse(T_before) @ T_now
         by_turn_m = self._tuning.turn_share * abs(yaw_of(motion)) * range_m
-        return self._differ(float(np.hypot(*step_m)) - by_turn_m, motion)
+        return self._differ(float(np.hypot(*median_m)) - by_turn_m, motion)
+
+    def _carried(self, were: Float64, step_m: Float64, motion_in_world: Float64) -> Bool:
+        """(k,) steps (k, 2) by which k-DOPs (8, k) moved as what is fixed to the sensor does."""
+        at = _places(were)
+        with_sensor = motion_in_world[:2, :2] @ at + motion_in_world[:2, 3:] - at
+        carried: Bool = np.hypot(*(step_m.T - with_sensor)) < self._tuning.motion_m / 2
+        return carried
 
     def _differ(self, far_m: float, motion: Float64) -> bool:
         """Whether a motion (4, 4) and another one that ends at a distance differ by more than the errors of a way."""
@@ -139,3 +156,9 @@ class PoseCheck:
             self._compared_from = now_s, T_given, T_registered
         elif now_s - from_s >= self._tuning.agree_s:
             self.doubted = False
+
+
+def _places(kdop: Float64) -> Float64:
+    """(2, k) x and y of the middles of k-DOPs (8, k) [m]."""
+    x_and_y: Float64 = centres(kdop)[::2]  # the other axes are diagonal
+    return x_and_y
