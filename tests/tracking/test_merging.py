@@ -163,6 +163,22 @@ def test_a_car_in_two_parts_keeps_its_track_and_its_box(pose):
     np.testing.assert_allclose(follower.tracks.box[0], transform_boxes(T, np.array([WHOLE]))[0], atol=0.05)
 
 
+def test_a_car_that_passes_behind_a_pole_keeps_its_velocity():
+    follower = Follower()
+    worst_mps = 0.0
+    for k in range(30):
+        rear_m, front_m, pole_m = 0.8 * k, 0.8 * k + 4.2, 12.0
+        ends = [rear_m, front_m]
+        if rear_m + 0.6 < pole_m < front_m - 0.6:
+            ends = [rear_m, pole_m - 0.2, pole_m + 0.2, front_m]
+        parts = [box((a + b) / 2, 6, b - a, 1.8, 1.5) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+        follower.run([parts], CAR, points=100)
+        if k > 8:
+            worst_mps = max(worst_mps, np.hypot(*(follower.tracks.velocity[0] - [8.0, 0.0])))
+    assert follower.tracks.id[0] == 0
+    assert worst_mps < 1.0
+
+
 def test_who_leaves_a_parked_car_is_a_track_of_his_own_once_apart():
     follower = Follower()
     for i in range(KNOWN):

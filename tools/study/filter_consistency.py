@@ -4,9 +4,9 @@
                                               [--sensor hdl-64e]
 
 The reference point of a track on its body is unknown; it is taken as the mean position of the track in the body
-frame. The position error is relative to that point (2 degrees of freedom), the motion error is that of heading and
-speed (2), for moving bodies. Errors of one track are correlated, so the bounds assume as many independent samples as
-tracks.
+frame. The position error is relative to that point (2 degrees of freedom), the motion error is that of the velocity
+(2) by its published covariance, for moving bodies. Errors of one track are correlated, so the bounds assume as many
+independent samples as tracks.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from scipy.stats import chi2
 
 from modt.classes import CLASS_NAMES
 from modt.cli.options import frames as number_range
-from modt.geometry import wrap
 from modt.profile import load
 from modt.types import NONE, Float64, Int, Proposals
 from modt_simulation.synthetic_stream import SyntheticStream
@@ -45,7 +44,7 @@ class BodyTrack:
 
     Attributes:
         kind: class and motion, as in "car, moving".
-        x, P: (n, 4) state and (n, 4, 4) covariance of the filter.
+        x, P: (n, 4) x, y [m] and their velocities [m/s], world frame, and (n, 4, 4) covariance as published.
         pose: (n, 4) true x, y [m], heading [rad] and speed [m/s], world frame.
     """
 
@@ -69,7 +68,11 @@ def body_tracks(stream: SyntheticStream, profile_name: str) -> list[BodyTrack]:
             k = int(body[tracks.proposal[row]])
             if k >= 0 and share[tracks.proposal[row]] >= MIN_SHARE:
                 key = (int(tracks.id[row]), k, bool(poses[k, 4] > MOVING_MPS))
-                records[key].append((tracks.x[row].copy(), tracks.P[row].copy(), poses[k, [0, 1, 3, 4]]))
+                P = np.zeros((4, 4))
+                P[:2, :2] = tracks.P[row, :2, :2]
+                P[2:, 2:] = tracks.velocity_covariance[row]
+                x = np.concatenate([tracks.x[row, :2], tracks.velocity[row]])
+                records[key].append((x, P, poses[k, [0, 1, 3, 4]]))
     out = []
     for (_, k, moving), states in records.items():
         if len(states) >= MIN_FRAMES:
@@ -92,15 +95,14 @@ def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, Float64]:
 
 
 def errors(track: BodyTrack) -> tuple[Float64, Float64]:
-    """(n, 2) position errors [m], and (n, 2) errors of heading [rad] and speed [m/s]."""
+    """(n, 2) position errors [m], and (n, 2) errors of the velocity [m/s]."""
     c, s = np.cos(track.pose[:, 2]), np.sin(track.pose[:, 2])
     R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
     off = track.x[:, :2] - track.pose[:, :2]
     # The point of the body that the track refers to: the mean of its positions in the frame of the body.
     point = np.einsum("nji,nj->ni", R, off).mean(axis=0)
-    motion = track.x[:, 2:] - track.pose[:, 2:]
-    motion[:, 0] = wrap(motion[:, 0])
-    return off - R @ point, motion
+    velocity = track.pose[:, 3, None] * R[:, :, 0]
+    return off - R @ point, track.x[:, 2:] - velocity
 
 
 def normalised(error: Float64, P: Float64) -> Float64:

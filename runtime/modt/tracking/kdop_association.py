@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.class_sizes import IS_PERSON
 from modt.classes import ObjectClass
 from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
-from modt.tracking.association import Matches
+from modt.tracking.association import Associated, Matches
+from modt.tracking.pairs import with_rows
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import KdopAssociationTuning
 from modt.types import Bool, Float64, Int
@@ -65,20 +67,7 @@ class KdopAssociation:
         second = second[_free(columns[second], columns[first], len(observations))]
         second = second[self._kernels.assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
         kept = np.concatenate([first, second])
-        return self._measured(tracks, observations, rows[kept], columns[kept])
-
-    def _measured(self, tracks: TrackTable, observations: Observations, rows: Int, columns: Int) -> Matches:
-        """Matches of pairs of a row and a proposal, with the position that each proposal measures."""
-        x = tracks.x.take(rows, axis=0)[:, :2]
-        mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
-        before = tracks.end_variance.T.take(rows, axis=1)
-        kdop = observations.kdop.take(columns, axis=1)
-        # What rests has its near end hidden by its neighbours as often as it hides its far end itself.
-        is_car = tracks.object_class[rows] == ObjectClass.CAR.value
-        near_end_measures = is_car & (tracks.moving_probability[rows] > 0.5)
-        sight = observations.sight(columns) * near_end_measures
-        shift, covariance, end_variance = self._kernels.measured(mean, kdop, sight, self._variance, before)
-        return Matches(rows, columns, x + shift, covariance, end_variance.T)
+        return measured(tracks, observations, rows[kept], columns[kept], self._kernels, self._variance)
 
     def initial_position(self, observations: Observations) -> Float64:
         """Centre of the k-DOP."""
@@ -98,6 +87,55 @@ class KdopAssociation:
         squared = np.minimum(affordable, self._tuning.reach_sigmas**2)
         reach: Float64 = self._tuning.reach_margin_m + np.sqrt(np.maximum(squared, 0.0) * np.maximum(xx, yy))
         return reach
+
+
+def measured(
+    tracks: TrackTable,
+    observations: Observations,
+    rows: Int,
+    proposals: Int,
+    kernels: GeometryKernels,
+    variance: float,
+) -> Matches:
+    """Matches of rows (K,) and proposals (K,), with the position that each proposal measures.
+
+    Args:
+        tracks: as predicted.
+        observations: all proposals in the world.
+        rows: (K,) rows of the tracks.
+        proposals: (K,) proposal of each.
+        kernels: passes over pairs.
+        variance: variance of a position along either axis [m2].
+    """
+    x = tracks.x.take(rows, axis=0)[:, :2]
+    mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
+    kdop = observations.kdop.take(proposals, axis=1)
+    moves = tracks.moving_probability[rows] > 0.5
+    # What rests has its near end hidden by its neighbours as often as it hides its far end itself.
+    is_car = tracks.object_class[rows] == ObjectClass.CAR.value
+    sight = observations.sight(proposals) * (is_car & moves)
+    # The place of what rests stays in doubt. What moves is measured from where it was measured last.
+    before = tracks.end_variance.T.take(rows, axis=1) * ~moves
+    shift, covariance, end_variance = kernels.measured(mean, kdop, sight, variance, before)
+    position = x + shift
+    # Arms, legs and wheels reach out in turn, while the centroid goes with the body.
+    people = IS_PERSON[tracks.object_class[rows]].nonzero()[0]
+    step = observations.centroid[proposals[people]] - tracks.centroid[rows[people]]
+    position[people] = tracks.kdop_position[rows[people]] + step
+    return Matches(rows, proposals, position, covariance, end_variance.T)
+
+
+def remeasured(tracks: TrackTable, frame: Associated, kernels: GeometryKernels, variance: float) -> Matches:
+    """The matches of a frame, in which proposals that gained parts measure the positions of their tracks whole."""
+    matches = frame.matches
+    joined = np.isin(matches.rows, frame.joined).nonzero()[0]
+    rows = matches.rows[joined]
+    whole = measured(tracks, frame.observations, rows, matches.proposals[joined], kernels, variance)
+    return matches._replace(
+        position=with_rows(matches.position, joined, whole.position),
+        covariance=with_rows(matches.covariance, joined, whole.covariance),
+        end_variance=with_rows(matches.end_variance, joined, whole.end_variance),
+    )
 
 
 def _free(index: Int, taken: Int, n: int) -> Bool:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from modt.class_sizes import IS_PERSON
 from modt.geometry.kernels import GeometryKernels
 from modt.native.declarations import declare
 from modt.tracking.kalman import HEADING, SPEED, X, Y
@@ -89,7 +90,11 @@ class MotionFilter:
             was not expected at either is no evidence of motion.
         """
         moving, resting = self._update(tracks, rows, position, noise)
-        log_ratio = (resting.distance - moving.distance + np.log(resting.determinant / moving.determinant)) / 2
+        is_person = IS_PERSON[tracks.object_class[rows]]
+        # The velocity of a new track is as uncertain as that of a fast car, which speaks against a person's motion.
+        least = np.where(is_person, np.exp(-2 * self.tuning.max_person_penalty), 0.0)
+        precision = np.maximum(resting.determinant / moving.determinant, least)
+        log_ratio = (resting.distance - moving.distance + np.log(precision)) / 2
         most = np.where(moving.distance < self.tuning.max_distance, self.tuning.max_log_ratio, 0.0)
         bounded: Float64 = np.clip(log_ratio, -self.tuning.max_log_ratio, most)
         return bounded

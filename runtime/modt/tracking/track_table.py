@@ -36,6 +36,7 @@ class TrackTable(Tracks):
     bottom: Float64 = column(float)  # lowest point last observed [m, world]
     top: Float64 = column(float)  # highest point last observed [m, world]
     kdop_position: Float64 = column(float, 2)  # measured position when `kdop` was observed [m, world]
+    centroid: Float64 = column(float, 2)  # centroid of the last proposal [m, world]
     rest_position: Float64 = column(float, 2)  # position at which the track was last known to rest [m, world]
     stationary: Bool = column(bool)  # the track is at rest
     reappears: Bool = column(bool)  # the track has a proposal after a frame without one

@@ -15,7 +15,7 @@ from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.extent import extent_update_of
 from modt.tracking.hiding import Hiding
 from modt.tracking.kalman import SPEED, filter_of, velocity_of
-from modt.tracking.kdop_association import KdopAssociation
+from modt.tracking.kdop_association import KdopAssociation, remeasured
 from modt.tracking.motion_filter import motion_filter_of
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Regrouping
@@ -65,6 +65,8 @@ class Tracker:
         self._extended = config.extensions == "all"
         self._period_s = period_s
         self._regrouping = Regrouping(kernels, tuning)
+        self._kernels = kernels
+        self._position_variance = tuning.kdop_association.position_sigma_m**2
         self._update_extent = extent_update_of(kernels, tuning.extent)
         self._filter = filter_of(kernels, tuning.filter)
         position_m = tuning.filter.initial_position_sigma_m
@@ -133,6 +135,8 @@ class Tracker:
         frame = Associated(proposals, located.observations, matches)
         if self._extended:  # the paper takes proposals as they are
             frame = self._regrouping.regroup(self.tracks, frame, located.placement)
+            if len(frame.joined):
+                frame = frame._replace(matches=remeasured(self.tracks, frame, self._kernels, self._position_variance))
         nearest = None
         if self._extended and points is not None and proposals.kind is not None:
             nearest = self._sight.look(points, proposals.kind)
@@ -238,6 +242,7 @@ class Tracker:
         t.end_variance[rows] = matches.end_variance
         known = t.envelope.take(frame.joined, axis=0)
         self._update_extent(t, rows, matches.proposals, frame.observations, matches.position, dt_s)
+        t.centroid[rows] = frame.observations.centroid[matches.proposals]
         t.envelope[frame.joined] = known  # what is joined justifies no further joins
 
     def _weighed(self, log_ratio: Float64, frame: Associated, nearest: Float32 | None) -> Float64:
@@ -304,6 +309,8 @@ class Tracker:
     def _decide_motion(self) -> None:
         """Write which tracks move and which are still, by the probability of moving and the distance gone.
 
+        The covariance of a velocity becomes the published one, which the filter writes anew in each frame.
+
         What flickers seems to move from one place to another, so no track starts to move as it reappears.
         """
         t = self.tracks
@@ -314,6 +321,7 @@ class Tracker:
         known = (moves | (t.moving_probability < 0.5)) & (t.hits >= evidence.min_hits)
         t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
         t.motion[~known] = MotionState.UNKNOWN.value
+        t.velocity_covariance[moves & known] *= evidence.velocity_variance
 
     def _from_rest_m(self) -> Float64:
         """(M,) distance of tracks from their rest positions [m]."""
@@ -346,4 +354,5 @@ class Tracker:
         t.age[new] = t.hits[new] = 1
         t.lagged_kdop[new] = observations.kdop.T.take(proposals, axis=0)
         t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]
+        t.centroid[new] = observations.centroid[proposals]
         self._update_extent(t, rows, proposals, observations, position, 0.0)

@@ -31,15 +31,15 @@ class FilterTuning:
 class MotionFilterTuning:
     """Filter of two hypotheses, at rest and moving."""
 
-    acceleration_sigma_mps2: float = 1.0
+    acceleration_sigma_mps2: float = 0.7
     """Process noise of the velocity of what moves [m/s2]. Greater: velocities follow the last positions faster, and
     jitter more.
-    Chosen on: simulated streets, by the error of velocities."""
+    Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
-    turn_sigma_radps: float = 0.4
+    turn_sigma_radps: float = 0.6
     """Further process noise of the velocity, relative to the speed [rad/s]. Greater: fast objects are followed
-    through sharper turns, and their velocities jitter more.
-    Chosen on: judgement."""
+    through sharper turns and starts, and their velocities jitter more.
+    Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
     start_sigma_mps: float = 1.0
     """Standard deviation of the velocity of what has just started, along either axis [m/s]. Greater: slow starts are
@@ -67,6 +67,11 @@ class MotionFilterTuning:
     """Standard deviation of the velocity of a new moving track, along either axis [m/s]. Less: fast objects are lost
     in their second frame.
     Chosen on: judgement."""
+
+    max_person_penalty: float = 1.0
+    """Most that the uncertainty of its velocity takes from the logarithm of the odds that a person moves. Greater:
+    new walkers seem to stand.
+    Chosen on: simulated streets with cyclists that accelerate, by the error of velocities of new tracks."""
 
     creep_mps: float = 0.02
     """Process noise of a resting position [m/sqrt(s)]. Greater: slow motion is taken for rest.
@@ -130,6 +135,11 @@ class MotionEvidenceTuning:
     """Distance from its rest position from which a track moves [m]. Greater: what sways does not move, and slow
     starts are reported later.
     Chosen on: judgement."""
+
+    velocity_variance: float = 0.2
+    """Variance of the velocity that is published once the motion of a track is known, relative to that of the filter,
+    which allows for accelerations and jumps that are rare. Greater: velocities seem less certain.
+    Chosen on: simulated streets with vehicles that accelerate, by the errors of velocities of cars and cyclists."""
 
     min_hits: int = 5
     """Frames with a proposal from which the motion of a track is known. Less: movers are reported earlier, and what

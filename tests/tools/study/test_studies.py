@@ -59,7 +59,8 @@ def random_track(rng, n, scale):
     P = A @ A.transpose(0, 2, 1) + 0.01 * np.eye(4)
     error = scale * np.einsum("nij,nj->ni", np.linalg.cholesky(P), rng.normal(0, 1, (n, 4)))
     beside = 0.3 * np.array([-np.sin(0.7), np.cos(0.7)])
-    x = pose + error
+    velocity = 1.2 * np.column_stack([np.cos(heading), np.sin(heading)])
+    x = np.c_[pose[:, :2], velocity] + error
     x[:, :2] += beside
     return BodyTrack("pedestrian, moving", x, P, pose)
 
