@@ -125,7 +125,7 @@ def measured(
     return Matches(rows, proposals, position, covariance, end_variance.T)
 
 
-def remeasured(tracks: TrackTable, frame: Associated, kernels: GeometryKernels, variance: float) -> Matches:
+def with_whole_hosts(tracks: TrackTable, frame: Associated, kernels: GeometryKernels, variance: float) -> Matches:
     """The matches of a frame, in which proposals that gained parts measure the positions of their tracks whole."""
     matches = frame.matches
     joined = np.isin(matches.rows, frame.joined).nonzero()[0]

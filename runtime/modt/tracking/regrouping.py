@@ -13,6 +13,8 @@ which are records. Takes are applied first. Joins and splits are found from the 
 The senior track has the greater product of hits and last points. Age would mislead: a fragment is as old as its car,
 and a bush is older than the car that passes it.
 
+A proposal that gained parts measures the position of its track whole.
+
 What is joined does not extend the known extent of its track. Else each join would justify the next, and who leaves a
 parked car would be a part of it for metres.
 
@@ -32,6 +34,7 @@ from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Associated, Matches
 from modt.tracking.join import Joins, find_joins
+from modt.tracking.kdop_association import with_whole_hosts
 from modt.tracking.pairs import Situation, with_rows
 from modt.tracking.split import Splits, find_splits, locate_pieces
 from modt.tracking.take import find_takes
@@ -124,7 +127,7 @@ class Regrouping:
         # The reflectance of single points is not known here. A host keeps its statistics, though it gained or lost
         # points; those of a piece are unknown, since it is another object. Flags and ground come from the source.
         reflectance = proposals.reflectance
-        return Associated(
+        regrouped = Associated(
             proposals=replace(
                 proposals,
                 box=with_rows(proposals.box, changed, few.box),
@@ -135,6 +138,10 @@ class Regrouping:
             matches=matches._replace(proposals=number[matches.proposals]),
             joined=rows_of_hosts,
         )
+        if not len(rows_of_hosts):
+            return regrouped
+        remeasured = with_whole_hosts(tracks, regrouped, self._kernels, self._position_variance)
+        return regrouped._replace(matches=remeasured)
 
     def _regrouped(self, former: Proposals, splits: Splits, numbering: _Numbering) -> Proposals:
         """Proposals of the members in their new order; boxes and other columns are those of their sources."""

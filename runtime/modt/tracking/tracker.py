@@ -15,7 +15,7 @@ from modt.tracking.association import Associated, Association, Matches
 from modt.tracking.extent import extent_update_of
 from modt.tracking.hiding import Hiding
 from modt.tracking.kalman import SPEED, filter_of, velocity_of
-from modt.tracking.kdop_association import KdopAssociation, remeasured
+from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.motion_filter import motion_filter_of
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Regrouping
@@ -65,8 +65,6 @@ class Tracker:
         self._extended = config.extensions == "all"
         self._period_s = period_s
         self._regrouping = Regrouping(kernels, tuning)
-        self._kernels = kernels
-        self._position_variance = tuning.kdop_association.position_sigma_m**2
         self._update_extent = extent_update_of(kernels, tuning.extent)
         self._filter = filter_of(kernels, tuning.filter)
         position_m = tuning.filter.initial_position_sigma_m
@@ -135,11 +133,7 @@ class Tracker:
         frame = Associated(proposals, located.observations, matches)
         if self._extended:  # the paper takes proposals as they are
             frame = self._regrouping.regroup(self.tracks, frame, located.placement)
-            if len(frame.joined):
-                frame = frame._replace(matches=remeasured(self.tracks, frame, self._kernels, self._position_variance))
-        nearest = None
-        if self._extended and points is not None and proposals.kind is not None:
-            nearest = self._sight.look(points, proposals.kind)
+        nearest = self._look(points, proposals)
         rows = frame.matches.rows
         box_before = self.tracks.box.take(rows, axis=0)
         self._associate(rows)
@@ -211,6 +205,12 @@ class Tracker:
         else:
             self._filter.predict(t.x, t.P, dt_s)
         return dt_s
+
+    def _look(self, points: Float32 | None, proposals: Proposals) -> Float32 | None:
+        """Nearest returns of a frame (`Sight.look`); None where points or their kinds are not known, or not used."""
+        if not self._extended or points is None or proposals.kind is None:
+            return None
+        return self._sight.look(points, proposals.kind)
 
     def _associate(self, rows: Int) -> None:
         """Count hits and misses; matched proposals take over the states of their tracks, the other tracks coast."""
