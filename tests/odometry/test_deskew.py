@@ -78,13 +78,13 @@ def test_the_delay_is_the_mean_over_the_bearings_also_across_the_seam(towards, d
     assert found == pytest.approx(-turn_s * mean / (2 * np.pi), abs=1e-3)
 
 
-def drive(turn_s, known, posed=False, frames=25):
-    """Odometry and tracker after a drive with skewed sweeps at 8 m/s and 35 degrees/s, and the true pose."""
+def drive(turn_s, known, posed=False, frames=25, speed=8.0, turn=0.6):
+    """Odometry and tracker after a drive with skewed sweeps, at a speed [m/s] and a turn [rad/s]; the true pose."""
     tracker = Follower()
     for i in range(frames):
-        frame, proposals = skewed(street(n=60), i, turn_s, 8.0, 0.6, posed)
+        frame, proposals = skewed(street(n=60), i, turn_s, speed, turn, posed)
         tracker.follow(replace(frame, turn_s=turn_s if known else 0.0), proposals)
-    return tracker, constant_turn_pose((frames - 1) * PERIOD_S, 8.0, 0.6)
+    return tracker, constant_turn_pose((frames - 1) * PERIOD_S, speed, turn)
 
 
 @pytest.mark.parametrize("turn_s", [0.1, -0.1])
@@ -97,6 +97,15 @@ def test_the_path_is_found_through_skewed_sweeps(turn_s):
         # Of 15 m; a sweep is registered a second time where the first one moves it far.
         assert not known or np.hypot(*error[:2, 3]) < 0.08
     assert turn_deg[True] < min(0.3, turn_deg[False] / 2)
+
+
+@pytest.mark.parametrize("turn", [np.pi, -np.pi, 3.9])
+def test_a_robot_that_spins_from_the_first_sweep_on_keeps_its_place(turn):
+    """The first sweep is not deskewed, since no motion is known."""
+    tracker, T = drive(0.1, known=True, frames=12, speed=0.0, turn=turn)
+    error = inverse(T) @ tracker.T_world_sensor
+    assert np.hypot(*error[:2, 3]) < 0.1
+    assert abs(yaw_of(error)) < np.deg2rad(2.0)
 
 
 def test_stationary_objects_stay_in_place_though_their_sweeps_are_skewed():

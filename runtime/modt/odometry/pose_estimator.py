@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,8 @@ FAR_M = 1e5
 of that pose. Positions are in double precision, but pairs of k-DOPs are compared in single precision first, whose
 step is 8 mm at this coordinate and half a metre at a northing of 5000 km. The coarser it is, the more pairs that do
 not overlap are compared a second time, in double precision."""
+_INITIAL_TURNS = sorted(range(-8, 9), key=abs)
+"""Turns that are tried while no motion is known, in steps of RegistrationTuning.initial_turn_rad."""
 
 
 class PoseEstimator:
@@ -142,17 +144,38 @@ class PoseEstimator:
 
     def _register(self, sweep: _Sweep, landmarks: Landmarks) -> Placement:
         """Placement of a sweep without a pose, by stationary objects."""
-        # The motion between the last two frames goes on, by the same displacement. Registration corrects it in the
-        # plane only, so a pitch or a climb that also went on would never end.
+        # Registration corrects the prediction in the plane only, so a pitch or a climb that went on would never end.
         T_world_last = _planar(self._T_world_last)
-        last_motion = inverse(_planar(self._T_world_before)) @ T_world_last
-        last_motion[2, 3] = 0.0
-        predicted = sweep.place(T_world_last @ last_motion)
+        if self._registration.initialised:  # the motion between the last two frames goes on, by the same displacement
+            motion = inverse(_planar(self._T_world_before)) @ T_world_last
+            motion[2, 3] = 0.0
+        else:
+            motion = self._initial_turn(sweep, landmarks, T_world_last)
+            sweep = replace(sweep, delay_s=None)
+        predicted = sweep.place(T_world_last @ motion)
         placement = self._corrected(predicted, sweep, landmarks)
         change_m = sweep.deskewed_change_m(predicted, placement, self._tuning.repeat_range_m)
         if change_m > self._tuning.repeat_tolerance_m:
             placement = self._corrected(placement, sweep, landmarks)
         return placement
+
+    def _initial_turn(self, sweep: _Sweep, landmarks: Landmarks, T_world_last: Float64) -> Float64:
+        """(4, 4) turn since the last sweep by which most proposals agree with landmarks, while no motion is known.
+
+        What a sensor that turns on the spot sees is twisted alike in each sweep, so the sweeps are compared as seen.
+        """
+        as_seen = replace(sweep, delay_s=None)
+        best = np.eye(4)
+        most_inliers = 0
+        for k in _INITIAL_TURNS:
+            turn = se3(rotation_zyx(0.0, 0.0, k * self._tuning.registration.initial_turn_rad), np.zeros(3))
+            fit = self._registration.support(landmarks, as_seen.observe(as_seen.place(T_world_last @ turn)))
+            if fit.inliers > most_inliers:
+                most_inliers = fit.inliers
+                best = turn
+            if fit.supported(self._tuning.registration.inlier_ratio):
+                break
+        return best
 
     def _corrected(self, placement: Placement, sweep: _Sweep, landmarks: Landmarks) -> Placement:
         """Placement of a sweep that is observed by another one, corrected once."""

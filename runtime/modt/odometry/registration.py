@@ -107,8 +107,6 @@ _COARSE_SCALES = _SCALES[:4]
 """Factors in the iterations of each fit of a wide search: the coarsest of them."""
 _WIDE_ROUNDS = 4
 """Rounds of matching and fitting in a wide search."""
-_INITIAL_TURNS = (0, 1, -1, 2, -2, 3, -3)
-"""Turns that are tried while no motion is known, in steps of RegistrationTuning.initial_turn_rad."""
 _MIN_LANDMARKS = 3
 """Fewest candidate pairs for which a motion is fitted, and fewest inliers that support it. A planar motion needs two
 pairs, and the third one checks it. A fit may have fewer pairs than candidates: only those that are the best match of
@@ -160,6 +158,9 @@ class Registration:
     Args:
         kernels: passes over pairs.
         tuning: how a pose is fitted.
+
+    Attributes:
+        initialised: whether a motion was known once.
     """
 
     def __init__(
@@ -167,9 +168,17 @@ class Registration:
     ) -> None:
         self._kernels = kernels
         self._tuning = tuning
-        self._initialised = False  # whether a motion was known once
+        self.initialised = False
         self._motion_known = False  # whether the last call of `correct` gave a motion with support
         self._inliers = 0  # of the fit of that call
+
+    def support(self, landmarks: Landmarks, observations: Observations) -> Fit:
+        """The best motion within reach that brings observations, as placed on trial, onto the landmarks.
+
+        Nothing is remembered of it. Without enough pairs it has no inliers.
+        """
+        fit = self._solve_coarsely(_View(landmarks, observations, _jacobian(observations)), np.zeros(3))
+        return Fit(np.zeros(3), 0, 0) if fit is None else fit
 
     def correct(
         self, landmarks: Landmarks, observations: Observations, motion_share: Float64 | float = 1.0
@@ -193,7 +202,7 @@ class Registration:
             fit = _best(fit, self._solve_wide(view))
         self._inliers = 0 if fit is None else fit.inliers
         self._motion_known = fit is not None and fit.supported(self._tuning.min_agreement)
-        self._initialised |= self._motion_known
+        self.initialised |= self._motion_known
         if fit is None:
             return np.eye(4)
         if np.hypot(*fit.motion[:2]) > self._tuning.reach_m or abs(fit.motion[2]) > self._tuning.max_turn_rad:
@@ -207,10 +216,7 @@ class Registration:
         return fit.supported(self._tuning.inlier_ratio) and fit.inliers >= enough
 
     def _solve_wide(self, view: _View) -> Fit | None:
-        """Motion within reach of the predicted one, or of several turns while no motion was ever known."""
-        if not self._initialised:
-            turns = (k * self._tuning.initial_turn_rad for k in _INITIAL_TURNS)
-            return _best(*(self._solve_coarsely(view, np.array([0.0, 0.0, turn])) for turn in turns))
+        """Motion within reach of the predicted one."""
         fit = self._solve_coarsely(view, np.zeros(3))
         if fit is None or fit.supported(self._tuning.min_agreement):
             return fit
