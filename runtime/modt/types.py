@@ -370,7 +370,7 @@ class Evidence(Columns):
 class Requests(Columns):
     """Column of the scheduler."""
 
-    waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
+    waiting: Int = column(int)  # frames in a row in which its call was deferred; a coasting track keeps the number
 
 
 @dataclass(frozen=True)

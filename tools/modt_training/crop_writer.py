@@ -69,7 +69,11 @@ class Labels:
 
 
 def label(scan: Scan, proposals: Proposals) -> Labels:
-    """Label the proposals of a scan by overlap with its objects."""
+    """Label the proposals of a scan by overlap with its objects.
+
+    The order of the objects matters: points of another object make a whole proposal partial only if that object
+    comes after the one that the proposal is.
+    """
     number = proposals.label(len(scan.points))
     size = proposals.count
     kind = np.full(len(proposals), ObjectClass.BACKGROUND, np.int64)

@@ -46,7 +46,7 @@ Pools = list[tuple[Int, Float64 | None]]
 CHUNK = 2000
 """Crops processed at a time."""
 MAJORITY = "owner"
-"""Column of a file that holds the majority; files of this name have the hashes that stand on the cards."""
+"""Column of a file that holds the majority: its name in files, so that the hashes on the model cards hold."""
 NOT_CONCATENATED = ("offsets", "provenance", "truth_row")
 
 
@@ -238,7 +238,7 @@ def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> Po
 
 
 def draw_batch(pools: Pools, rng: Generator, n: int = BATCH_SIZE, share: Float64 = CLASS_SHARE) -> Int:
-    """(n,) rows, classes by their shares; none of a class without rows."""
+    """At most n rows, classes by their shares; the share of a class without rows is lost."""
     number = rng.multinomial(n, share / share.sum())
     drawn = zip(pools, number, strict=True)
     return np.concatenate([rng.choice(rows, k, p=p) for (rows, p), k in drawn if len(rows)])

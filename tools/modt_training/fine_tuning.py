@@ -1,7 +1,8 @@
 """Further training of an exported model: new crops are learnt, and others keep the posterior that it gives them.
 
-A model of fewer classes than the table gets outputs for the further ones. Nothing is learnt about the
-crops that are kept, and the class frequencies that the posteriors assume hold on them.
+A model of fewer classes than the table gets outputs for the further ones. The loss has a part for each kind of crops:
+new ones are learnt by their labels, kept ones by the posterior that the model gave them, streets by their labels. The
+class frequencies that the posteriors assume hold on the kept ones. A crop may be in more than one part.
 """
 
 from __future__ import annotations
@@ -95,11 +96,11 @@ def layers_of(model: onnx.ModelProto) -> list[Layer]:
 KEPT_BATCHES = 800
 """Batches of crops that keep their posterior, half of them augmented; augmentation costs more than a step."""
 TRAINED_SHARE = 0.82
-"""Share of the trained weights in those of the network; the others are those before, which know streets better."""
+"""Weight of the trained parameters in the mean with those before, which know streets better."""
 STREET_SIZE = 96
 """Number of crops of simulated streets of a step, as frequent as they are met."""
 BOX_STREET_SIZE = 192
-"""Number of crops of simulated streets of such a step."""
+"""Number of crops of simulated streets of a step of the box classifier."""
 RATE = 4e-4
 """Greatest learning rate of the network."""
 BOX_CROPS = 40_000
@@ -118,7 +119,7 @@ RARE = 1e-4
 
 @dataclass(frozen=True)
 class Examples:
-    """Augmented crops, and the posteriors to learn.
+    """Crops, augmented or not, and the posteriors to learn.
 
     Attributes:
         local: R crops in the canonical frame.
@@ -307,6 +308,7 @@ def train_network(
 ) -> Model:
     """The model after training of its network on other crops, and on its own posteriors for those that are kept.
 
+    The parameters are averaged with those before by TRAINED_SHARE, then calibrated to the posteriors that are kept.
     `step` is called after every step.
     """
     torch.manual_seed(seed)
@@ -397,9 +399,10 @@ def train_boxes(model: Model, data: Dataset, others: Sequence[Boxes], steps: int
 
 
 def _all_and_simulated(data: Dataset) -> tuple[Int, Int]:
-    """All rows of a data set, and those of simulated sweeps.
+    """All rows of a data set, and those of simulated sweeps; the same rows where all are simulated.
 
-    Bare crops are all simulated: without as many simulated objects beside them, simulated would mean background.
+    Crops without objects (tools.train.bare_scans) are all simulated. As many simulated crops with objects are kept
+    beside them, so that a model does not learn that what is simulated is background.
     """
     return np.arange(len(data)), np.flatnonzero(data.variant == SYNTHETIC)
 

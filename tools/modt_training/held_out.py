@@ -161,7 +161,9 @@ def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> H
 def fit_pool(
     network: Float64, box: Float64, reflectance: Float64, valid: Validation, weight: Float64
 ) -> tuple[PoolWeights, Float64]:
-    """Weights of modt.classification.pool, 0 to 1, that minimise the log loss; (R, 4) log posteriors of the pool.
+    """Weights of modt.classification.pool that minimise the log loss; (R, 4) log posteriors of the pool.
+
+    The weights are 0 to 1, rounded to 0.01.
 
     Args:
         network: (R, 4) P(class | points).

@@ -1,7 +1,8 @@
 """Labelled recordings of one's own to a model that has learnt them, with its card and a profile.
 
-The model is a shipped one, trained further: crops of the recordings are learnt by their labels, and crops of
-simulated sweeps keep the posterior that it gives them. Every fold leaves recordings out, and the card is of those.
+The model is a shipped one, trained further: crops of the recordings are learnt by their labels. Simulated crops serve
+twice: all keep the posterior of the base model, and the trainable ones are also learnt by their labels. Every fold
+leaves recordings out, and the card is of those.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ class Trainer:
         base: the model before, with an output for each class.
         data: crops of the recordings.
         kept_data: crops that keep their posterior.
-        kept: these crops, augmented.
+        kept: examples drawn from these crops, half of them augmented.
         steps: steps of the network.
         step: called after every step of the network.
     """
@@ -191,10 +192,10 @@ def frequencies(model: Model, data: Dataset) -> Model:
 
 
 def threshold(score: Float64, right: Bool) -> tuple[float, float, float]:
-    """The score from which precision and recall have the greatest harmonic mean, and both there.
+    """Posterior threshold of the greatest F1, clipped to THRESHOLDS; precision and recall before clipping.
 
     Args:
-        score: (R,) score of a class.
+        score: (R,) log posterior of a class.
         right: (R,) whether a crop is of that class.
     """
     at, precision, recall = precision_recall(score, right, int(right.sum()))
@@ -211,7 +212,7 @@ class Request:
         profiles: names or files of the sensor's profiles.
         out: folder to write.
         name: of the model and the profile.
-        steps: steps of each network.
+        steps: steps of the network; the box classifier takes BOX_STEPS times as many.
         kept_seeds: number of simulated worlds of each scene that keep their posterior.
     """
 
@@ -335,8 +336,9 @@ def card(
             *score_tables(scores),
             "## Thresholds, out of fold",
             "",
-            "The posterior of a proposal at which precision and recall [%] have the greatest harmonic mean. Those of",
-            "the user's own classes stand in their table, as `missed_cost`.",
+            "The posterior of a proposal with the greatest F1, clipped to "
+            f"{THRESHOLDS[0]:g} to {THRESHOLDS[1]:g}; precision and recall [%] before clipping.",
+            "Those of the user's own classes stand in their table, as `missed_cost`.",
             "",
             "| class | posterior | precision | recall |",
             "|---|---|---|---|",

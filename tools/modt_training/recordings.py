@@ -42,7 +42,7 @@ def open_recordings(paths: Sequence[Path], labels: Sequence[Path]) -> list[Recor
     """Recordings with their labels, those beside them where none are given.
 
     Raises:
-        MisuseError: fewer than two recordings, no labels, as many labels as not recordings, or no sweeps.
+        MisuseError: fewer than two recordings, no labels, not one label file for each recording, or no sweeps.
     """
     if len({path.resolve() for path in paths}) < 2:
         remedy = "give two recordings or more: one is left out to judge by what was learnt from the others"
@@ -87,7 +87,11 @@ def labelled_scan(
     config: ProfileConfig,
     mount: Mount,
 ) -> Scan:
-    """A sweep (N, 4) with the points of its objects. Those of a type between the classes count as unlabelled."""
+    """A sweep (N, 4) with the points of its objects. Those of a type between the classes count as unlabelled.
+
+    The points of the scan are turned level by `mount`, the boxes stay in the frame of the tilted sensor: of boxes of
+    recordings only the height is used.
+    """
     members = overlap.ObjectPoints.of(points, truth).clear
     counted = truth.role == Role.COUNTED
     boxes = on_bottom(transform_boxes(inverse(truth.T_box_sensor), truth.box))

@@ -23,7 +23,8 @@ class Scan:
         points: (N, 4) sensor frame.
         objects: point indices of each of the B labelled objects.
         kinds: class of each, BACKGROUND for other labelled types.
-        boxes: (B, 7) x, y, z of the centre of the bottom face, l, w, h, yaw, sensor frame; NaN where unknown.
+        boxes: (B, 7) x, y, z of the centre of the bottom face, l, w, h, yaw, sensor frame; NaN where unknown. For a
+            tilted sensor, whose points are turned level, they stay in the frame of the sensor as it is mounted.
         fov: region with complete labels.
         unlabelled: (N,) points without a label.
         sensor: name of the sensor, by which results are grouped.

@@ -26,7 +26,7 @@ PRECISIONS = (0.9, 0.8)
 
 
 def by_sensor(log_probability: Float64, valid: Validation, rows: Bool) -> dict[str, dict[str, Any]]:
-    """Scores of log posteriors (R, 4) for every sensor that measured a crop of a mask (R,)."""
+    """Scores of log posteriors (R, 4) by sensor. A mask (R,) selects the sensors, of which all crops are scored."""
     return {
         valid.sensor_names[s]: sensor_scores(log_probability, valid, valid.sensor == s)
         for s in np.unique(valid.sensor[rows]).tolist()
@@ -38,7 +38,8 @@ def sensor_scores(log_probability: Float64, valid: Validation, of_sensor: Bool) 
 
     Keys: `average_precision` over all objects; `log_loss`; `temperature`, by which the logits of this sensor are
     still to be divided; `calibration_error` of the likeliest class; `recall`, by precision and class, of the objects
-    of MIN_OBJECT_POINTS points, found and called right: `of_all` and `of_found`, those with a proposal of their own.
+    of MIN_OBJECT_POINTS points, detected with the right class: as a share `of_all`, and `of_found`, those with a
+    proposal of their own.
     """
     score = log_softmax(log_probability, axis=1)
     clear = of_sensor & valid.clear

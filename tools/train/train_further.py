@@ -116,7 +116,7 @@ RIDER_FREQUENCY = np.array([0.89, 0.07, 0.03, 0.01])
 MIN_RIDER_POINTS = 10
 """Least number of points of such a crop."""
 BOX_BARE_SIZE = 96
-"""Number of bare crops of such a step."""
+"""Number of bare crops of a step of the box classifier."""
 BOX_PEOPLE_SIZE = 192
 """Number of crops of people and things of such a step."""
 BOX_NARROW_SIZE = 256

@@ -7,7 +7,8 @@ since the first of its class may yet come. Doubtful people count as background, 
 has not learnt are not calibrated: vines that resemble people a little would make people frequent, and so be people.
 
 An object is reported where its expected cost, if it were missed, exceeds that of a false one. A reported class is
-kept down to `kept_probability`, since a posterior also falls while the object is half hidden.
+kept down to `kept_probability`, since a posterior also falls while the object is half hidden. For this its posterior
+is raised by the same ratio, so it is also preferred to other classes that are more probable by less than that.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from modt.types import Bool, Decisions, Evidence, Float64, Motion
 
 
 class LikeliestClass:
-    """The likeliest object, where its posterior reaches its threshold: nothing is adapted or remembered.
+    """The likeliest object, where its posterior reaches its threshold. This class adapts and remembers nothing.
 
     Args:
         config: costs.
@@ -65,7 +66,7 @@ class Decision(LikeliestClass):
         # Sums of the posteriors of proposals: as if seen before the start, and seen since then.
         self._start_mass = tuning.start_proposals * self.frequency
         self._mass = np.zeros(N_CLASSES)
-        # A reported class is kept down to this share of its threshold.
+        # A reported class is kept down to this share of its threshold, and preferred to others by its inverse.
         self._kept_share = np.append(1.0, np.minimum(tuning.kept_probability / self._threshold, 1.0))
 
     def decide(self, decisions: Decisions, evidence: Evidence, motion: Motion) -> None:

@@ -8,6 +8,8 @@ The posterior of a track after t frames, with views Y, boxes B and motion M, is
 
     P(X | Y_1:t, B_1:t, M_t) ~ P(X) P(M_t | X) exp(n^view_exponent mean log P(Y | X) + box_weight mean log P(B | X))
 
+times (1 - mismatch_probability), plus mismatch_probability P(X | B_t), in case the last box is of another object.
+
 Views of one object are correlated (log-odds of consecutive views of a car by .8 to .87), so they are averaged, not
 multiplied: n of them weigh n^view_exponent. Both means forget the past; a view counts by the root of its points, and
 one of few points of what stands still less.
@@ -238,12 +240,13 @@ class FurtherViews(FusedTracks):
     nearby box of a person's size allow an object. A track of many points within some distance has it whatever its box
     is: the box prior takes people in rare postures for background. An unconfirmed track is
     classified again when it shows more points, at growing intervals, and every few frames if it may be a person. A
-    confirmed object is classified again at longer intervals. Confirmed background is classified again only with far
-    more points, if it may be an object. A person whose upper half is cut off is not classified.
+    confirmed object is classified again at longer intervals. A confirmed track of any class is classified again with
+    far more points, if it may be an object. A person whose upper half is cut off is not classified. A class counts as
+    confirmed here by the present posterior, whatever `Motion.final` says, and every state may ask for a view.
     """
 
     def asks(self, evidence: Evidence, motion: Motion, proposals: Proposals, wants_class: Bool) -> Bool:
-        """(M,) tracks at their first view or one that may change their class."""
+        """(M,) tracks at their first view or one that may change their class; `wants_class` is not regarded."""
         conditions = self._conditions
         rows = motion.observed.nonzero()[0]
         age = motion.age[rows]

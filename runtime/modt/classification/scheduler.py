@@ -68,8 +68,8 @@ class TimeLimit:
 class Scheduler:
     """Greedy selection by worth.
 
-    A call is worth more for an uncertain posterior, a view that differs from the last one, and a near and whole
-    object; and more with each frame of waiting, so that every call that fits into the budget is made in the end.
+    A call is worth more for an uncertain posterior, a view that differs from the last one, and a near object; and
+    more with each frame of waiting, so that every call that fits into the budget is made in the end.
 
     Args:
         cost: CPU time of a call.
@@ -124,7 +124,10 @@ class Scheduler:
     def worth(
         self, requests: Requests, motion: Motion, evidence: Evidence, proposals: Proposals, rows: Int
     ) -> Float64:
-        """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
+        """(R,) worth of a call for these tracks.
+
+        It is the weighted sum of uncertainty, nearness and novelty, each 0 to 1, plus the weighted frames waited.
+        """
         tuning = self._tuning
         proposal_of_row = motion.proposal[rows]
         posterior = np.maximum(evidence.posterior[rows], 1e-12)

@@ -88,8 +88,9 @@ class PorosityFinder:
     The solidity of a cell is the number of returns in the window of cells around it, over the number of rays that
     cross the window between its lowest and its highest return. A surface across the window has 1. A single return has
     none, because one ray tells nothing of its neighbours. A cell is airborne where its own solidity and that of all
-    its neighbours are too low, so that the edge of a surface stays with it. Above a person's head the same holds of
-    points: their window ends a little below and above them.
+    its neighbours are too low, so that the edge of a surface stays with it. Within
+    `point_range_m` each point is also judged alone, in a window that ends a little below and above it, so that fog
+    above a head is recognised although it is in the cell of the head.
 
     Args:
         sensor: spacing of the rays.
@@ -125,6 +126,7 @@ class PorosityFinder:
         """
         near = np.flatnonzero(sqrt_range < self.max_sqrt_range)
         around = self._around(cells, near)
+        # Row C, the last of these columns, stands for no cell: NONE is -1, which wraps to it.
         returns = np.append(cells.entries, 0).take(around, mode="wrap").sum(axis=1)
         low = np.append(cells.low, np.float32(np.inf)).take(around, mode="wrap").min(axis=1)
         high = np.append(cells.high, np.float32(-np.inf)).take(around, mode="wrap").max(axis=1)
@@ -141,7 +143,8 @@ class PorosityFinder:
     def is_full(self, found: Clusters) -> bool:
         """Whether the air of a sweep is full of fog, flakes or drops all round, or of a cloud nearby.
 
-        Most rays also pass through leaves. But those are in few directions, or fewer than the returns of surfaces.
+        It is full if airborne returns are a large share of those looked at, or fill most directions. Leaves, through
+        which most rays also pass, do neither.
         """
         air = found.air
         if air.share > self.tuning.max_sweep_share:
@@ -176,7 +179,10 @@ class PorosityFinder:
         return is_air | found.air.airborne.take(found.cell_of_point)
 
     def _around(self, cells: Cells, which: Int) -> Int:
-        """(R, WINDOW * WINDOW) cells in the windows around `which` (R,), NONE where no cell is occupied."""
+        """(R, WINDOW * WINDOW) cells in the windows around `which` (R,), NONE where no cell is occupied.
+
+        The numbers of the cells are written to `grid.number`, and taken back at the end.
+        """
         index = self.grid.flat_index(cells.row, cells.column)
         self.grid.number[index] = np.arange(len(index), dtype=np.int32)
         step = np.arange(WINDOW) - WINDOW // 2
