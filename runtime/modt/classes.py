@@ -157,6 +157,7 @@ CLASSES = (*SHIPPED, *(read_rows(Path(FILE)) if FILE else ()))
 """The classes in the order of their indices."""
 CLASS_NAMES = tuple(spec.name for spec in CLASSES)
 N_CLASSES = len(CLASSES)
+"""Number of classes, background first; C in the shapes of arrays."""
 PERSON_M = 1.7  # height of a person
 OBJECTS = tuple(range(1, N_CLASSES))
 """Index of every class but background."""

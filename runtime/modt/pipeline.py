@@ -76,7 +76,7 @@ class ClassificationStage(Protocol):
     """Points to class likelihoods."""
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(Y|X) of the proposals named."""
+        """(R, C) P(Y|X) of the proposals named."""
 
     def facts(self) -> dict[str, str]:
         """Name and hash of the model, for the record of a run."""
@@ -92,7 +92,7 @@ class FusionStage(Protocol):
         """(M,) tracks whose view of this frame is worth a classification."""
 
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Write the views (R, 4) of the rows (R,) and their posteriors; returns (R,) whether each is confirmed."""
+        """Write the views (R, C) of the rows (R,) and their posteriors; returns (R,) whether each is confirmed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ class Pipeline:
         )
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
-        """(R, 4) likelihoods. The ledger counts the points; the scheduler learns the cost where time is limited."""
+        """(R, C) likelihoods. The ledger counts the points; the scheduler learns the cost where time is limited."""
         cost = self.scheduler.cost
         count = proposals.count[which]
         classify = self.classifier.classify

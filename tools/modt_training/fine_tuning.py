@@ -72,7 +72,7 @@ class Student(nn.Module):
         self.bias = nn.ParameterList(torch.from_numpy(b.astype(np.float32)) for _, b in layers)
 
     def forward(self, xyz: Tensor, count: Tensor) -> Tensor:
-        """(R, 4) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
+        """(R, C) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
         h = xyz
         for i, (weight, bias) in enumerate(zip(self.weight, self.bias, strict=True)):
             product = MaxPooledLinear.apply(h, weight, count) if i == N_SHARED - 1 else h @ weight.T
@@ -123,9 +123,9 @@ class Examples:
 
     Attributes:
         local: R crops in the canonical frame.
-        wanted: (R, 4) posteriors that the network is to give.
+        wanted: (R, C) posteriors that the network is to give.
         size: number of them in a step.
-        shift: (4,) addend of the logits, by which the share of each class among the crops differs from its frequency.
+        shift: (C,) addend of the logits, by which the share of each class among the crops differs from its frequency.
     """
 
     local: Crops
@@ -187,7 +187,7 @@ class BoxStudent(nn.Module):
         self.bias = nn.ParameterList(torch.from_numpy(np.array(b, np.float32)) for _, b in layers)
 
     def forward(self, feature: Tensor) -> Tensor:
-        """(R, 4) logits of (R, 7) features."""
+        """(R, C) logits of (R, 7) features."""
         value = feature
         for i, (weight, bias) in enumerate(zip(self.weight, self.bias, strict=True)):
             value = value @ weight + bias
@@ -206,7 +206,7 @@ class Model:
     Attributes:
         network: the network.
         boxes: the box classifier.
-        log_frequency: (4,) log of the class frequencies that both assume.
+        log_frequency: (C,) log of the class frequencies that both assume.
         metadata: texts of the model by their keys.
     """
 
@@ -231,7 +231,7 @@ class Model:
 
     @torch.no_grad()
     def network_posterior(self, local: Crops) -> Float64:
-        """(R, 4) posteriors by the network, of R crops in the canonical frame."""
+        """(R, C) posteriors by the network, of R crops in the canonical frame."""
         logits = []
         for first in range(0, len(local), 500):
             part = slice(first, min(first + 500, len(local)))
@@ -240,12 +240,12 @@ class Model:
         return np.asarray(softmax(np.concatenate(logits), axis=1), np.float64)
 
     def posterior_of_points(self, data: Dataset, rows: Int) -> Float64:
-        """(R, 4) posteriors by the network, of rows of a data set, without augmentation."""
+        """(R, C) posteriors by the network, of rows of a data set, without augmentation."""
         crops = subsample(data.take(rows), POINTS, np.random.default_rng(0))
         return self.network_posterior(canonical(crops, data.sensors.ground_z_m[rows]))
 
     def posterior(self, data: Dataset) -> Float64:
-        """(R, 4) posteriors by network and box together, of the crops of a data set, without augmentation."""
+        """(R, C) posteriors by network and box together, of the crops of a data set, without augmentation."""
         network = self.posterior_of_points(data, np.arange(len(data)))
         log_box = box_classifier.logits(self.boxes.layers, crop_features(data.crops, data.sensors))
         none = np.zeros_like(log_box)
@@ -287,7 +287,7 @@ def kept_examples(model: Model, data: Dataset, rng: Generator, batches: int = KE
 
 
 def one_hot(label: Int) -> Float64:
-    """(R, 4) certain posteriors of classes (R,)."""
+    """(R, C) certain posteriors of classes (R,)."""
     return np.eye(N_CLASSES)[label]
 
 
@@ -350,9 +350,9 @@ class Boxes:
 
     Attributes:
         feature: (R, 7) features.
-        wanted: (R, 4) posteriors that the box classifier is to give.
+        wanted: (R, C) posteriors that the box classifier is to give.
         size: number of them in a step.
-        shift: (4,) addend of the logits, as of Examples.
+        shift: (C,) addend of the logits, as of Examples.
     """
 
     feature: Tensor
@@ -408,7 +408,7 @@ def _all_and_simulated(data: Dataset) -> tuple[Int, Int]:
 
 
 def keep_posteriors(logits: Float64, wanted: Float64, weight: Float64) -> Calibration:
-    """Calibration of (R, 4) logits to posteriors (R, 4), crops weighted by (R,), 1 in total.
+    """Calibration of (R, C) logits to posteriors (R, C), crops weighted by (R,), 1 in total.
 
     Classes of the user's own keep their logits, since the crops hold none of them.
     """

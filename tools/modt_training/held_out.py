@@ -17,7 +17,7 @@ from modt.types import NONE, Bool, Float64, Int
 from modt_training.dataset import Dataset, LabelledObjects, folds
 
 Model = Callable[[Int], Float64]
-"""Maps rows (R,) to logits (R, 4)."""
+"""Maps rows (R,) to logits (R, C)."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Calibration:
     offset: Float64
 
     def apply(self, logits: Float64, base: Float64 | float = 0.0) -> Float64:
-        """(R, 4) probabilities of logits (R, 4), added to calibrated logits `base`."""
+        """(R, C) probabilities of logits (R, C), added to calibrated logits `base`."""
         probability: Float64 = softmax(base + logits / self.temperature + self.offset, axis=1)
         return probability
 
@@ -47,10 +47,10 @@ def fit_calibration(logits: Float64, label: Int, weight: Float64, base: Float64 
     """Maximum-likelihood calibration on held-out logits; the offsets absorb the weighted class frequencies.
 
     Args:
-        logits: (R, 4) uncalibrated.
+        logits: (R, C) uncalibrated.
         label: (R,) classes.
         weight: (R,) weight of each, 1 in total.
-        base: (R, 4) calibrated logits that they are added to.
+        base: (R, C) calibrated logits that they are added to.
     """
 
     def loss(theta: Float64) -> float:
@@ -109,7 +109,7 @@ class Validation:
 
     @property
     def class_frequency(self) -> Float64:
-        """(4,) frequency of the classes among the weighted crops, which a posterior calibrated to them assumes."""
+        """(C,) frequency of the classes among the weighted crops, which a posterior calibrated to them assumes."""
         return np.asarray(np.bincount(self.label, self.weight, N_CLASSES), np.float64)
 
     def weight_of(self, rows: Bool) -> Float64:
@@ -126,7 +126,7 @@ class HeldOut:
 
     Attributes:
         validation: the crops.
-        logits: (R, 4) logits of each.
+        logits: (R, C) logits of each.
         calibration: fitted to the clear ones.
     """
 
@@ -136,7 +136,7 @@ class HeldOut:
 
     @property
     def probability(self) -> Float64:
-        """(R, 4) calibrated probabilities."""
+        """(R, C) calibrated probabilities."""
         return self.calibration.apply(self.logits)
 
 
@@ -161,14 +161,14 @@ def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> H
 def fit_pool(
     network: Float64, box: Float64, reflectance: Float64, valid: Validation, weight: Float64
 ) -> tuple[PoolWeights, Float64]:
-    """Weights of modt.classification.pool that minimise the log loss; (R, 4) log posteriors of the pool.
+    """Weights of modt.classification.pool that minimise the log loss; (R, C) log posteriors of the pool.
 
     The weights are 0 to 1, rounded to 0.01.
 
     Args:
-        network: (R, 4) P(class | points).
-        box: (R, 4) P(class | box).
-        reflectance: (R, 4) log P(reflectance | class, box), zeros without: its weight is then zero.
+        network: (R, C) P(class | points).
+        box: (R, C) P(class | box).
+        reflectance: (R, C) log P(reflectance | class, box), zeros without: its weight is then zero.
         valid: the crops.
         weight: (R,) weight of each, 1 in total.
     """

@@ -29,7 +29,7 @@ DROPOUT = 0.3
 HIDDEN = (32, 32)
 """Widths of the small networks."""
 Batch = tuple[Float64, Int, Float64 | float]
-"""(R, F) features of crops, (R,) classes, and (R, 4) logits to which the network's are added, or zero."""
+"""(R, F) features of crops, (R,) classes, and (R, C) logits to which the network's are added, or zero."""
 
 
 class MaxPooledLinear(torch.autograd.Function):
@@ -93,7 +93,7 @@ class PointNet(nn.Module):
         self.dropout = nn.Dropout(DROPOUT)
 
     def forward(self, xyz: Tensor, count: Tensor) -> Tensor:
-        """(R, 4) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
+        """(R, C) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
         h = xyz
         for layer, norm in zip(self.shared[:-1], self.norms, strict=False):
             h = torch.relu(norm(layer(h)))

@@ -124,7 +124,7 @@ def new_examples(model: Model, data: Dataset, rows: Int, batches: int, seed: int
 
 
 def _smooth(label: Int) -> Float64:
-    """(R, 4) posteriors of labels (R,)."""
+    """(R, C) posteriors of labels (R,)."""
     return np.asarray((1.0 - SMOOTHING) * one_hot(label) + SMOOTHING / N_CLASSES)
 
 
@@ -157,7 +157,7 @@ class Trainer:
         return train_boxes(model, self.kept_data, [boxes, street_boxes(self.kept_data)], BOX_STEPS * self.steps, seed)
 
     def held_out(self, k: int) -> tuple[Validation, dict[str, Float64]]:
-        """The crops to judge by, and (R, 4) log posteriors of each by a model that has not seen its recording."""
+        """The crops to judge by, and (R, C) log posteriors of each by a model that has not seen its recording."""
         valid = Validation.of(self.data)
         fold = folds(self.data, k)
         out = {name: np.zeros((len(valid.rows), N_CLASSES)) for name in ("network", "box", POOL)}
@@ -174,7 +174,7 @@ POOL = "pool"
 
 
 def log_posteriors(model: Model, data: Dataset, rows: Int) -> dict[str, Float64]:
-    """(R, 4) log posteriors of rows of a data set by network, box, and both."""
+    """(R, C) log posteriors of rows of a data set by network, box, and both."""
     network = model.posterior_of_points(data, rows)
     box = log_softmax(box_classifier.logits(model.boxes.layers, dataset_features(data, rows)), axis=1)
     pool = log_pool(network, box, np.zeros_like(box), model.log_frequency, model.boxes.weights)

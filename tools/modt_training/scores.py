@@ -26,7 +26,7 @@ PRECISIONS = (0.9, 0.8)
 
 
 def by_sensor(log_probability: Float64, valid: Validation, rows: Bool) -> dict[str, dict[str, Any]]:
-    """Scores of log posteriors (R, 4) by sensor. A mask (R,) selects the sensors, of which all crops are scored."""
+    """Scores of log posteriors (R, C) by sensor. A mask (R,) selects the sensors, of which all crops are scored."""
     return {
         valid.sensor_names[s]: sensor_scores(log_probability, valid, valid.sensor == s)
         for s in np.unique(valid.sensor[rows]).tolist()
@@ -69,7 +69,7 @@ def sensor_scores(log_probability: Float64, valid: Validation, of_sensor: Bool) 
 
 
 def shift(frequency: Float64, assumed: Float64) -> Float64:
-    """(4,) to add to logits that assume a class frequency, for another one; absent classes stay."""
+    """(C,) to add to logits that assume a class frequency, for another one; absent classes stay."""
     return np.log(np.where(frequency > 0, frequency, assumed).clip(1e-9) / assumed.clip(1e-9))
 
 

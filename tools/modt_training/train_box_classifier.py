@@ -69,7 +69,7 @@ def cross_validate(
 
     Args:
         data: all crops.
-        network: (R, 4) out-of-fold probabilities of the PointNet.
+        network: (R, C) out-of-fold probabilities of the PointNet.
         k: number of folds.
         steps: training steps of a fold.
         seed: seed of the first fold.
@@ -92,7 +92,7 @@ def cross_validate(
 
 
 def ruled_out(probability: Float64, label: Int) -> list[dict[str, Any]]:
-    """Share of each class below each threshold of the object probability, from probabilities (R, 4)."""
+    """Share of each class below each threshold of the object probability, from probabilities (R, C)."""
     return [
         {
             "likely": threshold,
@@ -108,7 +108,7 @@ def _share_below(probability: Float64, label: Int, threshold: float) -> list[flo
 
 
 def calibrated(data: Dataset, network: Float64) -> tuple[Layers, dict[str, Any]]:
-    """Calibrated layers trained on all crops, and their report, of (R, 4) out-of-fold probabilities of the PointNet.
+    """Calibrated layers trained on all crops, and their report, of (R, C) out-of-fold probabilities of the PointNet.
 
     The report holds the weights of the pool with the network, out-of-fold scores by sensor of the box alone and of
     the pool, and the share of each class below each of THRESHOLDS.

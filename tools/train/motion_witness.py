@@ -37,7 +37,7 @@ SECONDS = 8.0
 
 
 def counted(drive: Drive, number: int) -> Int:
-    """(4, CELLS, 4) tracks of a drive, frame by frame, by length, cell and true class."""
+    """(4, CELLS, C) tracks of a drive, frame by frame, by length, cell and true class."""
     step = steps_of("accurate", drive.profile, drive.fov)
     results = [step(frame) for frame, _ in drive.frames]
     judged = (JudgedFrame.of_result(r, truth, drive.fov) for r, (_, truth) in zip(results, drive.frames, strict=True))
@@ -53,7 +53,7 @@ def counted(drive: Drive, number: int) -> Int:
 
 
 def log_likelihood_ratio(counts: Int) -> Float64:
-    """(4, 3, CELLS) by length and class but background, of counts (4, CELLS, 4)."""
+    """(4, C - 1, CELLS) by length and class but background, of counts (4, CELLS, C)."""
     overall = (counts.sum(axis=0) + 1.0) / (counts.sum(axis=0) + 1.0).sum(axis=0)
     smooth = counts + SMOOTHING * overall
     log = np.log(smooth / smooth.sum(axis=1, keepdims=True))

@@ -105,7 +105,7 @@ def train_bounds(source: NearSource, seed: int) -> Layers:
 
 @torch.no_grad()
 def network_posterior(network: Student, data: Dataset, rows: Int) -> Float64:
-    """(R, 4) posteriors of rows of a data set by a network."""
+    """(R, C) posteriors of rows of a data set by a network."""
     rng = np.random.default_rng(0)
     parts = [(data.take(part), data.sensors.take(part)) for part in np.array_split(rows, max(1, len(rows) // 500))]
     logits = [network(*tensors(subsample(crops, POINTS, rng), sensors)).double().numpy() for crops, sensors in parts]
@@ -113,7 +113,7 @@ def network_posterior(network: Student, data: Dataset, rows: Int) -> Float64:
 
 
 def score(probability: Float64, person: Bool) -> str:
-    """Recall and precision of people at a posterior of one half [%], of (R, 4) and (R,) who is one."""
+    """Recall and precision of people at a posterior of one half [%], of (R, C) and (R,) who is one."""
     called = probability[:, ObjectClass.PEDESTRIAN] > 0.5
     return f"{100 * called[person].mean():.0f} / {100 * person[called].mean() if called.any() else 0:.0f}"
 
@@ -125,7 +125,7 @@ def table(first: Student, net: Student, boxes: BoxClassifier, log_frequency: Flo
         first: the network before training.
         net: the network after it.
         boxes: both box classifiers, and the weights of the pool.
-        log_frequency: (4,) log of the class frequencies that networks and boxes assume.
+        log_frequency: (C,) log of the class frequencies that networks and boxes assume.
         held: crops that nothing was trained on.
     """
     rows = np.flatnonzero(held.trainable)

@@ -103,7 +103,7 @@ def train(data: Dataset, box: Float64, rows: Int, steps: int, seed: int) -> Poin
 
 @torch.no_grad()
 def logits(net: torch.nn.Module, data: Dataset, rows: Int) -> Float64:
-    """(R, 4) logits of rows of the data set, without augmentation."""
+    """(R, C) logits of rows of the data set, without augmentation."""
     rng = np.random.default_rng(0)
     parts = np.split(rows, np.arange(BATCH_SIZE, len(rows), BATCH_SIZE))
     out: Float64 = (

@@ -68,7 +68,7 @@ def cross_validate(
     Args:
         data: all crops.
         features: (R, 12) features of the crops.
-        network: (R, 4) out-of-fold probabilities of the PointNet.
+        network: (R, C) out-of-fold probabilities of the PointNet.
         k: number of folds.
         steps: training steps of a fold.
         seed: seed of the first fold.
@@ -112,7 +112,7 @@ def calibrated(data: Dataset, sensor: str, network: Float64, boxes: Layers) -> t
     Args:
         data: all R crops.
         sensor: name of the sensor that measured the reflectance.
-        network: (R, 4) out-of-fold probabilities of the PointNet.
+        network: (R, C) out-of-fold probabilities of the PointNet.
         boxes: calibrated layers of the box classifier.
     """
     data = on_scale(data, sensor)

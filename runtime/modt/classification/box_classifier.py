@@ -27,7 +27,7 @@ Layers = Sequence[tuple[Weights, Weights]]
 
 
 def logits(layers: Layers, features: Float64) -> Float64:
-    """(R, 4) outputs of a multilayer perceptron for (R, F) features, in the precision of its layers."""
+    """(R, C) outputs of a multilayer perceptron for (R, F) features, in the precision of its layers."""
     *hidden, (weight, bias) = layers
     value: Weights = features.astype(weight.dtype)
     for hidden_weight, hidden_bias in hidden:
@@ -86,7 +86,7 @@ class BoxClassifier:
     bounds: Layers | None = None
 
     def log_probability(self, features: Float64, cut: Int) -> Float64:
-        """(R, 4) log P(class | box) up to a constant a row, of (R, 7) `box_features` and (R,) flags of Cut."""
+        """(R, C) log P(class | box) up to a constant a row, of (R, 7) `box_features` and (R,) flags of Cut."""
         out = logits(self.layers, features)
         if self.bounds is not None and len(rows := is_bound(features, cut).nonzero()[0]):
             out[rows] = logits(self.bounds, bound_features(features[rows], cut[rows]))

@@ -139,7 +139,7 @@ _CACHE_BYTES = 4 << 20
 
 
 Classify = Callable[[Float32, Proposals, Int], Float64]
-"""Likelihoods (R, 4) of the proposals of a frame that are named by index."""
+"""Likelihoods (R, C) of the proposals of a frame that are named by index."""
 
 
 def warm_up(classify: Classify, cost: LinearCost, max_points: int, batch: int, cpu_ns: Callable[[], int]) -> None:

@@ -27,7 +27,7 @@ class LikeliestClass:
 
     Args:
         config: costs.
-        frequency: (4,) frequencies of the classes among proposals that the posteriors assume; also an attribute.
+        frequency: (C,) frequencies of the classes among proposals that the posteriors assume; also an attribute.
     """
 
     def __init__(self, config: DecisionConfig, frequency: Float64) -> None:
@@ -39,7 +39,7 @@ class LikeliestClass:
         self._report(decisions, evidence.posterior.T)
 
     def _report(self, decisions: Decisions, weight: Float64) -> None:
-        """Write the class of every track by the weights (4, M) of its classes."""
+        """Write the class of every track by the weights (C, M) of its classes."""
         likeliest = weight[1:].argmax(axis=0)
         is_reported = weight[1:].max(axis=0) >= self._threshold[likeliest]
         decisions.object_class[:] = np.where(is_reported, likeliest + 1, ObjectClass.BACKGROUND)
@@ -50,11 +50,11 @@ class Decision(LikeliestClass):
 
     Args:
         config: costs, and the frequency at the start.
-        frequency: (4,) frequencies of the classes among proposals that the posteriors assume.
+        frequency: (C,) frequencies of the classes among proposals that the posteriors assume.
         tuning: memory and bounds of the frequency, and hysteresis of the reported class.
 
     Attributes:
-        frequency: (4,) frequencies of the classes among the proposals of this stream, as estimated so far.
+        frequency: (C,) frequencies of the classes among the proposals of this stream, as estimated so far.
     """
 
     def __init__(self, config: DecisionConfig, frequency: Float64, tuning: DecisionTuning = DecisionTuning()) -> None:
@@ -83,15 +83,15 @@ class Decision(LikeliestClass):
         self._learn(adapted.take(rows, axis=1), is_doubtful.take(rows, axis=1))
 
     def adapted(self, posterior: Float64) -> Float64:
-        """(4, M) posteriors under the frequencies of the stream."""
+        """(C, M) posteriors under the frequencies of the stream."""
         weighted = posterior * (self.frequency / self._assumed)[:, None]
         adapted: Float64 = weighted / weighted.sum(axis=0)
         return adapted
 
     def _learn(self, adapted: Float64, is_doubtful: Bool) -> None:
-        """Add adapted posteriors (4, R), and estimate the frequency by the mean of all, within bounds.
+        """Add adapted posteriors (C, R), and estimate the frequency by the mean of all, within bounds.
 
-        The share of a person who `is_doubtful` (4, R) counts as background.
+        The share of a person who `is_doubtful` (C, R) counts as background.
         """
         mass = np.where(is_doubtful, 0.0, adapted).sum(axis=1)
         mass[ObjectClass.BACKGROUND] += adapted.shape[1] - mass.sum()

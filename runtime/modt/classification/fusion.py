@@ -15,7 +15,7 @@ multiplied: n of them weigh n^view_exponent. Both means forget the past; a view 
 one of few points of what stands still less.
 Profile `paper` multiplies views as the paper writes it: `modt.classification.product_fusion`.
 
-Arrays of R tracks with a class in each of four rows, (4, R), are contiguous by class: arithmetic along axes of four
+Arrays of R tracks with a class in each row, (C, R), are contiguous by class: arithmetic along an axis as short as C
 would be slow.
 """
 
@@ -39,19 +39,19 @@ _MAX_VIEWS = 1000
 
 
 def normalise(probability: Float64) -> Float64:
-    """(R, 4) rows scaled to sum 1 with entries of at least MIN_PROBABILITY; uniform where no entry is above 0."""
+    """(R, C) rows scaled to sum 1 with entries of at least MIN_PROBABILITY; uniform where no entry is above 0."""
     finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0).T
     greatest = finite.max(axis=0, initial=0.0)
     return _floored(np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0)).T
 
 
 def from_log_weights(log_weight: Float64) -> Float64:
-    """(4, R) softmax of each column of finite numbers, with the floor of `normalise`."""
+    """(C, R) softmax of each column of finite numbers, with the floor of `normalise`."""
     return _floored(np.exp(log_weight - log_weight.max(axis=0)))
 
 
 def _floored(weight: Float64) -> Float64:
-    """(4, R) columns of positive sum scaled to sum 1 with entries of at least MIN_PROBABILITY."""
+    """(C, R) columns of positive sum scaled to sum 1 with entries of at least MIN_PROBABILITY."""
     floored = np.maximum(weight / weight.sum(axis=0), MIN_PROBABILITY)
     normalised: Float64 = floored / floored.sum(axis=0)
     return normalised
@@ -63,7 +63,7 @@ def _log(probability: Float64) -> Float64:
 
 
 def log_frequency_of(prior: Prior) -> Float64:
-    """(4,) logarithm of the class frequency that a prior assumes."""
+    """(C,) logarithm of the class frequency that a prior assumes."""
     frequency = np.maximum(prior.frequency, MIN_PROBABILITY)
     log_frequency: Float64 = np.log(frequency / frequency.sum())
     return log_frequency
@@ -76,7 +76,7 @@ class Confirmation:
     posterior under equal class frequencies.
 
     Args:
-        log_frequency: (4,) log of the frequencies of the classes.
+        log_frequency: (C,) log of the frequencies of the classes.
         object_threshold, background_threshold: posteriors from which a class is confirmed.
     """
 
@@ -86,7 +86,7 @@ class Confirmation:
         self._background_threshold = background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
-        """(R,) whether a class is confirmed by posteriors (4, R)."""
+        """(R,) whether a class is confirmed by posteriors (C, R)."""
         is_object: Bool = posterior[1:].max(axis=0) >= self._object_threshold
         under_equal = posterior / self._frequency[:, None]
         threshold = self._background_threshold * under_equal.sum(axis=0)
@@ -153,7 +153,7 @@ class FusedTracks:
     def fuse(self, evidence: Evidence, motion: Motion, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Add a view to what is known of the rows (R,); returns (R,) whether the class is confirmed now.
 
-        The likelihood (R, 4) of the classifier is a posterior under the class frequency and, by its pool weight, the
+        The likelihood (R, C) of the classifier is a posterior under the class frequency and, by its pool weight, the
         box prior: both are divided out.
         """
         points = proposals.count[motion.proposal[rows]]
@@ -178,14 +178,14 @@ class FusedTracks:
         return self._is_confirmed(posterior)
 
     def _posterior(self, evidence: Evidence, rows: Int, prior: Float64, boxes: Float64, motion: Float64) -> Float64:
-        """(4, R) posterior of the rows (R,).
+        """(C, R) posterior of the rows (R,).
 
         Args:
             evidence: the views.
             rows: (R,) tracks.
-            prior: (4, R) P(class | box) of the last box.
-            boxes: (4, R) evidence of the boxes.
-            motion: (4, R) evidence of the motion.
+            prior: (C, R) P(class | box) of the last box.
+            boxes: (C, R) evidence of the boxes.
+            motion: (C, R) evidence of the motion.
         """
         weight = self._weight_of_views.take(evidence.views[rows], mode="clip")
         log_weight = self._log_frequency[:, None] + weight * _by_class(evidence.view_evidence, rows)
@@ -195,7 +195,7 @@ class FusedTracks:
         return posterior
 
     def _may_be_object(self, probability: Float64) -> Bool:
-        """(R,) whether probabilities (R, 4) leave an object likely enough for a classification."""
+        """(R,) whether probabilities (R, C) leave an object likely enough for a classification."""
         return self._prior.may_be_object(probability, self._min_object_probability)
 
     def _shows_more(self, evidence: Evidence, motion: Motion, rows: Int, ratio: float) -> Bool:
@@ -203,7 +203,7 @@ class FusedTracks:
         return motion.points[rows] > ratio * evidence.key_points[rows] + self._conditions.more_points_offset
 
     def _is_person_due(self, evidence: Evidence, motion: Motion, rows: Int, posterior: Float64) -> Bool:
-        """(R,) tracks that may be people by their posterior (4, R), and whose last view is some frames ago."""
+        """(R,) tracks that may be people by their posterior (C, R), and whose last view is some frames ago."""
         maybe_person: Bool = posterior[IS_PERSON].sum(axis=0) > self._conditions.maybe_person
         return maybe_person & (motion.age[rows] >= evidence.key_age[rows] + self._conditions.person_frames)
 
@@ -290,5 +290,5 @@ class FurtherViews(FusedTracks):
 
 
 def _by_class(column: Float64, rows: Int) -> Float64:
-    """(4, R) rows of a column (M, 4), contiguous by class."""
+    """(C, R) rows of a column (M, C), contiguous by class."""
     return column.take(rows, axis=0).T.copy()

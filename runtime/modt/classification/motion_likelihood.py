@@ -55,7 +55,7 @@ since box and motion are not independent, and limited to 1.5. `python -m tools.t
 """
 
 _BY_CLASS: Float64 = np.zeros((N_CLASSES, LOG_LIKELIHOOD_RATIO[:, 0].size))
-"""(4, 40) the table by class, and one after the other the cells of each length; 0 for other kinds."""
+"""(C, 40) the table by class, and one after the other the cells of each length; 0 for other kinds."""
 for of_kind, is_of_kind in enumerate((IS_VEHICLE, IS_WALKER, IS_RIDER)):
     _BY_CLASS[is_of_kind] = LOG_LIKELIHOOD_RATIO[:, of_kind].ravel()
 
@@ -85,7 +85,7 @@ class MotionLikelihood:
         self._max_length_m, self._max_width_m = tuning.oversize_ratio * MAX_SIZE_M[IS_RIDER].max(axis=0)
 
     def log_ratio(self, moved_m: Float64, observed_s: Float64, size_m: Float64) -> Float64:
-        """(4, R) log P(motion, size | class) over that of background.
+        """(C, R) log P(motion, size | class) over that of background.
 
         Args:
             moved_m: (R,) displacement from the k-DOP lagged by about `ExtentTuning.lag_s` [m].

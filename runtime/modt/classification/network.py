@@ -44,7 +44,7 @@ class Network:
     """Points of proposals to class probabilities.
 
     Args:
-        model: a plain ONNX model of (batch, points, 3) to (batch, 4).
+        model: a plain ONNX model of (batch, points, 3) to (batch, C).
 
     Attributes:
         metadata: texts in the model by their keys.
@@ -78,7 +78,7 @@ class Network:
         self._input = names[0]
 
     def infer(self, batch: Float32) -> Float32:
-        """(b, 4) probabilities of (b, n, 3) points in the canonical frame."""
+        """(b, C) probabilities of (b, n, 3) points in the canonical frame."""
         (output,) = self._session.run(None, {self._input: batch})
         probability: Float32 = output
         return probability

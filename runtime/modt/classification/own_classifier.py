@@ -13,7 +13,7 @@ from modt.types import Float32, Float64, Int, Proposals
 
 Classifier = Callable[[Sequence[Float32]], ArrayLike]
 """Function of the points of R proposals, each (n, 4) x, y, z [m, level sensor frame], reflectance [0, 1]. It returns
-(R, 4) likelihoods P(points | class), in the order of CLASS_NAMES, each row up to a factor."""
+(R, C) likelihoods P(points | class), in the order of CLASS_NAMES, each row up to a factor."""
 
 
 class OwnClassifier:
@@ -21,7 +21,7 @@ class OwnClassifier:
 
     Args:
         function: gives likelihoods.
-        class_frequency: (4,) frequencies of the classes that the posteriors assume.
+        class_frequency: (C,) frequencies of the classes that the posteriors assume.
     """
 
     def __init__(self, function: Classifier, class_frequency: Float64) -> None:
@@ -29,7 +29,7 @@ class OwnClassifier:
         self._class_frequency = class_frequency
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) class probabilities of the given proposals, in their order.
+        """(R, C) class probabilities of the given proposals, in their order.
 
         Args:
             points: (N, 4) points of the frame.

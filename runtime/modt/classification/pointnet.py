@@ -20,7 +20,7 @@ from modt.model_file import ModelFile
 from modt.types import Float32, Float64, Int, Proposals
 
 CLASS_FREQUENCY_KEY = "class_frequency"
-"""Key of the class frequency in the metadata of a model: (4,), background first."""
+"""Key of the class frequency in the metadata of a model: (C,), background first."""
 
 
 class PointNet:
@@ -42,11 +42,11 @@ class PointNet:
         model: as given.
         network: the network alone.
         box_scores: classifiers of boxes, and of reflectance for this sensor.
-        class_frequency: (4,) frequencies of the classes that the posteriors assume; a model that states none
+        class_frequency: (C,) frequencies of the classes that the posteriors assume; a model that states none
             assumes that all are equal.
 
     Raises:
-        MisuseError: not a plain ONNX model of (batch, points, 3) to (batch, 4), more memory than
+        MisuseError: not a plain ONNX model of (batch, points, 3) to (batch, C), more memory than
             `network.MEMORY_BYTES`, or malformed metadata; of the model or of that beside it.
     """
 
@@ -78,7 +78,7 @@ class PointNet:
         self.network.check_largest(config.batch, config.max_points)
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) class probabilities of the given proposals, in their order.
+        """(R, C) class probabilities of the given proposals, in their order.
 
         Args:
             points: (N, 4) points of the frame; the proposals hold the coordinates of theirs.
@@ -104,7 +104,7 @@ class PointNet:
         return [(self.network, crops[~near]), (self._near, crops[near])]
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(class | points, box, reflectance) of (R, 4) P(class | points) and the scores of the proposals."""
+        """(R, C) P(class | points, box, reflectance) of (R, C) P(class | points) and the scores of the proposals."""
         if not self.box_scores.informative:
             return network
         scores = self.box_scores.of(proposals)
@@ -118,7 +118,7 @@ class PointNet:
 
 
 def _class_frequency(metadata: Mapping[str, str]) -> Float64:
-    """(4,) class frequency that a model states, each equal where it states none. Background gets what others leave.
+    """(C,) class frequency that a model states, each equal where it states none. Background gets what others leave.
 
     Raises:
         TypeError, ValueError: malformed.

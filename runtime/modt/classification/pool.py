@@ -46,17 +46,17 @@ class PoolWeights:
 
 
 def _log_odds(log_probability: Float64) -> Float64:
-    """(R,) logarithm of the odds of any object against background, of log probabilities (R, 4)."""
+    """(R,) logarithm of the odds of any object against background, of log probabilities (R, C)."""
     log_odds: Float64 = np.log(np.exp(log_probability[:, 1:] - log_probability[:, :1]).sum(axis=1))
     return log_odds
 
 
 def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Float64:
-    """(R, 4) logarithm of the class frequency times the likelihood of an object by its box, up to a constant.
+    """(R, C) logarithm of the class frequency times the likelihood of an object by its box, up to a constant.
 
     Args:
-        log_box: (R, 4) log P(class | box), up to a constant a row.
-        log_frequency: (4,) log of the frequencies of the classes.
+        log_box: (R, C) log P(class | box), up to a constant a row.
+        log_frequency: (C,) log of the frequencies of the classes.
         weight: exponent of the box.
     """
     log_ratio = np.zeros(log_box.shape)
@@ -74,13 +74,13 @@ def _assumed_log_odds(log_frequency: bytes) -> Float64:
 def log_pool(
     network: Float64, log_box: Float64, reflectance: Float64, log_frequency: Float64, weights: PoolWeights
 ) -> Float64:
-    """(R, 4) logarithm of the pool, up to a constant.
+    """(R, C) logarithm of the pool, up to a constant.
 
     Args:
-        network: (R, 4) P(class | points) of the network.
-        log_box: (R, 4) log P(class | box), up to a constant a row.
-        reflectance: (R, 4) log P(reflectance | class, box), up to a constant a row.
-        log_frequency: (4,) log of the frequencies of the classes that network and box assume.
+        network: (R, C) P(class | points) of the network.
+        log_box: (R, C) log P(class | box), up to a constant a row.
+        reflectance: (R, C) log P(reflectance | class, box), up to a constant a row.
+        log_frequency: (C,) log of the frequencies of the classes that network and box assume.
         weights: exponents of the three.
     """
     score = pooled_prior(log_box, log_frequency, weights.box)
@@ -91,8 +91,8 @@ def log_pool(
 
 
 def softmax(log_probability: Float64) -> Float64:
-    """(R, 4) probabilities whose logarithms are given up to a constant a row."""
-    by_class = log_probability.T.copy()  # arithmetic along axes of four would be slow
+    """(R, C) probabilities whose logarithms are given up to a constant a row."""
+    by_class = log_probability.T.copy()  # arithmetic along axes of so few would be slow
     likelihood = np.exp(by_class - by_class.max(axis=0))
     probability: Float64 = (likelihood / likelihood.sum(axis=0)).T
     return probability

@@ -20,8 +20,8 @@ class Scores:
     """Scores of the P proposals of a frame by box and reflectance.
 
     Attributes:
-        box: (P, 4) log P(class | box), up to a constant a row.
-        reflectance: (P, 4) log P(reflectance | class, box), up to a constant a row.
+        box: (P, C) log P(class | box), up to a constant a row.
+        reflectance: (P, C) log P(reflectance | class, box), up to a constant a row.
         is_bound: (P,) proposals cut at the top or bottom within a person's height, so the size is a lower bound.
         weights: weights in the pool with the network, which counts more where the sweep has no reflectance.
     """
@@ -82,23 +82,23 @@ class Prior(Protocol):
     """P(class) of proposals that are not classified yet."""
 
     frequency: Float64
-    """(4,) frequency of the classes among proposals."""
+    """(C,) frequency of the classes among proposals."""
 
     def pool_weight(self, proposals: Proposals) -> float:
         """Exponent of the prior's odds of an object in the classifier's pool (0 to 1)."""
 
     def probability(self, proposals: Proposals) -> Float64:
-        """(P, 4) prior of each proposal of a frame."""
+        """(P, C) prior of each proposal of a frame."""
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
-        """(M,) rows of priors (M, 4) worth a classification: the threshold or more for the objects together."""
+        """(M,) rows of priors (M, C) worth a classification: the threshold or more for the objects together."""
 
 
 class FrequencyPrior:
     """The frequency of the classes among proposals, the same for each: it excludes none.
 
     Args:
-        frequency: (4,) frequencies of the classes; also an attribute.
+        frequency: (C,) frequencies of the classes; also an attribute.
     """
 
     def __init__(self, frequency: Float64) -> None:
@@ -109,7 +109,7 @@ class FrequencyPrior:
         return 0.0
 
     def probability(self, proposals: Proposals) -> Float64:
-        """(P, 4) prior of each proposal of a frame, in equal rows."""
+        """(P, C) prior of each proposal of a frame, in equal rows."""
         return np.tile(self.frequency, (len(proposals), 1))
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
@@ -122,7 +122,7 @@ class BoxPrior:
 
     Args:
         scores: the classifiers.
-        frequency: (4,) class frequency that they assume; also an attribute.
+        frequency: (C,) class frequency that they assume; also an attribute.
     """
 
     def __init__(self, scores: BoxScores, frequency: Float64) -> None:
@@ -134,12 +134,12 @@ class BoxPrior:
         return self._scores.of(proposals).weights.box
 
     def probability(self, proposals: Proposals) -> Float64:
-        """(P, 4) prior of each proposal of a frame."""
+        """(P, C) prior of each proposal of a frame."""
         scores = self._scores.of(proposals)
         return softmax(scores.box + scores.reflectance)
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
-        """(M,) rows of priors (M, 4) that give the objects together at least this probability."""
+        """(M,) rows of priors (M, C) that give the objects together at least this probability."""
         return 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
 
 

@@ -41,7 +41,7 @@ class ReflectanceClassifier:
         self._warned = False
 
     def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) log P(reflectance | class, box) up to a constant a row.
+        """(R, C) log P(reflectance | class, box) up to a constant a row.
 
         Args:
             box_features: (R, 7) features of the boxes.
