@@ -116,9 +116,9 @@ static ALWAYS_INLINE i32 cell_at(const CellMap *map, i32 at)
 }
 
 /* PorosityFinder._columns */
-static ALWAYS_INLINE float columns_at(float window_rays, float sqrt_range)
+static ALWAYS_INLINE float columns_at(float rays_sqrt_range, float sqrt_range)
 {
-    return maxf(window_rays / sqrt_range, 1.0f);
+    return maxf(rays_sqrt_range / sqrt_range, 1.0f);
 }
 
 /* Square part of a grid around the sensor that holds all cells that are looked at, with those beside them. Between
@@ -154,7 +154,7 @@ static ALWAYS_INLINE float window_solidity(const NearCells *near, i32 at, float 
 /* PorosityFinder.air of n cells: returns the number of returns in airborne cells, of the number looked at, which is
  * written. Scratch: `place`, (n,). */
 EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *cells, const float *sqrt_range,
-                    const float *beam_m, float window_rays, i32 n, i32 *place, float *solidity, uint8_t *airborne, i64 *looked_at)
+                    const float *beam_m, float rays_sqrt_range, i32 n, i32 *place, float *solidity, uint8_t *airborne, i64 *looked_at)
 {
     for (i32 c = 0; c < n; c++) {
         i32 at = place[c] = near_place(near, cells, c);
@@ -170,7 +170,7 @@ EXPORT i64 modt_air(const PorosityRules *r, const NearCells *near, const Cells *
         i32 at = place[c];
         int is_near = sqrt_range[c] < r->max_sqrt_range;
         PROVEN(!is_near || (at > near->side && at < near->side * near->side - near->side - 1));
-        solidity[c] = is_near ? window_solidity(near, at, columns_at(window_rays, sqrt_range[c]), beam_m[c]) : 1.0f;
+        solidity[c] = is_near ? window_solidity(near, at, columns_at(rays_sqrt_range, sqrt_range[c]), beam_m[c]) : 1.0f;
         *looked_at += is_near ? cells->entries[c] : 0;
         if (at != NONE)
             near->solidity[at] = solidity[c];
@@ -217,7 +217,7 @@ EXPORT void modt_mean_solidity(const i64 *entries, const float *solidity, const 
 /* PorosityFinder.airborne_points: whether each point is airborne. `rows` are the points in the order of their
  * cells, from `offsets` on. Scratch: `place`, (n,), and `height_of_row`, of all points. */
 EXPORT void modt_airborne_points(const PorosityRules *r, const Grid *grid, const Cells *cells, const float *sqrt_range,
-                                 const float *beam_m, const uint8_t *airborne, float window_rays, i32 n,
+                                 const float *beam_m, const uint8_t *airborne, float rays_sqrt_range, i32 n,
                                  const i64 *rows, const i64 *offsets, const float *height, i32 *place,
                                  float *height_of_row, uint8_t *is_air)
 {
@@ -230,7 +230,7 @@ EXPORT void modt_airborne_points(const PorosityRules *r, const Grid *grid, const
         if (airborne[c] || !(sqrt_range[c] < r->point_sqrt_range))
             continue;
         float reach_m = maxf(r->reach_m, r->reach_beams * beam_m[c]);
-        float enough = r->min_solidity * columns_at(window_rays, sqrt_range[c]) * (2.0f * reach_m / beam_m[c] + 1.0f);
+        float enough = r->min_solidity * columns_at(rays_sqrt_range, sqrt_range[c]) * (2.0f * reach_m / beam_m[c] + 1.0f);
         i32 around[9], n_around = 0;
         for (i32 row = -map.side; row <= map.side; row += map.side)
             for (i32 column = -1; column <= 1; column++) {

@@ -17,7 +17,7 @@ typedef struct {
 } Cluster;
 
 enum { BINS = 5 };
-static const double FIRST = 0.2, LAST = 0.8, HALF_WAY_M = 0.3;
+static const double FIRST = 0.2, LAST = 0.8, HALF_WIDTH_M = 0.3;
 
 /* Square of the distance of two cells [m2] */
 static inline double square_m2(const Cluster *c, i64 a, i64 b)
@@ -26,7 +26,7 @@ static inline double square_m2(const Cluster *c, i64 a, i64 b)
     return dx * dx + dy * dy;
 }
 
-/* _dips */
+/* _are_two_heads */
 static int dips(const HeadTuning *r, const Cluster *c, i64 peak, i64 other)
 {
     double x = c->x[other], y = c->y[other], dx = (double)c->x[peak] - x, dy = (double)c->y[peak] - y;
@@ -39,7 +39,7 @@ static int dips(const HeadTuning *r, const Cluster *c, i64 peak, i64 other)
     for (i64 i = 0; i < c->m; i++) {
         double off_x = (double)c->x[i] - x, off_y = (double)c->y[i] - y;
         double share = (off_x * dx + off_y * dy) / square, aside = off_y * dx - off_x * dy;
-        if (!(share >= FIRST && share < LAST && aside * aside < HALF_WAY_M * HALF_WAY_M * square))
+        if (!(share >= FIRST && share < LAST && aside * aside < HALF_WIDTH_M * HALF_WIDTH_M * square))
             continue;
         int part = (int)mind((share - FIRST) * (BINS / (LAST - FIRST)), BINS - 1);
         top[part] = maxf(c->high[i], top[part]);

@@ -12,11 +12,11 @@ from modt.segmentation.tuning import HeadTuning
 from modt.types import NONE, Bool, Float32, Float64, Int
 
 BINS = 5
-"""Parts of the way between two peaks, each of which has a greatest height."""
-WAY = 0.2, 0.8
-"""First and last share of that way that is looked at."""
-HALF_WAY_M = 0.3
-"""Half the width of that way [m]."""
+"""Parts of the corridor between two peaks, each of which has a greatest height."""
+CORRIDOR_SHARES = 0.2, 0.8
+"""Share of the way between two peaks at which the corridor begins, and at which it ends."""
+CORRIDOR_HALF_WIDTH_M = 0.3
+"""Half the width of the corridor [m]."""
 
 
 def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: Int, tuning: HeadTuning) -> Int:
@@ -24,6 +24,7 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
 
     There is nobody, or there are two or more people, or one with something to push. That lies to one side of the
     person, is as high as a trolley, and ends below the shoulders. A rider has a wheel on each side, which is lower.
+    One head without such a load divides nothing, so its cells are nobody's: the cluster is then one object.
 
     Args:
         x: (m,) a point of each cell [m, sensor frame].
@@ -71,17 +72,20 @@ def _extent_m(at: Float64) -> float:
 def _peaks(at: Float64, high: Float32, tuning: HeadTuning) -> list[int]:
     """Cells that are the highest around, and between which the heights dip, from the highest on."""
     peaks: list[int] = []
-    left: Bool = high >= tuning.min_top_m
-    while left.any():
-        peak = int(np.where(left, high, -np.inf).argmax())
-        if all(_dips(at, high, peak, other, tuning) for other in peaks):
+    remaining: Bool = high >= tuning.min_top_m
+    while remaining.any():
+        peak = int(np.where(remaining, high, -np.inf).argmax())
+        if all(_are_two_heads(at, high, peak, other, tuning) for other in peaks):
             peaks.append(peak)
-        left &= _square_m2(at, peak) >= tuning.reach_m * tuning.reach_m
+        remaining &= _square_m2(at, peak) >= tuning.reach_m * tuning.reach_m
     return peaks
 
 
-def _dips(at: Float64, high: Float32, peak: int, other: int, tuning: HeadTuning) -> bool:
-    """Whether the heights dip on the way between two peaks; a part of it without cells tells nothing."""
+def _are_two_heads(at: Float64, high: Float32, peak: int, other: int, tuning: HeadTuning) -> bool:
+    """Whether two peaks may be two heads: they are far apart, or the heights between them dip.
+
+    A part of the corridor without cells tells nothing. Without any cell in it, near peaks are one head.
+    """
     x, y = at - at[:, other, None]
     dx = x[peak]
     dy = y[peak]
@@ -89,9 +93,10 @@ def _dips(at: Float64, high: Float32, peak: int, other: int, tuning: HeadTuning)
     if square_m2 > tuning.max_apart_m * tuning.max_apart_m:
         return True
     share = (x * dx + y * dy) / square_m2
-    aside = y * dx - x * dy
-    first, last = WAY
-    between = (share >= first) & (share < last) & (aside * aside < HALF_WAY_M * HALF_WAY_M * square_m2)
+    aside_m2 = y * dx - x * dy  # distance from the line through the peaks, times that of the peaks
+    first, last = CORRIDOR_SHARES
+    between = (share >= first) & (share < last)
+    between &= aside_m2 * aside_m2 < CORRIDOR_HALF_WIDTH_M * CORRIDOR_HALF_WIDTH_M * square_m2
     part = np.minimum((share[between] - first) * (BINS / (last - first)), BINS - 1).astype(np.int64)
     top = np.full(BINS, -np.inf, np.float32)
     np.maximum.at(top, part, high[between])
@@ -110,5 +115,6 @@ def _pushes(at: Float64, high: Float32, entries: Int, peak: int, tuning: HeadTun
         return False
     x, y = at - at[:, peak, None]
     farthest = square_m2.argmax()
+    # No cell lies more than reach_m behind the person, seen from the farthest cell.
     along = x * x[farthest] + y * y[farthest]
     return bool(along.min() >= -tuning.reach_m * np.sqrt(square_m2[farthest]))

@@ -112,7 +112,7 @@ class PorosityFinder:
         self._usual_rays = WINDOW * grid.step / np.deg2rad(sensor.azimuth_step_deg)
 
     @property
-    def window_rays(self) -> np.float32:
+    def rays_sqrt_range(self) -> np.float32:
         """Rays of a beam across a window, times the square root of its range [sqrt(m)]."""
         return np.float32(self.rays.density * self._usual_rays)
 
@@ -130,7 +130,7 @@ class PorosityFinder:
         returns = np.append(cells.entries, 0).take(around, mode="wrap").sum(axis=1)
         low = np.append(cells.low, np.float32(np.inf)).take(around, mode="wrap").min(axis=1)
         high = np.append(cells.high, np.float32(-np.inf)).take(around, mode="wrap").max(axis=1)
-        rays = self._columns(sqrt_range.take(near)) * ((high - low) / beam_m.take(near) + np.float32(1.0))
+        rays = self._rays_across(sqrt_range.take(near)) * ((high - low) / beam_m.take(near) + np.float32(1.0))
         solidity = np.ones(len(cells) + 1, np.float32)
         solidity[near] = np.where(returns > 1, returns.astype(np.float32) / rays, np.float32(0.0))
         solidity[NONE] = 0.0
@@ -165,7 +165,7 @@ class PorosityFinder:
         around = self._around(found.cells, cells_near)
         beam_m = found.air.beam_m.take(cells_near)
         reach_m = np.maximum(self.reach_m, self.reach_beams * beam_m)
-        columns = self._columns(found.sampled.sqrt_range.take(cells_near))
+        columns = self._rays_across(found.sampled.sqrt_range.take(cells_near))
         enough = self.min_solidity * columns * (np.float32(2.0) * reach_m / beam_m + np.float32(1.0))
         points_of_cell = Groups.from_labels(found.cell_of_point, len(found.cells))
         members = np.split(points_of_cell.rows, points_of_cell.offsets[1:-1])
@@ -191,7 +191,7 @@ class PorosityFinder:
         self.grid.number[index] = NONE
         return around.astype(np.int64)
 
-    def _columns(self, sqrt_range: Float32) -> Float32:
-        """(R,) rays of a beam that cross a window, 1 at least."""
-        columns: Float32 = np.maximum(self.window_rays / sqrt_range, np.float32(1.0))
-        return columns
+    def _rays_across(self, sqrt_range: Float32) -> Float32:
+        """(R,) rays of a beam that cross the window of cells at a range, 1 at least."""
+        rays: Float32 = np.maximum(self.rays_sqrt_range / sqrt_range, np.float32(1.0))
+        return rays
