@@ -10,7 +10,7 @@ from scipy.special import softmax
 from modt.classification.crops import Crops
 from modt.types import NONE, Int
 from modt_evaluation.class_score import top_calibration_error
-from modt_training.dataset import CLUSTERED, SHIPPED, SYNTHETIC, Dataset, folds
+from modt_training.dataset import CLUSTERED, REAL, SYNTHETIC, Dataset, folds
 from modt_training.held_out import Calibration, Validation, fit_calibration, fit_pool, out_of_fold
 from modt_training.scores import by_sensor, recall_at, shift
 from tests.tools.train.datasets import data_of, truth_of
@@ -27,7 +27,7 @@ def test_folds_split_real_scans_by_drive_and_leave_out_the_rest():
     drive = np.array([0, 0, 1, 2, 3, 4, 4, 5])  # the last two drives are synthetic
     truth = truth_of(np.array([1, 2, 1]), np.array([0, 1, 2]))
     label = np.array([1, 0, 2, 1, 0, 1, 0, 3])
-    variant = np.where(drive < 4, SHIPPED, SYNTHETIC)
+    variant = np.where(drive < 4, REAL, SYNTHETIC)
     fold = folds(single_points(label, variant=variant, drive=drive, truth=truth), 3)
     assert (fold[4:] == NONE).all()
     assert sorted(set(fold[:4].tolist())) == [0, 1, 2]
@@ -57,7 +57,7 @@ def test_every_sensor_counts_as_much_as_the_others():
     label = np.array([0, 0, 0, 1, 0, 1, 2, 0])
     sensor = np.array([0, 0, 0, 0, 1, 1, 1, 1])
     partial = np.arange(8) == 4
-    variant = np.where(np.arange(8) == 7, CLUSTERED, SHIPPED)
+    variant = np.where(np.arange(8) == 7, CLUSTERED, REAL)
     truth = truth_of(label[4:], np.array([0, 0, 0, 9]), row=np.array([5, NONE, 7, 4]))
     columns = {"sensor": sensor, "sensor_names": ("a", "b"), "partial": partial, "variant": variant}
     valid = Validation.of(single_points(label, truth=truth, **columns))

@@ -17,7 +17,7 @@ from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.crops import gather, ground_z_m
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
-from modt_training.dataset import CLUSTERED, MAJORITY, PASTED, SHIPPED, VARIANT_NAMES, Sensors
+from modt_training.dataset import CLUSTERED, MAJORITY, PASTED, REAL, VARIANT_NAMES, Sensors
 from modt_training.scan import Scan
 
 MAX_POINTS = 1200
@@ -174,6 +174,6 @@ class CropWriter:
 
 def add_labelled(writer: CropWriter, scan: Scan) -> None:
     """Add a scan, for validation and, in finer and coarser clusters, for training."""
-    writer.add(scan, SHIPPED, validation=True)
+    writer.add(scan, REAL, validation=True)
     for scale in CELL_SCALES:
         writer.add(scan, CLUSTERED, scale)

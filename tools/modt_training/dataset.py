@@ -22,9 +22,11 @@ from modt.segmentation.tuning import HeadingTuning
 from modt.types import NONE, Bool, Float64, Int
 
 VARIANT_NAMES = ("shipped", "clustered", "pasted", "synthetic")
-SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
-"""Variants of crops: real scans under the default segmentation; real scans under other cell sizes; real scans with
-pasted objects; synthetic sweeps. All but the first are for training alone."""
+"""Names of the variants in the provenance of a file."""
+REAL, CLUSTERED, PASTED, SYNTHETIC = range(4)
+"""Variants of crops: real scans under the segmentation of their profile; real scans for training alone, most of them
+under other cell sizes; real scans with pasted objects; simulated sweeps. The first of them that a data set has is
+validated; the others are for training alone."""
 
 FOLDS = 3
 """Folds of the cross-validation."""
@@ -35,7 +37,7 @@ CLASS_SHARE = np.append([0.46, 0.24, 0.16, 0.14], np.full(N_CLASSES - N_SHIPPED,
 VARIANT_SHARE = np.array(
     [[0.4, 0.35, 0.0, 0.25], [0.3, 0.25, 0.3, 0.15], [0.2, 0.15, 0.3, 0.35], [0.2, 0.15, 0.3, 0.35]]
 )
-"""Share of each variant (shipped, clustered, pasted, synthetic) in each class, where present; more generated crops
+"""Share of each variant in each class, where present; more generated crops
 for the classes that are rare in real scans, which those of the user's own are too."""
 TALL_SHARE = 0.3
 """Share of vans among the cars."""
@@ -148,6 +150,11 @@ class Dataset:
         """(R,) whole objects, and known background."""
         return ~self.partial & ((self.label > 0) | ~self.unknown)
 
+    @property
+    def validated(self) -> Bool:
+        """(R,) crops of the variant that is validated: those of real scans, where the data set has any."""
+        return np.asarray(self.variant == self.variant.min())
+
     def take(self, rows: Int) -> Crops:
         """Crops of rows (R,)."""
         count = self.crops.count[rows]
@@ -210,7 +217,7 @@ def folds(data: Dataset, k: int) -> Int:
     weight /= weight.sum(axis=0).clip(1)
     load = np.zeros((k, N_CLASSES))
     fold = np.full(len(weight), NONE)
-    validation = np.unique(data.drive[data.variant == data.variant.min()])
+    validation = np.unique(data.drive[data.validated])
     for drive in validation[np.argsort(-weight[validation].max(axis=1), kind="stable")]:
         fold[drive] = np.argmin((load + weight[drive]).max(axis=1) + load.sum(axis=1) * 1e-3)
         load[fold[drive]] += weight[drive]

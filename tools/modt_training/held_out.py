@@ -86,7 +86,7 @@ class Validation:
     @classmethod
     def of(cls, data: Dataset) -> Validation:
         """Validation part of a data set."""
-        rows = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
+        rows = np.flatnonzero(data.validated & ~data.unknown)
         place = np.full(len(data) + 1, NONE)  # index -1, NONE, is the last one
         place[rows] = np.arange(len(rows))
         truth = data.truth.take(np.isin(data.truth.drive, data.drive[rows]))
@@ -112,9 +112,9 @@ class Validation:
         """(C,) frequency of the classes among the weighted crops, which a posterior calibrated to them assumes."""
         return np.asarray(np.bincount(self.label, self.weight, N_CLASSES), np.float64)
 
-    def weight_of(self, rows: Bool) -> Float64:
-        """(R,) weight of the clear crops of a mask, with the class frequency of all crops."""
-        weight = self.weight * rows
+    def weight_of(self, mask: Bool) -> Float64:
+        """(R,) weight of the clear crops of a mask (R,), with the class frequency of all crops."""
+        weight = self.weight * mask
         frequency = np.bincount(self.label, weight, N_CLASSES)
         weight *= (self.class_frequency / np.where(frequency > 0, frequency, 1.0))[self.label]
         return weight / weight.sum()

@@ -22,7 +22,7 @@ from scipy.special import softmax
 
 from modt.classes import CLASS_NAMES
 from modt_evaluation.class_score import average_precision
-from modt_training.dataset import BATCH_SIZE, SEED, SHIPPED, Dataset, folds, load, sampling_pools
+from modt_training.dataset import BATCH_SIZE, REAL, SEED, Dataset, folds, load, sampling_pools
 from modt_training.export_pointnet import graph
 from modt_training.held_out import Validation
 from modt_training.network import PointNet
@@ -43,7 +43,7 @@ DECAY_EPOCHS = 20
 
 def crops_of_epoch(data: Dataset) -> int:
     """Number of crops that the scans show, those of one epoch."""
-    return int((data.trainable & (data.variant == SHIPPED)).sum())
+    return int((data.trainable & (data.variant == REAL)).sum())
 
 
 def trained(net: PointNet, data: Dataset, epochs: int) -> Iterator[tuple[int, float]]:
