@@ -258,7 +258,7 @@ class FurtherViews(FusedTracks):
         many_points = proposals.count[proposal_of_row] >= conditions.first_view_points
         may_be_object = evidence.may_be_object[rows] | (many_points & self._may_be_object(evidence.prior[rows]))
         may_be_object |= self._may_be_near_person(proposals)[proposal_of_row]
-        first = may_be_object | (many_points & self._is_unseen_nearby(motion, proposals, rows))
+        first = may_be_object | (many_points & self._is_near_and_lasting(motion, proposals, rows))
         # Views of a confirmed class: of an object at growing intervals, of background with far more points.
         review = (background < 0.5) & (age >= conditions.review_age_ratio * key_age + conditions.review_frames)
         review |= may_be_object & self._shows_more(evidence, motion, rows, conditions.far_more_points_ratio)
@@ -273,7 +273,7 @@ class FurtherViews(FusedTracks):
         asks[rows] = ~motion.hidden[rows] & np.where(evidence.viewed[rows], further, first)
         return asks
 
-    def _is_unseen_nearby(self, motion: Motion, proposals: Proposals, rows: Int) -> Bool:
+    def _is_near_and_lasting(self, motion: Motion, proposals: Proposals, rows: Int) -> Bool:
         """(R,) tracks that are near and seen in some frames."""
         conditions = self._conditions
         x, y = proposals.box[motion.proposal[rows], :2].T

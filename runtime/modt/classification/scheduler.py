@@ -55,13 +55,13 @@ class TimeLimit:
     Attributes:
         now_ms: CPU time that they may take in this frame [ms].
         later_ms: CPU time that they may take in a frame for which enough is saved [ms].
-        of_frame: True if `later_ms` is the budget of a frame, which saving cannot raise.
+        is_hard: True if `later_ms` is the budget of a frame, which saving cannot raise.
         has_credit: True if one call may take more than is saved.
     """
 
     now_ms: float
     later_ms: float
-    of_frame: bool
+    is_hard: bool
     has_credit: bool
 
 
@@ -114,7 +114,7 @@ class Scheduler:
         asking = (asks & observed).nonzero()[0]
         worth = self.worth(requests, motion, evidence, proposals, asking)
         ranked = asking[np.lexsort((motion.id[asking], -worth))]
-        granted = self._affordable(proposals.count[motion.proposal[ranked]], budget)
+        granted = self._grant(proposals.count[motion.proposal[ranked]], budget)
         deferred = ranked[~granted]
         waiting = requests.waiting[deferred] + 1
         requests.waiting[observed] = 0
@@ -144,8 +144,8 @@ class Scheduler:
         )
         return value
 
-    def _affordable(self, points: Int, budget: Budget) -> Bool:
-        """(R,) calls that the budget pays for, of calls for (R,) points by decreasing worth.
+    def _grant(self, points: Int, budget: Budget) -> Bool:
+        """Grant the calls that the budget pays for: (R,), of calls for (R,) points by decreasing worth.
 
         The mean budget of the frame is saved first. A frame in which no call fits may be counted (`_try_exception`).
         """
@@ -165,9 +165,9 @@ class Scheduler:
         """
         if budget.mean_ms is None:
             return None if budget.cpu_ms is None else TimeLimit(budget.cpu_ms, budget.cpu_ms, True, False)
-        of_frame = budget.cpu_ms is not None
+        is_hard = budget.cpu_ms is not None
         later_ms = max(1e3 * self._period_s, budget.mean_ms) if budget.cpu_ms is None else budget.cpu_ms
-        return TimeLimit(min(self._savings.saved_ms, later_ms), later_ms, of_frame, self._savings.may_borrow)
+        return TimeLimit(min(self._savings.saved_ms, later_ms), later_ms, is_hard, self._savings.may_borrow)
 
     def _within(self, limit: TimeLimit, points: Int) -> Bool:
         """(R,) calls within the limit.
@@ -207,7 +207,7 @@ class Scheduler:
         A call that costs more than the budget of a frame is refused, and the frame is counted as one without a call.
         After so many of them that the estimate is outdated, the call is made, to measure it.
         """
-        if limit.of_frame and self.cost.cost_ms(points) > limit.later_ms:
+        if limit.is_hard and self.cost.cost_ms(points) > limit.later_ms:
             self.cost.record_starved_frame()
             return self.cost.outdated and limit.later_ms > 0
         return limit.has_credit
