@@ -140,7 +140,7 @@ def overlapping(rng: np.random.Generator) -> tuple[tuple[int, int], tuple[int, i
 def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode, Episode]) -> list[TrustLevel]:
     """The trust of each frame of a drive with two faults."""
     stages = Stages(Request(profile=[SENSOR], odometry="recording"), stream.info, Ledger(), live=True)
-    stages.recognise(frames[0])
+    stages.choose_profile(frames[0])
     levels = []
     points = frames[0].points
     for k, frame in enumerate(frames):
@@ -153,9 +153,9 @@ def levels_of(stream: SyntheticStream, frames: list[Frame], pair: tuple[Episode,
         points = given.points
         levels.append(stages.step(given, stages.budget, reduced=False).trust.level)
         stages.ledger.close_frame(k)
-        stages.watch(given)
-        if stages.recognising is not None:
-            stages.recognising.join()
+        stages.adapt(given)
+        if stages.comparison is not None:
+            stages.comparison.join()
     return levels
 
 

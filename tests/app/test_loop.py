@@ -89,8 +89,8 @@ class Stages:
         self.work_s = work_s
         self.fails = fails
         self.steps = []
-        self.recognise = Mock()
-        self.watch = Mock()
+        self.choose_profile = Mock()
+        self.adapt = Mock()
         self.recover = Mock()
         line = line_of(segmentation=20)
         self.ledger = Mock(run=lambda stage, write, r: write(r), close_frame=lambda index: line)
@@ -161,9 +161,9 @@ def test_every_sweep_in_time_goes_through():
     assert sink.indices == live.seen
     assert live.deadlines.missed == live.sensor.dropped == live.deadlines.shed == 0
     assert live.deadlines.figures().lateness_ms["max"] == 0.0
-    ((first, named),) = (made.args for made in live.stages.recognise.call_args_list)
+    ((first, named),) = (made.args for made in live.stages.choose_profile.call_args_list)
     assert (first.index, named) == (1, "vlp-16")
-    assert [made.args[0].index for made in live.stages.watch.call_args_list] == live.seen
+    assert [made.args[0].index for made in live.stages.adapt.call_args_list] == live.seen
     figures = live.deadlines.figures()
     assert (figures.execution_ms["max"], figures.latency_ms["max"]) == pytest.approx((20.0, 20.0))
     live.notifier.ready.assert_called_once_with()

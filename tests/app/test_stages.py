@@ -10,9 +10,10 @@ import pytest
 from modt import profile
 from modt.app.chosen_profile import FOUND, choose
 from modt.app.inputs import Request
-from modt.app.stages import RANGE_SHARE, Stages
+from modt.app.stages import Stages
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
+from modt.trust.sample import REACH_SHARE
 from modt.trust.watch import TrustWatch
 from modt.types import NONE, UNLIMITED, Frame, TrustLevel
 from modt_simulation.synthetic_stream import SyntheticStream
@@ -116,7 +117,7 @@ def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
     tilted = SyntheticStream("yard", "vlp-16", 0.2, 3, mount_deg=(0.0, 12.0))
     stages = stages_of(profile=None)
     first, _ = tilted
-    stages.recognise(first)
+    stages.choose_profile(first)
     sensor = stages.config.sensor
     made = stages.pipeline
     assert sensor.pitch_deg == pytest.approx(12.5, abs=1.0)
@@ -134,7 +135,7 @@ def test_a_reload_of_another_sensors_profile_is_a_reason_until_the_right_one_is_
 
     write("vlp-16")
     stages = stages_of(profile=str(own))
-    stages.recognise(frames()[0])
+    stages.choose_profile(frames()[0])
     assert not stages._findings()
     write("hdl-64e")
     stages.reload()
@@ -149,7 +150,7 @@ def test_a_reload_of_another_sensors_profile_is_a_reason_until_the_right_one_is_
 def test_a_reduced_frame_holds_what_is_near():
     stages = stages_of()
     frame = frames()[0]
-    reach_m = RANGE_SHARE * stages.config.sensor.max_range_m
+    reach_m = REACH_SHARE * stages.config.sensor.max_range_m
     result = stages.step(frame, UNLIMITED, reduced=True)
     distance_m = np.hypot(*result.frame.points[:, :2].T)
     assert distance_m.max() <= reach_m
@@ -160,9 +161,9 @@ def followed(stages, sweeps):
     """Trust after the last of some sweeps in a row, a comparison with the profile being awaited."""
     for frame in sweeps:
         trust = stages.step(frame, UNLIMITED, reduced=False).trust
-        stages.watch(frame)
-        if stages.recognising is not None:
-            stages.recognising.join()
+        stages.adapt(frame)
+        if stages.comparison is not None:
+            stages.comparison.join()
     return trust
 
 
@@ -179,7 +180,7 @@ def of_drive(sensor, first, n):
 def test_another_sensor_is_noticed_and_followed_and_the_first_one_is_believed_again():
     stages = stages_of(profile=None)
     before, *_ = of_drive("hdl-64e", 0, 1)
-    stages.recognise(before)
+    stages.choose_profile(before)
     assert stages.chosen.name == "hdl-64e"
     assert followed(stages, of_drive("hdl-64e", 0, 30)).keys == ()
     trust = followed(stages, of_drive("vlp-16", 30, 40))
@@ -194,12 +195,12 @@ def test_another_sensor_is_noticed_and_followed_and_the_first_one_is_believed_ag
 def test_a_sensor_that_does_not_fit_the_requested_profile_is_named_until_it_does():
     stages = stages_of(profile="vlp-16")
     first = frames()[0]
-    stages.recognise(first)
-    stages._recognise_again(dataclasses.replace(first, points=first.points[::2]))
-    stages.watch(first)
+    stages.choose_profile(first)
+    stages._compare(dataclasses.replace(first, points=first.points[::2]))
+    stages.adapt(first)
     assert list(stages._findings()) == ["profile"]
-    stages._recognise_again(first)
-    stages.watch(first)
+    stages._compare(first)
+    stages.adapt(first)
     assert not stages._findings()
     assert stages.misfits == 2
 
@@ -213,15 +214,15 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
         looks.append(frame.index)
         may_end.wait(60)
 
-    monkeypatch.setattr(stages, "_recognise_again", look)
+    monkeypatch.setattr(stages, "_compare", look)
     for k in range(10):
         stages.trust.watch.another_sensor = True
-        stages.watch(Frame(k, 0.1 * k, frames()[0].points))
+        stages.adapt(Frame(k, 0.1 * k, frames()[0].points))
     assert looks == [0]
     may_end.set()
-    stages.recognising.join()
-    stages.watch(Frame(10, 1.0, frames()[0].points))
-    stages.recognising.join()
+    stages.comparison.join()
+    stages.adapt(Frame(10, 1.0, frames()[0].points))
+    stages.comparison.join()
     assert looks == [0, 10]  # what it could not look at meanwhile
 
 
@@ -250,8 +251,8 @@ def test_a_displaced_sensor_keeps_its_profile_until_it_is_back(monkeypatch):
     frame = frames()[0]
     monkeypatch.setattr(TrustWatch, "displaced", True)
     stages.trust.watch.another_sensor = True
-    stages.watch(frame)
-    assert stages.recognising is None
+    stages.adapt(frame)
+    assert stages.comparison is None
     monkeypatch.setattr(TrustWatch, "displaced", False)
-    stages.watch(frame)
-    stages.recognising.join()
+    stages.adapt(frame)
+    stages.comparison.join()

@@ -140,7 +140,7 @@ class Loop:
         first = next(sweeps, None)
         if first is None:
             return
-        self.stages.recognise(first.frame, self.source.profile)
+        self.stages.choose_profile(first.frame, self.source.profile)
         for received in chain([first], sweeps):
             if self.deadlines.admit(received.arrived_s):
                 self._process(received)
@@ -179,7 +179,7 @@ class Loop:
             return
         self.failures.succeed()
         self.deadlines.finish(received.arrived_s, line)
-        self.stages.watch(received.frame)
+        self.stages.adapt(received.frame)
 
     def _step(self, received: Received) -> LedgerLine:
         """Run the stages, then the sinks, which cost no frame if they fail; returns the frame's ledger line."""

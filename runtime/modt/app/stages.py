@@ -20,6 +20,7 @@ from modt.placement import Mount
 from modt.poses.pose_source import PoseSource
 from modt.sensor_fit.recognition import recognise
 from modt.sources.stream import StreamInfo
+from modt.trust.sample import REACH_SHARE
 from modt.trust.visibility import VisibilityEstimate
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import Budget, Frame, FrameResult, TrustLevel
@@ -27,8 +28,6 @@ from modt.types import Budget, Frame, FrameResult, TrustLevel
 DOUBTED_S = 0.5
 """Time for which given poses are doubted before it is reported [s]."""
 POSES_REMEDY = "check the odometry: its scale, units, frames, and whether it stands still"
-RANGE_SHARE = 0.6
-"""Share of sensor.max_range_m that is kept while the range is reduced."""
 
 
 class Stages:
@@ -47,7 +46,7 @@ class Stages:
         odometry: source of the poses.
         trust: judges the results.
         source_findings: what is held against a live source, by the names of the checks.
-        recognising: thread that compares a sweep with the profile; None before the first comparison.
+        comparison: thread that compares a sweep with the profile; None before the first comparison.
         read: account of what was read, once the run has ended.
         misfits: number of times that sweeps were found to be of another sensor than before.
 
@@ -70,11 +69,11 @@ class Stages:
         self._info = info
         self._live = live
         self._mode = assembly.MODES[request.mode]
-        self._first: Frame | None = None  # identifies the sensor
+        self._chosen_for: Frame | None = None  # sweep by which the present profile was chosen
         self.misfits = 0
         self.read: dict[str, Any] | None = None  # account of what was read, at the end
-        self.recognising: Thread | None = None
-        self._recognised: list[tuple[Frame | None, ChosenProfile]] = []  # chosen by the thread `recognising`
+        self.comparison: Thread | None = None
+        self._chosen_by_thread: list[tuple[Frame | None, ChosenProfile]] = []  # chosen by the thread `comparison`
         self._continuity = assembly.Continuity()
         self.chosen = self._choose(None)
         self._began_with: tuple[Frame | None, ChosenProfile] = None, self.chosen
@@ -98,9 +97,9 @@ class Stages:
         """Budget of a frame by mode and profile."""
         return self._mode.budget(self.config)
 
-    def recognise(self, first: Frame, named: str | None = None) -> None:
+    def choose_profile(self, first: Frame, named: str | None = None) -> None:
         """Use the profile that fits the first sweep; `named` is the profile that the messages of the sensor name."""
-        self._first = first
+        self._chosen_for = first
         self._info = replace(self._info, profile=named or self._info.profile)
         chosen = self._choose(first)
         self._began_with = first, chosen
@@ -110,11 +109,14 @@ class Stages:
             self._use(chosen)
 
     def step(self, frame: Frame, budget: Budget, *, reduced: bool) -> FrameResult:
-        """Process a frame, and judge how far its result can be believed; `reduced` leaves out distant points."""
+        """Process a frame, and judge how far its result can be believed.
+
+        `reduced` leaves out points beyond REACH_SHARE of the range, where the trust counts no returns.
+        """
         frame = self.odometry.place(frame)
         if reduced:
             x, y = frame.points[:, :2].T
-            near = np.square(x) + np.square(y) <= (RANGE_SHARE * self.config.sensor.max_range_m) ** 2
+            near = np.square(x) + np.square(y) <= (REACH_SHARE * self.config.sensor.max_range_m) ** 2
             frame = replace(frame, points=frame.points[near])
         result = self.pipeline.step(frame, budget)
         return replace(result, run_id=self.run_id, trust=self.trust.judge(result, self._findings()))
@@ -135,25 +137,25 @@ class Stages:
             findings["poses"] = Finding(TrustLevel.DEGRADED, cause, POSES_REMEDY)
         return findings
 
-    def watch(self, frame: Frame) -> None:
+    def adapt(self, frame: Frame) -> None:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it.
 
         A sensor that was knocked or turned keeps its profile: one that fits the view from there would hide that.
         """
-        trust = self.trust.watch
-        if self._recognised:
+        watch = self.trust.watch
+        if self._chosen_by_thread:
             self.misfits += 1
-            self._first, chosen = self._recognised.pop()
+            self._chosen_for, chosen = self._chosen_by_thread.pop()
             self._use(chosen)
-        elif trust.another_sensor and not trust.displaced and self._live and not self._recognises:
-            trust.another_sensor = False
-            self.recognising = Thread(target=self._recognise_again, args=(frame,), name="recognition", daemon=True)
-            self.recognising.start()
+        elif watch.another_sensor and not watch.displaced and self._live and not self._thread_runs:
+            watch.another_sensor = False
+            self.comparison = Thread(target=self._compare, args=(frame,), name="recognition", daemon=True)
+            self.comparison.start()
 
     @property
-    def _recognises(self) -> bool:
+    def _thread_runs(self) -> bool:
         """Whether the thread that compares profiles runs."""
-        return self.recognising is not None and self.recognising.is_alive()
+        return self.comparison is not None and self.comparison.is_alive()
 
     def recover(self, *, anew: bool) -> None:
         """Restore the tracks of the last good frame; with `anew` make new stages without tracks."""
@@ -170,9 +172,9 @@ class Stages:
         Raises:
             ModtError: it is not valid; nothing has changed.
         """
-        chosen = self._choose(self._first)
+        chosen = self._choose(self._chosen_for)
         self._use(chosen)
-        self._began_with = self._first, chosen
+        self._began_with = self._chosen_for, chosen
 
     def facts(self, core: int | None, command: Sequence[str]) -> dict[str, Any]:
         """Content of run.yaml."""
@@ -209,12 +211,12 @@ class Stages:
             "profile": profile.dump(chosen.config),
         }
 
-    def _recognise_again(self, frame: Frame) -> None:
+    def _compare(self, frame: Frame) -> None:
         """Choose a profile anew if a sweep has other beams than the present one, or fits it as none did before."""
         if recognise(frame.points, self.config).fits == self.chosen.fits:
             return
         back = recognise(frame.points, self._began_with[1].config).fits and self._began_with[1].fits
-        self._recognised.append(self._began_with if back else (frame, self._choose(frame)))
+        self._chosen_by_thread.append(self._began_with if back else (frame, self._choose(frame)))
 
     def _choose(self, first: Frame | None) -> ChosenProfile:
         return choose(self.request.profile, first, self._info)
