@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.classes import CLASSES, PERSON_M, ClassKind, ObjectClass
+from modt.classes import CLASSES, PERSON_HEIGHT_M, ClassKind, ObjectClass
 from modt.types import NONE, Bool, Cut, Float32, Float64, FrameResult
 
 MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES])
@@ -70,7 +70,7 @@ def unknown_near(result: FrameResult) -> Bool:
     proposals = result.proposals
     length_m = proposals.box[:, 3]
     height_m = proposals.box[:, 5]
-    may_be_person = (proposals.cut & Cut.TOP > 0) & (height_m < PERSON_M / 3) & (length_m < MAX_PERSON_M)
+    may_be_person = (proposals.cut & Cut.TOP > 0) & (height_m < PERSON_HEIGHT_M / 3) & (length_m < MAX_PERSON_M)
     visible = result.tracks.proposal != NONE
     unknown: Bool = visible & (result.tracks.object_class == ObjectClass.BACKGROUND)
     unknown[unknown] = may_be_person[result.tracks.proposal[unknown]]

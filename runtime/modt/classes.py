@@ -20,7 +20,7 @@ from modt.errors import MisuseError
 
 VARIABLE = "MODT_CLASSES"
 """Environment variable with the file of further rows."""
-MOST = 65536
+LIMIT = 65536
 """Every number of a row is below it."""
 MOST_ROWS = 16
 """Greatest number of further rows."""
@@ -39,7 +39,7 @@ class ClassKind(Enum):
     """The rules that a class is subject to."""
 
     OTHER = "other"
-    """None: neither a vehicle nor a person."""
+    """No rules: neither a vehicle nor a person."""
     VEHICLE = "vehicle"
     """Rigid. Its parts are joined, and it moves like a car."""
     WALKER = "walker"
@@ -139,7 +139,10 @@ def _row(row: Any, taken: set[str], place: str) -> ClassSpec:
 
 
 def _fits(kind: str, value: Any) -> bool:
-    """Whether a value of JSON has an annotated type: a text, a number above zero, or a list of either."""
+    """Whether a value of JSON has an annotated type: a text, a number above zero, or a list of either.
+
+    `kind` is the text of an annotation of `ClassSpec`, which `from __future__ import annotations` keeps as text.
+    """
     if kind.startswith("tuple["):
         of_item, *rest = kind[len("tuple[") : -1].split(", ")
         length_fits = rest == ["..."] or (isinstance(value, list) and len(value) == 1 + len(rest))
@@ -148,7 +151,7 @@ def _fits(kind: str, value: Any) -> bool:
         return isinstance(value, str) and bool(value)
     if isinstance(value, bool) or not isinstance(value, int if kind == "int" else int | float):
         return False
-    return bool(0 <= value < MOST if kind == "int" else 0 < value < MOST)
+    return bool(0 <= value < LIMIT if kind == "int" else 0 < value < LIMIT)
 
 
 FILE = os.environ.get(VARIABLE) or None
@@ -158,6 +161,7 @@ CLASSES = (*SHIPPED, *(read_rows(Path(FILE)) if FILE else ()))
 CLASS_NAMES = tuple(spec.name for spec in CLASSES)
 N_CLASSES = len(CLASSES)
 """Number of classes, background first; C in the shapes of arrays."""
-PERSON_M = 1.7  # height of a person
+PERSON_HEIGHT_M = 1.7
+"""Height of a person [m]."""
 OBJECTS = tuple(range(1, N_CLASSES))
 """Index of every class but background."""

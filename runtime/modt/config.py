@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from modt.classes import CLASS_NAMES, CLASSES, N_SHIPPED, OBJECTS, PERSON_M
+from modt.classes import CLASS_NAMES, CLASSES, N_SHIPPED, OBJECTS, PERSON_HEIGHT_M
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
@@ -343,9 +343,9 @@ class SensorConfig(StageConfig):
         low, high = (math.tan(math.radians(deg)) for deg in self.span_deg)
         for decimetres in range(1, 201):
             distance_m = decimetres / 10
-            top_m = min(self.height_m + distance_m * high, PERSON_M)
+            top_m = min(self.height_m + distance_m * high, PERSON_HEIGHT_M)
             bottom_m = max(self.height_m + distance_m * low, 0.0)
-            if top_m - bottom_m >= PERSON_M / 3:
+            if top_m - bottom_m >= PERSON_HEIGHT_M / 3:
                 return distance_m
         return None
 

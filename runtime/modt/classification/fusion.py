@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.class_sizes import IS_PERSON, MAX_PERSON_M
-from modt.classes import PERSON_M, ObjectClass
+from modt.classes import PERSON_HEIGHT_M, ObjectClass
 from modt.classification.motion_likelihood import MotionLikelihood
 from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
@@ -285,7 +285,7 @@ class FurtherViews(FusedTracks):
         """(P,) proposals that are near, at most as long as a person, and at least half as high."""
         x, y, _, length_m, _, height_m, _ = proposals.box.T
         near: Bool = x * x + y * y < self._conditions.near_m**2
-        near &= (length_m < MAX_PERSON_M) & (height_m > PERSON_M / 2)
+        near &= (length_m < MAX_PERSON_M) & (height_m > PERSON_HEIGHT_M / 2)
         return near
 
 

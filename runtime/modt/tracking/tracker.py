@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from modt.class_sizes import IS_PERSON
-from modt.classes import PERSON_M, ObjectClass
+from modt.classes import PERSON_HEIGHT_M, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
@@ -285,7 +285,7 @@ class Tracker:
         top_before_m = box_before[people, 2] + box_before[people, 5] / 2
         top_m = t.box[rows, 2] + t.box[rows, 5] / 2
         hidden_m = np.maximum(top_before_m - top_m, 0.0)
-        t.hidden[rows] = (hidden_m > 0) & (t.box[rows, 5] < PERSON_M / 2)
+        t.hidden[rows] = (hidden_m > 0) & (t.box[rows, 5] < PERSON_HEIGHT_M / 2)
         middle_and_height = np.outer(hidden_m, (0.5, 1.0))  # z of the middle rises by half
         t.box[rows, 2:6:3] += middle_and_height
         box = frame.proposals.box.copy()
