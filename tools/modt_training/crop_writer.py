@@ -17,7 +17,7 @@ from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.crops import gather, ground_z_m
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
-from modt_training.dataset import CLUSTERED, MAJORITY, PASTED, REAL, VARIANT_NAMES, Sensors
+from modt_training.dataset import CLUSTERED, MAJORITY, PASTED, REAL, VARIANT_NAMES, Sensors, is_trainable
 from modt_training.scan import Scan
 
 MAX_POINTS = 1200
@@ -161,14 +161,14 @@ class CropWriter:
         table["offsets"] = np.append(0, np.cumsum(table.pop("count")))
         for key in ("label", "points", "row", "drive", "sensor"):
             table.setdefault(f"truth_{key}", np.zeros(0, np.str_ if key in {"drive", "sensor"} else np.int64))
-        trainable = ~table["partial"] & ~(table["unknown"] & (table["label"] == 0))
+        trainable = is_trainable(table["partial"], table["label"], table["unknown"])
         tally = {
             name: np.bincount(table["label"][trainable & (table["variant"] == v)], minlength=N_CLASSES).tolist()
             for v, name in enumerate(VARIANT_NAMES)
         }
-        provenance |= {"scans": len(np.unique(table["name"])), "crops": tally, "modt": modt.__version__}
-        provenance |= {"sensors": np.unique(table["sensor"]).tolist()}
-        np.savez_compressed(path, provenance=np.array(json.dumps(provenance)), **table)
+        facts = {"scans": len(np.unique(table["name"])), "crops": tally, "modt": modt.__version__}
+        facts |= {"sensors": np.unique(table["sensor"]).tolist()}
+        np.savez_compressed(path, provenance=np.array(json.dumps(provenance | facts)), **table)
         return f"{path} {hashlib.sha256(path.read_bytes()).hexdigest()} {json.dumps(tally)}"
 
 

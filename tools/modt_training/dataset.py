@@ -148,7 +148,7 @@ class Dataset:
     @property
     def trainable(self) -> Bool:
         """(R,) whole objects, and known background."""
-        return ~self.partial & ((self.label > 0) | ~self.unknown)
+        return is_trainable(self.partial, self.label, self.unknown)
 
     @property
     def validated(self) -> Bool:
@@ -163,6 +163,11 @@ class Dataset:
             self.crops.xyz[np.repeat(self.crops.offsets[rows] - offsets[:-1], count) + np.arange(offsets[-1])],
             offsets,
         )
+
+
+def is_trainable(partial: Bool, label: Int, unknown: Bool) -> Bool:
+    """(R,) whole objects, and known background."""
+    return ~partial & ((label > 0) | ~unknown)
 
 
 def load(*paths: Path) -> Dataset:

@@ -304,12 +304,12 @@ def train_network(
     others: Sequence[Examples],
     steps: int,
     seed: int,
-    step: Callable[[str], None] = lambda words: None,
+    progress: Callable[[str], None] = lambda words: None,
 ) -> Model:
     """The model after training of its network on other crops, and on its own posteriors for those that are kept.
 
     The parameters are averaged with those before by TRAINED_SHARE, then calibrated to the posteriors that are kept.
-    `step` is called after every step.
+    `progress` is called after every step.
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
@@ -328,7 +328,7 @@ def train_network(
         (loss / sum(examples.size for examples in parts)).backward()
         optimiser.step()
         schedule.step()
-        step("")
+        progress("")
     both = zip(model.network.layers(), network.layers(), strict=True)
     layers = [
         (_between(weight, new_weight), _between(bias, new_bias)) for (weight, bias), (new_weight, new_bias) in both

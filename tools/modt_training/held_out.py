@@ -16,7 +16,7 @@ from modt.classification.pool import PoolWeights, log_pool
 from modt.types import NONE, Bool, Float64, Int
 from modt_training.dataset import Dataset, LabelledObjects, folds
 
-Model = Callable[[Int], Float64]
+LogitsOfRows = Callable[[Int], Float64]
 """Maps rows (R,) to logits (R, C)."""
 
 
@@ -140,7 +140,7 @@ class HeldOut:
         return self.calibration.apply(self.logits)
 
 
-def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> HeldOut:
+def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], LogitsOfRows]) -> HeldOut:
     """Cross-validate over drives.
 
     Args:

@@ -51,6 +51,7 @@ class MaxPooledLinear(torch.autograd.Function):
         """Gradients of points and weight."""
         x, weight, y, maxima, count = ctx.saved
         crop = np.repeat(np.arange(len(count)), count)
+        # Row by row, so the order is that of a CSR matrix. All points that share a maximum get its gradient.
         point, channel = np.divmod(np.flatnonzero(y == maxima[crop]), y.shape[1])
         starts = np.append(0, np.cumsum(np.bincount(point, minlength=len(y))))
         d_y = csr_matrix((grad[0].numpy()[crop[point], channel], channel, starts), shape=y.shape)

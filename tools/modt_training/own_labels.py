@@ -45,6 +45,7 @@ from modt_training.fine_tuning import (
     BOX_CROPS,
     BOX_STEPS,
     KEPT_BATCHES,
+    RARE,
     Boxes,
     Examples,
     Model,
@@ -64,7 +65,7 @@ from modt_training.fine_tuning import (
     unchanged,
 )
 from modt_training.held_out import Validation
-from modt_training.recordings import Step, check_examples, open_recordings, write_crops
+from modt_training.recordings import Progress, check_examples, open_recordings, write_crops
 from modt_training.scores import by_sensor
 from modt_training.simulated import simulated_scans
 
@@ -95,14 +96,14 @@ THRESHOLDS = (0.2, 0.8)
 """Least and greatest posterior from which a class of the user's own is reported."""
 
 
-def write_kept(path: Path, sensor: str, seeds: int, step: Step) -> None:
+def write_kept(path: Path, sensor: str, seeds: int, progress: Progress) -> None:
     """Write the crops of simulated sweeps, by the sensor of a profile or else by every simulated one in turn."""
     sensors = (sensor,) if sensor in SENSORS else tuple(SENSORS)
     writer = CropWriter()
     for k, (seed, scene) in enumerate(product(range(FIRST_SEED, FIRST_SEED + seeds), KEPT_SCENES)):
         for scan in simulated_scans([scene], [seed], KEPT_TIMES_S, camera=False, sensors=[sensors[k % len(sensors)]]):
             writer.add(scan, SYNTHETIC)
-        step(f"simulated {scene}")
+        progress(f"simulated {scene}")
     writer.save(path, {"synthetic": seeds * len(KEPT_SCENES), "seed": FIRST_SEED})
 
 
@@ -118,7 +119,7 @@ def new_examples(model: Model, data: Dataset, rows: Int, batches: int, seed: int
     same, rows_of_same = unchanged(data, drawn[1::2], rng)
     wanted = _smooth(data.label[np.append(rows_of_changed, rows_of_same)])
     of_box = draw_batch(pools, rng, BOX_CROPS, share)
-    feature = dataset_features(data, rows)[np.searchsorted(rows, of_box)]
+    feature = dataset_features(data, rows)[np.searchsorted(rows, of_box)]  # rows are ascending
     boxes = Boxes.of(feature, _smooth(data.label[of_box]), NEW_BOX_SIZE, shift)
     return Examples(joined([changed, same]), wanted, NEW_SIZE, shift), boxes
 
@@ -138,7 +139,7 @@ class Trainer:
         kept_data: crops that keep their posterior.
         kept: examples drawn from these crops, half of them augmented.
         steps: steps of the network.
-        step: called after every step of the network.
+        progress: called after every step of the network.
     """
 
     base: Model
@@ -146,14 +147,14 @@ class Trainer:
     kept_data: Dataset
     kept: Examples
     steps: int
-    step: Step
+    progress: Progress
 
     def trained(self, among: Bool, seed: int) -> Model:
         """The model after training on rows of a mask (R,)."""
         rows = np.flatnonzero(among & self.data.trainable)
         examples, boxes = new_examples(self.base, self.data, rows, min(NEW_BATCHES, self.steps), seed)
         streets = street_examples(self.kept_data, np.random.default_rng(seed))
-        model = train_network(self.base, self.kept, [examples, streets], self.steps, seed, self.step)
+        model = train_network(self.base, self.kept, [examples, streets], self.steps, seed, self.progress)
         return train_boxes(model, self.kept_data, [boxes, street_boxes(self.kept_data)], BOX_STEPS * self.steps, seed)
 
     def held_out(self, k: int) -> tuple[Validation, dict[str, Float64]]:
@@ -231,11 +232,11 @@ class Request:
 
     @property
     def n_pieces(self) -> int:
-        """Number of calls of `step`."""
+        """Number of calls of `progress`."""
         return len(self.recordings) + self.kept_seeds * len(KEPT_SCENES) + (self.n_folds + 1) * self.steps
 
 
-def train(request: Request, step: Step) -> list[str]:
+def train(request: Request, progress: Progress) -> list[str]:
     """Train, and write model, network beside it, card, table of classes and profile; returns lines about them.
 
     Raises:
@@ -252,15 +253,15 @@ def train(request: Request, step: Step) -> list[str]:
     base = Model.of(onnx.load_from_string(file.content))
     request.out.mkdir(parents=True, exist_ok=True)
     crops = request.out / "crops.npz"
-    write_crops(crops, recordings, sensor, resolved.config, step)
+    write_crops(crops, recordings, sensor, resolved.config, progress)
     data = load(crops)
     check_examples(data)
     kept = request.out / "kept.npz"
-    write_kept(kept, sensor, request.kept_seeds, step)
+    write_kept(kept, sensor, request.kept_seeds, progress)
     kept_data = load(kept)
     base = frequencies(base, data)
     examples = kept_examples(base, kept_data, np.random.default_rng(SEED), min(KEPT_BATCHES, 2 * request.steps))
-    trainer = Trainer(base, data, kept_data, examples, request.steps, step)
+    trainer = Trainer(base, data, kept_data, examples, request.steps, progress)
     valid, held = trainer.held_out(request.n_folds)
     model = trainer.trained(np.ones(len(data), np.bool_), SEED)
     found = {c: threshold(held[POOL][valid.clear, c], valid.label[valid.clear] == c) for c in _present(valid)}
@@ -288,7 +289,7 @@ def _write_beside(base: ModelFile, path: Path) -> None:
     if (beside := base.beside("-near")) is not None:
         proto = onnx.load_from_string(beside.content)
         metadata = extended_metadata({entry.key: entry.value for entry in proto.metadata_props})
-        save(path.with_stem(f"{path.stem}-near"), extended(layers_of(proto), np.log(1e-4)), metadata)
+        save(path.with_stem(f"{path.stem}-near"), extended(layers_of(proto), np.log(RARE)), metadata)
 
 
 def _write_profile(request: Request, path: Path, found: dict[int, tuple[float, float, float]]) -> list[str]:

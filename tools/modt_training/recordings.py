@@ -25,7 +25,7 @@ from modt_training.scan import Scan, on_bottom
 SWEEPS = 60
 """Greatest number of sweeps of a recording, evenly spaced: neighbouring ones show the same."""
 
-Step = Callable[[str], None]
+Progress = Callable[[str], None]
 """Called after every piece of work with a few words."""
 
 
@@ -118,13 +118,15 @@ def _sector(half_deg: float) -> FieldOfView:
     return FieldOfView(np.array(edges))
 
 
-def write_crops(path: Path, recordings: Sequence[Recording], sensor: str, config: ProfileConfig, step: Step) -> None:
+def write_crops(
+    path: Path, recordings: Sequence[Recording], sensor: str, config: ProfileConfig, progress: Progress
+) -> None:
     """Write the crops of recordings."""
     writer = CropWriter()
     for number, recording in enumerate(recordings):
         for scan in scans_of(recording, number, sensor, config):
             add_labelled(writer, scan)
-        step(recording.path.name)
+        progress(recording.path.name)
     writer.save(path, {"recordings": [recording.path.name for recording in recordings]})
 
 

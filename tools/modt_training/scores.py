@@ -51,14 +51,13 @@ def sensor_scores(log_probability: Float64, valid: Validation, of_sensor: Bool) 
     number = np.bincount(truth.label[objects] if objects.any() else label, minlength=N_CLASSES)
     rows = np.flatnonzero(of_sensor)
     probability = np.exp(score[rows])
-    recall = {
-        str(precision): {
-            name: recall_at(precision, score[:, c], valid.majority == c, of_sensor, wanted, truth.row)
-            for c, name in enumerate(CLASS_NAMES[1:], 1)
-            if (wanted := objects & (truth.label == c) & (truth.points >= MIN_OBJECT_POINTS)).any()
-        }
-        for precision in PRECISIONS
-    }
+    recall: dict[str, dict[str, Any]] = {str(precision): {} for precision in PRECISIONS}
+    for c, name in enumerate(CLASS_NAMES[1:], 1):
+        wanted = objects & (truth.label == c) & (truth.points >= MIN_OBJECT_POINTS)
+        if wanted.any():
+            for precision in PRECISIONS:
+                found = recall_at(precision, score[:, c], valid.majority == c, of_sensor, wanted, truth.row)
+                recall[str(precision)][name] = found
     return {
         "average_precision": average_precision(probability, valid.label[rows], number),
         "log_loss": round(-float(log_softmax(adapted, axis=1)[np.arange(len(label)), label].mean()), 4),

@@ -12,7 +12,7 @@ from modt.geometry import FieldOfView
 from modt.types import Frame
 from modt_simulation.simulator import Truth
 from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
-from modt_training.scan import Scan
+from modt_training.scan import Scan, on_bottom
 
 SECONDS = 4.0
 
@@ -30,7 +30,7 @@ def labelled_scan(
         frame.points,
         tuple(objects),
         tuple(kind.object_class for kind in truth.kinds),
-        truth.boxes - np.outer(truth.boxes[:, 5] / 2, np.eye(7)[2]),
+        on_bottom(truth.boxes),
         FieldOfView.of_camera(CAMERA) if camera else FieldOfView(),
         np.zeros(len(frame.points), np.bool_),
         sensor,

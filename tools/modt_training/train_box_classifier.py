@@ -26,7 +26,7 @@ from modt_training.dataset import (
     draw_batch,
     sampling_pools,
 )
-from modt_training.held_out import Calibration, Model, fit_pool, out_of_fold
+from modt_training.held_out import Calibration, LogitsOfRows, fit_pool, out_of_fold
 from modt_training.network import Batch, train_mlp
 from modt_training.scores import by_sensor
 
@@ -75,7 +75,7 @@ def cross_validate(
         seed: seed of the first fold.
     """
 
-    def model(among: Bool, i: int) -> Model:
+    def model(among: Bool, i: int) -> LogitsOfRows:
         layers = train(data, np.flatnonzero(among & data.trainable), steps, seed + i)
         return lambda rows: logits(layers, dataset_features(data, rows))
 

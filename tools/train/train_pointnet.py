@@ -35,7 +35,7 @@ from modt_training.dataset import (
 )
 from modt_training.export_pointnet import export
 from modt_training.fine_tuning import MAX_POINTS, POINTS, tensors
-from modt_training.held_out import Model, out_of_fold
+from modt_training.held_out import LogitsOfRows, out_of_fold
 from modt_training.network import PointNet
 from modt_training.scores import by_sensor
 from tools.options import make_torch_deterministic, parser
@@ -127,7 +127,7 @@ def main() -> None:
     started = time.process_time()
     box = dataset_features(data, np.arange(len(data)))
 
-    def fold_model(among: Bool, i: int) -> Model:
+    def fold_model(among: Bool, i: int) -> LogitsOfRows:
         net = train(data, box, np.flatnonzero(among & data.trainable), args.steps, SEED + i)
         return lambda rows: logits(net, data, rows)
 

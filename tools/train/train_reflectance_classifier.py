@@ -16,7 +16,7 @@ from modt.classification.box_classifier import N_FEATURES, Layers, logits
 from modt.types import Bool, Float64, Int
 from modt_training import train_box_classifier
 from modt_training.dataset import FOLDS, SEED, Dataset, dataset_features, draw_batch, sampling_pools
-from modt_training.held_out import Calibration, Model, Validation, fit_calibration, fit_pool, out_of_fold
+from modt_training.held_out import Calibration, LogitsOfRows, Validation, fit_calibration, fit_pool, out_of_fold
 from modt_training.network import Batch, train_mlp
 from modt_training.scores import by_sensor
 
@@ -75,7 +75,7 @@ def cross_validate(
     """
     boxes: dict[int, Layers] = {}
 
-    def box_model(among: Bool, i: int) -> Model:
+    def box_model(among: Bool, i: int) -> LogitsOfRows:
         layers = train_box_classifier.train(
             data, np.flatnonzero(among & data.trainable), train_box_classifier.STEPS, seed + i
         )
@@ -84,7 +84,7 @@ def cross_validate(
 
     by_box = out_of_fold(data, k, box_model)
 
-    def reflectance_model(among: Bool, i: int) -> Model:
+    def reflectance_model(among: Bool, i: int) -> LogitsOfRows:
         base = by_box.calibration.fold_into(boxes[i])
         layers = train(data, features, np.flatnonzero(among & data.trainable), base, steps, seed + i)
         return lambda rows: logits(layers, np.nan_to_num(features[rows]))
