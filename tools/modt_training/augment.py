@@ -16,10 +16,27 @@ from modt.types import Bool, Float64, Int
 from modt_training.dataset import Sensors
 
 MAX_RANGE_M = 75.0
+"""Greatest range to which a crop is moved [m]."""
 MIN_POINTS = 6
 """Minimum number of points of an augmented crop; a step that would leave fewer is skipped."""
-
-
+MAX_DROPPED = 0.35
+"""A crop loses the share u ** DROPPED_EXPONENT of its returns, with u uniform from 0 to this."""
+DROPPED_EXPONENT = 1.5
+"""Greater than 1, so that most crops lose few returns."""
+POINT_NOISE_M = 0.012
+"""Standard deviation of the noise of each coordinate of a point [m]."""
+GROUND_NOISE_M = 0.05
+"""Standard deviation of the height of a crop at the sensor [m]."""
+GROUND_NOISE_SLOPE = 0.002
+"""Growth of that deviation with the range [m/m]."""
+OCCLUSIONS = ("none", "side", "foot", "top", "post")
+"""What an occluder hides of a crop."""
+OCCLUSION_SHARE = (0.5, 0.28, 0.1, 0.05, 0.07)
+"""Share of the crops with each of these."""
+HIDDEN_SHARE = (0.1, 0.65)
+"""Least and greatest share of the extent of a crop that is hidden at a side or the foot; half of it at the top."""
+HALF_POST = 0.08
+"""Half the width of the post, a share of the width of the crop."""
 BEAM_STEPS = (1, 2, 4)
 """Every n-th beam of a crop is kept."""
 BEAM_STEP_SHARE = (0.5, 0.3, 0.2)
@@ -39,12 +56,12 @@ def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sens
     xyz = _change_range(xyz, centre, crop_of_point, rng)
     keep, sensors = _one_return_per_beam(xyz, crop_of_point, sensors, rng)
     keep = _keep_enough(keep, _occlude(xyz, crop_of_point, keep, n, rng), crop_of_point, n)
-    keep = _keep_enough(
-        keep, rng.random(len(crop_of_point)) < 1 - rng.uniform(0, 0.35, n)[crop_of_point] ** 1.5, crop_of_point, n
-    )
-    xyz += rng.normal(0, 0.012, xyz.shape)
+    draw = rng.random(len(crop_of_point))
+    returned = draw < 1 - rng.uniform(0, MAX_DROPPED, n)[crop_of_point] ** DROPPED_EXPONENT
+    keep = _keep_enough(keep, returned, crop_of_point, n)
+    xyz += rng.normal(0, POINT_NOISE_M, xyz.shape)
     rho = np.hypot(*centre[:, :2].T)
-    xyz[:, 2] += (rng.normal(0, 1, n) * (0.05 + 0.002 * rho))[crop_of_point]
+    xyz[:, 2] += (rng.normal(0, 1, n) * (GROUND_NOISE_M + GROUND_NOISE_SLOPE * rho))[crop_of_point]
     offsets = np.append(0, np.cumsum(np.bincount(crop_of_point[keep], minlength=n)))
     return Crops(xyz[keep].astype(np.float32), offsets), sensors
 
@@ -119,23 +136,24 @@ def _one_return_per_beam(xyz: Float64, crop_of_point: Int, sensors: Sensors, rng
     thin = _keep_enough(
         keep, (beam + rng.integers(0, 4, n)[crop_of_point]) % step[crop_of_point] == 0, crop_of_point, n
     )
-    kept = np.bincount(crop_of_point[thin], minlength=n) == np.bincount(crop_of_point[keep], minlength=n)
-    return thin, replace(sensors, elevation_deg=np.where(kept, 1, step) * sensors.elevation_deg)
+    unthinned = np.bincount(crop_of_point[thin], minlength=n) == np.bincount(crop_of_point[keep], minlength=n)
+    return thin, replace(sensors, elevation_deg=np.where(unthinned, 1, step) * sensors.elevation_deg)
 
 
 def _occlude(xyz: Float64, crop_of_point: Int, keep: Bool, n: int, rng: Generator) -> Bool:
     """(K,) mask of points left by an occluder: one side, the foot or the top cut off, or a post in front."""
     across = np.arctan2(xyz[:, 1], xyz[:, 0])
-    kind = rng.choice(5, n, p=[0.5, 0.28, 0.1, 0.05, 0.07])
-    cut = rng.uniform(0.1, 0.65, n)
+    kind = rng.choice(len(OCCLUSIONS), n, p=OCCLUSION_SHARE)
+    cut = rng.uniform(*HIDDEN_SHARE, n)
     left = rng.random(n) < 0.5
     a = _relative_position(across, crop_of_point, keep, n)
     z = _relative_position(xyz[:, 2], crop_of_point, keep, n)
     side = np.where(left[crop_of_point], a, 1 - a) > cut[crop_of_point]
     foot = z > cut[crop_of_point]
     top = z < 1 - 0.5 * cut[crop_of_point]
-    post = np.abs(a - (0.2 + 0.6 * cut)[crop_of_point]) > 0.08
-    chosen: Bool = np.choose(kind[crop_of_point], [np.ones(len(crop_of_point), np.bool_), side, foot, top, post])
+    post = np.abs(a - (0.2 + 0.6 * cut)[crop_of_point]) > HALF_POST
+    left_by = {"none": np.ones(len(crop_of_point), np.bool_), "side": side, "foot": foot, "top": top, "post": post}
+    chosen: Bool = np.choose(kind[crop_of_point], [left_by[name] for name in OCCLUSIONS])
     return chosen
 
 
