@@ -81,12 +81,14 @@ class PoseCheck:
         return near_registered >= least and near_registered > self._tuning.better * near
 
     def drifted(self, now_s: float, tracks: StaticTracks, T_world_sensor: Float64) -> bool:
-        """Whether the tracks at rest have moved alike since the anchors were set; if not, they are set anew.
+        """Once in `anchor_s`, whether the tracks at rest moved alike since the anchors; if not, set new anchors.
+
+        After a gap of twice `anchor_s` new anchors are set without a comparison.
 
         Args:
-            now_s: time of the frame [s].
+            now_s: time of this frame [s].
             tracks: tracks after the frame before.
-            T_world_sensor: (4, 4) its pose.
+            T_world_last: (4, 4) pose of the frame before.
         """
         anchors = self._anchors
         if anchors is not None and 0 <= now_s - anchors.time_s < self._tuning.anchor_s:

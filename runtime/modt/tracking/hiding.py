@@ -60,6 +60,8 @@ class Hiding:
     def stop_clock(self, tracks: TrackTable, nearest: Float32, T_world_sensor: Float64, dt_s: float) -> None:
         """Do not count a time step without a proposal of people in hiding, unless their position is too uncertain.
 
+        Where the clock stalls, tracks age by a period in spite of hiding, since only `dt_s` is taken off.
+
         Nobody steps out unseen: who is expected in view, one step out of hiding, stays where that step began.
 
         Args:

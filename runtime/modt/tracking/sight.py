@@ -1,4 +1,4 @@
-"""Lines of sight: which ends of a proposal the view of the sensor makes, and what something nearer hides.
+"""Lines of sight: which sides of a proposal something nearer or its own surface bounds, and what is hidden.
 
 A proposal ends to the left and to the right where the object ends, or where something nearer hides the rest of it,
 or where the same surface goes on without it. In the latter cases the end is *bounded*: it may move while the object
@@ -31,8 +31,8 @@ BESIDE = 2
 """Bearings beside a proposal that are looked at."""
 LOW_SHARE = 0.25
 """Lowest part of a proposal whose slopes are not looked at, since the ground is near there."""
-HIDES = np.isin(np.arange(-128, 128), [PointKind.MEMBER, *OBSTACLES])
-"""(256,) whether a point of each kind, from -128 on, stands above the ground."""
+BLOCKS_SIGHT = np.isin(np.arange(-128, 128), [PointKind.MEMBER, *OBSTACLES])
+"""(256,) whether a point of each kind, from -128 on, hides what is behind it."""
 
 
 class Sight:
@@ -46,7 +46,7 @@ class Sight:
         self.tuning = tuning
 
     def look(self, points: Float32, kind: Int8) -> Float32:
-        """(BEARINGS, SLOPES) distance of the nearest return that stands above the ground [m], infinity if none does.
+        """(BEARINGS, SLOPES) horizontal distance of the nearest return that blocks the sight [m], else infinity.
 
         Args:
             points: (N, 4) points of a frame, sensor frame.
@@ -85,6 +85,8 @@ class Sight:
     def hides(self, nearest: Float32, box: Float64) -> Bool:
         """(R,) whether something nearer hides at least half of the bearings at which objects are expected.
 
+        The number of bearings is approximate, since it takes them as equal angles.
+
         Args:
             nearest: result of `look` for the frame.
             box: (R, 7) boxes where the objects are expected, sensor frame. The shorter side is taken for the width.
@@ -103,8 +105,8 @@ class Sight:
 
     def _look(self, points: Float32, kind: Int8, every: int, nearest: Float32) -> None:
         """Fill the grid `nearest`, looking at one of `every` points."""
-        above_ground = HIDES[kind[::every].astype(np.int64) + 128]
-        x, y, z = np.ascontiguousarray(points[::every][above_ground, :3].T)
+        blocks = BLOCKS_SIGHT[kind[::every].astype(np.int64) + 128]
+        x, y, z = np.ascontiguousarray(points[::every][blocks, :3].T)
         range_m = np.maximum(np.sqrt(x * x + y * y), np.float32(1e-3))
         slope = np.floor((z / range_m - LEAST_SLOPE) * PER_SLOPE)
         inside = ((slope >= 0) & (slope < SLOPES)).nonzero()[0]

@@ -249,7 +249,7 @@ class Tracker:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
 
         Where a proposal is bounded by what is nearer, or goes on there, its ends may move while the object rests.
-        Evidence of rest counts in any case.
+        A flat and low proposal of no known class is no evidence of motion. Evidence of rest counts in any case.
         """
         tuning = self._evidence
         length_m, width_m, height_m = frame.proposals.box[frame.matches.proposals, 3:6].T

@@ -157,8 +157,9 @@ class SightTuning:
     Chosen on: judgement."""
 
     margin_m: float = 0.3
-    """A proposal is bounded where what is beside it is less than this behind its end [m]. Greater: ends near walls
-    are bounded.
+    """A proposal is bounded where what is beside it is less than this behind its end, and a person is hidden by what
+    is nearer by more than this [m]. Greater: ends near walls are bounded, and people close behind things are not
+    hidden.
     Chosen on: simulated scenes, by static things that were reported as moving."""
 
 

@@ -14,7 +14,7 @@ from modt.types import Bool, Float64
 BANDS = 12
 """Bands of elevation, of the same width in its tangent."""
 OUTER = 0.01
-"""Share of the returns of the first sweep below the lowest band, and above the highest one."""
+"""Share of the returns of the first sweep below the bands, and above them. Such returns count in the end bands."""
 AROUND = 10
 """Number of sectors in which a band must usually have returns to be expected. One tree does not count."""
 MIN_DEAD = 2
@@ -51,7 +51,7 @@ class ReturnsCheck:
         self._last: tuple[Sample, Float64] | None = None  # the last count, and of what
         self._lost: Bool = np.zeros(SECTORS, np.bool_)
         self._dead: Bool = np.zeros(BANDS, np.bool_)
-        self.gained = False  # whether nearly all cells have more returns than usual
+        self.gained = False  # nearly all cells had more returns than usual at the last look that judged all of them
 
     def learn(self, sample: Sample, elapsed_s: float) -> None:
         """Follow the returns of a sweep."""

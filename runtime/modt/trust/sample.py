@@ -11,7 +11,8 @@ from modt.config import SensorConfig
 from modt.types import Bool, Float32, Float64, Frame, Int
 
 SAMPLE = 2003
-"""Number of points looked at, a prime: no step between them is a multiple of the number of beams."""
+"""Greatest number of points looked at. The step between them is (n - 1) / (SAMPLE - 1) of n
+rows. Where n is a multiple of the number of beams, this step is not, so the beams take turns."""
 REACH_SHARE = 0.6
 """Share of the range of the sensor within which returns are counted; load shedding cuts the range to it."""
 OBSTACLE_M = (0.35, 1.8)
@@ -103,7 +104,10 @@ class Sample:
 
     @cached_property
     def lowest_m(self) -> Float32:
-        """(SECTORS x RINGS,) height of the lowest return of each cell near the sensor [m], infinite without one."""
+        """(SECTORS x RINGS,) z of the lowest return of each cell near the sensor [m, level sensor frame].
+
+        It is infinite in a cell without returns.
+        """
         reach_m = np.clip(HEIGHTS * abs(self.plane[0]), *GROUND_M)
         near = np.flatnonzero(self.range_m < reach_m)
         cell = self.sector.take(near) * RINGS + self.range_m.take(near).astype(np.int64)

@@ -19,12 +19,16 @@ from modt.types import Bool, Float32, Float64, Int
 BEARINGS = 72
 LOG_STEP = 0.08
 """Width of a cell in the logarithm of the range."""
-NEAREST_M = 1.0
+FIRST_RANGE_M = 1.0
 """Range of the first cell [m]."""
 RANGES = 50
 """Cells along the range, up to 54 m."""
 MIN_POINTS = 40
 """Fewest obstacle points in which a scene is compared."""
+TURN_TOLERANCE = 2
+"""Bearings by which a scene may be turned and count as unchanged."""
+SCALE_TOLERANCE = 1
+"""Steps by which a scene may be scaled and count as unchanged."""
 UNSCALED_FAVOUR = 0.02
 """Share of the points by which a scale has to be better for each of its steps, as places are several steps wide."""
 
@@ -44,14 +48,27 @@ class Change:
         return np.diag([1.0, -1.0 if self.mirrored else 1.0, 1.0, 1.0]) @ T
 
     def motion(self, before: Sample, after: Sample) -> Float64:
-        """(4, 4) from the sensor frame of a sweep to that of another one, both of them changed like this."""
+        """(4, 4) from the sensor frame of a sweep to that of another one, both turned and mirrored like this.
+
+        The scale is neglected.
+        """
         T = inverse(after.T_world_sensor) @ before.T_world_sensor
         return T if self.is_none else self.matrix @ T @ np.linalg.inv(self.matrix)
 
     @property
     def is_none(self) -> bool:
-        """Whether it is within the width of the cells."""
-        return not self.mirrored and abs(self.turned) <= 2 and abs(self.scaled) <= 1
+        """Whether it is within the tolerances of the grid."""
+        return not (self.mirrored or self.is_turned or self.is_scaled)
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the scene is turned by more than the tolerance."""
+        return abs(self.turned) > TURN_TOLERANCE
+
+    @property
+    def is_scaled(self) -> bool:
+        """Whether the scene is scaled by more than the tolerance."""
+        return abs(self.scaled) > SCALE_TOLERANCE
 
     def then(self, other: Change) -> Change:
         """Change that these two make, the other one after this."""
@@ -63,9 +80,9 @@ class Change:
         parts = []
         if self.mirrored:
             parts.append("mirrored")
-        if abs(self.turned) > 2:
+        if self.is_turned:
             parts.append(f"turned by {self.turned * 360 // BEARINGS} deg")
-        if abs(self.scaled) > 1:
+        if self.is_scaled:
             parts.append(f"scaled by {np.exp(self.scaled * LOG_STEP):.2g}")
         return " and ".join(parts)
 
@@ -103,7 +120,7 @@ class SceneCheck:
         tuning = self._tuning
         now = pairs[-1][1]
         agreed = agreement(first, now, self.change)
-        fell = agreed < min(tuning.suspected, self._agreed - tuning.fall)
+        fell = agreed < tuning.suspected and agreed < self._agreed - tuning.fall
         self._agreed = agreed
         if fell or agreed < tuning.same or not self.change.is_none:
             agreements = [(agreement(*pair, self.change), pair) for pair in pairs]
@@ -126,7 +143,7 @@ class SceneCheck:
         """Note how the scene changed from one sweep to the next."""
         tuning = self._tuning
         change, share = explain(before, after, self.change)
-        if on_moved_ground and abs(change.scaled) > 1:
+        if on_moved_ground and change.is_scaled:
             return
         other_scene = least < tuning.same and not on_moved_ground
         needed = tuning.explained if other_scene else tuning.surely_explained
@@ -142,7 +159,7 @@ class SceneCheck:
 def _cells(x: Float32, y: Float32, turn: Float32) -> Int:
     """(k,) cells of points, below 0 where they are beyond the grid."""
     bearing = (turn * np.float32(BEARINGS)).astype(np.int64) % BEARINGS
-    far = (np.log(np.maximum(x * x + y * y, NEAREST_M)) * np.float32(0.5 / LOG_STEP)).astype(np.int64)
+    far = (np.log(np.maximum(x * x + y * y, FIRST_RANGE_M**2)) * np.float32(0.5 / LOG_STEP)).astype(np.int64)
     return np.where(far < RANGES, bearing * RANGES + far, -1)
 
 
@@ -185,7 +202,11 @@ def agreement(before: Sample, after: Sample, change: Change) -> float:
 
 
 def explain(before: Sample, after: Sample, known_change: Change) -> tuple[Change, float]:
-    """The further change that brings most of the points of a sweep to known places, and their share."""
+    """The further change that explains a sweep best, and the greatest share of its points at known places.
+
+    The change is chosen with a preference for small scales (UNSCALED_FAVOUR). The share is the greatest that any
+    shift reaches, so it may be a little greater than that of the chosen one.
+    """
     known, cells = places(before, after, known_change)
     n = RANGES + 20
     wide = np.zeros((BEARINGS, n))

@@ -133,12 +133,12 @@ class SceneTuning:
     """Obstacles against those of the sweep before, brought by the pose into the present one."""
 
     suspected: float = 0.85
-    """Share of the obstacle points at known places below which all frames since the last look are compared.
-    Greater: more comparisons.
+    """All frames since the last look are compared if the share of the obstacle points at known places is below this
+    and fell by more than `fall`, if it is below `same`, or while a change is known. Greater: more comparisons.
     Chosen on: simulated drives."""
 
     fall: float = 0.05
-    """Fall of that share since the look before from which they are, too. Less: more comparisons.
+    """Fall of that share since the look before that all frames are compared for. Less: more comparisons.
     Chosen on: simulated drives."""
 
     same: float = 0.6

@@ -1,4 +1,4 @@
-"""The watch over the trust: a sample of every frame, and a look at all checks twice a second."""
+"""The watch over the trust: a sample of every frame, and a look at all checks at intervals of `look_s`."""
 
 from __future__ import annotations
 
@@ -38,8 +38,9 @@ class Debounced:
     """Reasons that begin after some looks in a row with a finding, and end after some without one.
 
     Args:
-        looks: with a finding.
-        back_looks: without one; none of the checks in `at_once`, which have waited themselves.
+        looks: looks in a row with a finding that begin a reason.
+        back_looks: looks in a row without a finding that end a reason. Reasons of the checks in `at_once` end after
+            `looks` of them, since these checks wait themselves.
     """
 
     def __init__(self, looks: int, back_looks: int) -> None:
@@ -84,7 +85,7 @@ class TrustWatch:
         self._scene = SceneCheck(tuning.scene)
         self._beams = BeamHistory(sensor, tuning.lasting)
         self._sectors = SectorHistory(sensor, tuning.lasting)
-        self._samples: list[Sample] = []  # those since the last look, its own included
+        self._samples: list[Sample] = []  # the last MOST_SAMPLES + 1 at most since the last look, its own included
         self._debounced = Debounced(tuning.looks, tuning.back_looks)
         self._looked_s = -np.inf
         self._began_s: float | None = None
@@ -202,7 +203,7 @@ class TrustWatch:
 
 
 GAP_S = 1.0
-"""Longest time between two frames after which a look is made [s]."""
+"""After a longer time between two frames the samples start anew, and no look is made [s]."""
 AT_ONCE_S = 0.25
 """Longest time between two frames of which a step tells that it came at once [s]."""
 SAME_PLACE_M = 1.0
@@ -214,11 +215,11 @@ OWN = frozenset({"frozen", "returns", "scene", "ground"})
 AT_ONCE = frozenset({"scene", "ground"})
 """Checks whose finding is a step between two frames, which is not waited for twice."""
 REPEATED_SHARE = 0.5
-"""Share of the points at the same place to the last bit from which a sweep is one before."""
+"""Share of the returns whose x is that of the sweep before, to the last bit, above which a sweep repeats it."""
 
 
 def _repeated(before: Sample, now: Sample) -> bool:
-    """Whether a sweep is the one before, to the last bit."""
+    """Whether more than REPEATED_SHARE of the returns have the x of the same row of the sweep before."""
     if before.raw.shape != now.raw.shape:
         return False
     x = now.raw[:, 0]
