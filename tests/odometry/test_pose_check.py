@@ -98,9 +98,9 @@ def test_what_rested_may_move_by_the_errors_of_a_way(step_m, way_m, drifted):
     check = PoseCheck()
     kdop = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (8, 1))
     step = step_m * np.array([1.0, np.sqrt(0.5), 0.0, -np.sqrt(0.5), -1.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)])
-    assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
-    assert not check.drifted(0.5, static_tracks(kdop + 5 * step), pose(way_m, 0.0, 0.0))  # not looked at so soon
-    assert check.drifted(1.0, static_tracks(kdop + step), pose(way_m, 0.0, 0.0)) == drifted
+    assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    assert not check.check_drift(0.5, static_tracks(kdop + 5 * step), pose(way_m, 0.0, 0.0))  # not looked at so soon
+    assert check.check_drift(1.0, static_tracks(kdop + step), pose(way_m, 0.0, 0.0)) == drifted
 
 
 @pytest.mark.parametrize(
@@ -113,8 +113,8 @@ def test_what_rested_may_move_by_an_error_of_the_scale_of_a_turn(turn_rad, wrong
     step = (
         20.0 * wrong_rad * np.array([0.0, np.sqrt(0.5), 1.0, np.sqrt(0.5), 0.0, -np.sqrt(0.5), -1.0, -np.sqrt(0.5)])
     )
-    assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
-    assert check.drifted(1.0, static_tracks(kdop + step), pose(0.0, 0.0, turn_rad)) == drifted
+    assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    assert check.check_drift(1.0, static_tracks(kdop + step), pose(0.0, 0.0, turn_rad)) == drifted
 
 
 @pytest.mark.parametrize(
@@ -128,5 +128,5 @@ def test_parts_of_walls_that_move_with_the_sensor_say_nothing_of_its_pose(n_rest
     kdop = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (n_resting + 12, 1))
     along = np.array([1.0, np.sqrt(0.5), 0.0, -np.sqrt(0.5), -1.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)])
     moved_m = np.repeat([wrong_m, 0.5], [n_resting, 12])
-    assert not check.drifted(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
-    assert check.drifted(1.0, static_tracks(kdop + moved_m[:, None] * along), pose(0.5, 0.0, 0.0)) == drifted
+    assert not check.check_drift(0.0, static_tracks(kdop), pose(0.0, 0.0, 0.0))
+    assert check.check_drift(1.0, static_tracks(kdop + moved_m[:, None] * along), pose(0.5, 0.0, 0.0)) == drifted

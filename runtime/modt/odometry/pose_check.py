@@ -32,6 +32,9 @@ class PoseCheck:
     moved alike. It ends once the poses have moved as registration does for a while; the motion counts, as their
     origin may have jumped.
 
+    Of the methods, `check_drift` is called in each frame that has a pose. While the poses are believed, `count_near`
+    serves `agrees` and `convinces`, and `begin` ends the belief. While they are doubted, `follow` is called.
+
     Args:
         kernels: passes over pairs.
         tuning: what agrees, and for how long.
@@ -57,30 +60,35 @@ class PoseCheck:
         """Time for which the poses have been doubted [s]."""
         return self._now_s - self._began_s if self.doubted else 0.0
 
-    def near(self, landmarks: Landmarks, observations: Observations) -> tuple[int, int]:
-        """Number of established landmarks, or of all if few are, and of those near which something is observed.
+    def count_near(self, landmarks: Landmarks, observations: Observations) -> tuple[int, int]:
+        """Number of known landmarks, and of those near which something is observed.
 
-        By poses that are wrong since before anything was seen, nothing rests for long.
+        Known are the established landmarks, or all if few are established. If the poses were wrong from the start,
+        nothing rests for long enough to be established.
+
+        Returns:
+            n_known and n_near.
         """
         known = landmarks.established.nonzero()[0]
         if len(known) < self._tuning.min_landmarks:
             known = np.arange(len(landmarks.established))
         centre = centres(landmarks.kdop.take(known, axis=1))
         seen = centres(observations.kdop)
+        # Bounds (x, y, -x, -y) overlap where an observation is within near_m of a landmark on both axes.
         widened = np.concatenate([centre, -centre]) + self._tuning.near_m
         pairs = self._kernels.overlapping_pairs(widened, np.concatenate([seen, -seen]))
         return len(known), len(np.unique(pairs[0]))
 
-    def agrees(self, known: int, near: int) -> bool:
+    def agrees(self, n_known: int, n_near: int) -> bool:
         """Whether enough of the landmarks are where the pose says, or too few are known to tell."""
-        return known < self._tuning.min_landmarks or near >= self._tuning.agreeing_share * known
+        return n_known < self._tuning.min_landmarks or n_near >= self._tuning.agreeing_share * n_known
 
-    def convinces(self, known: int, near: int, near_registered: int) -> bool:
+    def convinces(self, n_known: int, n_near: int, n_near_registered: int) -> bool:
         """Whether registration explains the frame, and clearly better than the pose."""
-        least = max(self._tuning.min_landmarks, self._tuning.convincing_share * known)
-        return near_registered >= least and near_registered > self._tuning.better * near
+        least = max(self._tuning.min_landmarks, self._tuning.convincing_share * n_known)
+        return n_near_registered >= least and n_near_registered > self._tuning.better * n_near
 
-    def drifted(self, now_s: float, tracks: StaticTracks, T_world_sensor: Float64) -> bool:
+    def check_drift(self, now_s: float, tracks: StaticTracks, T_world_last: Float64) -> bool:
         """Once in `anchor_s`, whether the tracks at rest moved alike since the anchors; if not, set new anchors.
 
         After a gap of twice `anchor_s` new anchors are set without a comparison.
@@ -97,11 +105,11 @@ class PoseCheck:
             _, before, now = np.intersect1d(anchors.id, tracks.id, assume_unique=True, return_indices=True)
             seen = tracks.observed[now]
             if self._moved_alike(
-                anchors.kdop[before[seen]].T, tracks.kdop[now[seen]].T, anchors.T_world_sensor, T_world_sensor
+                anchors.kdop[before[seen]].T, tracks.kdop[now[seen]].T, anchors.T_world_sensor, T_world_last
             ):
                 return True
         rests = tracks.stationary & tracks.observed
-        self._anchors = Anchors(now_s, tracks.id[rests], tracks.kdop[rests], T_world_sensor)
+        self._anchors = Anchors(now_s, tracks.id[rests], tracks.kdop[rests], T_world_last)
         return False
 
     def _moved_alike(self, were: Float64, are: Float64, T_before: Float64, T_now: Float64) -> bool:
@@ -120,7 +128,7 @@ class PoseCheck:
         range_m = float(np.median(np.hypot(*(_places(are)[:, counted] - T_now[:2, 3, None]))))
         motion = inverse(T_before) @ T_now
         by_turn_m = self._tuning.turn_share * abs(yaw_of(motion)) * range_m
-        return self._differ(float(np.hypot(*median_m)) - by_turn_m, motion)
+        return self._exceeds_tolerance(float(np.hypot(*median_m)) - by_turn_m, motion)
 
     def _carried(self, were: Float64, step_m: Float64, motion_in_world: Float64) -> Bool:
         """(k,) steps (k, 2) by which k-DOPs (8, k) moved as what is fixed to the sensor does."""
@@ -129,13 +137,18 @@ class PoseCheck:
         carried: Bool = np.hypot(*(step_m.T - with_sensor)) < self._tuning.motion_m / 2
         return carried
 
-    def _differ(self, far_m: float, motion: Float64) -> bool:
-        """Whether a motion (4, 4) and another one that ends at a distance differ by more than the errors of a way."""
+    def _exceeds_tolerance(self, far_m: float, motion: Float64) -> bool:
+        """Whether a displacement exceeds `motion_m` and `motion_share` of the way of a motion (4, 4)."""
         way_m = float(np.hypot(motion[0, 3], motion[1, 3]))
         return far_m > self._tuning.motion_m + self._tuning.motion_share * way_m
 
     def begin(self, now_s: float) -> Int:
-        """Begin to doubt; returns the ids (k,) of the tracks that rested when they were last looked at."""
+        """Begin to doubt.
+
+        Returns:
+            Ids (k,) of the tracks that rested at the anchors. Registration holds them as landmarks, since the wrong
+            poses have made them seem to move.
+        """
         rested = np.zeros(0, np.int64) if self._anchors is None else self._anchors.id
         self.doubted = True
         self._anchors = None
@@ -154,7 +167,7 @@ class PoseCheck:
         difference = inverse(given) @ inverse(T_registered_before) @ T_registered
         far_m = float(np.hypot(difference[0, 3], difference[1, 3]))
         most_rad = self._tuning.motion_rad + self._tuning.turn_share * abs(yaw_of(given))
-        if self._differ(far_m, given) or abs(yaw_of(difference)) > most_rad:
+        if self._exceeds_tolerance(far_m, given) or abs(yaw_of(difference)) > most_rad:
             self._compared_from = now_s, T_given, T_registered
         elif now_s - from_s >= self._tuning.agree_s:
             self.doubted = False

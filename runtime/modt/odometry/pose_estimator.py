@@ -85,7 +85,7 @@ class PoseEstimator:
         tracks = static_tracks(frame.time_s)
         landmarks = self._landmarks.update(tracks)
         if T_odometry_sensor is not None and self._T_world_odometry is not None:
-            drifted = self.pose_check.drifted(frame.time_s, tracks, self._T_world_last)
+            drifted = self.pose_check.check_drift(frame.time_s, tracks, self._T_world_last)
             located = self._checked(frame.time_s, sweep, landmarks, T_odometry_sensor, drifted=drifted)
         else:
             placement = self._register(sweep, landmarks)
@@ -112,12 +112,13 @@ class PoseEstimator:
             return Located(placement, sweep.observe(placement))
         given_placement = sweep.place(self._T_world_odometry @ T_odometry_sensor)
         located = Located(given_placement, sweep.observe(given_placement))
-        known, near = check.near(landmarks, located.observations)
-        if check.agrees(known, near) and not drifted:
+        n_known, n_near = check.count_near(landmarks, located.observations)
+        if check.agrees(n_known, n_near) and not drifted:
             return located
         placement = self._register(sweep, landmarks)
         registered = Located(placement, sweep.observe(placement))
-        if not drifted and not check.convinces(known, near, check.near(landmarks, registered.observations)[1]):
+        _, n_near_registered = check.count_near(landmarks, registered.observations)
+        if not drifted and not check.convinces(n_known, n_near, n_near_registered):
             return located
         self._landmarks.hold(check.begin(now_s))
         return registered
