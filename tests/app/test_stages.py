@@ -127,7 +127,7 @@ def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
     assert stages.pipeline is not made
 
 
-def test_a_reload_of_another_sensors_profile_is_a_reason_until_the_right_one_is_loaded(tmp_path):
+def test_a_reload_of_compare_profiless_profile_is_a_reason_until_the_right_one_is_loaded(tmp_path):
     own = tmp_path / "robot.yaml"
 
     def write(name):
@@ -177,7 +177,7 @@ def of_drive(sensor, first, n):
 
 
 @pytest.mark.slow
-def test_another_sensor_is_noticed_and_followed_and_the_first_one_is_believed_again():
+def test_compare_profiles_is_noticed_and_followed_and_the_first_one_is_believed_again():
     stages = stages_of(profile=None)
     before, *_ = of_drive("hdl-64e", 0, 1)
     stages.choose_profile(before)
@@ -216,7 +216,7 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
 
     monkeypatch.setattr(stages, "_compare", look)
     for k in range(10):
-        stages.trust.watch.another_sensor = True
+        stages.trust.watch.compare_profiles = True
         stages.adapt(Frame(k, 0.1 * k, frames()[0].points))
     assert looks == [0]
     may_end.set()
@@ -250,7 +250,7 @@ def test_a_displaced_sensor_keeps_its_profile_until_it_is_back(monkeypatch):
     stages = stages_of()
     frame = frames()[0]
     monkeypatch.setattr(TrustWatch, "displaced", True)
-    stages.trust.watch.another_sensor = True
+    stages.trust.watch.compare_profiles = True
     stages.adapt(frame)
     assert stages.comparison is None
     monkeypatch.setattr(TrustWatch, "displaced", False)

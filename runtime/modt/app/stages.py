@@ -147,8 +147,8 @@ class Stages:
             self.misfits += 1
             self._chosen_for, chosen = self._chosen_by_thread.pop()
             self._use(chosen)
-        elif watch.another_sensor and not watch.displaced and self._live and not self._thread_runs:
-            watch.another_sensor = False
+        elif watch.compare_profiles and not watch.displaced and self._live and not self._thread_runs:
+            watch.compare_profiles = False
             self.comparison = Thread(target=self._compare, args=(frame,), name="recognition", daemon=True)
             self.comparison.start()
 

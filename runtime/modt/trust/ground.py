@@ -43,15 +43,15 @@ class GroundCheck:
 
     Attributes:
         plane: (3,) the ground z = plane @ (1, x, y).
-        moved: how the ground has moved at once, in words; empty if it has not, or is back.
+        phrase: how the ground has moved at once, in words; empty if it has not, or is back.
     """
 
     def __init__(self, tuning: GroundTuning, height_m: float | None) -> None:
         self._tuning = tuning
         self.plane = np.array([-(height_m or 1.0), 0.0, 0.0])
-        self._first_m = self.plane[0]
-        self.moved = ""
-        self._step = np.zeros(3)  # plane by which it moved
+        self._profile_z_m = self.plane[0]
+        self.phrase = ""
+        self._offset = np.zeros(3)  # plane by which it is moved
         self._greatest = 0.0  # greatest size that it had
         self._before: Sample | None = None  # the last sweep before that
         self._looks = 0  # in a row in which it is back
@@ -64,14 +64,14 @@ class GroundCheck:
             off_m = sample.lowest_m.take(cells) - self.plane @ _CELLS.take(cells, axis=1)
             self.plane = self.plane + self._tuning.gain * _fitted(cells, off_m)
             on_it = float(np.sort(np.abs(off_m))[len(cells) // 3]) < KNOWN_M
-            below = self.plane[0] < LEAST_SHARE * self._first_m
+            below = self.plane[0] < LEAST_SHARE * self._profile_z_m
             self._known_looks = self._known_looks + 1 if on_it and below else 0
 
     @property
     def present(self) -> Float64:
         """(3,) the ground z = present @ (1, x, y) as it has moved."""
-        moved = self._before is not None and bool(np.isfinite(self._step).all())
-        return self.plane + self._step if moved else self.plane
+        moved = self._before is not None and bool(np.isfinite(self._offset).all())
+        return self.plane + self._offset if moved else self.plane
 
     @property
     def _known(self) -> bool:
@@ -79,6 +79,9 @@ class GroundCheck:
 
     def look(self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int) -> None:
         """Notice a ground that moves at once, and one that is back.
+
+        It is back where it stands as before the step or fits the known plane in enough looks, and at once if a step
+        the other way has undone most of it.
 
         Args:
             first: the sweep of the look before.
@@ -88,22 +91,22 @@ class GroundCheck:
         if not pairs or not self._known:
             return
         now = pairs[-1][1]
-        if self._size(_step(first, now, known=self._known)) >= self._least():
+        if self._size(_moved_between(first, now)) >= self._least():
             self._add(pairs)
         if self._before is None:
             return
-        steps = (_step(self._before, now, known=True), self._from_plane(now))
+        steps = (_moved_between(self._before, now), self._from_plane(now))
         is_back = min(self._size(step) for step in steps) < BACK_SHARE
         self._looks = self._looks + 1 if is_back else 0
-        if self._looks >= back_looks or self._size(self._step) < max(1.0, LEFT_SHARE * self._greatest):
-            self.moved = ""
+        if self._looks >= back_looks or self._size(self._offset) < max(1.0, LEFT_SHARE * self._greatest):
+            self.phrase = ""
             self._before = None
 
     def look_past(self, before: Sample, now: Sample, *, same_place: bool) -> None:
         """Notice a ground that moved since a sweep after which nothing was seen, though slopes may have passed."""
         if not self._known or self._before is not None:
             return
-        steps = (_step(before, now, known=True), self._from_plane(now))
+        steps = (_moved_between(before, now), self._from_plane(now))
         if min(self._size(step) for step in steps) >= (1.0 if same_place else UNSEEN_FACTOR):
             self._add([(before, now)])
 
@@ -117,17 +120,17 @@ class GroundCheck:
     def _add(self, pairs: Sequence[tuple[Sample, Sample]]) -> None:
         """Add the steps of the ground between the two sweeps of each pair."""
         for before, after in pairs:
-            step = _step(before, after, known=self._known)
+            step = _moved_between(before, after)
             if self._size(step) < self._least():
                 continue
             if self._before is None:
                 self._before = before
-                self._step = np.zeros(3)
+                self._offset = np.zeros(3)
                 self._greatest = 0.0
                 self._looks = 0
-            self._step = self._step + step
-            self._greatest = max(self._greatest, self._size(self._step))
-            self.moved = self._phrase()
+            self._offset = self._offset + step
+            self._greatest = max(self._greatest, self._size(self._offset))
+            self.phrase = self._describe()
 
     def _least(self) -> float:
         """Least size of a step. A smaller one may undo another."""
@@ -138,14 +141,14 @@ class GroundCheck:
         limit_m = max(self._tuning.height_share * abs(self.plane[0]), MIN_STEP_M)
         return float(max(_tilt_deg(plane) / self._tuning.tilt_deg, abs(plane[0]) / limit_m))
 
-    def _phrase(self) -> str:
-        if not np.isfinite(self._step).all():
+    def _describe(self) -> str:
+        if not np.isfinite(self._offset).all():
             return "the ground is out of view at once"
-        tilt_deg = _tilt_deg(self._step)
+        tilt_deg = _tilt_deg(self._offset)
         if tilt_deg > self._tuning.tilt_deg:
             return f"the ground is tilted by {tilt_deg:.0f} deg against the mount"
         height_m = -self.plane[0]
-        now_m = height_m - self._step[0]
+        now_m = height_m - self._offset[0]
         if now_m < 0:
             return "the ground is above the sensor"
         return f"the ground is {now_m:.2f} m below the sensor, not {height_m:.2f}"
@@ -155,18 +158,22 @@ def _tilt_deg(plane: Float64) -> float:
     return float(np.rad2deg(np.arctan(np.hypot(plane[1], plane[2]))))
 
 
-def _step(before: Sample, after: Sample, *, known: bool) -> Float64:
-    """Plane (3,) by which most of the cells with ground in both sweeps moved; OUT_OF_VIEW, none if few had any."""
+def _moved_between(before: Sample, after: Sample) -> Float64:
+    """Plane (3,) by which most of the cells with ground in both sweeps moved.
+
+    Where few cells have ground in both, it is OUT_OF_VIEW if many cells of the sectors that the second one sees had
+    ground in the first one, else zero.
+    """
     ground = np.isfinite(before.lowest_m)
     both = np.flatnonzero(ground & np.isfinite(after.lowest_m))
     if len(both) >= MIN_CELLS:
         return _fitted(both, after.lowest_m.take(both) - before.lowest_m.take(both))
     expected = ground.reshape(SECTORS, RINGS)[after.seen]
-    return OUT_OF_VIEW if known and np.count_nonzero(expected) > 2 * MIN_CELLS else np.zeros(3)
+    return OUT_OF_VIEW if np.count_nonzero(expected) > 2 * MIN_CELLS else np.zeros(3)
 
 
 def _fitted(cells: Int, values: Float32 | Float64) -> Float64:
-    """Plane (3,) through most of the values (k,) of cells (k,); none where most values are next to nothing."""
+    """Plane (3,) through most of the values (k,) of cells (k,); zero where most values are next to nothing."""
     plane = np.zeros(3)
     off = np.abs(values)
     median = np.sort(off)[len(off) // 2]

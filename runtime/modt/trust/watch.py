@@ -12,7 +12,7 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.trust.ground import GroundCheck
 from modt.trust.lasting import BeamHistory, SectorHistory
-from modt.trust.returns import ReturnsCheck
+from modt.trust.returns import Loss, ReturnsCheck
 from modt.trust.sample import Sample, sample
 from modt.trust.scene import SceneCheck
 from modt.trust.tuning import TrustTuning
@@ -39,7 +39,7 @@ class Debounced:
 
     Args:
         looks: looks in a row with a finding that begin a reason.
-        back_looks: looks in a row without a finding that end a reason. Reasons of the checks in `at_once` end after
+        back_looks: looks in a row without a finding that end a reason. Reasons of the checks in `sudden` end after
             `looks` of them, since these checks wait themselves.
     """
 
@@ -49,18 +49,18 @@ class Debounced:
         self._found: dict[str, int] = {}  # looks in a row with a finding, or minus those without one
         self.reasons: dict[str, Reason] = {}
 
-    def update(self, findings: dict[str, Finding], now_s: float, at_once: frozenset[str]) -> None:
-        """Take the findings of a look; those of the checks in `at_once` count from the first look on."""
+    def update(self, findings: dict[str, Finding], now_s: float, sudden: frozenset[str]) -> None:
+        """Take the findings of a look; those of the checks in `sudden` count from the first look on."""
         for key in {*findings, *self.reasons, *self._found}:
             finding = findings.get(key)
             before = self._found.get(key, 0)
             in_a_row = max(before, 0) + 1 if finding else min(before, 0) - 1
             self._found[key] = in_a_row
-            if finding and (in_a_row >= self._looks or key in at_once or key in self.reasons):
+            if finding and (in_a_row >= self._looks or key in sudden or key in self.reasons):
                 known = self.reasons.get(key)
                 since_s = known.since_s if known else now_s
                 self.reasons[key] = Reason(key, finding.level, finding.cause, finding.remedy, since_s)
-            elif in_a_row <= -(self._looks if key in at_once else self._back_looks):
+            elif in_a_row <= -(self._looks if key in sudden else self._back_looks):
                 self.reasons.pop(key, None)
                 del self._found[key]
 
@@ -73,7 +73,8 @@ class TrustWatch:
         tuning: what is expected.
 
     Attributes:
-        another_sensor: whether the sweeps may be of another sensor; to be reset by who has looked.
+        compare_profiles: whether the sweeps are to be compared with the profiles. They may be of another sensor where
+            the reasons of their own checks change, or they have more returns. Who has compared resets it.
         trust: the last verdict.
     """
 
@@ -91,14 +92,14 @@ class TrustWatch:
         self._began_s: float | None = None
         self._repeated = False  # the sweep of the last look was one before
         self._before_loss: Sample | None = None  # the last sweep before the view was lost
-        self._own: frozenset[str] = frozenset()  # checks of the sweeps themselves that have a reason
-        self.another_sensor = False
+        self._own_reasons: frozenset[str] = frozenset()  # checks of the sweeps themselves that have a reason
+        self.compare_profiles = False
         self.trust = Trust()
 
     @property
     def displaced(self) -> bool:
         """Whether ground or scene have moved, which a watch without their history would not know."""
-        return bool(self._ground.moved) or not self._scene.change.is_none
+        return bool(self._ground.phrase) or not self._scene.change.is_none
 
     def adopt(self, other: TrustWatch) -> None:
         """Keep the reasons of another sensor's watch until looks of this one have confirmed or withdrawn them."""
@@ -115,31 +116,37 @@ class TrustWatch:
             T_world_sensor: (4, 4) its pose.
             others: findings of other checks by their names.
         """
-        seen = sample(frame, T_world_sensor, self._sensor, self._ground.present)
-        now_s = seen.time_s
-        if self._began_s is None or now_s < self._samples[-1].time_s or now_s - self._samples[-1].time_s > GAP_S:
-            self._began_s = now_s if self._began_s is None else self._began_s
-            self._samples = [seen]
+        sweep = sample(frame, T_world_sensor, self._sensor, self._ground.present)
+        now_s = sweep.time_s
+        if self._began_s is None:
+            self._began_s = now_s
+        if not self._samples or not 0 <= now_s - self._samples[-1].time_s <= GAP_S:
+            self._samples = [sweep]
             self._looked_s = now_s
             return self.trust
-        self._samples = [*self._samples[-MOST_SAMPLES:], seen]
+        self._samples = [*self._samples[-MOST_SAMPLES:], sweep]
         elapsed_s = now_s - self._looked_s
-        if elapsed_s < self._tuning.look_s - 1e-3:
-            return self.trust
-        learning = now_s - self._began_s < self._tuning.learn_s
-        own = {} if learning else dict(self._findings(seen))
-        lasting = dict(self._lasting_findings(seen))
-        self._debounced.update({**others, **lasting, **own}, now_s, AT_ONCE)
-        reasons = OWN & self._debounced.reasons.keys()
-        self.another_sensor |= reasons != self._own or self._returns.gained
-        self._own = reasons
-        if not own and not reasons:
-            self._returns.learn(seen, elapsed_s)
-            self._ground.learn(seen)
-        self._samples = [seen]
+        if elapsed_s >= self._tuning.look_s - 1e-3:
+            self._look(sweep, elapsed_s, others, learning=now_s - self._began_s < self._tuning.learn_s)
+        return self.trust
+
+    def _look(self, sweep: Sample, elapsed_s: float, others: Mapping[str, Finding], *, learning: bool) -> None:
+        """Run all checks on a sweep, some time after the last look, and judge by their findings."""
+        now_s = sweep.time_s
+        own_findings = {} if learning else self._run_own_checks(sweep)
+        self._beams.add(sweep)
+        self._sectors.add(sweep)
+        lasting = dict(self._lasting_findings())
+        self._debounced.update({**others, **lasting, **own_findings}, now_s, SUDDEN_CHECKS)
+        own_reasons = OWN_CHECKS & self._debounced.reasons.keys()
+        self.compare_profiles |= own_reasons != self._own_reasons or self._returns.gained
+        self._own_reasons = own_reasons
+        if not own_findings and not own_reasons:
+            self._returns.learn(sweep, elapsed_s)
+            self._ground.learn(sweep)
+        self._samples = [sweep]
         self._looked_s = now_s
         self.trust = self._judged(now_s)
-        return self.trust
 
     def _judged(self, now_s: float) -> Trust:
         reasons = tuple(sorted(self._debounced.reasons.values(), key=lambda reason: (-reason.level, reason.since_s)))
@@ -147,32 +154,34 @@ class TrustWatch:
         since_s = self.trust.since_s if level == self.trust.level else now_s
         return Trust(level, since_s, reasons)
 
-    def _findings(self, seen: Sample) -> Iterator[tuple[str, Finding]]:
-        """Findings of a look by the name of the check."""
-        repeated = _repeated(self._samples[-2], seen)
-        if repeated:
-            yield "frozen", Finding(TrustLevel.BLIND, "the same sweep comes again and again", DRIVER)
+    def _run_own_checks(self, sweep: Sample) -> dict[str, Finding]:
+        """Run the checks of the sweeps themselves, and return their findings by the name of the check."""
+        repeated = _repeated(self._samples[-2], sweep)
         loss = self._returns.loss(self._samples)
-        if loss is not None:
-            level = TrustLevel.BLIND if loss.blind else TrustLevel.DEGRADED
-            yield "returns", Finding(level, loss.what, CLEAN)
         if not repeated and not self._repeated:
             self._follow()
         self._repeated = repeated
         lost = repeated or (loss is not None and loss.blind)
         if not lost and self._before_loss is not None and not self.displaced:
-            self._look_past(self._before_loss, seen)
+            self._look_past(self._before_loss, sweep)
         self._before_loss = (self._before_loss or self._samples[0]) if lost else None
+        return dict(self._own_findings(loss, repeated=repeated))
+
+    def _own_findings(self, loss: Loss | None, *, repeated: bool) -> Iterator[tuple[str, Finding]]:
+        """Findings of the checks of the sweeps themselves, as they stand."""
+        if repeated:
+            yield "frozen", Finding(TrustLevel.BLIND, "the same sweep comes again and again", DRIVER)
+        if loss is not None:
+            level = TrustLevel.BLIND if loss.blind else TrustLevel.DEGRADED
+            yield "returns", Finding(level, loss.what, CLEAN)
+        if self._ground.phrase:
+            yield "ground", Finding(TrustLevel.BLIND, self._ground.phrase, MOUNT)
         change = self._scene.change
-        if self._ground.moved:
-            yield "ground", Finding(TrustLevel.BLIND, self._ground.moved, MOUNT)
         if not change.is_none:
             yield "scene", Finding(TrustLevel.BLIND, f"the scene is {change} against the one before", MOUNT)
 
-    def _lasting_findings(self, seen: Sample) -> Iterator[tuple[str, Finding]]:
-        """Findings of the histories of beams and narrow sectors after another sweep."""
-        self._beams.add(seen)
-        self._sectors.add(seen)
+    def _lasting_findings(self) -> Iterator[tuple[str, Finding]]:
+        """Findings of the histories of beams and narrow sectors, as they stand."""
         if dead_deg := self._beams.dead_deg:
             which = ", ".join(f"{each_deg:.1f}" for each_deg in dead_deg)
             what = f"no returns from the beam{'s' * (len(dead_deg) > 1)} at {which} deg of elevation"
@@ -184,35 +193,35 @@ class TrustWatch:
 
     def _follow(self) -> None:
         """Compare the sweeps since the last look with one another. Obstacles are told by the ground below them."""
-        pairs = [(a, b) for a, b in pairwise(self._samples) if b.time_s - a.time_s <= AT_ONCE_S]
+        pairs = [(a, b) for a, b in pairwise(self._samples) if b.time_s - a.time_s <= MAX_SUDDEN_S]
         first = self._samples[0]
         ground = self._ground.present
         self._ground.look(first, pairs, self._tuning.back_looks)
         moves = bool((self._ground.present != ground).any())
         if moves:  # the obstacles stand on it as it is after the step
             pairs = [(first, replace(self._samples[-1], plane=self._ground.present))]
-        on_moved_ground = moves or bool(self._ground.moved)
+        on_moved_ground = moves or bool(self._ground.phrase)
         self._scene.look(first, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
 
     def _look_past(self, before: Sample, now: Sample) -> None:
         """Compare the sweeps before and after a time in which nothing was seen."""
         same_place = bool(np.hypot(*(now.T_world_sensor - before.T_world_sensor)[:2, 3]) < SAME_PLACE_M)
         self._ground.look_past(before, now, same_place=same_place)
-        if not self._ground.moved and same_place:
+        if not self._ground.phrase and same_place:
             self._scene.look(before, [(before, now)], self._tuning.back_looks)
 
 
 GAP_S = 1.0
 """After a longer time between two frames the samples start anew, and no look is made [s]."""
-AT_ONCE_S = 0.25
+MAX_SUDDEN_S = 0.25
 """Longest time between two frames of which a step tells that it came at once [s]."""
 SAME_PLACE_M = 1.0
 """Greatest way between two sweeps that show the same scene [m]."""
 MOST_SAMPLES = 24
 """Greatest number of frames between two looks that are kept."""
-OWN = frozenset({"frozen", "returns", "scene", "ground"})
+OWN_CHECKS = frozenset({"frozen", "returns", "scene", "ground"})
 """Checks of the sweeps themselves. Nothing is learned while one of them has a reason."""
-AT_ONCE = frozenset({"scene", "ground"})
+SUDDEN_CHECKS = frozenset({"scene", "ground"})
 """Checks whose finding is a step between two frames, which is not waited for twice."""
 REPEATED_SHARE = 0.5
 """Share of the returns whose x is that of the sweep before, to the last bit, above which a sweep repeats it."""
