@@ -323,7 +323,7 @@ class Motion(Columns):
     moved_m: Float64 = column(float)  # displacement from `lagged_kdop`, along the axis where both ends moved most [m]
     observed_s: Float64 = column(float)  # sum of the steps that ended with a proposal, so a gap adds its last one [s]
     size_m: Float64 = column(float, 3)  # smoothed length, width and height of the boxes seen [m]
-    hidden: Bool = column(bool)  # a person whose upper half the view cuts off
+    top_cut: Bool = column(bool)  # a person whose upper half the view cuts off
     motion: Int = column(int)  # value of MotionState
     moving_probability: Float64 = column(float, fill=0.5)  # probability that it moves
     velocity: Float64 = column(float, 2)  # velocity, about 0 of what is still [m/s, world]

@@ -96,7 +96,7 @@ def test_what_shows_enough_points_nearby_gets_one_view_whatever_its_box_says(x, 
 @pytest.mark.parametrize("mode", [FirstViews, FurtherViews])
 def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(mode):
     subject = Fused(mode(CONFIG, FixedPrior(CAR, CAR)), 50, 50, frames=3)
-    subject.tracks.hidden[0] = True
+    subject.tracks.top_cut[0] = True
     assert subject.asks() == [False, True]
     assert (subject.tracks.box_evidence[0] == 0).all()
     assert (subject.tracks.box_evidence[1] != 0).any()

@@ -31,7 +31,7 @@ def followed(object_class=PEDESTRIAN):
 
 
 @pytest.mark.parametrize(
-    ("cut", "lower", "object_class", "hidden"),
+    ("cut", "lower", "object_class", "top_cut"),
     [
         (Cut.TOP, LOWER, PEDESTRIAN, True),
         (Cut.TOP | Cut.NEAR, LOWER, PEDESTRIAN, True),
@@ -41,14 +41,14 @@ def followed(object_class=PEDESTRIAN):
         (Cut.TOP, LOWER, BACKGROUND, False),
     ],
 )
-def test_a_person_is_hidden_while_the_view_cuts_off_the_upper_half(cut, lower, object_class, hidden):
+def test_a_person_is_hidden_while_the_view_cuts_off_the_upper_half(cut, lower, object_class, top_cut):
     follower = followed(object_class)
     tracks = follow(follower, [lower], 6, cut)
-    assert tracks.hidden.tolist() == [hidden]
+    assert tracks.top_cut.tolist() == [top_cut]
     height_m = WHOLE[5] if object_class == PEDESTRIAN and cut & Cut.TOP else lower[5]  # as before, or as it is seen
     for of in (tracks.box[0], follower.proposals.box[0]):
         assert (of[5], of[2] - of[5] / 2) == (pytest.approx(height_m), pytest.approx(-1.0))
-    assert not follow(follower, [WHOLE], 7).hidden.any()
+    assert not follow(follower, [WHOLE], 7).top_cut.any()
 
 
 def test_two_legs_are_one_object_as_high_as_the_person():

@@ -98,7 +98,7 @@ def test_the_expected_one_is_continued_first():
     tracks.age[2] = 2
     tracks.x[0, 1] = 1.0  # expected where the other one was seen
     tracks.x[1, 1] = -1.0
-    gone = Hiding(SIGHT).reunite(tracks)
+    gone = Hiding(SIGHT).merge_returned(tracks)
     assert gone.tolist() == [2]
     assert tracks.missed.tolist() == [0, 10, 0]
     assert tracks.id.tolist() == [0, 1, 2]
@@ -117,7 +117,7 @@ def test_only_new_people_continue_tracks(columns, class_):
     tracks.age[1] = 2
     for name, value in columns.items():
         getattr(tracks, name)[1] = value
-    assert not len(Hiding(SIGHT).reunite(tracks))
+    assert not len(Hiding(SIGHT).merge_returned(tracks))
 
 
 def test_the_position_of_a_person_with_a_hidden_side_is_uncertain():
@@ -138,7 +138,7 @@ def test_who_is_expected_in_view_stays_in_hiding():
     tracks.unseen_s[:] = 0.3
     tracks.x[0, 1] = tracks.moving_mean[0, 1] = 1.3
     tracks.velocity[0, 1] = tracks.moving_mean[0, 3] = 5.0
-    Hiding(SIGHT).stop_clock(tracks, SIGHT.look(points, proposals.kind), EYE, 0.1)
+    Hiding(SIGHT).keep_hidden(tracks, SIGHT.look(points, proposals.kind), EYE, 0.1)
     assert tracks.x[0, 1] == tracks.moving_mean[0, 1] == pytest.approx(0.8)
     assert tracks.unseen_s[0] == pytest.approx(0.2)
 
@@ -148,5 +148,5 @@ def test_the_time_of_an_uncertain_place_counts():
     tracks = tracks_at([person(0.0)], PEDESTRIAN, P=np.eye(4) * 4.0)
     tracks.proposal[:] = NONE
     tracks.unseen_s[:] = 0.3
-    Hiding(SIGHT).stop_clock(tracks, SIGHT.look(points, proposals.kind), EYE, 0.1)
+    Hiding(SIGHT).keep_hidden(tracks, SIGHT.look(points, proposals.kind), EYE, 0.1)
     assert tracks.unseen_s[0] == 0.3

@@ -141,7 +141,7 @@ class FusedTracks:
         motion_evidence = self._motion_likelihood.log_ratio(motion.moved_m[rows], motion.observed_s[rows], size_m)
         # Plain mean of the first boxes, then an exponential one; boxes of hidden people are left out.
         box_evidence = _by_class(evidence.box_evidence, rows)
-        gain = np.maximum(1.0 / motion.hits[rows], 1.0 - self._weights.box_memory) * ~motion.hidden[rows]
+        gain = np.maximum(1.0 / motion.hits[rows], 1.0 - self._weights.box_memory) * ~motion.top_cut[rows]
         box_evidence += gain * (_log(prior) - self._log_frequency[:, None] - box_evidence)
         evidence.prior[rows] = prior.T
         evidence.motion_evidence[rows] = motion_evidence.T
@@ -230,7 +230,7 @@ class FirstViews(FusedTracks):
         is_due |= self._is_person_due(evidence, motion, rows, posterior)
         asks = np.zeros(len(motion), np.bool_)
         asks[rows] = evidence.may_be_object[rows] & is_due
-        return asks & wants_class & (motion.hits >= self._conditions.first_view_min_hits) & ~motion.hidden
+        return asks & wants_class & (motion.hits >= self._conditions.first_view_min_hits) & ~motion.top_cut
 
 
 class FurtherViews(FusedTracks):
@@ -270,7 +270,7 @@ class FurtherViews(FusedTracks):
         unconfirmed |= self._is_person_due(evidence, motion, rows, posterior)
         further = np.where(self._is_confirmed(posterior), review, unconfirmed)
         asks = np.zeros(len(motion), np.bool_)
-        asks[rows] = ~motion.hidden[rows] & np.where(evidence.viewed[rows], further, first)
+        asks[rows] = ~motion.top_cut[rows] & np.where(evidence.viewed[rows], further, first)
         return asks
 
     def _is_near_and_lasting(self, motion: Motion, proposals: Proposals, rows: Int) -> Bool:

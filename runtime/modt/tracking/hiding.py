@@ -19,13 +19,14 @@ from modt.tracking.association import NO_ROWS, Associated
 from modt.tracking.sight import Sight
 from modt.tracking.track_table import TrackTable
 from modt.tracking.tuning import HidingTuning
-from modt.types import Float32, Float64, Int, Motion, Tracks
+from modt.types import Bool, Float32, Float64, Int, Motion, Tracks
 
-_OF_BOTH = ("hits", "observed_s")
-"""Columns that add up as a track continues another one."""
 _COLUMNS = {f.name for f in fields(TrackTable)} - {f.name for f in fields(Tracks)} | {f.name for f in fields(Motion)}
-_OF_THE_NEW = sorted(_COLUMNS - {"id", "state", "final", "age", *_OF_BOTH})
-"""Columns that a track takes over from the one that it continues: where it is, and how it moves."""
+"""Columns of the tracker. Those of the other stages, such as the evidence of the class, stay with the lost track."""
+_ADDED = ("hits", "observed_s")
+"""Columns of the new track that are added to those of the lost one."""
+_REPLACED = sorted(_COLUMNS - {"id", "state", "final", "age", *_ADDED})
+"""Columns of the lost track that those of the new one replace: where it is, and how it moves."""
 
 
 class Hiding:
@@ -57,12 +58,12 @@ class Hiding:
         covariance[people[sides.any(axis=1)]] += self._tuning.side_sigma_m**2 * np.eye(2)
         return covariance
 
-    def stop_clock(self, tracks: TrackTable, nearest: Float32, T_world_sensor: Float64, dt_s: float) -> None:
+    def keep_hidden(self, tracks: TrackTable, nearest: Float32, T_world_sensor: Float64, dt_s: float) -> None:
         """Do not count a time step without a proposal of people in hiding, unless their position is too uncertain.
 
-        Where the clock stalls, tracks age by a period in spite of hiding, since only `dt_s` is taken off.
-
         Nobody steps out unseen: who is expected in view, one step out of hiding, stays where that step began.
+
+        While the clock stalls, tracks age by a period a frame in spite of hiding, since only `dt_s` is taken off.
 
         Args:
             tracks: after the update of the frame.
@@ -71,28 +72,29 @@ class Hiding:
             dt_s: time step [s].
         """
         variance = np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1])
-        known = variance < self._tuning.max_sigma_m**2
-        rows = (~tracks.observed & IS_PERSON[tracks.object_class] & known).nonzero()[0]
+        certain = variance < self._tuning.max_sigma_m**2
+        rows = (~tracks.observed & IS_PERSON[tracks.object_class] & certain).nonzero()[0]
         if not len(rows):
             return
-        step = dt_s * tracks.velocity[rows]
+        hidden_now, hidden_before = self._hidden_now_and_before(tracks, rows, nearest, T_world_sensor, dt_s)
+        _step_back(tracks, rows[hidden_before & ~hidden_now], dt_s)
+        tracks.unseen_s[rows[hidden_now | hidden_before]] -= dt_s
+
+    def _hidden_now_and_before(
+        self, tracks: TrackTable, rows: Int, nearest: Float32, T_world_sensor: Float64, dt_s: float
+    ) -> Bool:
+        """(2, R) whether rows (R,) are hidden where they are expected, and where they were before the time step."""
         moved = tracks.x[rows, :2] - tracks.kdop_position[rows]
         box = tracks.box[np.tile(rows, 2)]
-        box[:, :2] += np.concatenate([moved, moved - step])
+        box[:, :2] += np.concatenate([moved, moved - dt_s * tracks.velocity[rows]])
         hidden = self._sight.hides(nearest, transform_boxes(inverse(T_world_sensor), box))
-        is_hidden, was_hidden = hidden.reshape(2, -1)
-        stays = was_hidden & ~is_hidden
-        tracks.x[rows[stays], :2] -= step[stays]
-        tracks.moving_mean[rows[stays], :2] -= dt_s * tracks.moving_mean[rows[stays], 2:]
-        tracks.unseen_s[rows[is_hidden | was_hidden]] -= dt_s
+        return hidden.reshape(2, -1)
 
-    def reunite(self, tracks: TrackTable) -> Int:
-        """Continue tracks of people without a proposal by new tracks of people that began where they may come out.
-
-        The track expected nearest comes first.
+    def merge_returned(self, tracks: TrackTable) -> Int:
+        """Merge new tracks of people into lost ones that may have come out of hiding there, the nearest pair first.
 
         Returns:
-            Rows (R,) of the new tracks that were continued; they are to be deleted.
+            Rows (R,) of the new tracks that were merged; they are to be deleted.
         """
         tuning = self._tuning
         people = IS_PERSON[tracks.object_class]
@@ -105,22 +107,28 @@ class Hiding:
         fits = tracks.age[new, None] <= tracks.missed[lost]  # both were not there at once
         fits &= _distance_m(position, tracks.kdop_position[lost], expected) < tuning.reach_m
         distance_m = np.where(fits, _distance_m(position, expected, expected), np.inf)
-        continued = np.zeros(len(new), np.bool_)
+        is_merged = np.zeros(len(new), np.bool_)
         while np.isfinite(distance_m.min()):
             i, k = np.unravel_index(distance_m.argmin(), distance_m.shape)
-            _continue(tracks, int(lost[k]), int(new[i]))
-            continued[i] = True
+            _merge(tracks, int(lost[k]), int(new[i]))
+            is_merged[i] = True
             distance_m[i] = distance_m[:, k] = np.inf
-        rows: Int = new[continued]
+        rows: Int = new[is_merged]
         return rows
 
 
-def _continue(tracks: TrackTable, lost: int, new: int) -> None:
-    """Let a lost track go on as a new one."""
-    for name in _OF_THE_NEW:
+def _step_back(tracks: TrackTable, rows: Int, dt_s: float) -> None:
+    """Move tracks (R,) back to where they were before a time step."""
+    tracks.x[rows, :2] -= dt_s * tracks.velocity[rows]
+    tracks.moving_mean[rows, :2] -= dt_s * tracks.moving_mean[rows, 2:]
+
+
+def _merge(tracks: TrackTable, lost: int, new: int) -> None:
+    """Give a lost track the place and the motion of the new one. Its id, age, state and class stay."""
+    for name in _REPLACED:
         column = getattr(tracks, name)
         column[lost] = column[new]
-    for name in _OF_BOTH:
+    for name in _ADDED:
         column = getattr(tracks, name)
         column[lost] += column[new]
 

@@ -96,7 +96,7 @@ def _listed(
     expected = tracks.predicted_kdops()
     which, proposals = kernels.overlapping_pairs(known, observations.kdop)
     rows = listed[which]
-    joinable = ~IS_PERSON[tracks.object_class] | tracks.hidden
+    joinable = ~IS_PERSON[tracks.object_class] | tracks.top_cut
     within = kernels.coverage(observations.kdop, known, proposals, which)
     around = kernels.coverage(expected, observations.kdop, rows, proposals)
     free = np.maximum(within, around) > min_coverage

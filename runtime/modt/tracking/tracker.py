@@ -27,6 +27,8 @@ from modt.types import NONE, Bool, Cut, Float32, Float64, Int, MotionState, Prop
 
 MIN_STEP_SHARE = 0.1
 """A time step shorter than this share of the period means a stalled clock."""
+ANY, COMPACT, OBJECT = range(3)
+"""Rows of the weights of evidence: any proposal, a compact one, one of a track whose class is not background."""
 
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels, tuning: TrackingTuning) -> Association:
@@ -75,6 +77,7 @@ class Tracker:
         self._sight = sight_of(kernels, tuning.sight)
         self._hiding = Hiding(self._sight, tuning.hiding)
         self._evidence = evidence = tuning.motion_evidence
+        # (3, 3) weight of evidence of motion, by ANY, COMPACT or OBJECT and the number of bounded sides
         self._weight_by_sides = np.array(
             [
                 [1.0, evidence.one_side_weight, 0.0],
@@ -82,7 +85,6 @@ class Tracker:
                 [1.0, evidence.object_weight, evidence.object_weight],
             ]
         )
-        """(3, 3) weight of evidence of motion by bounded sides: of any proposal, a compact one, a known object."""
         self._rest = tuning.rest
         self._live = LiveTracks() if live is None else live
 
@@ -112,7 +114,7 @@ class Tracker:
     def track(
         self, stamp_s: float, proposals: Proposals, located: Located, points: Float32 | None = None
     ) -> TrackedFrame:
-        """Match the proposals of a frame with the tracks, and regroup them by known extents.
+        """Predict the tracks, match and regroup the proposals of a frame, and update, end and begin tracks by them.
 
         Each of the proposals returned belongs to one track, a new one where none matched. `confirm` ends the frame.
 
@@ -127,7 +129,7 @@ class Tracker:
         """
         self._end_after_gap(stamp_s)
         if self._extended:
-            self._delete(self._hiding.reunite(self.tracks))
+            self._delete(self._hiding.merge_returned(self.tracks))
         dt_s = self._predict(stamp_s)
         matches = self.association.match(self.tracks, located.observations)
         frame = Associated(proposals, located.observations, matches)
@@ -136,12 +138,12 @@ class Tracker:
         nearest = self._look(points, proposals)
         rows = frame.matches.rows
         box_before = self.tracks.box.take(rows, axis=0)
-        self._associate(rows)
+        self._count_and_advance(rows)
         self._update(frame, dt_s, nearest)
-        proposals = self._keep_top(frame, box_before)
+        proposals = self._keep_tops(frame, box_before)
         self._observe_rest(rows)
         if nearest is not None:
-            self._hiding.stop_clock(self.tracks, nearest, located.placement.T_world_sensor, dt_s)
+            self._hiding.keep_hidden(self.tracks, nearest, located.placement.T_world_sensor, dt_s)
         kept = self._expire()
         self._begin_tracks(kept, frame.matches, frame.observations)
         t = self.tracks
@@ -174,12 +176,14 @@ class Tracker:
         last_s = self._live.stamp_s
         return 0.0 if last_s is None else max(0.0, stamp_s - last_s)
 
-    def _max_unseen_s(self, frames: float) -> float:
-        """(max_missed + `frames`) periods [s]."""
-        return (self.config.max_missed + frames) * self._period_s
+    def _max_unseen_s(self, slack_periods: float) -> float:
+        """(max_missed + `slack_periods`) periods [s]; half a period of them is for the jitter of the frames."""
+        return (self.config.max_missed + slack_periods) * self._period_s
 
     def _end_after_gap(self, stamp_s: float) -> None:
         """Delete tracks unseen for more than max_missed + 1.5 periods.
+
+        That is a period more than in `_expire`, since the present frame may yet show them.
 
         An odometry that registers asks for the tracks before `track`, so this is called once or twice a frame. The
         second call changes nothing.
@@ -212,8 +216,11 @@ class Tracker:
             return None
         return self._sight.look(points, proposals.kind)
 
-    def _associate(self, rows: Int) -> None:
-        """Count hits and misses; matched proposals take over the states of their tracks, the other tracks coast."""
+    def _count_and_advance(self, rows: Int) -> None:
+        """Count hits and misses, and advance the states: matched tracks are tracked, the others coast.
+
+        No track has a proposal until `_update` writes those of the matched ones.
+        """
         t = self.tracks
         events = np.full(len(t), StateEvent.UNASSOCIATED.value)
         events[rows] = StateEvent.ASSOCIATED.value
@@ -240,56 +247,53 @@ class Tracker:
         else:
             self._filter.update(t.x, t.P, rows, matches.position, matches.covariance)
         t.end_variance[rows] = matches.end_variance
-        known = t.envelope.take(frame.joined, axis=0)
+        envelope_before = t.envelope.take(frame.joined, axis=0)
         self._update_extent(t, rows, matches.proposals, frame.observations, matches.position, dt_s)
         t.centroid[rows] = frame.observations.centroid[matches.proposals]
-        t.envelope[frame.joined] = known  # what is joined justifies no further joins
+        t.envelope[frame.joined] = envelope_before  # what is joined justifies no further joins
 
     def _weighed(self, log_ratio: Float64, frame: Associated, nearest: Float32 | None) -> Float64:
         """Evidence of moving (R,) of the matched tracks, less where a changing view explains it.
 
         Where a proposal is bounded by what is nearer, or goes on there, its ends may move while the object rests.
-        A flat and low proposal of no known class is no evidence of motion. Evidence of rest counts in any case.
+        A flat and low proposal of a background track is no evidence of motion. Evidence of rest counts in any case.
         """
         tuning = self._evidence
         length_m, width_m, height_m = frame.proposals.box[frame.matches.proposals, 3:6].T
         flat = (height_m < tuning.min_height_m) & (height_m < tuning.flat_height * length_m)
-        known = self.tracks.object_class[frame.matches.rows] != ObjectClass.BACKGROUND.value
-        weighed = np.where(flat & ~known, np.minimum(log_ratio, 0.0), log_ratio)
+        is_object = self.tracks.object_class[frame.matches.rows] != ObjectClass.BACKGROUND.value
+        weighed = np.where(flat & ~is_object, np.minimum(log_ratio, 0.0), log_ratio)
         claims = (weighed > 0).nonzero()[0]
         if nearest is None or not len(claims):
             return weighed
         compact = (length_m < tuning.max_compact_m) & (width_m > tuning.min_compact_width * length_m)
-        kind = np.where(known, 2, compact)[claims]
+        row = np.where(is_object, OBJECT, np.where(compact, COMPACT, ANY))[claims]
         sides = self._sight.bounded_sides(nearest, frame.proposals, frame.matches.proposals[claims])
-        weighed[claims] *= self._weight_by_sides[kind, sides.sum(axis=1)]
+        weighed[claims] *= self._weight_by_sides[row, sides.sum(axis=1)]
         return weighed
 
-    def _keep_top(self, frame: Associated, box_before: Float64) -> Proposals:
-        """Keep the former height of people whose top the view cuts off, in the tracks and in the returned proposals.
+    def _keep_tops(self, frame: Associated, box_before: Float64) -> Proposals:
+        """Keep the former tops of people whose top the view cuts off, in the tracks and in the returned proposals.
 
-        Write which tracks are people whose upper half is cut off (`hidden`).
+        Write which tracks are people whose upper half is cut off (`top_cut`).
 
         Args:
             frame: frame after regrouping.
             box_before: (R, 7) boxes of the matched tracks before the frame [m, world].
         """
         t = self.tracks
-        t.hidden[frame.matches.rows] = False
+        t.top_cut[frame.matches.rows] = False
         cut_above = frame.proposals.cut[frame.matches.proposals] & Cut.TOP.value > 0
         people = (IS_PERSON[t.object_class[frame.matches.rows]] & cut_above).nonzero()[0]
         if not len(people):
             return frame.proposals
         rows = frame.matches.rows[people]
-        proposals = frame.matches.proposals[people]
-        top_before_m = box_before[people, 2] + box_before[people, 5] / 2
-        top_m = t.box[rows, 2] + t.box[rows, 5] / 2
-        hidden_m = np.maximum(top_before_m - top_m, 0.0)
-        t.hidden[rows] = (hidden_m > 0) & (t.box[rows, 5] < PERSON_HEIGHT_M / 2)
-        middle_and_height = np.outer(hidden_m, (0.5, 1.0))  # z of the middle rises by half
+        cut_off_m = np.maximum(_top_m(box_before[people]) - _top_m(t.box[rows]), 0.0)
+        t.top_cut[rows] = (cut_off_m > 0) & (t.box[rows, 5] < PERSON_HEIGHT_M / 2)
+        middle_and_height = np.outer(cut_off_m, (0.5, 1.0))  # z of the middle rises by half
         t.box[rows, 2:6:3] += middle_and_height
         box = frame.proposals.box.copy()
-        box[proposals, 2:6:3] += middle_and_height
+        box[frame.matches.proposals[people], 2:6:3] += middle_and_height
         return replace(frame.proposals, box=box)
 
     def _observe_rest(self, rows: Int) -> None:
@@ -318,10 +322,10 @@ class Tracker:
         went = self._from_rest_m() > evidence.min_distance_m
         may_move = ~t.reappears | (t.motion == MotionState.MOVING.value)
         moves = (t.moving_probability > evidence.moving) & went & may_move
-        known = (moves | (t.moving_probability < 0.5)) & (t.hits >= evidence.min_hits)
+        is_decided = (moves | (t.moving_probability < 0.5)) & (t.hits >= evidence.min_hits)
         t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
-        t.motion[~known] = MotionState.UNKNOWN.value
-        t.velocity_covariance[moves & known] *= evidence.velocity_variance
+        t.motion[~is_decided] = MotionState.UNKNOWN.value
+        t.velocity_covariance[moves & is_decided] *= evidence.velocity_variance
 
     def _from_rest_m(self) -> Float64:
         """(M,) distance of tracks from their rest positions [m]."""
@@ -356,3 +360,9 @@ class Tracker:
         t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]
         t.centroid[new] = observations.centroid[proposals]
         self._update_extent(t, rows, proposals, observations, position, 0.0)
+
+
+def _top_m(box: Float64) -> Float64:
+    """(k,) z of the tops of boxes (k, 7) [m]."""
+    top_m: Float64 = box[:, 2] + box[:, 5] / 2
+    return top_m
