@@ -19,8 +19,9 @@ async function take({ status, frame, states, tracks, points }) {
     return;
   }
   delete stage.dataset.notice;
-  const at = last + 1, follows = state.at === last;
+  const at = last + 1;
   await addTracks(tracks, at);
+  const follows = state.at === last; // not earlier: while tracks are added, another frame may be chosen
   frames[at] = frame;
   packedSweeps[at] = points;
   notice.textContent = status || "live";
