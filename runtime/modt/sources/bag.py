@@ -130,7 +130,29 @@ class BagStream:
 
     def _frames(self, poses: RecordedPoses, stamps: StampCheck) -> Iterator[Frame | None]:
         """Frames in their order; None after a message of a pose, or one without a frame."""
-        parts = copy.deepcopy(self._parts)
+        if self._parts is None:
+            return self._whole_sweeps(poses, stamps)
+        return self._joined_parts(copy.deepcopy(self._parts), poses, stamps)
+
+    def _whole_sweeps(self, poses: RecordedPoses, stamps: StampCheck) -> Iterator[Frame | None]:
+        """Frames of messages that are whole sweeps."""
+        index = -1
+        for message in self._messages(poses):
+            if message is None:
+                yield None
+                continue
+            index += 1
+            if self._last is not None and index >= self._last:
+                return
+            if index < self._first:
+                self._pass_over(message, stamps)
+                continue
+            cloud = self._cloud(index, message)
+            yield None if cloud is None else self._frame(index, cloud, message, stamps)
+        self._account_for_damage()
+
+    def _joined_parts(self, parts: TurnParts, poses: RecordedPoses, stamps: StampCheck) -> Iterator[Frame | None]:
+        """Frames of messages that are parts of a sweep."""
         last: BagMessage | None = None
         index = -1
         for message in self._messages(poses):
@@ -138,21 +160,13 @@ class BagStream:
                 yield None
                 continue
             last = message
-            if self._parts is None:
-                index += 1
-                if self._last is not None and index >= self._last:
-                    return
-                if index < self._first:
-                    self._pass_over(message, stamps)
-                    continue
-            cloud = self._cloud(index, message)
-            if parts is not None:
-                cloud = None if cloud is None else parts.add(cloud, message.recorded_s)
-                index += cloud is not None
-                if self._last is not None and index >= self._last:
-                    return
+            part = self._cloud(index, message)
+            cloud = None if part is None else parts.add(part, message.recorded_s)
+            index += cloud is not None
+            if self._last is not None and index >= self._last:
+                return
             yield None if cloud is None or index < self._first else self._frame(index, cloud, message, stamps)
-        if parts is not None and last is not None and (cloud := parts.finish()) is not None:
+        if last is not None and (cloud := parts.finish()) is not None:
             yield self._frame(index + 1, cloud, last, stamps)
         self._account_for_damage()
 
