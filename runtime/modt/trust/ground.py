@@ -25,8 +25,10 @@ LEAST_SHARE = 0.5
 MIN_STEP_M = 0.08
 """Least limit of a change of the height [m], under a sensor that is low."""
 BACK_SHARE = 0.7
-"""Share of the limits within which the ground is back."""
-UNSEEN_FACTOR = 1.5
+"""Share of the limits within which the ground is back where it was."""
+KNOWN_SHARE = 0.35
+"""Share of the limits within which it is the known one, as seen from another place; hills come near it by chance."""
+UNSEEN_FACTOR = 2.5
 """Multiple of the limits by which the ground has moved if the sensor went on while nothing was seen."""
 LEFT_SHARE = 0.25
 """Share of a step that another one may leave, as the ground has another shape elsewhere."""
@@ -95,8 +97,8 @@ class GroundCheck:
             self._add(pairs)
         if self._before is None:
             return
-        steps = (_moved_between(self._before, now), self._from_plane(now))
-        is_back = min(self._size(step) for step in steps) < BACK_SHARE
+        as_before = self._size(_moved_between(self._before, now)) < BACK_SHARE
+        is_back = as_before or self._size(self._from_plane(now)) < KNOWN_SHARE
         self._looks = self._looks + 1 if is_back else 0
         if self._looks >= back_looks or self._size(self._offset) < max(1.0, LEFT_SHARE * self._greatest):
             self.phrase = ""

@@ -144,7 +144,7 @@ class TrustWatch:
         if not own_findings and not own_reasons:
             self._returns.learn(sweep, elapsed_s)
             self._ground.learn(sweep)
-        self._samples = [sweep]
+        self._samples = self._samples[-1:]
         self._looked_s = now_s
         self.trust = self._judged(now_s)
 
@@ -198,8 +198,9 @@ class TrustWatch:
         ground = self._ground.present
         self._ground.look(first, pairs, self._tuning.back_looks)
         moves = bool((self._ground.present != ground).any())
-        if moves:  # the obstacles stand on it as it is after the step
-            pairs = [(first, replace(self._samples[-1], plane=self._ground.present))]
+        if moves:  # the obstacles of this sweep, the first one of the next look, stand on it as it is after the step
+            self._samples[-1] = replace(self._samples[-1], plane=self._ground.present)
+            pairs = [(first, self._samples[-1])]
         on_moved_ground = moves or bool(self._ground.phrase)
         self._scene.look(first, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
 
