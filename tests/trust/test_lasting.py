@@ -1,7 +1,7 @@
 """Single beams and narrow sectors without returns are reported with which, and with nothing wrong none is."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -50,21 +50,17 @@ def without_sector(from_deg, width_deg=30.0):
     return lambda points: points[(bearing_deg(points) - from_deg) % 360 >= width_deg]
 
 
-def dead_deg(history, samples):
-    """Dead beams after each sample."""
+def followed(history, samples, name):
+    """Time and an attribute of a history after each sample."""
     found = []
     for each in samples:
         history.add(each)
-        found.append((each.time_s, history.dead_deg))
+        found.append((each.time_s, getattr(history, name)))
     return found
 
 
-def blocked_deg(history, samples):
-    found = []
-    for each in samples:
-        history.add(each)
-        found.append((each.time_s, history.blocked_deg))
-    return found
+dead_deg = partial(followed, name="dead_deg")
+blocked_deg = partial(followed, name="blocked_deg")
 
 
 @pytest.mark.parametrize("from_s", [0.0, 9.0])

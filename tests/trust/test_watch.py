@@ -97,6 +97,15 @@ def test_a_fault_is_reported_within_two_seconds_and_withdrawn_within_three(name)
     assert levels[-1] == TrustLevel.GOOD
 
 
+@pytest.mark.parametrize("name", ["rolled by 15 deg", "pitched by -8 deg", "a fifth farther"])
+@pytest.mark.parametrize("scene", ["hills", "loading"])
+def test_a_ground_that_moves_among_hills_and_ramps_is_reported_and_withdrawn(scene, name):
+    """The ground has another shape where the fault ends; neither it nor the scene may be taken for the known one."""
+    levels = np.array([trust.level for trust in judged(scene, FAULTS[name], seconds=12.0)])
+    assert (levels[ONSET + 20 : END] > TrustLevel.GOOD).all()
+    assert (levels[END + 40 :] == TrustLevel.GOOD).all()
+
+
 def test_a_knock_under_a_cover_is_reported_when_the_cover_is_gone():
     """The sensor stands: the sweeps before and after the cover show one place."""
     watch = TrustWatch(load(SENSOR).sensor)
