@@ -57,10 +57,6 @@ TOGETHER = 5
 """Constants that are compared with the same run of the shipped values."""
 MEASURES = ("AP", "length", "calls", "CPU")
 SIGNS = {"-": -CHANGE, "+": CHANGE}
-TOGETHER = 5
-"""Constants that are compared with the same run of the shipped values."""
-MEASURES = ("AP", "length", "calls", "CPU")
-SIGNS = {"-": -CHANGE, "+": CHANGE}
 NOT_MEASURED = dict.fromkeys(SIGNS, "")
 
 

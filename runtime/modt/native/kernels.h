@@ -72,7 +72,7 @@ typedef struct {
     i64 n_points, n_cells, n;
 } Clusters;
 
-/* PointKind of types.py */
+/* PointKind of types/proposals.py */
 enum {
     MEMBER_KIND = 0, GROUND_KIND = -1, STRUCTURE_KIND = -2, LOW_KIND = -3, SPARSE_KIND = -4, OVERHEAD_KIND = -5,
     OUT_OF_RANGE_KIND = -6
