@@ -15,7 +15,8 @@ from modt.cli.progress import bar
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:  # NumPy is imported once the process is pinned
-    from modt_evaluation.experiments.study import Row
+    from modt_evaluation.experiments.drives import Drive
+    from modt_evaluation.experiments.study import Row, Study
 
 
 def add_options(p: argparse.ArgumentParser) -> None:
@@ -47,27 +48,13 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: no such experiment, or no drive.
     """
     host.pin_to_core(None)  # one thread a process: NumPy is imported from here on
-    from modt.sinks.output import writing
     from modt_evaluation.engine import Engine
     from modt_evaluation.experiments.catalogue import chosen
-    from modt_evaluation.experiments.drives import Drive, completed, kitti_drives, simulated_drives
-    from modt_evaluation.experiments.markdown import markdown, sources
-    from modt_evaluation.experiments.results_page import results_page
     from modt_evaluation.experiments.study import Study
-    from modt_profiling.reporting.view_extra import save
 
-    experiments = chosen(arguments.experiment)
-    recorded = [] if arguments.kitti is None else kitti_drives(arguments.kitti)
-    drives: list[Drive] = [*recorded]
-    if arguments.further is not None:
-        drives.append(completed(recorded, arguments.further))
-    drives += simulated_drives(arguments.simulated, arguments.seconds)
-    if not drives:
-        raise MisuseError("--experiment", "no drives", "give --kitti ROOT, --simulated N or both")
-    out: Path = arguments.out
     base = tuple(arguments.profile)
     profiles = [base, *((*base, name) for name in arguments.beside)]
-    study = Study(experiments, drives, profiles)
+    study = Study(chosen(arguments.experiment), _drives(arguments), profiles)
     with (
         Engine(arguments.jobs, arguments.scheduler) as engine,
         bar(len(study.tasks()), "replay", shown=not arguments.quiet) as tick,
@@ -77,10 +64,37 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(
             "--experiment", "none of the drives has the sweeps that it needs", "add them, or --simulated N"
         )
+    written = _write_results(arguments, study, rows)
+    print(f"{len(rows)} figures: {', '.join(map(str, written))}")
+    return 0
+
+
+def _drives(arguments: argparse.Namespace) -> list[Drive]:
+    """The drives that the command line asks for."""
+    from modt_evaluation.experiments.drives import completed, kitti_drives, simulated_drives
+
+    recorded = [] if arguments.kitti is None else kitti_drives(arguments.kitti)
+    drives: list[Drive] = [*recorded]
+    if arguments.further is not None:
+        drives.append(completed(recorded, arguments.further))
+    drives += simulated_drives(arguments.simulated, arguments.seconds)
+    if not drives:
+        raise MisuseError("--experiment", "no drives", "give --kitti ROOT, --simulated N or both")
+    return drives
+
+
+def _write_results(arguments: argparse.Namespace, study: Study, rows: Sequence[Row]) -> list[Path]:
+    """Write table, text and page of the results; the page alone needs an extra. Returns the files written."""
+    from modt.sinks.output import writing
+    from modt_evaluation.experiments.markdown import markdown, sources
+    from modt_evaluation.experiments.results_page import results_page
+    from modt_profiling.reporting.view_extra import save
+
+    out: Path = arguments.out
+    made_of = (_command(arguments), sources(study.profiles), study.experiments, rows)
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
         _write_table(out / "results.csv", rows)
-        made_of = (_command(arguments), sources(profiles), experiments, rows)
         (out / "results.md").write_text(markdown(*made_of), encoding="utf-8")
     written = [out / "results.md", out / "results.csv"]
     try:
@@ -88,8 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
         written.insert(0, out / "results.html")
     except MisuseError as error:
         print(f"modt: no page: {error}", file=sys.stderr)
-    print(f"{len(rows)} figures: {', '.join(map(str, written))}")
-    return 0
+    return written
 
 
 def _write_table(path: Path, rows: Sequence[Row]) -> None:
