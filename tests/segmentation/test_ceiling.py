@@ -45,6 +45,15 @@ def test_a_slope_of_five_percent_is_a_ceiling():
     assert 2.4 < CEILING.height_m(tops(slope), 0.0) < 3.0
 
 
+def test_the_vault_of_a_narrow_passage_is_a_ceiling_though_most_rays_end_at_its_sides():
+    """A quarter of the rays goes along the passage; the others meet the curve of the vault at two heights."""
+    along = np.arange(SECTORS)[:, None] % (SECTORS // 2) < SECTORS // 8
+    sides = np.full((SECTORS, RINGS), np.nan)
+    sides[:, 10] = 1.95
+    sides[:, 12] = 2.25
+    assert CEILING.height_m(tops(np.where(along, seen_from(14, 26, 2.5), sides)), 0.0) == pytest.approx(2.5)
+
+
 @pytest.mark.parametrize(
     "height_m",
     [
