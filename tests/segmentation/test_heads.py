@@ -53,6 +53,13 @@ def test_three_abreast_are_three_people():
     assert sorted(people(*(person(5, 0.53 * k) for k in range(3)))) == [0, 1, 2]
 
 
+@pytest.mark.parametrize("gap_m", [0.06, 0.12])
+@pytest.mark.parametrize(("top_m", "found"), [(2.5, [0, NONE]), (1.9, [NONE, NONE])])
+def test_who_stands_at_a_column_is_a_person_and_the_column_is_not(gap_m, top_m, found):
+    """A thing no higher than a person divides nothing: it may be a part of the person, such as a raised load."""
+    assert people(person(5, 0), column(5, 0.24 + gap_m + 0.3, 0.6, 0.6, 0.0, top_m)) == found
+
+
 def test_who_pushes_a_trolley_is_a_person_and_the_trolley_is_not():
     assert people(person(5.1, 0), TROLLEY) == [0, NONE]
 

@@ -4,7 +4,7 @@
 
 /* HeadTuning: values by the names that they have there. */
 typedef struct {
-    double min_top_m, reach_m, max_apart_m, min_dip_m, head_height_m, max_head_m, max_bottom_m, load_m,
+    double min_top_m, max_top_m, reach_m, max_apart_m, min_dip_m, head_height_m, max_head_m, max_bottom_m, load_m,
         min_load_top_m;
     i64 min_points;
 } HeadTuning;
@@ -72,14 +72,36 @@ static i64 find_peaks(const HeadTuning *r, const Cluster *c, i64 *left, i64 *pea
     return n;
 }
 
-/* Whether peak k of those nearest to each cell is the head of a person. */
-static int is_head(const HeadTuning *r, const Cluster *c, const i64 *nearest, i64 k, i64 peak)
+/* Number of the peak nearest to cell i, the first of those alike */
+static i64 nearest_peak(const Cluster *c, i64 i, const i64 *peaks, i64 n)
+{
+    i64 nearest = 0;
+    for (i64 k = 1; k < n; k++)
+        nearest = square_m2(c, i, peaks[k]) < square_m2(c, i, peaks[nearest]) ? k : nearest;
+    return nearest;
+}
+
+/* _is_lower: whether cell i is not of something higher than a person, given its nearest peak */
+static int is_lower(const HeadTuning *r, const Cluster *c, i64 i, i64 peak, int any_higher)
+{
+    float top = (float)r->max_top_m;
+    double own = square_m2(c, i, peak);
+    if (c->high[i] >= top)
+        return 0;
+    for (i64 j = 0; j < c->m && any_higher; j++)
+        if (c->high[j] >= top && square_m2(c, i, j) <= own)
+            return 0;
+    return 1;
+}
+
+/* Whether peak k is the head of a person, given the peak to which each cell belongs */
+static int is_head(const HeadTuning *r, const Cluster *c, const i64 *owner, i64 k, i64 peak)
 {
     double least[2] = {INFINITY, INFINITY}, greatest[2] = {-INFINITY, -INFINITY};
     float bottom = INFINITY, top_from = c->high[peak] - (float)r->head_height_m;
     i64 points = 0;
     for (i64 i = 0; i < c->m; i++) {
-        if (nearest[i] != k)
+        if (owner[i] != k)
             continue;
         if (square_m2(c, i, peak) < r->reach_m * r->reach_m) {
             bottom = minf(c->low[i], bottom);
@@ -123,34 +145,30 @@ static int pushes(const HeadTuning *r, const Cluster *c, i64 peak)
     return along >= -r->reach_m * __builtin_sqrt(most);
 }
 
-/* Number of the peak nearest to cell i, the first of those alike */
-static i64 nearest_peak(const Cluster *c, i64 i, const i64 *peaks, i64 n)
-{
-    i64 nearest = 0;
-    for (i64 k = 1; k < n; k++)
-        nearest = square_m2(c, i, peaks[k]) < square_m2(c, i, peaks[nearest]) ? k : nearest;
-    return nearest;
-}
-
-/* find_people, given room for m peaks and m heads */
+/* find_people, given room for m peaks, and for the person of each peak, NONE where it is no head */
 EXPORT void modt_find_people(const HeadTuning *r, const float *x, const float *y, const float *low, const float *high,
-                             const i64 *entries, i64 m, i64 *peaks, i64 *heads, i64 *person)
+                             const i64 *entries, i64 m, i64 *peaks, i64 *person_of_peak, i64 *person)
 {
     const Cluster cluster = {x, y, low, high, entries, m}, *c = &cluster;
-    i64 n = find_peaks(r, c, person, peaks), n_heads = 0;
-    for (i64 i = 0; i < m && n; i++)
-        person[i] = nearest_peak(c, i, peaks, n);
-    for (i64 k = 0; k < n; k++)
-        if (is_head(r, c, person, k, peaks[k]))
-            heads[n_heads++] = peaks[k];
-    if (n_heads == 1 && !pushes(r, c, heads[0]))
-        n_heads = 0;
+    i64 n = find_peaks(r, c, person, peaks), n_heads = 0, head = NONE;
+    /* Peaks come from the highest on. */
+    int any_higher = n && high[peaks[0]] >= (float)r->max_top_m;
+    i64 *owner = person;
     for (i64 i = 0; i < m; i++) {
-        person[i] = NONE;
-        if (!n_heads)
+        i64 k = n ? nearest_peak(c, i, peaks, n) : NONE;
+        owner[i] = n && is_lower(r, c, i, peaks[k], any_higher) ? k : NONE;
+    }
+    for (i64 k = 0; k < n; k++) {
+        person_of_peak[k] = NONE;
+        if (!is_head(r, c, owner, k, peaks[k]))
             continue;
-        i64 k = nearest_peak(c, i, heads, n_heads);
-        if (square_m2(c, i, heads[k]) < r->reach_m * r->reach_m)
-            person[i] = k;
+        person_of_peak[k] = n_heads++;
+        head = peaks[k];
+    }
+    int divided = n_heads > 1 || (n_heads == 1 && (any_higher || pushes(r, c, head)));
+    for (i64 i = 0; i < m; i++) {
+        i64 k = owner[i];
+        int around = divided && k != NONE && square_m2(c, i, peaks[k]) < r->reach_m * r->reach_m;
+        person[i] = around ? person_of_peak[k] : NONE;
     }
 }

@@ -90,7 +90,7 @@ class Clusterer:
         heads = self.heads
         tried = (sizes.points >= heads.min_points) & (sizes.sqrt_range < math.sqrt(heads.max_range_m))
         tried &= (sizes.extent_m > heads.min_extent_m) & (sizes.extent_m < heads.max_extent_m)
-        tried &= (sizes.top_m > heads.min_top_m) & (sizes.top_m < self.cells.split.person.max_top_m)
+        tried &= sizes.top_m > heads.min_top_m
         part = np.full(len(cells), NONE)
         n = 0
         for g in tried.nonzero()[0]:

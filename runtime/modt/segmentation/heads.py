@@ -1,4 +1,4 @@
-"""People within a cluster that is more than one object: who stands beside another, or pushes something.
+"""People within a cluster that is more than one object: who stands beside another or a column, or pushes something.
 
 From above, a head is a narrow peak of the heights of the cells. Between two heads the heights dip to the shoulders.
 The cells around a head are the person below it.
@@ -22,9 +22,10 @@ CORRIDOR_HALF_WIDTH_M = 0.3
 def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: Int, tuning: HeadTuning) -> Int:
     """(m,) person to whom each cell of one cluster belongs, NONE where it is nobody's.
 
-    There is nobody, or there are two or more people, or one with something to push. That lies to one side of the
-    person, is as high as a trolley, and ends below the shoulders. A rider has a wheel on each side, which is lower.
-    One head without such a load divides nothing, so its cells are nobody's: the cluster is then one object.
+    There is nobody, or there are two or more people, or one beside something higher than any person, or one with
+    something to push. That lies to one side of the person, is as high as a trolley, and ends below the shoulders. A
+    rider has a wheel on each side, which is lower. One head without any of this divides nothing, so its cells are
+    nobody's: the cluster is then one object.
 
     Args:
         x: (m,) a point of each cell [m, sensor frame].
@@ -42,18 +43,40 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
     square_m2 = np.stack([_square_m2(at, peak) for peak in peaks])  # (peaks, m)
     near = square_m2 < tuning.reach_m * tuning.reach_m
     nearest = square_m2.argmin(axis=0)
-    heads = []
+    lower = _is_lower(at, high, square_m2.min(axis=0), tuning)
+    heads = []  # rows of peaks
     for k, peak in enumerate(peaks):
-        body = (nearest == k) & near[k]
-        top = (nearest == k) & (high > high[peak] - tuning.head_height_m)
+        if not lower[peak]:
+            continue
+        own = (nearest == k) & lower
+        body = own & near[k]
+        top = own & (high > high[peak] - tuning.head_height_m)
         stands = low[body].min() < tuning.max_bottom_m
         if stands and entries[body].sum() >= tuning.min_points and _extent_m(at[:, top]) < tuning.max_head_m:
             heads.append(k)
-    if not heads or (len(heads) == 1 and not _pushes(at, high, entries, peaks[heads[0]], tuning)):
+    if not heads:
         return person
-    around = near[heads].any(axis=0)
-    person[around] = square_m2[heads].argmin(axis=0)[around]
+    # Peaks come from the highest on.
+    is_divided = len(heads) > 1 or not lower[peaks[0]] or _pushes(at, high, entries, peaks[heads[0]], tuning)
+    if not is_divided:
+        return person
+    person_of_peak = np.full(len(peaks), NONE)
+    person_of_peak[heads] = np.arange(len(heads))
+    around = near[nearest, np.arange(len(x))] & lower
+    person[around] = person_of_peak[nearest[around]]
     return person
+
+
+def _is_lower(at: Float64, high: Float32, peak_m2: Float64, tuning: HeadTuning) -> Bool:
+    """(m,) cells that are not of something higher than a person: they are lower, and nearer to their peak than to it.
+
+    Args:
+        peak_m2: (m,) square of the distance of each cell to the nearest peak [m2].
+    """
+    lower: Bool = high < np.float32(tuning.max_top_m)
+    for cell in np.flatnonzero(~lower):
+        lower &= peak_m2 < _square_m2(at, int(cell))
+    return lower
 
 
 def _square_m2(at: Float64, cell: int) -> Float64:

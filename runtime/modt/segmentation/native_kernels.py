@@ -228,9 +228,9 @@ class NativeKernels(NativeGeometryKernels, Kernels):
     ) -> Int:
         """(m,) person to whom each cell of one cluster belongs, NONE where it is nobody's."""
         m = len(x)
-        peaks, heads, person = np.empty((3, m), np.int64)
+        peaks, person_of_peak, person = np.empty((3, m), np.int64)
         rules = self._structure(HEAD_TUNING.of, tuning)
-        self.library.modt_find_people(rules, x, y, low, high, entries, m, peaks, heads, person)
+        self.library.modt_find_people(rules, x, y, low, high, entries, m, peaks, person_of_peak, person)
         return person
 
     def view_bounds(self, clusters: Clusters, strip_of_cluster: Int, n: int) -> ViewBounds:

@@ -102,8 +102,8 @@ class CeilingTuning:
     """Polar cells with returns above `lowest_m` below which there is no ceiling. Chosen on: judgement."""
     min_share: float = 0.4
     """Share of those cells whose top continues that of the cell before on its ray, from which they are a ceiling.
-    Less cuts shelves, hedges and lorries, more misses the vaults of narrow passages. Chosen on: greatest share without
-    a ceiling, of simulated streets, yards and real scans, .36; least share of a narrow vault, .41."""
+    Less cuts shelves, hedges and lorries, more misses the vaults of narrow passages. Chosen on: greatest share
+    without a ceiling, of simulated streets, yards and real scans, .36; least share of a narrow vault, .41."""
     step_m: float = 0.1
     """Difference in height below which a top continues the one before [m]. More takes trees for a ceiling.
     Chosen on: simulated rooms, streets and forests."""
@@ -191,6 +191,9 @@ class HeadTuning:
     """Range of a cluster up to which heads are looked for [m]. More divides cars, whose roofs few points meet."""
     min_top_m: float = 1.35
     """Least height of a head [m]. Less takes handlebars for heads."""
+    max_top_m: float = 2.2
+    """Greatest height of a head [m]. Beside what is higher, a column or a wall, one person is found too. Less divides
+    trees. Chosen on: people at columns of a hall, with a check on an orchard."""
     reach_m: float = 0.43
     """Distance to the head within which cells belong to a person [m]. More adds the handle of what is pushed, and the
     person is taken for a cyclist."""
