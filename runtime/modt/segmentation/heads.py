@@ -68,10 +68,13 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
 
 
 def _is_lower(at: Float64, high: Float32, peak_m2: Float64, tuning: HeadTuning) -> Bool:
-    """(m,) cells that are not of something higher than a person: they are lower, and nearer to their peak than to it.
+    """(m,) cells of what is no higher than a person; none that is nearer to a higher cell than to its peak.
 
     Args:
+        at: (2, m) positions of the cells [m].
+        high: (m,) greatest heights of the points of the cells [m].
         peak_m2: (m,) square of the distance of each cell to the nearest peak [m2].
+        tuning: height of a person.
     """
     lower: Bool = high < np.float32(tuning.max_top_m)
     for cell in np.flatnonzero(~lower):
