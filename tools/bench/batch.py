@@ -32,7 +32,7 @@ from modt_evaluation.engine import Engine
 from modt_evaluation.experiments.markdown import commit
 from modt_simulation.kitti_raw import DATE, DriveWriter
 from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
-from tools.docs.sections import DOCS, replace_section
+from tools.docs.sections import DOCS, update
 from tools.options import parser
 
 PAGE = DOCS / "batch.md"
@@ -214,7 +214,7 @@ def main() -> None:
     made = "\n".join(table(Bench(recordings, args.folder, np.random.default_rng(args.seed))))
     print(made)
     if args.write:
-        PAGE.write_text(replace_section(PAGE.read_text(encoding="utf-8"), MARK, made), encoding="utf-8")
+        update(PAGE, MARK, made)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,9 @@ from __future__ import annotations
 
 import gc
 import json
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -31,7 +29,8 @@ from modt.geometry import FieldOfView
 from modt.pipeline import SEGMENTATION
 from modt.sources.recognise import open_stream
 from modt.types import Float64, Frame
-from tools.docs.sections import replace_section
+from tools.bench.ground import Patchwork, cpu_ms
+from tools.docs.sections import DOCS, update
 from tools.options import parser
 
 FIRST = 10
@@ -40,19 +39,12 @@ MODES = ("accurate", "efficient")
 PART = "segmentation in it"
 BASELINE = "Patchwork++: ground alone"
 YARDSTICK = "sorting 100,000 numbers"
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "segmentation.md"
+PAGE = DOCS / "segmentation.md"
 _NUMBERS = np.random.default_rng(0).random(100_000)
 
 Work = Callable[[Frame], float]
 """Work on a frame, which returns its CPU time [ms]."""
 Rows = dict[str, dict[str, float]]
-
-
-def timed(work: Callable[[Frame], object], frame: Frame) -> float:
-    """CPU time of the call [ms]."""
-    start = time.thread_time_ns()
-    work(frame)
-    return (time.thread_time_ns() - start) / 1e6
 
 
 def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
@@ -62,13 +54,10 @@ def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
 
 def contenders() -> dict[str, Work]:
     """Work to time, by name."""
-    found: dict[str, Work] = {YARDSTICK: partial(timed, lambda _: np.sort(_NUMBERS))}
+    found: dict[str, Work] = {YARDSTICK: partial(cpu_ms, lambda _: np.sort(_NUMBERS))}
     if find_spec("pypatchworkpp"):
-        patchwork = import_module("pypatchworkpp")
-        parameters = patchwork.Parameters()
-        parameters.verbose = False
-        ground = patchwork.patchworkpp(parameters).estimateGround
-        found[BASELINE] = partial(timed, lambda frame: ground(frame.points))
+        patchwork = Patchwork()
+        found[BASELINE] = partial(cpu_ms, lambda frame: patchwork.run(frame.points))
     shipped = profile.load("hdl-64e")
     for kernels in (NATIVE, NUMPY_KERNELS):
         config = replace(shipped, segmentation=replace(shipped.segmentation, kernels=kernels))
@@ -76,7 +65,7 @@ def contenders() -> dict[str, Work]:
             ledger = Ledger()
             pipeline = assembly.pipeline(assembly.MODES[mode], config, FieldOfView(), ledger)
             budget = assembly.MODES[mode].budget(config)
-            found[f"{mode}, {kernels}"] = partial(timed, partial(pipeline.step, budget=budget))
+            found[f"{mode}, {kernels}"] = partial(cpu_ms, partial(pipeline.step, budget=budget))
             found[f"{PART} ({mode}, {kernels})"] = partial(segmentation_ms, ledger)
     return found
 
@@ -137,7 +126,7 @@ def main() -> None:
     rows = summary(measure(frames, contenders()))
     print(json.dumps(rows, indent=2))
     if arguments.write:
-        PAGE.write_text(replace_section(PAGE.read_text(), "cost of a frame", table(rows)))
+        update(PAGE, "cost of a frame", table(rows))
 
 
 if __name__ == "__main__":

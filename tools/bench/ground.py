@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -35,6 +36,7 @@ GROUND = (40, 44, 48, 49, 60, 72)
 VEGETATION = 70
 SENSOR_HEIGHT_M = 1.73
 Filter = Callable[[Float32], None]
+T = TypeVar("T")
 RANGES_M = (2.7, 80.0)
 """Nearest and farthest range of Patchwork++'s defaults [m]."""
 
@@ -126,10 +128,10 @@ class Patchwork:
         return ground
 
 
-def cpu_ms(work: Filter, points: Float32) -> float:
-    """CPU time of a filter on a scan [ms]."""
+def cpu_ms(work: Callable[[T], object], argument: T) -> float:
+    """CPU time of a call [ms]."""
     start = time.thread_time_ns()
-    work(points)
+    work(argument)
     return (time.thread_time_ns() - start) / 1e6
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -27,11 +26,11 @@ from modt_evaluation.experiments.markdown import commit, sources
 from modt_evaluation.experiments.study import Study
 from modt_evaluation.frame import JudgedFrame
 from tools.docs.paper_page import NAMES, section
-from tools.docs.sections import replace_section
+from tools.docs.sections import DOCS, update
 from tools.options import parser
 from tools.study import drives
 
-ROOT = Path(__file__).resolve().parents[2]
+README = DOCS.parent / "README.md"
 MARK = "tools.docs.figures"
 DRIVE = "0005"
 SENSORS = {"hdl-64e": "HDL-64E", "os1-64": "OS1-64", "vlp-16": "VLP-16", "mid-360": "Mid-360"}
@@ -90,12 +89,8 @@ def _head() -> list[str]:
 
 def _simulated(engine: Engine, sensor: str, **conditions: str) -> Evaluation:
     """All simulated drives of a sensor in the same conditions, those of SyntheticStream."""
-    runs = [
-        drives.SimulatedRun(scene, sensor, SECONDS, seed, (MODE,), number, conditions)
-        for number, (seed, scene) in enumerate(product(SEEDS, SCENES))
-    ]
-    judged = {run.number: rows for run, (rows,) in engine.results(drives.judged_simulated, runs)}
-    return evaluation([judged[run.number] for run in runs])
+    judged = drives.judged_in_order(engine, SCENES, sensor, SECONDS, SEEDS, (MODE,), conditions)
+    return evaluation([rows for (rows,) in judged])
 
 
 def on_kitti(drive: drives.Drive) -> Iterator[str]:
@@ -161,15 +156,11 @@ def main() -> None:
         options.error(f"{args.kitti}: no drive {DRIVE} with labels and sweeps")
     with Engine(args.jobs) as engine:
         if args.only in (None, "readme"):
-            _write(ROOT / "README.md", MARK, readme(engine, drive.path, args.further, args.pandaset))
+            update(README, MARK, readme(engine, drive.path, args.further, args.pandaset))
         if args.only in (None, "readme", "weather"):
-            _write(ROOT / "README.md", WEATHER_MARK, weather(engine))
+            update(README, WEATHER_MARK, weather(engine))
         if args.only in (None, "paper"):
-            _write(ROOT / "docs" / "paper.md", MARK, paper_page(engine, drive, args.further))
-
-
-def _write(page: Path, mark: str, made: str) -> None:
-    page.write_text(replace_section(page.read_text(encoding="utf-8"), mark, made), encoding="utf-8")
+            update(DOCS / "paper.md", MARK, paper_page(engine, drive, args.further))
 
 
 if __name__ == "__main__":

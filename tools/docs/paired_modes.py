@@ -8,7 +8,6 @@ It takes ten minutes of CPU time.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from modt_evaluation.class_score import class_scores
 from modt_evaluation.engine import Engine
 from modt_evaluation.evaluation import DriveRows
 from modt_evaluation.experiments.markdown import commit
-from tools.docs.sections import DOCS, replace_section
+from tools.docs.sections import DOCS, update
 from tools.options import parser
 from tools.study import drives
 
@@ -89,12 +88,8 @@ def _precisions(rows: Sequence[DriveRows]) -> Float64:
 def _judged(engine: Engine, sensor: str) -> Rows:
     """Judged drives of a sensor in every mode."""
     modes = (BASELINE, *MODES)
-    runs = [
-        drives.SimulatedRun(scene, sensor, SECONDS, seed, modes, number)
-        for number, (seed, scene) in enumerate(product(SEEDS, SCENES))
-    ]
-    judged = {run.number: rows for run, rows in engine.results(drives.judged_simulated, runs)}
-    return {mode: [judged[run.number][k] for run in runs] for k, mode in enumerate(modes)}
+    judged = drives.judged_in_order(engine, SCENES, sensor, SECONDS, SEEDS, modes, {})
+    return {mode: [rows[k] for rows in judged] for k, mode in enumerate(modes)}
 
 
 def main() -> None:
@@ -102,7 +97,7 @@ def main() -> None:
     options.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (default: 1)")
     with Engine(options.parse_args().jobs) as engine:
         made = "\n".join(table(engine))
-    PAGE.write_text(replace_section(PAGE.read_text(encoding="utf-8"), MARK, made), encoding="utf-8")
+    update(PAGE, MARK, made)
 
 
 if __name__ == "__main__":

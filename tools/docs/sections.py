@@ -23,6 +23,11 @@ def replace_section(text: str, mark: str, section: str) -> str:
     return f"{before}{begin}\n{section}\n{end}{after}"
 
 
+def update(page: Path, mark: str, section: str) -> None:
+    """Write a new text between the marks of a page."""
+    page.write_text(replace_section(page.read_text(encoding="utf-8"), mark, section), encoding="utf-8")
+
+
 def write(about: str | None, page: Path, document: Callable[[], str]) -> None:
     """Run a command without options that brings a page up to date."""
     parser(about).parse_args()

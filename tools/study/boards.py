@@ -17,7 +17,6 @@ import subprocess
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from modt import host, profile
 from modt.cli.options import frames as number_range
 from modt_simulation.sensors import SENSORS
 from modt_simulation.synthetic_stream import SyntheticStream
-from tools.docs.sections import replace_section
+from tools.docs.sections import DOCS, update
 from tools.options import parser
 from tools.study.drives import steps_of
 
@@ -38,7 +37,7 @@ BOARDS = {
 """Rating in MIPS, as github.com/ThomasKaiser/sbc-bench publishes it (Sorted-Results.md, 64-bit systems); the lowest
 where there are several."""
 MODES = ("accurate", "efficient")
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "deployment.md"
+PAGE = DOCS / "deployment.md"
 _FIRST = 10
 """Frames left out while tracks begin."""
 
@@ -121,7 +120,7 @@ def main() -> None:
     text = table([work_of(sensor, mode, seeds, given.seconds) for sensor in given.sensors for mode in MODES], rating)
     print(text)
     if given.write:
-        PAGE.write_text(replace_section(PAGE.read_text(), "boards", text))
+        update(PAGE, "boards", text)
 
 
 if __name__ == "__main__":

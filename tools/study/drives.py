@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
 from modt.sources.recognise import open_stream
 from modt.types import Frame, FrameResult
+from modt_evaluation.engine import Engine
 from modt_evaluation.evaluation import DriveRows, collect
 from modt_evaluation.experiments.drives import simulated_truth
 from modt_evaluation.frame import JudgedFrame
@@ -78,11 +80,29 @@ class SimulatedRun:
     seconds: float
     seed: int
     modes: tuple[str, ...]
-    number: int = 0
-    conditions: Mapping[str, Any] = field(default_factory=dict)
+    number: int
+    conditions: Mapping[str, Any]
 
 
-def judged_simulated(run: SimulatedRun) -> list[DriveRows]:
+def judged_in_order(
+    engine: Engine,
+    scenes: Sequence[str],
+    sensor: str,
+    seconds: float,
+    seeds: Sequence[int],
+    modes: tuple[str, ...],
+    conditions: Mapping[str, Any],
+) -> list[list[DriveRows]]:
+    """Drives of every seed and scene, each judged in each of the modes; other arguments as of SimulatedRun."""
+    runs = [
+        SimulatedRun(scene, sensor, seconds, seed, modes, number, conditions)
+        for number, (seed, scene) in enumerate(product(seeds, scenes))
+    ]
+    judged_of = {run.number: rows for run, rows in engine.results(_judged_in_modes, runs)}
+    return [judged_of[run.number] for run in runs]
+
+
+def _judged_in_modes(run: SimulatedRun) -> list[DriveRows]:
     """The drive judged in each of the modes."""
     drive = simulated(run.scene, run.sensor, run.seconds, run.seed, **run.conditions)
     return [judged(drive, mode, run.number) for mode in run.modes]

@@ -11,7 +11,7 @@ distance [m], of all people and of cars.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -23,16 +23,13 @@ from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.profile import load
 from modt.sensor_fit.recognition import recognise
-from modt_evaluation.evaluation import DriveRows, collect
-from modt_evaluation.experiments.drives import simulated_truth
-from modt_evaluation.frame import JudgedFrame
+from modt_evaluation.evaluation import DriveRows
 from modt_evaluation.rows import Outcome
-from modt_evaluation.rules import CUBOID_RULES
 from modt_evaluation.truth import Role
 from modt_simulation.sensors import SENSORS
-from modt_simulation.synthetic_stream import SCENES, SyntheticStream
+from modt_simulation.synthetic_stream import SCENES
 from tools.options import parser
-from tools.study.drives import steps_of
+from tools.study.drives import Drive, judged, simulated
 
 BANDS_M = ((0.5, 3.0), (3.0, 8.0), (8.0, 20.0), (20.0, 60.0))
 EVERYWHERE_M = (0.0, float("inf"))
@@ -42,17 +39,10 @@ MOUNTS_DEG = ((0.0, 0.0), (0.0, 10.0), (0.0, 15.0), (10.0, 0.0), (15.0, 0.0), (1
 PLACES = ("yard", "corridor", "hall", "crowd", "ramp")
 
 
-def run(stream: SyntheticStream, mode_name: str, config: ProfileConfig) -> DriveRows:
-    """Run a drive in a mode and judge it."""
-    frames = list(stream.sweeps())
-    config = recognise(frames[0][0].points, config).mounted(config)
-    step = steps_of(mode_name, config)
-
-    def judged() -> Iterator[JudgedFrame]:
-        for frame, truth in frames:
-            yield JudgedFrame.of_result(step(frame), simulated_truth(truth))
-
-    return collect(judged(), CUBOID_RULES)
+def run(drive: Drive, mode_name: str, config: ProfileConfig) -> DriveRows:
+    """Run a drive in a mode, with the tilt that its first sweep shows, and judge it."""
+    first, _ = drive.frames[0]
+    return judged(replace(drive, profile=recognise(first.points, config).mounted(config)), mode_name)
 
 
 def of_mount(sensor: str, height_m: float) -> ProfileConfig:
@@ -99,11 +89,10 @@ def main() -> None:
     columns = ["sensor", "scene", "height", "roll, pitch", *bands, "people", "cars"]
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
     for sensor, scene, height_m, angles in product(args.sensors, args.scenes, args.heights, args.mounts):
-        streams = [
-            SyntheticStream(scene, sensor, args.seconds, seed, height_m=height_m, mount_deg=angles)
-            for seed in range(*args.seeds)
-        ]
-        drives = [run(stream, args.mode, of_mount(sensor, height_m)) for stream in streams]
+        drives = []
+        for seed in range(*args.seeds):
+            drive = simulated(scene, sensor, args.seconds, seed, height_m=height_m, mount_deg=angles)
+            drives.append(run(drive, args.mode, of_mount(sensor, height_m)))
         print(row(f"{sensor} | {scene} | {height_m:g} | {angles[0]:g}, {angles[1]:g}", drives), flush=True)
 
 

@@ -41,7 +41,7 @@ from modt_evaluation.evaluation import collect
 from modt_evaluation.experiments.markdown import commit
 from modt_evaluation.frame import JudgedFrame
 from modt_evaluation.track_score import track_scores
-from tools.docs.sections import DOCS, replace_section
+from tools.docs.sections import DOCS, update
 from tools.options import parser
 from tools.study.drives import Drive, simulated
 
@@ -283,9 +283,7 @@ def main() -> None:
                 for result in found:
                     print(result["name"], *(" ".join(_cells(result[sign])) for sign in SIGNS), sep="  ", flush=True)
     if asked.write:
-        PAGE.write_text(
-            replace_section(PAGE.read_text(), MARK, tables(results, MEASURES if asked.cpu else MEASURES[:-1]))
-        )
+        update(PAGE, MARK, tables(results, MEASURES if asked.cpu else MEASURES[:-1]))
 
 
 if __name__ == "__main__":
