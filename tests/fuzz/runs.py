@@ -96,9 +96,16 @@ def described(run):
 
 def frame_record(k):
     """The record of a frame with a track that is seen and one that is lost."""
-    seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
-    lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
-    counts = {"proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
+    boxes = dict.fromkeys(("box", "seen"), dict.fromkeys(BOX_KEYS, 1.5))
+    state = {"witness": [0.0] * 4, "size": [1.5] * 3, "motion": "moving", "moving": 0.9, "heading_known": True}
+    velocity = {
+        "velocity": [1.0, 0.0],
+        "velocity_covariance": [0.1, 0.0, 0.1],
+        "world": dict.fromkeys(WORLD_KEYS, 2.5),
+    }
+    seen = {**track(3, 0, named=True), **boxes, **state, **velocity}
+    lost = {**seen, "id": 4, "proposal": None, "box": None, "seen": None, "state": "lost"}
+    counts = {"run": None, "proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
     trust = {"level": "good", "reasons": []}
     facts = {"schema": "modt.frame/4", "T_world_sensor": np.eye(4)[:3].ravel().tolist(), "trust": trust, **counts}
     return {**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]}

@@ -49,7 +49,7 @@ def test_further_objects_count_for_their_class_alone(tmp_path):
     assert more.ranges["all"].segmentation == bare.ranges["all"].segmentation
     assert after.segmentable == before.segmentable == 1
     assert more.tracks == bare.tracks
-    association = judge(frame(further(tmp_path, CAR_AT_20), blobs, tracks), KITTI_RULES)[2][0]
+    association = judge(frame(further(tmp_path, CAR_AT_20), blobs, tracks), KITTI_RULES).associations[0]
     assert (association.truth.tolist(), association.track.tolist()) == ([0], [7]), "the metrics leave them out"
     assert (more.further_objects, more.further_labels, bare.further_objects) == (1, 1, 0)
 
@@ -57,7 +57,7 @@ def test_further_objects_count_for_their_class_alone(tmp_path):
 @pytest.mark.parametrize(("n", "rules", "counts"), [(7, KITTI_RULES, 0), (8, KITTI_RULES, 1), (19, CUBOID_RULES, 0)])
 def test_least_points_of_a_further_object(tmp_path, n, rules, counts):
     scene = frame(further(tmp_path, CAR_AT_20), [(blob(n, 20), 0)], [(7, 0, "pedestrian")])
-    objects, proposals, _ = judge(scene, rules)
+    objects, proposals = judge(scene, rules)[:2]
     assert objects["to_classify"].tolist() == [False, bool(counts)]
     assert proposals["to_classify"].tolist() == [bool(counts)]  # on an object with too few points, not a false one
 
@@ -67,7 +67,11 @@ def test_an_object_that_is_not_called_what_it_is(tmp_path):
     scene = frame(
         truth, [(blob(40, 10), 0), (blob(40, 20), 1), (blob(40, 30), NONE)], [(7, 0, "car"), (8, 1, "cyclist")]
     )
-    assert judge(scene, KITTI_RULES)[0]["reported_by_match"].tolist() == [ObjectClass.CAR, ObjectClass.CYCLIST, NONE]
+    assert judge(scene, KITTI_RULES).objects["reported_by_match"].tolist() == [
+        ObjectClass.CAR,
+        ObjectClass.CYCLIST,
+        NONE,
+    ]
     assert score([scene]).ranges["all"].classification["car"].objects_called == pytest.approx(1 / 3)
 
 

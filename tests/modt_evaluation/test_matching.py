@@ -136,14 +136,14 @@ def test_range(rules, counts):
 def test_frames_without_objects_or_proposals():
     objects, proposals = judged(FrameTruth.of(KITTI_TYPES, [], [], []), [], [])
     assert (len(objects), len(proposals)) == (0, 0)
-    objects, proposals, associations = judge(frame(cars(10.0), [(blob(30, 10), NONE)], []), KITTI_RULES)
+    objects, proposals, associations, _ = judge(frame(cars(10.0), [(blob(30, 10), NONE)], []), KITTI_RULES)
     assert (objects["outcome"][0], objects["track"][0], len(proposals)) == (Outcome.MISSED, NONE, 0)
     assert associations[0].similarity.shape == (1, 0)
 
 
 def test_associations_compare_by_the_points_in_common():
     blobs = [(blob(30, 10), 0), (blob(10, 10), NONE), (blob(20, 10, 5), 0)]
-    _, _, (first, second, *_) = judge(frame(cars(10.0, first_id=5), blobs, ONE), KITTI_RULES)
+    first, second, *_ = judge(frame(cars(10.0, first_id=5), blobs, ONE), KITTI_RULES).associations
     assert (first.truth.tolist(), first.track.tolist(), first.similarity.tolist()) == ([5], [7], [[0.5]])
     assert not len(second.truth)
 

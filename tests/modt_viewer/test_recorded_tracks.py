@@ -23,9 +23,10 @@ def track(id_, box, world, state="tracked", class_="car"):
     """A track of a line of tracks.jsonl."""
     return {
         "id": id_, "state": state, "class": class_, "posterior": [0.1, 0.7, 0.15, 0.05],
-        "witness": [0.0, 1.5, -0.6, 0.2], "viewed": True, "final": False,
+        "witness": [0.0, 1.5, -0.6, 0.2], "viewed": True, "final": False, "heading_known": False, "size": [0.0] * 3,
+        "motion": "unknown", "moving": 0.5, "velocity": [0.0] * 2, "velocity_covariance": [0.0] * 3,
         "proposal": None if box is None else 0, "points": 12, "age": 3, "missed": 0,
-        "box": None if box is None else dict(zip(BOX_KEYS, box, strict=True)),
+        **dict.fromkeys(("box", "seen"), None if box is None else dict(zip(BOX_KEYS, box, strict=True))),
         "world": dict(zip(WORLD_KEYS, world, strict=True)),
     }  # fmt: skip
 
@@ -38,8 +39,9 @@ def posts(x):
 def recorded(at, *tracks, **more):
     """The result of a line of tracks.jsonl, `at` metres along the world's x, where the sensor looks along its y."""
     T = se3(rotation_zyx(0.0, 0.0, np.pi / 2), np.array([at, 0.0, 0.0]))
-    counts = {"proposals": 1, "classifications": 0, "deferred": 0, "T_world_sensor": T[:3].ravel().tolist()}
-    return recorded_result({"frame": at, "stamp_s": 0.0, "tracks": [*tracks], **counts, **more})
+    counts = {"proposals": 1, "classifications": 0, "deferred": 0, "classified": [], "run": None}
+    pose = {"frame": at, "stamp_s": 0.0, "T_world_sensor": T[:3].ravel().tolist()}
+    return recorded_result({**pose, "tracks": [*tracks], **counts, **more})
 
 
 def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():

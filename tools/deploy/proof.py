@@ -91,38 +91,45 @@ def prepare(root: Path) -> None:
     (units / "proof.service").write_text(DRIVER.format(python=INTERPRETER, steps="/srv/modt/steps.py"))
 
 
+def report_of(base: Path) -> str:
+    """Boot a copy of this system, whose files lie in a folder, and let it prove the unit; returns the report."""
+    for name in ("prepared", "report", "work"):
+        (base / name).mkdir()
+    prepare(base / "prepared")
+    mounts = {PYTHON: Path(sys.base_prefix).resolve(), LIBRARIES: sysconfig.get_path("purelib"), PACKAGE: ROOT}
+    shared = "\n".join(f"mkdir -p .{place}; mount --rbind {path} .{place}" for place, path in mounts.items())
+    script = BOOT.format(
+        lower="/", work=base / "work", prepared=base / "prepared", report=base / "report", shared=shared
+    )
+    (base / "boot.sh").write_text(script)
+    namespaces = ["--mount", "--pid", "--fork", "--kill-child", "--ipc", "--uts", "--cgroup", "--net"]
+    command = ["unshare", *namespaces, "sh", str(base / "boot.sh")]
+    report = base / "report" / "report.txt"
+    end_s = time.monotonic() + LIMIT_S
+    text = ""
+    system = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        while time.monotonic() < end_s and system.poll() is None and not text.endswith(END):
+            time.sleep(0.2)
+            text = report.read_text() if report.exists() else ""
+    finally:
+        system.kill()  # --kill-child ends all its processes
+        system.wait()
+    return text
+
+
 def main(arguments: list[str] | None = None) -> int:
     parser(__doc__).parse_args(arguments)
     if os.geteuid() or shutil.which("systemctl") is None:
         raise SystemExit("proof: needs root and systemd")
     with tempfile.TemporaryDirectory() as folder:
-        base = Path(folder)
-        for name in ("prepared", "report", "work"):
-            (base / name).mkdir()
-        prepare(base / "prepared")
-        mounts = {PYTHON: Path(sys.base_prefix).resolve(), LIBRARIES: sysconfig.get_path("purelib"), PACKAGE: ROOT}
-        shared = "\n".join(f"mkdir -p .{place}; mount --rbind {path} .{place}" for place, path in mounts.items())
-        script = BOOT.format(
-            lower="/", work=base / "work", prepared=base / "prepared", report=base / "report", shared=shared
-        )
-        (base / "boot.sh").write_text(script)
-        namespaces = ["--mount", "--pid", "--fork", "--kill-child", "--ipc", "--uts", "--cgroup", "--net"]
-        command = ["unshare", *namespaces, "sh", str(base / "boot.sh")]
-        report = base / "report" / "report.txt"
-        end_s = time.monotonic() + LIMIT_S
-        text = ""
-        system = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-        try:
-            while time.monotonic() < end_s and system.poll() is None and not text.endswith(END):
-                time.sleep(0.2)
-                text = report.read_text() if report.exists() else ""
-        finally:
-            system.kill()  # --kill-child ends all its processes
-            system.wait()
+        text = report_of(Path(folder))
     print(text.removesuffix(END), end="")
-    whole = text.endswith(END)
-    print("verdict: " + ("good" if whole and "fail " not in text else "bad" if whole else "did not come to its end"))
-    return int(not whole or "fail " in text)
+    verdict = "did not come to its end"
+    if text.endswith(END):
+        verdict = "bad" if "fail " in text else "good"
+    print(f"verdict: {verdict}")
+    return int(verdict != "good")
 
 
 if __name__ == "__main__":

@@ -113,7 +113,8 @@ def judge_runs(arguments: argparse.Namespace) -> None:
     from modt.sources.nuscenes import read_scene, tables_of
     from modt_evaluation.engine import Engine
     from modt_evaluation.evaluation import evaluation
-    from modt_evaluation.nuscenes_results import scores_of_runs as nuscenes_scores
+    from modt_evaluation.export import Export
+    from modt_evaluation.nuscenes_results import results_of, scores
     from modt_evaluation.report import report
     from modt_evaluation.run_record import RunRecord
 
@@ -132,11 +133,13 @@ def judge_runs(arguments: argparse.Namespace) -> None:
         sensor, rows = judged[drive]
         by_sensor.setdefault(sensor, []).append(rows)
         if (tables := tables_of(labels.resolve())) is not None:
-            of_scenes.append((read_scene(*tables), RunRecord.open(run)))
+            scene = read_scene(*tables)
+            record = RunRecord.open(run)
+            of_scenes.append((scene, results_of(scene, record.mount, Export(record).results())))
     sensors = {name: evaluation(drives) for name, drives in by_sensor.items()}
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
-    benchmark = nuscenes_scores(of_scenes) if of_scenes else {}
+    benchmark = scores(of_scenes) if of_scenes else {}
     if arguments.html is not None:
         from modt_profiling.reporting.view_extra import save
         from modt_viewer.evaluation_page import evaluation_page

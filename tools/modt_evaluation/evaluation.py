@@ -13,7 +13,7 @@ from modt.types import NONE
 from modt_evaluation.box_score import BoxScore, box_scores
 from modt_evaluation.class_score import ClassScore, class_scores, top_calibration_error
 from modt_evaluation.frame import JudgedFrame
-from modt_evaluation.matching import judged_rows
+from modt_evaluation.matching import judge
 from modt_evaluation.reaction import Reaction, reactions
 from modt_evaluation.rows import Association, Outcome, Rows, kinds, ratio
 from modt_evaluation.rules import Rules
@@ -103,9 +103,10 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Driv
         ValueError: there are no frames.
     """
     judged = []
-    n_proposals = classified = 0
+    n_proposals = 0
+    classified = 0
     for frame in frames:
-        judged.append(judged_rows(frame, rules, drive))
+        judged.append(judge(frame, rules, drive))
         n_proposals += frame.n_proposals
         classified += frame.classified
     if not judged:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
@@ -19,6 +21,7 @@ from modt.sinks.output import LineFile, writing
 from modt.sinks.records import BROKEN
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import FrameResult
+from modt_evaluation.nuscenes_results import results_of, scene_of, submission
 from modt_evaluation.recorded_result import recorded_result, semantic_labels
 from modt_evaluation.run_record import RunRecord, broken
 
@@ -223,19 +226,11 @@ def write_parquet(export: Export, target: Path, constants: Mapping[str, str]) ->
     text.unlink()
 
 
-def _nuscenes(task: str) -> Callable[[Export, Path], None]:
-    """Writer of nuScenes' results of a task."""
-
-    def write(export: Export, target: Path) -> None:
-        import json
-
-        from modt_evaluation.nuscenes_results import results_of, scene_of, submission
-
-        results = results_of(scene_of(export.run.stream), export.run.mount, export.results())
-        with writing(target):
-            target.write_text(json.dumps(submission(results, task)), encoding="utf-8")
-
-    return write
+def _nuscenes(export: Export, target: Path, task: str) -> None:
+    """Write nuScenes' results of a task."""
+    results = results_of(scene_of(export.run.stream), export.run.mount, export.results())
+    with writing(target):
+        target.write_text(json.dumps(submission(results, task)), encoding="utf-8")
 
 
 FORMS: dict[str, Callable[[Export, Path], None]] = {
@@ -244,6 +239,6 @@ FORMS: dict[str, Callable[[Export, Path], None]] = {
     "semantickitti": _semantickitti,
     "csv": _csv,
     "parquet": _parquet,
-    "nuscenes_detection": _nuscenes("detection"),
-    "nuscenes_tracking": _nuscenes("tracking"),
+    "nuscenes_detection": partial(_nuscenes, task="detection"),
+    "nuscenes_tracking": partial(_nuscenes, task="tracking"),
 }

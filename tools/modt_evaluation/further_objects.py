@@ -106,7 +106,8 @@ def _label(fields: dict[str, str]) -> Label:
     """
     frame = int(fields["frame"])
     number = int(fields["object"])
-    x, y, foot, length, width, height, yaw = values = [float(fields[name]) for name in NUMBERS]
+    values = [float(fields[name]) for name in NUMBERS]
+    x, y, foot, length, width, height, yaw = values
     box = np.array([x, y, foot + height / 2, length, width, height, yaw])
     possible = 0 <= frame <= MAX_FRAME and 0 <= number <= MAX_ID and (np.abs(values) <= MAX_NUMBER).all()
     if not possible or min(length, width, height) <= 0:

@@ -13,37 +13,37 @@ WITHOUT_RIDER = ".without_rider"
 """Suffix of the types of nuScenes' bicycles and motorcycles that nobody rides."""
 
 
-def _types(**names_of: str) -> dict[str, tuple[int, Role]]:
-    """Types by the name of a role here, and the names of the classes; each value lists names, separated by `, `."""
-    types = {name: globals()[role] for role, names in names_of.items() for name in names.split(", ")}
-    return {**types, **LABELLED_TYPES}
+def _types(large_vehicle: str = "", carried: str = "", *, background: str) -> dict[str, tuple[int, Role]]:
+    """Types of three roles, each a list of names separated by `, `, and the names of the classes."""
+    roles = {LARGE_VEHICLE: large_vehicle, CARRIED: carried, BACKGROUND: background}
+    return {name: role for role, names in roles.items() for name in names.split(", ")} | dict(LABELLED_TYPES)
 
 
 KITTI_NAMES: Types = {**dict.fromkeys(("Truck", "Tram", "Misc", "DontCare", "Forklift"), BACKGROUND), **KITTI_TYPES}
 NUSCENES_TYPES = _types(
-    LARGE_VEHICLE="vehicle.truck, vehicle.trailer, vehicle.construction, vehicle.bus.bendy, vehicle.bus.rigid, "
+    large_vehicle="vehicle.truck, vehicle.trailer, vehicle.construction, vehicle.bus.bendy, vehicle.bus.rigid, "
     "vehicle.emergency.ambulance, vehicle.emergency.police",
-    CARRIED="human.pedestrian.personal_mobility, human.pedestrian.stroller, human.pedestrian.wheelchair",
-    BACKGROUND="vehicle.bicycle.without_rider, vehicle.motorcycle.without_rider, vehicle.ego, animal, "
+    carried="human.pedestrian.personal_mobility, human.pedestrian.stroller, human.pedestrian.wheelchair",
+    background="vehicle.bicycle.without_rider, vehicle.motorcycle.without_rider, vehicle.ego, animal, "
     "movable_object.barrier, movable_object.debris, movable_object.pushable_pullable, movable_object.trafficcone, "
     "static_object.bicycle_rack, static.manmade, static.other, static.vegetation, noise, flat.driveable_surface, "
     "flat.other, flat.sidewalk, flat.terrain",
 )
 ARGOVERSE_TYPES = _types(
-    LARGE_VEHICLE="LARGE_VEHICLE, BUS, BOX_TRUCK, TRUCK, TRUCK_CAB, SCHOOL_BUS, ARTICULATED_BUS, VEHICULAR_TRAILER, "
+    large_vehicle="LARGE_VEHICLE, BUS, BOX_TRUCK, TRUCK, TRUCK_CAB, SCHOOL_BUS, ARTICULATED_BUS, VEHICULAR_TRAILER, "
     "MESSAGE_BOARD_TRAILER, RAILED_VEHICLE, TRAFFIC_LIGHT_TRAILER",
-    CARRIED="STROLLER, WHEELCHAIR",
-    BACKGROUND="BICYCLE, MOTORCYCLE, WHEELED_DEVICE, DOG, ANIMAL, BOLLARD, CONSTRUCTION_BARREL, CONSTRUCTION_CONE, "
+    carried="STROLLER, WHEELCHAIR",
+    background="BICYCLE, MOTORCYCLE, WHEELED_DEVICE, DOG, ANIMAL, BOLLARD, CONSTRUCTION_BARREL, CONSTRUCTION_CONE, "
     "SIGN, STOP_SIGN, MOBILE_PEDESTRIAN_CROSSING_SIGN, MOBILE_PEDESTRIAN_SIGN",
 )
 OTHER_TYPES = _types(
-    LARGE_VEHICLE="truck, bus, trailer, construction_vehicle, Bus",
-    BACKGROUND="background, bicycle, motorcycle, barrier, traffic_cone, Static, Motor, ParkedBicycle, "
+    large_vehicle="truck, bus, trailer, construction_vehicle, Bus",
+    background="background, bicycle, motorcycle, barrier, traffic_cone, Static, Motor, ParkedBicycle, "
     "ParkedMotorcycle, TYPE_SIGN, TYPE_UNKNOWN, Unknown, Other",
 )
 """Names of benchmarks, of Waymo and of our own tables."""
 PANDASET_BACKGROUND = _types(
-    BACKGROUND="Bicycle, Motorized Scooter, Personal Mobility Device, Animals - Bird, Animals - Other, "
+    background="Bicycle, Motorized Scooter, Personal Mobility Device, Animals - Bird, Animals - Other, "
     "Construction Signs, Cones, Emergency Vehicle, Other Vehicle - Pedicab, Other Vehicle - Uncommon, Pylons, "
     "Road Barriers, Rolling Containers, Signs, Temporary Construction Barriers, Train, Tram / Subway, Trolley"
 )

@@ -32,17 +32,7 @@ class JudgedRows(NamedTuple):
     reported: Rows
 
 
-def judge(
-    frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None
-) -> tuple[Rows, Rows, tuple[Association, ...]]:
-    """The rows of a frame's objects and of its tracked proposals, and the associations of each class.
-
-    `points` are the points of the labelled objects, where they are known.
-    """
-    return judged_rows(frame, rules, drive, points)[:3]
-
-
-def judged_rows(frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None) -> JudgedRows:
+def judge(frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None) -> JudgedRows:
     """All rows of a frame; `points` are the points of the labelled objects, where they are known."""
     overlap = Overlap.of(frame, points)
     objects = _objects(frame, overlap, rules)
@@ -54,8 +44,9 @@ def judged_rows(frame: JudgedFrame, rules: Rules, drive: int = 0, points: Object
     proposals["track"][frame.of_track] = frame.track
     proposals["reported"][frame.of_track] = frame.reported
     proposals["posterior"][frame.of_track] = frame.posterior
-    objects["drive"] = proposals["drive"] = drive
-    objects["frame"] = proposals["frame"] = frame.index
+    for rows in (objects, proposals):
+        rows["drive"] = drive
+        rows["frame"] = frame.index
     best = proposals[overlap.best]
     objects["reported"] = np.where(objects["outcome"] == Outcome.DETECTED, best["reported"], NONE)
     objects["reported_by_match"] = np.where(pairs, best["reported"], NONE)

@@ -15,9 +15,7 @@ from modt.geometry import inverse, transform_boxes
 from modt.placement import Mount
 from modt.sources import nuscenes
 from modt.types import NONE, Float64, Frame, FrameResult, Int, MotionState, Tracks
-from modt_evaluation.export import Export
 from modt_evaluation.recorded_result import NO_POINTS
-from modt_evaluation.run_record import RunRecord
 
 NAMES = {ObjectClass.CAR: "car", ObjectClass.PEDESTRIAN: "pedestrian", ObjectClass.CYCLIST: "bicycle"}
 """nuScenes' name of each class; riders of motorcycles are cyclists too."""
@@ -156,15 +154,6 @@ class Boxes:
             np.array([row["velocity"] for row in rows], np.float64).reshape(-1, 2),
             np.array([row.get("detection_score", -1.0) for row in rows]),
         )
-
-
-def scores_of_runs(runs: Sequence[tuple[nuscenes.Scene, RunRecord]]) -> dict[str, NuscenesScore]:
-    """Score of each class over some runs of scenes.
-
-    Raises:
-        MisuseError: a record or a table is broken.
-    """
-    return scores([(scene, results_of(scene, run.mount, Export(run).results())) for scene, run in runs])
 
 
 def scores(runs: Sequence[tuple[nuscenes.Scene, Results]]) -> dict[str, NuscenesScore]:

@@ -23,25 +23,24 @@ NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
 
 
 def _symmetric(row: dict[str, Any]) -> list[list[float]]:
-    xx, xy, yy = row.get("velocity_covariance", [0.0] * 3)
+    xx, xy, yy = row["velocity_covariance"]
     return [[xx, xy], [xy, yy]]
 
 
 _COLUMNS: dict[str, Callable[[dict[str, Any]], Any]] = {
-    **{name: itemgetter(name) for name in ("id", "final", "points", "age", "missed", "posterior")},
+    **{name: itemgetter(name) for name in ("id", "final", "points", "age", "missed", "posterior", "velocity")},
     "key_points": itemgetter("viewed"),
     "object_class": lambda row: CLASS_NAMES.index(row["class"]),
-    "motion_evidence": lambda row: row.get("witness", [0.0] * len(CLASS_NAMES)),
-    "size_m": lambda row: row.get("size", [0.0] * 3),
-    "motion": lambda row: MOTION_NAMES.index(row.get("motion", "unknown")),
-    "moving_probability": lambda row: row.get("moving", 0.5),
-    "velocity": lambda row: row.get("velocity", [0.0] * 2),
+    "motion_evidence": itemgetter("witness"),
+    "size_m": itemgetter("size"),
+    "motion": lambda row: MOTION_NAMES.index(row["motion"]),
+    "moving_probability": itemgetter("moving"),
     "velocity_covariance": _symmetric,
-    "heading_known": lambda row: row.get("heading_known", False),
+    "heading_known": itemgetter("heading_known"),
     "proposal": lambda row: NONE if row["proposal"] is None else row["proposal"],
     "x": lambda row: [row["world"][key] for key in WORLD_KEYS],
 }
-"""Entry of each column that a recorded track has; runs of earlier versions lack those with a default."""
+"""Entry of each column that a recorded track has."""
 
 
 @np.errstate(over="raise", invalid="raise")
@@ -69,20 +68,14 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     in_view = [row for row in rows if row["proposal"] is not None]
     whole = _boxes([row["box"] for row in in_view])
     tracks.whole_box[seen] = transform_boxes(T_world_sensor, whole)
-    boxes = _boxes([seen_box(row) for row in in_view])
+    boxes = _boxes([row["seen"] for row in in_view])
     tracks.box[seen] = transform_boxes(T_world_sensor, boxes)
     proposals = _proposals(int(record["proposals"]))
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
-    classified = np.array(record.get("classified", []), np.int64)
-    run_id = record.get("run") or ""
+    classified = np.array(record["classified"], np.int64)
+    run_id = record["run"] or ""
     return FrameResult(frame, T_world_sensor, proposals, tracks, names, int(record["deferred"]), classified, run_id)
-
-
-def seen_box(row: dict[str, Any]) -> dict[str, float]:
-    """What the frame shows of a track in view; in runs of earlier versions that is `box`."""
-    seen: dict[str, float] = row.get("seen", row["box"])
-    return seen
 
 
 def _boxes(rows: list[dict[str, float]]) -> Float64:

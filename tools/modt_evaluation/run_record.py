@@ -69,6 +69,18 @@ class FramesByNumber:
             self._next = next(self._frames, None)
         return self._next if self._next is not None and self._next.index == number else None
 
+    def points(self, number: int, place: str) -> Float32:
+        """(N, 4) points of a frame whose record is at a place.
+
+        Raises:
+            MisuseError: the stream does not hold it.
+        """
+        frame = self.get(number)
+        if frame is None:
+            cause = f"{self._stream.info.name} has no sweep {number} that can be read"
+            raise MisuseError(place, cause, f"restore it, or {WRONG_TRUTH}")
+        return frame.points
+
 
 LABELS = "labels"
 """Folder of the labels that replay --labels writes."""
@@ -185,16 +197,13 @@ class RunRecord:
             if labels is None:
                 cause = f"frame {index} is not in the truth, which has {len(truth.frames)} frames"
                 raise MisuseError(place, cause, WRONG_TRUTH)
-            sweep = sweeps.get(index)
-            if sweep is None:
-                cause = f"{stream.info.name} has no sweep {index} that can be read"
-                raise MisuseError(place, cause, f"restore it, or {WRONG_TRUTH}")
-            proposals = self.proposals(index) if proposed is None else proposed(record, sweep.points)
-            if len(proposals) != len(sweep.points):
-                cause = f"{len(proposals)} labels for a scan of {len(sweep.points)} points"
+            points = sweeps.points(index, place)
+            proposals = self.proposals(index) if proposed is None else proposed(record, points)
+            if len(proposals) != len(points):
+                cause = f"{len(proposals)} labels for a scan of {len(points)} points"
                 raise MisuseError(self._labels(index), cause, WRONG_TRUTH)
             judged = JudgedFrame.of_result(result, labels, fov)
-            yield replace(judged, points=sweep.points, proposal=proposals, classified=n_classified)
+            yield replace(judged, points=points, proposal=proposals, classified=n_classified)
 
     def _fov(self, stream: Stream) -> FieldOfView:
         """The field of view of the run.

@@ -71,7 +71,9 @@ def _score(all_rows: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
     histories: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for drive, id_, frame, track in seen[["drive", "id", "frame", "track"]].tolist():
         histories.setdefault((drive, id_), []).append((frame, track))
-    breaks = taken = returned = 0
+    breaks = 0
+    taken = 0
+    returned = 0
     for (drive, _), history in histories.items():
         past = set()
         for (_, before), (frame, track) in pairwise(sorted(history)):

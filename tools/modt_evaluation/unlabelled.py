@@ -20,7 +20,7 @@ from modt.types import Bool, Float64, Int
 from modt_evaluation.further_objects import COLUMNS
 from modt_evaluation.matching import most_in_sector
 from modt_evaluation.overlap import FOOT_M, Overlap
-from modt_evaluation.recorded_result import recorded_pose, seen_box
+from modt_evaluation.recorded_result import recorded_pose
 from modt_evaluation.run_record import RunRecord, broken
 from modt_evaluation.truth import Truth
 
@@ -157,8 +157,7 @@ def _sightings(run: RunRecord, truth: Truth) -> dict[int, list[Sighting]]:
             pose = recorded_pose(record)
             for track in record["tracks"]:
                 if track["proposal"] is not None and free[track["proposal"]]:
-                    seen = seen_box(track)
-                    box = [float(seen[key]) for key in BOX_KEYS]
+                    box = [float(track["seen"][key]) for key in BOX_KEYS]
                     rows[track["id"]].append(Sighting(frame.index, stamp_s, box, pose, track["class"]))
         except BROKEN as error:
             raise broken(place, error) from None

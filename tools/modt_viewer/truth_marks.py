@@ -14,7 +14,6 @@ from modt.types import NONE, Float32, Int
 from modt.viewer.theme import COLOURS, Entry
 from modt_evaluation.matching import judge
 from modt_evaluation.overlap import inside
-from modt_evaluation.recorded_result import seen_box
 from modt_evaluation.rows import Rows
 from modt_evaluation.run_record import LABELS, RunRecord
 from modt_evaluation.truth import FrameTruth, Truth
@@ -48,10 +47,10 @@ def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int
     marks = {}
     labelled = ((place, record) for place, record in run.records() if record["frame"] in truth.frames)
     for frame in run.frames(truth, None if exact else points_in_boxes, stream, labelled):
-        objects, proposals, _ = judge(frame, truth.rules)
-        called = proposals[proposals["to_report"] & (proposals["reported"] > 0)]
+        rows = judge(frame, truth.rules)
+        called = rows.proposals[rows.proposals["to_report"] & (rows.proposals["reported"] > 0)]
         false = called["track"][called["reported"] != called["box_class"]]
-        marks[frame.index] = {"truth": _objects(frame.truth, objects), "false": false.tolist()}
+        marks[frame.index] = {"truth": _objects(frame.truth, rows.objects), "false": false.tolist()}
     if not marks:
         cause = f"none of its frames is in the truth, which has {len(truth.frames)}"
         raise MisuseError(run.path, cause, "give the truth of the run's own recording")
@@ -75,8 +74,7 @@ def points_in_boxes(record: dict[str, Any], points: Float32) -> Int:
     found = np.full(len(points), NONE, np.int64)
     for track in record["tracks"]:
         if track["box"] is not None:
-            shown = seen_box(track)
-            box = np.array([shown[key] for key in BOX_KEYS])
+            box = np.array([track["seen"][key] for key in BOX_KEYS])
             reach = np.hypot(box[3], box[4]) / 2 + MARGIN_M
             near = order[slice(*np.searchsorted(sorted_x, [box[0] - reach, box[0] + reach]))]
             found[near[inside(points[near], box, MARGIN_M, -MARGIN_M)]] = track["proposal"]

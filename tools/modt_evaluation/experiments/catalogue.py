@@ -30,8 +30,10 @@ DETECTION = "det_only"
 TRACKING = "with_trk"
 """Views fused along a track, by the paper's name."""
 IDEAL = "ideal detector, ideal tracker"
-ALPHAS = tuple(k / 50 for k in range(26))
-START_FRAMES = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60)
+ALPHAS = {alpha: {"point_change": (alpha,) * 4} for alpha in (k / 50 for k in range(26))}
+"""Keys of fusion by alpha."""
+START_FRAMES = {float(n): {"start_frame": n} for n in (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60)}
+"""Keys of fusion by the starting frame."""
 RANGES_M = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0)
 RANGE = "range of interest [m]"
 
@@ -66,14 +68,6 @@ def _labels(config: ProfileConfig) -> dict[Label, Replay]:
 def _pair(config: ProfileConfig, ideal: bool) -> dict[Label, Replay]:
     modes = {DETECTION: "conventional", TRACKING: "accurate"}
     return {(name, None): NetworkReplay(config, mode, ideal=ideal) for name, mode in modes.items()}
-
-
-def _of_alpha(config: ProfileConfig) -> dict[Label, Replay]:
-    return _fused(config, {alpha: {"point_change": (alpha,) * 4} for alpha in ALPHAS})
-
-
-def _of_start(config: ProfileConfig) -> dict[Label, Replay]:
-    return _fused(config, {float(n): {"start_frame": n} for n in START_FRAMES})
 
 
 def _fused(config: ProfileConfig, swept: Mapping[float, Mapping[str, Any]]) -> dict[Label, Replay]:
@@ -151,7 +145,7 @@ _ALL = (
     Experiment(
         "fig10",
         "Fig. 10: average precision against alpha, real detector, ideal tracker",
-        _of_alpha,
+        partial(_fused, swept=ALPHAS),
         _swept,
         "alpha",
         note="alpha: relative change of points by which a view of any class is independent (Equation 4).",
@@ -159,7 +153,7 @@ _ALL = (
     Experiment(
         "fig11",
         "Fig. 11: average precision against the starting frame, real detector, ideal tracker",
-        _of_start,
+        partial(_fused, swept=START_FRAMES),
         _swept,
         "starting frame",
         note="Age of a track from which views are fused.",

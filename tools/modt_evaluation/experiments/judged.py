@@ -94,9 +94,10 @@ class NetworkReplay:
         for made in known.frames:
             result = pipeline.step(made.frame, budget)
             frame = JudgedFrame.of_result(result, made.truth, known.fov)
-            objects, proposals, _ = judge(frame, known.rules, points=made.objects)
+            rows = judge(frame, known.rules, points=made.objects)
             calls = table(CALL, len(result.classified), track=result.classified)
-            frames.append(Judged(table(FRAME, 1, proposals=len(result.proposals)), objects, proposals, calls))
+            frame_row = table(FRAME, 1, proposals=len(result.proposals))
+            frames.append(Judged(frame_row, rows.objects, rows.proposals, calls))
         return Judged.joined(frames)
 
     def _pipeline(self, known: SegmentedDrive) -> Pipeline:

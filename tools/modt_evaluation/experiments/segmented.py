@@ -117,10 +117,9 @@ def _ideal_tracks(drive: SegmentedDrive, tracking: TrackingConfig, period_s: flo
 def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: PoseEstimator) -> Iterator[Int]:
     rows: dict[tuple[str, int], int] = {}
     for made in drive.frames:
-        frame, proposals = made.frame, made.proposals
-        located = odometry.locate(frame, proposals, tracker.static_tracks)
-        motion = tracker.track(frame.stamp_s, proposals, located).motion
-        id_of_proposal = motion.id[motion.row_of_proposal(len(proposals))].tolist()
+        located = odometry.locate(made.frame, made.proposals, tracker.static_tracks)
+        motion = tracker.track(made.frame.stamp_s, made.proposals, located).motion
+        id_of_proposal = motion.id[motion.row_of_proposal(len(made.proposals))].tolist()
         objects = _object_of_proposal(made)
         keys = [("object", k) if k != NONE else ("other", i) for k, i in zip(objects, id_of_proposal, strict=True)]
         yield np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
@@ -203,7 +202,8 @@ class IdealTracking(PlayedBack):
         self, stamp_s: float, proposals: Proposals, located: Located, points: Float32 | None = None
     ) -> TrackedFrame:
         """The table with a row for each track of the drive."""
-        t, rows = self._tracks, next(self._rows)[self._which]
+        t = self._tracks
+        rows = next(self._rows)[self._which]
         t.proposal[:] = NONE
         t.proposal[rows] = np.arange(len(rows))
         t.points[rows] = proposals.count
