@@ -52,34 +52,24 @@ function drawPoints() {
   if (!pixels || pixels.width !== width || pixels.height !== height) pixels = context.createImageData(width, height);
   const out = new Int32Array(pixels.data.buffer);
   out.fill(colours.paperPixel);
-  if (sweep && state.points && state.deep) drawDeepPoints(out);
-  else if (sweep && state.points) {
-    const { x, y, look } = sweep, { metre, up } = state, palette = palettes[state.kinds];
-    const size = Math.max(1, Math.min(4, Math.round((metre * run.points.step_cm) / 100)));
-    const [xx, xy] = up ? [0, -metre] : [metre, 0], [yx, yy] = up ? [-metre, 0] : [0, -metre];
-    for (const ground of [true, false]) // what stands lies above the ground
-      for (let k = 0; k < x.length; k++) {
-        if (((look[k] & 63) === 0) !== ground) continue;
-        const px = (state.x + xx * x[k] + xy * y[k]) | 0, py = (state.y + yx * x[k] + yy * y[k]) | 0;
-        if (px < 0 || py < 0 || px + size > width || py + size > height) continue;
-        for (let dy = 0; dy < size; dy++)
-          for (let dx = 0; dx < size; dx++) out[(py + dy) * width + px + dx] = palette[look[k]];
-      }
-  }
+  if (sweep && state.points) drawCells(out);
   context.putImageData(pixels, 0, 0);
 }
 
-function drawDeepPoints(out) {
-  const { width, height } = canvas, { x, y, look } = sweep, palette = palettes[state.kinds || "quiet"], camera = eye();
-  const { level_m, step_cm } = run.points;
+// The cells of the sweep as squares, those of the ground first: what stands lies above it.
+function drawCells(out) {
+  const { width, height } = canvas, { x, y, look } = sweep, { level_m, step_cm } = run.points, camera = eye();
+  const palette = palettes[state.kinds || (state.deep && "quiet")];
   for (const ground of [true, false])
     for (let k = 0; k < x.length; k++) {
       const level = look[k] & 63;
       if ((level === 0) !== ground) continue;
-      const [u, v, depth] = projected(x[k], y[k], level * level_m, camera);
-      const size = Math.max(1, Math.min(4, Math.round(camera.focal * step_cm / (100 * depth))));
+      const [u, v, depth] = state.deep ? projected(x[k], y[k], level * level_m, camera) : screen(x[k], y[k]);
+      if (depth < NEAREST_M) continue;
+      const metre = state.deep ? camera.focal / depth : state.metre; // pixels
+      const size = Math.max(1, Math.min(4, Math.round(metre * step_cm / 100)));
       const px = u | 0, py = v | 0;
-      if (depth < NEAREST_M || px < 0 || py < 0 || px + size > width || py + size > height) continue;
+      if (px < 0 || py < 0 || px + size > width || py + size > height) continue;
       for (let dy = 0; dy < size; dy++) out.fill(palette[look[k]], (py + dy) * width + px, (py + dy) * width + px + size);
     }
 }

@@ -30,7 +30,10 @@ function reset() {
 }
 
 function zoom(factor, px = canvas.width / 2, py = canvas.height / 2) {
-  if (state.deep) return void (state.away = Math.max(4, Math.min(150, state.away / factor)));
+  if (state.deep) {
+    state.away = Math.max(4, Math.min(150, state.away / factor));
+    return;
+  }
   const metre = Math.max(1, Math.min(400, state.metre * factor));
   state.x = px + (state.x - px) * metre / state.metre;
   state.y = py + (state.y - py) * metre / state.metre;
@@ -39,21 +42,27 @@ function zoom(factor, px = canvas.width / 2, py = canvas.height / 2) {
 
 // Turn the view in perspective, or move it from above, by a way on the canvas.
 function drag(dx, dy) {
-  if (!state.deep) return void ([state.x, state.y] = [state.x + dx, state.y + dy]);
-  state.turn += 3 * dx / canvas.width;
-  state.tilt = Math.max(0.08, Math.min(1.5, state.tilt + 2 * dy / canvas.height));
+  if (state.deep) {
+    state.turn += 3 * dx / canvas.width;
+    state.tilt = Math.max(0.08, Math.min(1.5, state.tilt + 2 * dy / canvas.height));
+  } else {
+    state.x += dx;
+    state.y += dy;
+  }
 }
 
 // The nearest box at a place of the canvas; where several lie there, an object before background, a seen one before a lost one.
 function trackAt(px, py) {
-  const near = 12 * dot;
-  let best = null, least = Infinity;
+  let best = null, least = 12 * dot; // a box farther away is not meant
   const rows = [...(rowsAt[state.at] || [])].sort((a, b) => Boolean(b.class) - Boolean(a.class) || b.seen - a.seen);
   for (const row of rows) {
     if (!isShown(row)) continue;
     const [left, top, right, bottom] = bounds(shape(row));
     const off = Math.hypot(Math.max(left - px, px - right, 0), Math.max(top - py, py - bottom, 0));
-    if (off < near && off < least) [best, least] = [row.id, off];
+    if (off < least) {
+      best = row.id;
+      least = off;
+    }
   }
   return best;
 }
