@@ -31,7 +31,7 @@ import numpy as np
 
 from modt.types import Frame
 from modt_simulation.synthetic_stream import SyntheticStream
-from tools.deploy.faults import FAULTS
+from tools.deploy.faults import FAULTS, NO_FAULT
 from tools.deploy.sender import Faulty
 from tools.fault_pairs import CHANGES, SECONDS, SENSOR, Change, moved_by, overlapping, pair_options
 from tools.send.ideal_packets import packets_of
@@ -207,7 +207,7 @@ class Sender:
     def _switch(self, before: int, sweep: int) -> None:
         """Begin and end the faults of the network, and send the signals that are due."""
         named = [e.fault.name for e in self._active(sweep) if e.fault.name in NETWORK]
-        self._faulty.fault = next((f for f in FAULTS if f.name in named), self._faulty.none)
+        self._faulty.fault = next((f for f in FAULTS if f.name in named), NO_FAULT)
         for episode in self._pair:
             if before < episode.begin <= sweep:
                 for number in episode.fault.signals:

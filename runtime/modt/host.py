@@ -22,6 +22,8 @@ _MAX_HELPER_SHARE = 0.01
 """The process counts as single-threaded if other threads use at most this share of the CPU time of the loop."""
 SWITCH_S = 0.0005
 """Time for which another thread may keep the interpreter from the loop [s]; Python's default is 5 ms."""
+PRIORITY = 10
+"""Real-time priority of the loop, of 1 to 99."""
 _MCL_CURRENT = 1  # mlockall(2)
 _MCL_FUTURE = 2
 _MCL_ONFAULT = 4
@@ -86,7 +88,7 @@ def threads_on(cores: frozenset[int] | None) -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-def take_real_time_priority(priority: int = 10) -> list[str]:
+def take_real_time_priority() -> list[str]:
     """Give this thread real-time priority (SCHED_FIFO), and keep the memory of the process from being swapped out.
 
     Threads that are started later have ordinary priority. Returns one line for each refusal, with its remedy.
@@ -96,9 +98,9 @@ def take_real_time_priority(priority: int = 10) -> list[str]:
     if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK != os.SCHED_FIFO:
         try:
             policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-            os.sched_setscheduler(0, policy, os.sched_param(priority))
+            os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
         except OSError as error:
-            cause, remedy = fifo_refusal(priority)
+            cause, remedy = fifo_refusal(PRIORITY)
             refusals.append(f"ordinary priority: SCHED_FIFO is not permitted: {cause or error.strerror}; {remedy}")
     cause = _lock_memory()
     if cause:

@@ -50,7 +50,9 @@ class World:
     """
 
     def __init__(self, core: int | None, hogs: int, *, fifo: bool) -> None:
-        self.disk_full = self.meter_lost = self.stage_broken = False
+        self.disk_full = False
+        self.meter_lost = False
+        self.stage_broken = False
         self._core = core
         self._n_hogs = hogs
         self._fifo = fifo

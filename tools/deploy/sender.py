@@ -38,8 +38,6 @@ class Faulty:
         fault: the present one.
     """
 
-    none = NO_FAULT
-
     def __init__(self) -> None:
         self.fault = NO_FAULT
         self._set_s = 0.0

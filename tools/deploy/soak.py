@@ -109,9 +109,9 @@ class FaultyReader:
         self._sender = sender
         self._world = world
         self._rng = np.random.default_rng(seed)
-        self._begin_s = self._rest_s = time.monotonic()
-        self._rest_s += WARM_UP_S
-        self._end_s = self._begin_s + seconds
+        began_s = time.monotonic()
+        self._rest_s = began_s + WARM_UP_S  # time until which there is no fault
+        self._end_s = began_s + seconds
         self._waiting: list[Fault] = []
         self.service: Service | None = None
         self.episodes: list[Episode] = []
@@ -280,7 +280,8 @@ def soak(given: argparse.Namespace) -> list[str]:
         source.reader = reader
         request = Request(profile=[given.profile] if given.profile else ())
         service = build.service(request, source, {"results": log}, given.out, None, core, ["soak"])
-    log.service = reader.service = service
+    log.service = service
+    reader.service = service
     try:
         service.run(Notifier())
     finally:

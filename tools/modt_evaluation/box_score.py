@@ -10,6 +10,7 @@ import numpy as np
 from modt.class_sizes import IS_VEHICLE
 from modt.classes import CLASS_NAMES
 from modt.types import Bool, Float64
+from modt_evaluation.class_score import envelope, precision_recall
 from modt_evaluation.rows import Rows
 from modt_evaluation.truth import CLASSIFIED, Role
 
@@ -98,13 +99,9 @@ def average_precision(reported: Rows, min_iou: float, n: int) -> float | None:
         return None
     right = reported["iou"] >= min_iou
     judged: Bool = np.where(right, reported["iou_judged"], reported["to_report"])
-    rows = reported[judged]
-    hit = right[judged][np.argsort(-rows["score"], kind="stable")]
-    true = np.cumsum(hit)
-    precision = true / np.arange(1, len(true) + 1)
-    envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    first = np.searchsorted(true / n, RECALLS - 1e-9)
-    return float(np.append(envelope, 0.0)[first].mean())
+    _, precision, recall = precision_recall(reported["score"][judged], right[judged], n)
+    first = np.searchsorted(recall, RECALLS - 1e-9)
+    return float(np.append(envelope(precision), 0.0)[first].mean())
 
 
 def _mean(values: Float64) -> float | None:

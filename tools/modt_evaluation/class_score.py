@@ -73,9 +73,13 @@ def precision_recall(score: Float64, hit: Bool, n: int) -> tuple[Float64, Float6
     return score[order], true / np.arange(1, len(true) + 1), true / max(n, 1)
 
 
+def envelope(precision: Float64) -> Float64:
+    """Greatest precision at each recall or a greater one, along the last axis."""
+    return np.asarray(np.maximum.accumulate(precision[..., ::-1], axis=-1)[..., ::-1])
+
+
 def _area(precision: Float64, recall: Float64) -> float:
-    envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    return float(np.sum(np.diff(recall, prepend=0.0) * envelope))
+    return float(np.sum(np.diff(recall, prepend=0.0) * envelope(precision)))
 
 
 def _sampled(threshold: Float64, precision: Float64, recall: Float64) -> tuple[tuple[float, float, float], ...]:

@@ -88,11 +88,6 @@ if TYPE_CHECKING:  # Matplotlib is an extra
     from matplotlib.figure import Figure
 
 Capture = Sequence[tuple[str, str]]
-PLAYER = ".html"
-PICTURE = ".svg"
-PIXELS = ".png"
-GIF = ".gif"
-MP4 = ".mp4"
 PICTURE_WIDTH = 1280
 """Width of a picture [pixel]."""
 FILM_WIDTH = 960
@@ -182,7 +177,8 @@ def _film(view: View) -> None:
     save_film(view.out, first, drawings, view.period_s)
 
 
-FORMS = {PLAYER: _player, PICTURE: _picture, PIXELS: _picture, GIF: _film, MP4: _film}
+FORMS = {".html": _player, ".svg": _picture, ".png": _picture, ".gif": _film, ".mp4": _film}
+"""Writer of a file by its suffix."""
 
 
 def save_view(
@@ -199,7 +195,8 @@ def save_view(
     if out.suffix not in FORMS:
         raise MisuseError(out, "no kind of picture", f"give a name that ends with {', '.join(FORMS)}")
     recorded = RecordedRun.read(directory)
-    first = 0 if out.suffix in (GIF, MP4) else recorded.first_object
+    write = FORMS[out.suffix]
+    first = 0 if write is _film else recorded.first_object
     at = first if frame is None else recorded.position(frame)
     stream = mark_truth(recorded, labels, source(recorded, capture))
     if stream is None and recorded.record.live:
@@ -207,7 +204,7 @@ def save_view(
     fov = FieldOfView()
     if stream is not None and stream.info.camera is not None:
         fov = inputs.field_of_view(inputs.Request(fov=recorded.facts.get("fov", "full")), stream.info)
-    FORMS[out.suffix](View(recorded, at, stream, Grid(recorded.config, fov), left_out, out))
+    write(View(recorded, at, stream, Grid(recorded.config, fov), left_out, out))
 
 
 def save_track_page(directory: Path, track: int, capture: Capture, out: Path) -> None:
@@ -225,8 +222,8 @@ def save_track_page(directory: Path, track: int, capture: Capture, out: Path) ->
 def default_name(frame: int | None, animate: bool) -> str:
     """Default name of the file."""
     if animate:
-        return f"view{MP4 if shutil.which('ffmpeg') else GIF}"
-    return f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}"
+        return "view.mp4" if shutil.which("ffmpeg") else "view.gif"
+    return "view.html" if frame is None else f"view-{frame}.svg"
 
 
 def mark_truth(recorded: RecordedRun, labels: Path | None, stream: Stream | None) -> Stream | None:

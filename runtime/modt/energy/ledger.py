@@ -17,6 +17,9 @@ PIPELINE = ("segmentation", "odometry", "tracking", "scheduling", "classificatio
 """Stages whose cost is that of the pipeline; reading and writing depend on where frames come from and go to."""
 STAGES = ("source", *PIPELINE, "sink")
 
+ROUNDS = 32
+"""Times that the overhead of a frame is measured, and number of spans in each."""
+
 Clock = Callable[[], int]
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -128,23 +131,23 @@ class Ledger:
         self._cpu_begin = cpu_ns
         self._stages = defaultdict(StageWork)
 
-    def _measure_overhead(self, spans: int = 32, rounds: int = 32) -> tuple[int, int]:
+    def _measure_overhead(self) -> tuple[int, int]:
         """Cost of a span beyond the timed call, and of a frame beyond its spans [ns], the least of the rounds."""
         span_ns = []
         frame_ns = []
-        for _ in range(rounds):
+        for _ in range(ROUNDS):
             start = self._cpu_ns()
-            for _ in range(spans):
+            for _ in range(ROUNDS):
                 _nothing()
             called = self._cpu_ns()
-            for _ in range(spans):
+            for _ in range(ROUNDS):
                 self.run("", _nothing)
             timed = self._cpu_ns()
             self._stages.update({stage: StageWork() for stage in STAGES})
             filled = self._cpu_ns()
             self.close_frame(0)
             closed = self._cpu_ns()
-            span_ns.append(max((timed - called) - (called - start), 0) // spans)
+            span_ns.append(max((timed - called) - (called - start), 0) // ROUNDS)
             frame_ns.append(max(closed - filled, 0))
         return min(span_ns), min(frame_ns)
 

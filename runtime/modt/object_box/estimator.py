@@ -33,7 +33,7 @@ UNKNOWN_RAD2 = 1e6
 
 
 class SeenBoxes:
-    """The box last seen passes for that of the whole object, as in the paper."""
+    """Takes the box last seen for that of the whole object, as in the paper."""
 
     def estimate(
         self, own: ObjectBoxes, motion: Motion, decisions: Decisions, proposals: Proposals, placement: Placement
@@ -275,8 +275,8 @@ class WholeBoxes(SeenBoxes):
         heading = state.heading[moving]
         backward = (_dot(heading, direction) < 0) & ~state.heading_known[moving]
         heading[backward] *= -1.0
-        elsewhere = _dot(heading, direction) < COS_45
-        variance = np.where(elsewhere, UNKNOWN_RAD2, state.heading_variance[moving])
+        turned_away = _dot(heading, direction) < COS_45
+        variance = np.where(turned_away, UNKNOWN_RAD2, state.heading_variance[moving])
         measured = tuning.motion_sigma_rad * tuning.motion_sigma_rad + across / square
         state.heading[moving], state.heading_variance[moving] = _turned(heading, variance, direction, measured)
         state.axis_evidence[moving] = tuning.moving_evidence

@@ -18,6 +18,8 @@ _COLUMNS = structure("ObjectBoxColumns")
 _PROPOSALS = structure("VisibleProposals")
 _FIT = structure("FitHeadings")
 _SIZES = structure("ClassSizes")
+_OF_THE_TRACKER = "box", "x", "velocity", "moved_m", "proposal", "motion"
+"""Columns that the tracker owns."""
 
 
 class NativeWholeBoxes(WholeBoxes):
@@ -70,9 +72,6 @@ class NativeWholeBoxes(WholeBoxes):
             self._sizes,
             *self._parts,
         )
-
-
-_OF_THE_TRACKER = "box", "x", "velocity", "moved_m", "proposal", "motion"
 
 
 def whole_boxes_of(kernels: GeometryKernels, tuning: ObjectBoxTuning = ObjectBoxTuning()) -> WholeBoxes:

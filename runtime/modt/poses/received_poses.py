@@ -103,8 +103,14 @@ class ReceivedPoses(PoseSource):
     def __init__(self, config: OdometryConfig, name: str) -> None:
         self.name = name
         self._poses = PoseSequence(config)
-        self.received = self.overflowed = self.used = self.posed = self.unposed = 0
+        # Messages, and those of them that the kernel dropped, that were used, and that were refused by reason
+        self.received = 0
+        self.overflowed = 0
+        self.used = 0
         self.refused: Counter[str] = Counter()
+        # Frames with a pose, and without one
+        self.posed = 0
+        self.unposed = 0
 
     @property
     def restarts(self) -> int:

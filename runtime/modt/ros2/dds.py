@@ -84,7 +84,8 @@ def participant(domain_id: int) -> Participant:
         found = _participants.get(domain_id)
         if found is None:
             _warn_of_buffer()
-            found = _participants[domain_id] = Participant(domain_id)
+            found = Participant(domain_id)
+            _participants[domain_id] = found
         return found
 
 

@@ -19,9 +19,16 @@ VARINT = 0
 FIXED_64 = 1
 TEXT = 2
 FIXED_32 = 5
-# Numbers of the fields of PointCloud, and of PackedElementField
-STAMP, FRAME, STRIDE, FIELD, DATA = 1, 2, 4, 5, 6
-NAME, OFFSET, KIND = 1, 2, 3
+# Numbers of the fields of a PointCloud
+STAMP = 1
+FRAME = 2
+STRIDE = 4
+FIELD = 5
+DATA = 6
+# Numbers of the fields of a PackedElementField
+NAME = 1
+OFFSET = 2
+KIND = 3
 
 
 def _of_json(message: bytes) -> PointCloud:

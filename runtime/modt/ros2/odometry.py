@@ -42,16 +42,7 @@ def read_odometry(message: bytes) -> OdometryMessage:
     cdr = CdrReader(message)
     stamp_s, _ = cdr.header()
     child_frame_id = cdr.text()
-    return OdometryMessage(stamp_s, child_frame_id, read_pose(cdr))
-
-
-def read_pose(cdr: CdrReader) -> Float64:
-    """(4, 4) of a geometry_msgs/Pose or Transform.
-
-    Raises:
-        MessageError: `malformed`, or `non_finite`.
-    """
-    return pose_of(cdr.doubles(7))
+    return OdometryMessage(stamp_s, child_frame_id, pose_of(cdr.doubles(7)))
 
 
 def pose_of(numbers: Float64) -> Float64:

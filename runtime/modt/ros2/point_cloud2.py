@@ -308,7 +308,8 @@ def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None
     begin_rad = float(np.angle(np.exp(1j * first).mean()))
     turned = np.mod(way * (begin_rad - bearing) + MARGIN_RAD, 2 * np.pi) - MARGIN_RAD
     inside = np.ones(len(turned), bool)
-    slope = offset_s = 0.0
+    slope = 0.0
+    offset_s = 0.0
     for _ in range(2):  # the second time with the seam where the first fit has it
         if not inside.any():
             return None, np.inf

@@ -32,7 +32,7 @@ NO_ACCELERATION = f"{8 * (6 + 36)}x"
 
 
 def detections(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
-    """vision_msgs/Detection3DArray (version 4): whole boxes and posteriors, what is published first."""
+    """vision_msgs/Detection3DArray (version 4): whole boxes and posteriors, the reported class first."""
     objects = published_objects(result, background)
     header, header_values = header_fields(result.frame.stamp_s, frame_id)
     layouts = [_detection(header, kind) for kind in range(len(KIND_NAMES))]

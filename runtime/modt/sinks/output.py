@@ -30,7 +30,7 @@ class Writer(Protocol[T_contra]):
 
     def close(self) -> None:
         """Close the files, where any stay open."""
-        return  # a default for all writers, which a body without a statement would not be
+        return  # writers inherit it; a protocol's method without a statement is abstract
 
 
 class Sink(Writer[FrameResult], Protocol):

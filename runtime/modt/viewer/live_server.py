@@ -37,7 +37,8 @@ class LiveServer(ThreadingTCPServer):
         OSError: the address cannot be bound.
     """
 
-    daemon_threads = allow_reuse_address = True
+    daemon_threads = True
+    allow_reuse_address = True
 
     def __init__(self, host: str, port: int, page: bytes) -> None:
         self.page = page

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from modt.classes import CLASS_NAMES
 from modt.types import NONE, Bool, Float64, Int
+from modt_evaluation.class_score import envelope
 from modt_evaluation.experiments.judged import Judged
 from modt_evaluation.rows import Rows
 from modt_evaluation.track_score import track_scores
@@ -126,9 +127,8 @@ class Ranking:
         drawn = weight[:, self.unit]
         true = np.cumsum(drawn * self.hit, axis=1)
         precision = true / np.maximum(np.cumsum(drawn, axis=1), 1e-9)
-        envelope = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
         wanted = weight[:, : len(self.wanted)] @ self.wanted
-        return envelope, true / np.maximum(wanted, 1e-9)[:, None]
+        return envelope(precision), true / np.maximum(wanted, 1e-9)[:, None]
 
 
 def _areas(precision: Float64, recall: Float64) -> Float64:

@@ -35,6 +35,8 @@ def nonnegative_fit(gram: Float64, moment: Float64) -> Float64:
 
 _MAX_CONDITION = 1e6
 """Condition number of the scaled regressors above which they are collinear."""
+_RESAMPLES = 1000
+"""Resamples of the windows for an interval."""
 _TAILS = (0.025, 0.975)
 """Quantiles of the intervals at 95 %."""
 
@@ -95,7 +97,7 @@ def usable_windows(lines: Iterable[EnergyWindow]) -> list[EnergyWindow]:
     return [line for line in lines if usable(line)]
 
 
-def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: int = 1000) -> Fit:
+def fit(lines: Sequence[EnergyWindow], random: np.random.Generator) -> Fit:
     """Coefficients of REGRESSORS over "modt.energy/1" lines, each at least 0.
 
     Raises:
@@ -110,7 +112,7 @@ def fit(lines: Sequence[EnergyWindow], random: np.random.Generator, resamples: i
     if condition > _MAX_CONDITION:
         raise FitError("the counts always varied together; vary rate and classification load independently")
     free, *_ = np.linalg.lstsq(X, y, rcond=None)
-    spread = _bootstrap(X, y, random, resamples) - free
+    spread = _bootstrap(X, y, random) - free
     # Resampling few windows underestimates the spread: widen by the ratio of Student's t to the normal quantile.
     wider = np.sqrt(n / (n - p)) * stats.t.ppf(_TAILS[1], n - p) / stats.norm.ppf(_TAILS[1])
     margin = wider * np.quantile(spread, _TAILS, axis=0)
@@ -161,10 +163,10 @@ def _refuse_negative(value: Float64, low: Float64, high: Float64) -> None:
         raise FitError(f"{negative}, but work gives no energy back: the readings do not follow the load")
 
 
-def _bootstrap(X: Float64, y: Float64, random: np.random.Generator, resamples: int) -> Float64:
-    """(resamples, p) solutions over windows drawn with replacement."""
+def _bootstrap(X: Float64, y: Float64, random: np.random.Generator) -> Float64:
+    """(_RESAMPLES, p) solutions over windows drawn with replacement."""
     n, p = X.shape
-    weight = random.multinomial(n, np.full(n, 1 / n), size=resamples).astype(float)
+    weight = random.multinomial(n, np.full(n, 1 / n), size=_RESAMPLES).astype(float)
     normal = np.einsum("bn,np,nq->bpq", weight, X, X, optimize=True) + 1e-12 * np.eye(p)
     moment = weight @ (X * y[:, None])
     return np.asarray(np.linalg.solve(normal, moment[..., None])[..., 0])

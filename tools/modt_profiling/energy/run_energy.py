@@ -39,8 +39,12 @@ class EnergySums:
 
     def __init__(self, board: EnergyConfig) -> None:
         self._board = board
-        self.count = self.frames = self.wall_ns = self.dropped = 0
-        self.gross_J = self.error2_J2 = 0.0
+        self.count = 0
+        self.dropped = 0  # windows that are not usable
+        self.frames = 0
+        self.wall_ns = 0
+        self.gross_J = 0.0
+        self.error2_J2 = 0.0  # sum of the squared resolutions
         self.parts_J: Counter[str] = Counter()
         self._cpu_ns: Counter[str] = Counter()  # CPU time of each stage
         self.kind = Kind.ESTIMATED
@@ -54,13 +58,10 @@ class EnergySums:
         self.marks.update(window.marks)
         if not usable(window):
             self.dropped += 1
-            self.marks.update(() if window.energy_J is None or window.marks else {"implausible"})
+            if window.energy_J is not None and not window.marks:
+                self.marks.add("implausible")
         elif window.n_frames:
-            self._add(window)
-
-    def add_frame(self, line: LedgerLine) -> None:
-        """Add a frame of the ledger by the power model."""
-        self._add(modelled(line, self._board))
+            self.add(window)
 
     def watts(self, *stages: str) -> float:
         """Power above idling while the stages compute: their energy over their CPU time; NaN where it has no part."""
@@ -72,7 +73,8 @@ class EnergySums:
         """Power of each of these stages as by `watts` [W]; stages without a part of the energy are left out."""
         return {stage: watts for stage in stages if not math.isnan(watts := self.watts(stage))}
 
-    def _add(self, window: EnergyWindow) -> None:
+    def add(self, window: EnergyWindow) -> None:
+        """Add the energy of a window, or of a modelled frame."""
         assert window.energy_J is not None
         self.kind = worst([window.kind, *([self.kind] if self.count else [])])
         self.meter = self.meter or window.meters[0].name
@@ -92,5 +94,5 @@ def run_energy(windows: Iterable[EnergyWindow], frames: Iterable[LedgerLine], bo
         sums.add_window(window)
     if not sums.count:
         for line in frames:
-            sums.add_frame(line)
+            sums.add(modelled(line, board))
     return sums

@@ -165,7 +165,8 @@ def reconcile(
     """
     tracks = run.tracks or 1
     e_class = costs.e_class(baseline)
-    model = paper = EnergyModel(costs.seg, e_class, baseline.n, run.n_go)
+    paper = EnergyModel(costs.seg, e_class, baseline.n, run.n_go)
+    model = paper
     repeats = run.classified - run.classified_tracks - run.reacquired
     view_cost_ratio = costs.e_class(run) / e_class if e_class and run.classified else 1.0
     extra1 = other1.track - costs.track

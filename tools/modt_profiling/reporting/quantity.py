@@ -84,15 +84,15 @@ def from_json(plain: dict[str, Any]) -> Quantity:
     return Quantity(value, plain["unit"], Kind(plain["kind"]), low, high)
 
 
-def format_number(value: float | None, digits: int = 3) -> str:
-    """A number in that many significant digits, without exponent from 1e-4 to 1e6; a count with all of them."""
+def format_number(value: float | None) -> str:
+    """A number in three significant digits, without exponent from 1e-4 to 1e6; a count with all of them."""
     if value is None:
         return "-"
     if isinstance(value, int):
         return str(value)
     if value and not 1e-4 <= abs(value) < 1e6:
-        return f"{value:.{digits - 1}e}"
-    decimals = digits - 1 - math.floor(math.log10(abs(value))) if value else 0
+        return f"{value:.2e}"
+    decimals = 2 - math.floor(math.log10(abs(value))) if value else 0
     return f"{value:.{max(decimals, 0)}f}"
 
 

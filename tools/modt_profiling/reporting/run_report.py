@@ -165,7 +165,8 @@ def _saved(mode: str, sums: FrameSums, energy: EnergySums) -> tuple[dict[str, An
     )
     found = reconcile(every, run, costs, other, other)
     series = sums.series.means
-    run_s = e1_s = series[:, : len(STAGES)].sum(axis=1)
+    run_s = series[:, : len(STAGES)].sum(axis=1)
+    e1_s = run_s
     if mode != _CONVENTIONAL:
         n, points = (series[:, COLUMNS.index(name)] for name in ("proposals", "all_points"))
         e1_s = run_s - series[:, CLASS] + costs.class_call + costs.class_item * n + costs.class_point * points

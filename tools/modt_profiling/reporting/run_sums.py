@@ -95,10 +95,13 @@ class FrameSums:
         self._size = size  # points that the network processes for proposals of (R,) points
         self.series = FrameSeries(len(COLUMNS))
         self.stages: defaultdict[str, StageWork] = defaultdict(StageWork)  # sums of the ledger's columns
-        self.overhead_ns = self.cpu_ns = 0
+        self.overhead_ns = 0
+        self.cpu_ns = 0
         self.marks: set[str] = set()
         self.lengths = Histogram()  # frames with a proposal, of the tracks that ended
-        self.foreground = self.tracks = self.classified_tracks = 0
+        self.foreground = 0  # proposals of objects
+        self.tracks = 0
+        self.classified_tracks = 0
         # products of calls, items and points with one another, and with CPU time [s]
         self.load_gram = np.zeros((3, 3))
         self.load_moment = np.zeros(3)
