@@ -80,7 +80,7 @@ def threads_on(cores: frozenset[int] | None) -> Iterator[None]:
         yield
         return
     before = os.sched_getaffinity(0)
-    with suppress(OSError):  # no longer permitted: they share the core of the loop
+    with suppress(OSError):  # where it is not permitted, they share the core of the loop
         os.sched_setaffinity(0, cores)
     try:
         yield
@@ -130,7 +130,7 @@ def serve_loop(cores: frozenset[int] | None) -> str:
     An ordinary thread that is preempted while it holds the interpreter keeps the loop waiting, even on another core.
     """
     if cores:
-        with suppress(OSError):  # no longer permitted: it stays where the process is
+        with suppress(OSError):  # where it is not permitted, it stays where the process is
             os.sched_setaffinity(0, cores)
     loop = os.getpid()
     if os.sched_getscheduler(loop) & ~os.SCHED_RESET_ON_FORK != os.SCHED_FIFO:

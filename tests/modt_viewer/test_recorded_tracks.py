@@ -109,17 +109,6 @@ def test_a_cell_has_the_heights_of_its_points_the_highest_on_top_and_ground_as_s
     assert np.abs(x).max() < config.sensor.max_range_m
 
 
-def test_what_is_left_out_is_drawn_as_what_it_is():
-    """A street whose walls are longer than an object."""
-    config = load("os1-64")
-    points = next(iter(SyntheticStream("street", "os1-64", 0.1, seed=2))).points
-    cells = Grid(config).cells(points)
-    structure = [entry["name"] for entry in theme.kinds()].index("structure")
-    assert np.count_nonzero(cells.group == structure) > 50
-    assert np.count_nonzero((cells.group == PLAIN) & (cells.level > 0)) > 500
-    assert (cells.group[cells.level == 0] != structure).all()
-
-
 def test_an_object_is_drawn_where_the_sensor_sees_it():
     T = se3(np.eye(3), np.array([10.0, 0.0, 0.0]))
     boxes = [[14, 2, 0, 4, 2, 1.5, 0.1], [15, 2, 0, 1, 1, 1.5, 0], [16, 2, 0, 4, 2, 1.5, 0], [0, 0, 0, 1, 1, 1, 0]]

@@ -109,13 +109,6 @@ def test_modt_itself_replays_the_points_and_the_poses(tmp_path):
         np.testing.assert_allclose(frame.T_world_sensor, sent.T_world_sensor, atol=1e-9)
 
 
-def test_points_can_be_left_out(tmp_path):
-    sink = open_sink(f"mcap://{tmp_path}/a.mcap?points=none")
-    sink.write(moving(3))
-    sink.close()
-    assert "/modt/points" not in {topic for topic, *_ in read(tmp_path / "a.mcap")}
-
-
 def test_the_oldest_parts_make_room_and_nothing_else(tmp_path):
     (tmp_path / "a-note.mcap").write_bytes(bytes(100_000))
     sizes = []

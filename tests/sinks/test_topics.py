@@ -59,13 +59,6 @@ def test_results_are_in_the_frame_of_the_input_unless_another_is_named(option, r
         assert (message.header.stamp.sec, message.header.stamp.nanosec) == (0, 300_000_000)
 
 
-def test_objects_in_view_are_detections_and_the_background_where_it_is_asked_for():
-    assert [found.id for found in detections(FRAME)] == ["1", "12"]
-    shown = {found.id: found.results[0].hypothesis.class_id for found in detections(FRAME, background=True)}
-    assert shown == {"1": "car", "12": "pedestrian", "1234567": "background"}
-    assert detections(EMPTY) == []
-
-
 def test_a_detection_has_its_box_and_the_reported_class_first_though_another_is_more_probable():
     frame = result(1, [5], {0: 7}, {7: [0.6, 0.1, 0.3, 0.0]})
     frame.tracks.object_class[:] = 2
@@ -119,12 +112,14 @@ def test_the_pose_of_the_sensor_is_an_odometry_and_a_transform():
 
 
 def test_points_of_a_tilted_sensor_are_as_it_sent_them_and_in_their_place_in_the_world():
-    level = dataclasses.replace(FRAME.frame, T_world_sensor=PLACED)
+    level = dataclasses.replace(LABELLED.frame, T_world_sensor=PLACED)
     tilted = Mount.of(10.0, -5.0).level(level)
-    frame = dataclasses.replace(FRAME, frame=tilted, T_world_sensor=tilted.T_world_sensor)
-    encoded = {topic.name: topic.encode(frame) for topic in topics(TopicOptions(points=True))}
+    frame = dataclasses.replace(LABELLED, frame=tilted, T_world_sensor=tilted.T_world_sensor)
+    encoded = {topic.name: topic.encode(frame) for topic in topics(TopicOptions(points=True, obstacles=True))}
     points = read_cloud(encoded["/modt/points"]).points
     np.testing.assert_allclose(points[:, :3], level.points[:, :3], atol=1e-4)
+    standing = read_cloud(encoded["/modt/obstacles"]).points
+    np.testing.assert_allclose(standing[:, :3], level.points[frame.obstacles(), :3], atol=1e-4)
     T = read_odometry(encoded["/modt/odometry"]).T_odom_child
     inside = points[:, :3].astype(np.float64)
     placed = tilted.points[:, :3].astype(np.float64)
@@ -166,14 +161,6 @@ def test_obstacles_and_ground_are_points_with_the_track_or_the_kind_and_the_clas
 def test_a_frame_without_points_has_clouds_without_points():
     shown = published(with_kinds(result(0, [], {}, n_points=0)), obstacles=True, points=True)
     assert [len(rows_of(shown[f"/modt/{name}"])) for name in ("points", "obstacles", "ground")] == [0, 0, 0]
-
-
-def test_obstacles_of_a_tilted_sensor_are_as_it_sent_them():
-    sent = LABELLED.frame
-    frame = dataclasses.replace(LABELLED, frame=Mount.of(10.0, -5.0).level(sent))
-    found = rows_of(published(frame, obstacles=True)["/modt/obstacles"])
-    xyz = np.column_stack([found[axis] for axis in "xyz"])
-    np.testing.assert_allclose(xyz, sent.points[frame.obstacles(), :3], atol=1e-4)
 
 
 @pytest.mark.parametrize("scheme", ["ros2", "mcap", "foxglove"])

@@ -13,9 +13,10 @@ from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import SINKS
 from modt.types import PointKind
-from modt.viewer import live_server, theme
+from modt.viewer import live_server
 from modt.viewer.live_page import live_cells, open_view
 from modt.viewer.live_server import MOST_CONNECTIONS, MOST_PAGES
+from modt.viewer.packed import group_of
 from modt.viewer.track_rows import COLUMNS
 from tests import results
 
@@ -137,21 +138,9 @@ def test_points_of_no_proposal_have_the_look_of_their_kind():
     shown = results.with_kinds(results.result(0, [5], {0: 1}, n_points=13))
     shown.frame.points[:, :2] = np.arange(13)[:, None] + 0.5
     cells = live_cells(shown)
-    names = [*(entry["name"] for entry in theme.kinds()), "plain"]
-    is_ground = (cells.level == 0).tolist()
-    looks = ["ground" if flat else names[k] for flat, k in zip(is_ground, cells.group.tolist(), strict=True)]
-    assert looks[:5] == ["plain"] * 5
-    kinds = [PointKind(kind).name for kind in shown.proposals.kind[5:].tolist()]
-    assert dict(zip(kinds, looks[5:], strict=True)) == {
-        "OUT_OF_RANGE": "plain",
-        "OUT_OF_VIEW": "plain",
-        "GROUND": "ground",
-        "STRUCTURE": "structure",
-        "LOW": "low or sparse",
-        "SPARSE": "low or sparse",
-        "AIRBORNE": "low or sparse",
-        "OVERHEAD": "overhead",
-    }
+    kind = shown.proposals.kind
+    assert (cells.level == 0).tolist() == (kind == PointKind.GROUND).tolist()
+    assert cells.group.tolist() == group_of(kind).tolist()
 
 
 def test_nothing_is_made_without_a_client_nor_for_a_line_without_its_frame(live, read, monkeypatch):

@@ -418,7 +418,10 @@ def _in_sensor(heading: Float64, forward: tuple[float, float]) -> tuple[Float64,
 
 
 def _in_world(seen: Seen, proposals: Proposals, position: Float64, T_world_sensor: Float64) -> Float64:
-    """(R, 2) positions in the sensor frame (R, 2), one a proposal, in the world, displaced as its box is [m]."""
+    """(R, 2) places in the world of positions (R, 2) in the sensor frame, one a proposal [m].
+
+    They keep their distance from the box of the proposal, whose place in the world is known.
+    """
     step = position - proposals.box.take(seen.proposal, axis=0)[:, :2]
     (xx, xy), (yx, yy) = T_world_sensor[:2, :2].tolist()
     x, y = step.T

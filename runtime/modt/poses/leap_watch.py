@@ -15,7 +15,7 @@ LEAST_M = 0.2
 """Deviation of a pose from the motion of the frames before that no sensor shows by itself [m]."""
 NOISE_FACTOR = 5.0
 """Deviations up to this multiple of the usual one are noise."""
-FOLLOWED = 0.1
+LATEST_WEIGHT = 0.1
 """Weight of the latest deviation in the usual one."""
 
 
@@ -43,7 +43,7 @@ class LeapWatch:
                 self._note(off_m, frame, name)
                 self._poses = PoseBuffer(OdometryConfig())
             else:
-                self._usual_m += FOLLOWED * (off_m - self._usual_m)
+                self._usual_m += LATEST_WEIGHT * (off_m - self._usual_m)
             self._poses.add(frame.time_s, T)
         return replace(frame, restarts=frame.restarts + self.leaps)
 

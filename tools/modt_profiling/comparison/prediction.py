@@ -160,7 +160,7 @@ class Forecast:
     expected: Expected
     low: Float64
     high: Float64
-    copied: Float64  # the calibration's own, geometric mean over its streams
+    copied: Float64  # values measured on the calibration's streams, their geometric mean
 
 
 def _means(started: Int, frames: int) -> list[float]:
