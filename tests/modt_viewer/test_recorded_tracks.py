@@ -7,7 +7,6 @@ from modt.classes import CLASS_NAMES
 from modt.geometry import rotation_zyx, se3
 from modt.profile import load
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.viewer import theme
 from modt.viewer.packed import LEVELS, PLAIN, SIDE
 from modt.viewer.theme import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
