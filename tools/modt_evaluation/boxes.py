@@ -55,18 +55,21 @@ def reported_rows(frame: JudgedFrame, objects: Rows, to_report: Bool, drive: int
     rows["centre_m"][k] = distance[k, i]
     rows["shape"][k] = 1 - aligned_iou(box[k, 3:6], truth.box[i, 3:6])
     rows["heading_rad"][k] = np.abs(wrap(box[k, 6] - truth.box[i, 6]))
-    _overlap(rows, box, frame, objects)
+    _overlap(rows, box, distance, frame, objects)
     return rows
 
 
-def _overlap(rows: Rows, box: Float64, frame: JudgedFrame, objects: Rows) -> None:
-    """Write the intersection over union with the labelled object of the class that each box (k, 7) is paired with."""
+def _overlap(rows: Rows, box: Float64, distance: Float64, frame: JudgedFrame, objects: Rows) -> None:
+    """Write the intersection over union with the labelled object of the class that each box (k, 7) is paired with.
+
+    Distances of the centres are (k, n) [m].
+    """
     if find_spec("shapely") is None or not len(rows) or not len(objects):
         return
     from modt_evaluation.box_tracking.sequences import iou_3d
 
     truth = frame.truth
-    near = np.hypot(*(box[:, None, :2] - truth.box[None, :, :2]).transpose(2, 0, 1)) < MATCH_M + truth.box[:, 3] / 2
+    near = distance < MATCH_M + truth.box[:, 3] / 2
     allowed = near & (rows["class"][:, None] == truth.object_class)
     k, i = np.nonzero(allowed)
     iou = np.zeros(allowed.shape)

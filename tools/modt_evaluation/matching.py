@@ -72,7 +72,7 @@ def _associations(overlap: Overlap, objects: Rows, proposals: Rows) -> tuple[Ass
 def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
     """The rows of all objects; columns that depend on tracks are blank."""
     truth = frame.truth
-    range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
+    range_m = truth.range_m
     object_of_point = np.repeat(np.arange(len(overlap.count)), overlap.count)
     points = frame.points[np.concatenate([np.zeros(0, np.int64), *overlap.clear])]
     empty = overlap.count == 0

@@ -104,19 +104,10 @@ def _tracks(e: Evaluation) -> Iterator[str]:
 def _boxes(e: Evaluation) -> Iterator[str]:
     rows = []
     for name, box in e.boxes.items():
-        errors = (box.translation_m, box.scale, box.orientation_rad, box.axis_rad)
-        velocities = (box.velocity_mps, box.moving, box.velocity_moving_mps)
-        numbers = [_number(error, 3) if error is None or isinstance(error, float) else error for error in velocities]
-        rows.append(
-            [
-                name,
-                box.matched,
-                *(_number(error, 3) for error in errors),
-                *numbers,
-                _percent(box.strict_ap),
-                _percent(box.loose_ap),
-            ]
-        )
+        errors = (box.translation_m, box.scale, box.orientation_rad, box.axis_rad, box.velocity_mps)
+        of_all = [box.matched, *(_number(error, 3) for error in errors)]
+        of_moving = [box.moving, _number(box.velocity_moving_mps, 3)]
+        rows.append([name, *of_all, *of_moving, _percent(box.strict_ap), _percent(box.loose_ap)])
     title = (
         "boxes and velocities: mean errors of the objects reported with their class, and average precision in 3D [%]"
     )

@@ -86,6 +86,11 @@ class FrameTruth:
     regions: Regions | None = None  # image regions without labels, None for none
     T_box_sensor: Float64 = field(default_factory=lambda: np.eye(4))
 
+    @property
+    def range_m(self) -> Float64:
+        """(n,) horizontal distance of each from the sensor [m]."""
+        return np.asarray(np.hypot(*(self.box[:, :2] - self.T_box_sensor[:2, 3]).T))
+
     @classmethod
     def of(cls, types: Types, id_: Sequence[int], type_: Sequence[str], box: ArrayLike, **more: Any) -> FrameTruth:
         """Make objects from their labelled types and boxes; `more` sets fields that have a default."""

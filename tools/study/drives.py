@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from modt.app import assembly
+from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
@@ -23,7 +25,8 @@ from modt_evaluation.further_objects import with_further
 from modt_evaluation.rules import CUBOID_RULES, Rules
 from modt_evaluation.truth import KITTI_TYPES, FrameTruth
 from modt_evaluation.truth_files import open_truth
-from modt_simulation.synthetic_stream import SyntheticStream
+from modt_simulation.sensors import SENSORS
+from modt_simulation.synthetic_stream import SCENES, SyntheticStream
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,15 @@ def labelled(path: Path, profile: str = DEFAULT, *, further: Path | None = None)
     fov = FieldOfView() if stream.info.camera is None else FieldOfView.of_camera(stream.info.camera)
     frames = [(frame, truth.frames[frame.index]) for frame in stream if frame.index in truth.frames]
     return Drive(path.name, load(profile), frames, truth.rules, fov)
+
+
+def add_options(options: ArgumentParser, scenes: Sequence[str], seeds: tuple[int, int]) -> None:
+    """Add the options of simulated drives: sensors, scenes, seeds, seconds, and the mode that runs on them."""
+    options.add_argument("--sensors", nargs="+", choices=SENSORS, default=["vlp-16", "os1-64", "mid-360"])
+    options.add_argument("--scenes", nargs="+", choices=SCENES, default=scenes)
+    options.add_argument("--seeds", type=number_range, default=seeds, metavar="A:B")
+    options.add_argument("--seconds", type=float, default=4.0)
+    options.add_argument("--mode", choices=assembly.MODES, default="accurate")
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,19 +17,15 @@ from itertools import product
 
 import numpy as np
 
-from modt.app import assembly
 from modt.classes import ObjectClass
-from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.profile import load
 from modt.sensor_fit.recognition import recognise
 from modt_evaluation.evaluation import DriveRows
 from modt_evaluation.rows import Outcome
 from modt_evaluation.truth import Role
-from modt_simulation.sensors import SENSORS
-from modt_simulation.synthetic_stream import SCENES
 from tools.options import parser
-from tools.study.drives import Drive, judged, simulated
+from tools.study.drives import Drive, add_options, judged, simulated
 
 BANDS_M = ((0.5, 3.0), (3.0, 8.0), (8.0, 20.0), (20.0, 60.0))
 EVERYWHERE_M = (0.0, float("inf"))
@@ -77,13 +73,9 @@ def _angles(text: str) -> tuple[float, float]:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("--sensors", nargs="+", choices=SENSORS, default=["vlp-16", "os1-64", "mid-360"])
-    options.add_argument("--scenes", nargs="+", choices=SCENES, default=PLACES)
+    add_options(options, PLACES, (700, 702))
     options.add_argument("--heights", nargs="+", type=float, default=HEIGHTS_M, metavar="M")
     options.add_argument("--mounts", nargs="+", type=_angles, default=MOUNTS_DEG, metavar="ROLL,PITCH")
-    options.add_argument("--seeds", type=number_range, default=(700, 702), metavar="A:B")
-    options.add_argument("--seconds", type=float, default=4.0)
-    options.add_argument("--mode", choices=assembly.MODES, default="accurate")
     args = options.parse_args()
     bands = [f"people {low:g}-{high:g}" for low, high in BANDS_M]
     columns = ["sensor", "scene", "height", "roll, pitch", *bands, "people", "cars"]

@@ -25,18 +25,15 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modt.app import assembly
 from modt.classes import CLASS_NAMES, N_CLASSES, OBJECTS
-from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.sensor_fit.recognition import recognise
 from modt.types import NONE, Frame, FrameResult, Int
-from modt_simulation.sensors import SENSORS
 from modt_simulation.simulator import Truth
-from modt_simulation.synthetic_stream import SCENES, SyntheticStream
+from modt_simulation.synthetic_stream import SyntheticStream
 from modt_simulation.world import World
 from tools.options import parser
-from tools.study.drives import steps_of
+from tools.study.drives import add_options, steps_of
 from tools.study.mounts import of_mount
 
 PLACES = ("wall", "carpark", "grass", "hedges", "hills", "heaps", "stairs", "movers", "lying")
@@ -178,12 +175,8 @@ def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("--scenes", nargs="+", choices=SCENES, default=PLACES)
-    options.add_argument("--sensors", nargs="+", choices=SENSORS, default=["vlp-16", "os1-64", "mid-360"])
+    add_options(options, PLACES, (900, 904))
     options.add_argument("--height", type=float, metavar="M", help="of the sensor (default: its usual one)")
-    options.add_argument("--seeds", type=number_range, default=(900, 904), metavar="A:B")
-    options.add_argument("--seconds", type=float, default=4.0)
-    options.add_argument("--mode", choices=assembly.MODES, default="accurate")
     args = options.parse_args()
     places = []
     roles = []

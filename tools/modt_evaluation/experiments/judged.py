@@ -62,9 +62,8 @@ class LabelReplay:
         rows = [np.zeros(0, OBJECT)]
         for frame, truth in sorted(drive.labels().items()):
             wanted = (truth.object_class > 0) & (truth.role != Role.IGNORED)
-            range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
             columns = {"class": truth.object_class, "role": truth.role, "id": truth.id, "track": truth.id}
-            rows.append(table(OBJECT, len(truth.id), **columns, frame=frame, range_m=range_m, to_follow=wanted))
+            rows.append(table(OBJECT, len(truth.id), **columns, frame=frame, range_m=truth.range_m, to_follow=wanted))
         frames = np.array([(0, len(row)) for row in rows[1:]], FRAME)
         return Judged(frames, np.concatenate(rows), np.zeros(0, PROPOSAL), np.zeros(0, CALL))
 
