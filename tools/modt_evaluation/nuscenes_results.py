@@ -43,6 +43,8 @@ DISTANCES_M = (0.5, 1.0, 2.0, 4.0)
 """Distances of the centres within which a box is right, over which average precision is averaged."""
 ERROR_M = 2.0
 """Distance within which errors are measured."""
+RECALLS = np.linspace(0, 1, 101)
+"""Recalls over which precision and errors are averaged."""
 LEAST_RECALL = 0.1
 LEAST_PRECISION = 0.1
 """Recall and precision below which nothing counts."""
@@ -229,26 +231,24 @@ def _score(true: Boxes, given: Boxes) -> NuscenesScore:
     n = len(true.sample)
     precisions = []
     errors = [1.0] * len(ERRORS)
+    first = round(100 * LEAST_RECALL) + 1  # the first recall that counts
     for distance_m in DISTANCES_M:
         order, match = _matched(true, given, distance_m)
         hit = match != NONE
         if not hit.any():
             precisions.append(0.0)
             continue
-        at = np.linspace(0, 1, 101)
-        found = np.cumsum(hit)
-        recall = found / n
-        precision = np.interp(at, recall, found / np.arange(1, len(hit) + 1), right=0)
-        confidence = np.interp(at, recall, given.score[order], right=0)
-        first = round(100 * LEAST_RECALL) + 1
+        hits = np.cumsum(hit)
+        recall = hits / n
+        precision = np.interp(RECALLS, recall, hits / np.arange(1, len(hit) + 1), right=0)
         above = np.maximum(precision[first:] - LEAST_PRECISION, 0.0)
         precisions.append(float(above.mean()) / (1.0 - LEAST_PRECISION))
-        last = int(np.flatnonzero(confidence)[-1]) if confidence.any() else 0
+        confidence = np.interp(RECALLS, recall, given.score[order], right=0)
+        last = int(np.flatnonzero(confidence)[-1]) if confidence.any() else 0  # the last recall that is reached
         if distance_m == ERROR_M and last >= first:
             means = _mean_errors(true, given, order[hit], match[hit], confidence)
             errors = [float(mean[first : last + 1].mean()) for mean in means]
-    ap = float(np.mean(precisions))
-    return NuscenesScore(n, ap, *errors)
+    return NuscenesScore(n, float(np.mean(precisions)), *errors)
 
 
 def _matched(true: Boxes, given: Boxes, distance_m: float) -> tuple[Int, Int]:
@@ -266,18 +266,24 @@ def _matched(true: Boxes, given: Boxes, distance_m: float) -> tuple[Int, Int]:
     return order, match
 
 
-def _mean_errors(true: Boxes, given: Boxes, k: Int, j: Int, confidence: Float64) -> Iterator[Float64]:
-    """(101,) mean of each error over the matches `k`, `j` of at least the confidence at each recall."""
-    smaller = np.minimum(true.size[j], given.size[k]).prod(axis=1)
-    union = true.size[j].prod(axis=1) + given.size[k].prod(axis=1) - smaller
-    turned = true.yaw[j] - given.yaw[k]
-    columns = (
-        np.linalg.norm(true.centre[j] - given.centre[k], axis=1),
-        1 - smaller / union,
+def _mean_errors(
+    true: Boxes, given: Boxes, given_rows: Int, true_rows: Int, confidence: Float64
+) -> Iterator[Float64]:
+    """(101,) means of each error over the matches (m,) whose confidence is at least that at each of RECALLS."""
+    true_size = true.size[true_rows]
+    size = given.size[given_rows]
+    shared = np.minimum(true_size, size).prod(axis=1)
+    union = true_size.prod(axis=1) + size.prod(axis=1) - shared
+    turned = true.yaw[true_rows] - given.yaw[given_rows]
+    errors = (
+        np.linalg.norm(true.centre[true_rows] - given.centre[given_rows], axis=1),
+        1 - shared / union,
         np.abs((turned + np.pi) % (2 * np.pi) - np.pi),
-        np.linalg.norm(true.velocity[j] - given.velocity[k], axis=1),
+        np.linalg.norm(true.velocity[true_rows] - given.velocity[given_rows], axis=1),
     )
-    for error in columns:
+    score = given.score[given_rows]
+    for error in errors:
         known = np.cumsum(~np.isnan(error))
         mean = np.nancumsum(error) / np.maximum(known, 1) if known[-1] else np.ones(len(error))
-        yield np.interp(confidence[::-1], given.score[k][::-1], mean[::-1])[::-1]
+        # Scores fall, and np.interp wants them to rise.
+        yield np.interp(confidence[::-1], score[::-1], mean[::-1])[::-1]

@@ -175,15 +175,11 @@ def _mover(track: int, sightings: list[Sighting], T_sensor_level: Float64) -> Mo
     stamp_s = stamp_s[part]
     world = world[part]
     frames, _, boxes, poses, classes = zip(*sightings[part], strict=True)
-    step = ((stamp_s - stamp_s[0]) // STEP_S).astype(np.int64)
-    path = np.array([world[step == k, :2].mean(axis=0) for k in np.unique(step)])
     gone_m = float(np.hypot(*(world[-1, :2] - world[0, :2])))
-    path_m = float(np.hypot(*np.diff([world[0, :2], *path[1:-1], world[-1, :2]], axis=0).T).sum())
+    path_m = _path_m(stamp_s, world)
     speed_mps = path_m / float(np.ptp(stamp_s))
     heading = _heading(stamp_s, world)
-    axes = np.stack([np.cos(heading), np.sin(heading), -np.sin(heading), np.cos(heading)], axis=-1)
-    extent = np.ptp(corners(world) @ axes.reshape(-1, 2, 2).swapaxes(1, 2), axis=1)
-    length, width, height = np.quantile(np.column_stack([extent, world[:, 5]]), 0.9, axis=0).tolist()
+    length, width, height = _size_m(world, heading)
     box = np.array(boxes)
     box[:, 2] += (height - box[:, 5] - FOOT_M) / 2  # the lowest points stand FOOT_M above the foot
     box[:, 3:6] = length, width, height + FOOT_M
@@ -198,6 +194,22 @@ def _mover(track: int, sightings: list[Sighting], T_sensor_level: Float64) -> Mo
         straightness=min(gone_m / path_m, 1.0),
         speed_mps=speed_mps,
     )
+
+
+def _path_m(stamp_s: Float64, world: Float64) -> float:
+    """Length of the path of (n, 7) boxes by their mean places in steps of STEP_S, so that noise adds nothing [m]."""
+    step = ((stamp_s - stamp_s[0]) // STEP_S).astype(np.int64)
+    means = np.array([world[step == k, :2].mean(axis=0) for k in np.unique(step)])
+    path = [world[0, :2], *means[1:-1], world[-1, :2]]
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def _size_m(world: Float64, heading: Float64) -> list[float]:
+    """Length along (n,) headings, width and height that (n, 7) boxes seldom exceed [m]."""
+    axes = np.stack([np.cos(heading), np.sin(heading), -np.sin(heading), np.cos(heading)], axis=-1)
+    extent = np.ptp(corners(world) @ axes.reshape(-1, 2, 2).swapaxes(1, 2), axis=1)
+    sides: list[float] = np.quantile(np.column_stack([extent, world[:, 5]]), 0.9, axis=0).tolist()
+    return sides
 
 
 def _heading(stamp_s: Float64, world: Float64) -> Float64:
