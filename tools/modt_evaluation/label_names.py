@@ -16,7 +16,8 @@ WITHOUT_RIDER = ".without_rider"
 def _types(large_vehicle: str = "", carried: str = "", *, background: str) -> dict[str, tuple[int, Role]]:
     """Types of three roles, each a list of names separated by `, `, and the names of the classes."""
     roles = {LARGE_VEHICLE: large_vehicle, CARRIED: carried, BACKGROUND: background}
-    return {name: role for role, names in roles.items() for name in names.split(", ")} | dict(LABELLED_TYPES)
+    types = {name: role for role, names in roles.items() for name in names.split(", ") if name}
+    return types | dict(LABELLED_TYPES)
 
 
 KITTI_NAMES: Types = {**dict.fromkeys(("Truck", "Tram", "Misc", "DontCare", "Forklift"), BACKGROUND), **KITTI_TYPES}
