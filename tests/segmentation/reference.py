@@ -43,33 +43,54 @@ def flood_fill(cells, beam_m):
 
 
 def trace(lowest, spread, estimator, height_m, max_slope_deg):
-    """(rings, SECTORS) ground cells, cells on and beside a ramp, and (SECTORS,) slope of the ramp at a ray's end."""
+    """(rings, SECTORS) ground cells, cells on and beside a ramp, and cells in which something stands.
+
+    Then the (rings, SECTORS) height of each cell if it is ground, and (SECTORS,) slope of the ramp at a ray's end.
+    """
     ground = SegmentationTuning().ground
     max_slope, hill_slope, ramp_slope = np.tan(np.deg2rad([v * max_slope_deg for v in (1.0, 2.0, ground.ramp_share)]))
     position = (lowest.view(np.int32) & (POSITIONS - 1)) / POSITIONS
     range_m = ((np.arange(len(lowest))[:, None] + position) * estimator.grid.ring_step) ** 2
-    is_ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
+    is_ground, steep, ramp, stands = np.zeros((4, *lowest.shape), bool)
+    height_m_of_cell = lowest.astype(float)
     last = [(-height_m, 0.0, 0.0)] * SECTORS
     for ring in range(len(range_m)):
+        may_join, hidden = [], []
+        sure = is_ground[ring].copy()
+        for ray in np.flatnonzero(np.isfinite(lowest[ring])).tolist():
+            height, at, slope = last[ray]
+            gap = range_m[ring, ray] - at
+            off = lowest[ring, ray] - height - slope * min(gap, ground.max_gap_m)
+            near = ground.max_gap_m if ring and ramp[ring - 1, ray] else ground.near_m
+            flat = spread[ring, ray] <= estimator.flat_m[ring] + max(slope, 0.0) * estimator.depth_m[ring]
+            may_fall = off > -gap * max_slope - ground.noise_m
+            is_ground[ring, ray] = may_fall and off < (min(gap, near) * max_slope if flat else 0.0) + ground.noise_m
+            stands[ring, ray] = may_fall and not flat
+            sure[ray] = is_ground[ring, ray] and (flat or off >= -ground.noise_m)
+            if stands[ring, ray] and off < -ground.noise_m and gap > ground.near_m:
+                hidden.append(ray)
+            if flat and off < gap * hill_slope:
+                may_join.append(ray)
+        for ray in may_join + hidden:
+            max_rise_m = 2 * np.pi / SECTORS * range_m[ring, ray] * max_slope
+            around = [beside for beside in (ray - 1, (ray + 1) % SECTORS) if sure[beside]]
+            continues = (np.abs(lowest[ring, around] - lowest[ring, ray]) < max_rise_m).any()
+            if continues and ray in may_join:
+                is_ground[ring, ray] = True
+            elif not continues and ray in hidden:
+                height_m_of_cell[ring, ray] -= ground.hidden_m
         for ray in range(SECTORS):
-            here, (height, at, slope) = lowest[ring, ray], last[ray]
-            if np.isfinite(here):
-                gap = range_m[ring, ray] - at
-                reach = min(gap, ground.max_gap_m)
-                off = here - height - slope * reach
-                near = ground.max_gap_m if ring and ramp[ring - 1, ray] else ground.near_m
-                flat_m = estimator.flat_m[ring] + max(slope, 0.0) * estimator.depth_m[ring]
-                bound = 0.0 if spread[ring, ray] > flat_m else min(gap, near) * max_slope
-                if -gap * max_slope - ground.noise_m < off < bound + ground.noise_m:
-                    is_ground[ring, ray] = True
-                    slope += (here - height - slope * gap) / (gap + ground.slope_length_m)
-                    slope = float(np.clip(slope, -hill_slope, hill_slope))
-                    last[ray] = here, range_m[ring, ray], slope
+            height, at, slope = last[ray]
+            if is_ground[ring, ray]:
+                here, gap = height_m_of_cell[ring, ray], range_m[ring, ray] - at
+                slope += (here - height - slope * gap) / (gap + ground.slope_length_m)
+                slope = float(np.clip(slope, -hill_slope, hill_slope))
+                last[ray] = here, range_m[ring, ray], slope
             steep[ring, ray] = abs(slope) > ramp_slope
         for ray in range(SECTORS):
             ramp[ring, ray] = steep[ring, [(ray + k * ground.flank_sectors) % SECTORS for k in (-1, 0, 1)]].any()
     slope = np.array([of[2] for of in last])
-    return is_ground, ramp, np.where(np.abs(slope) > ramp_slope, slope, 0.0)
+    return is_ground, ramp, stands, height_m_of_cell, np.where(np.abs(slope) > ramp_slope, slope, 0.0)
 
 
 def closeness(x, y, noise_m):

@@ -136,11 +136,13 @@ def test_tracing_equals_a_loop_over_rays_and_rings(seed):
     fast = ground()
     lowest = rng.normal(-HEIGHT_M, 0.25, (fast.grid.rings, SECTORS)).astype(np.float32)
     lowest[rng.random(lowest.shape) < 0.3] = np.inf
-    spread = rng.uniform(0.0, 0.6, lowest.shape).astype(np.float32)
+    spread = np.where(np.isfinite(lowest), rng.uniform(0.0, 0.6, lowest.shape), -np.inf).astype(np.float32)
     expected = reference.trace(lowest, spread, fast, HEIGHT_M, MAX_SLOPE_DEG)
-    *found, slope = fast.trace(lowest, spread, HEIGHT_M)
-    assert (np.array(found) == expected[:2]).mean() > 0.999  # float32 against float64
-    assert np.isclose(slope, expected[2], atol=1e-3).mean() > 0.97
+    rays = fast.trace(lowest, spread, HEIGHT_M)
+    found = np.array([rays.is_ground, rays.is_ramp, rays.stands])
+    assert (found == expected[:3]).mean() > 0.999  # float32 against float64
+    assert np.isclose(rays.lowest, expected[3], atol=2e-3).mean() > 0.999
+    assert np.isclose(rays.end_slope, expected[4], atol=1e-3).mean() > 0.97
 
 
 def waves(x, y, height_m=0.8):
@@ -154,6 +156,40 @@ def test_a_hill_opposite_is_ground(elevation):
     near = points[(np.abs(points[:, 0]) < 14.0) & (np.abs(points[:, 1]) < 3.0)]
     assert near[:, 2].max() > 1.0
     assert (np.abs(heights(near, ground(height_m=0.8, min_range_m=0.4), 0.8)) < 0.25).mean() > 0.98
+
+
+def with_person(profile, x, floor_z, elevation=scans.VLP_16):
+    """(n, 4) points of a sweep over a floor, and (n,) those on a person of 1.7 m at x ahead with feet at floor_z."""
+    direction = scans.rays(step_deg=0.2, elevation=elevation)
+    ahead = direction[:, 0] > 0.1
+    to_person = np.where(ahead, x / np.where(ahead, direction[:, 0], 1.0), np.inf)
+    y, z = (np.where(ahead, direction[:, axis] * np.minimum(to_person, 1e3), np.inf) for axis in (1, 2))
+    meets = (np.abs(y) < 0.25) & (z > floor_z) & (z < floor_z + 1.7)
+    hit = scans.floor_ranges(direction, profile)
+    on = meets & (to_person < np.where(np.isfinite(hit), hit, np.inf))
+    hit = np.where(on, to_person, hit)
+    seen = np.isfinite(hit)
+    return (direction[seen] * hit[seen, None]).astype(np.float32), on[seen]
+
+
+@pytest.mark.parametrize("x", [7.0, 8.0, 9.0])
+@pytest.mark.parametrize("elevation", [scans.VLP_16, np.deg2rad(np.linspace(-22.5, 22.5, 64))])
+def test_the_lowest_return_of_a_person_whose_feet_an_edge_hides_is_above_the_ground(x, elevation):
+    points, on = with_person(lambda x, y: -0.8 - 0.8 * np.clip(x - 5, 0, 1), x, -1.6, elevation)
+    height = heights(points, ground(height_m=0.8, min_range_m=0.4), 0.8)
+    assert on.sum() > 20
+    assert (points[on, 2] > -1.5).all()
+    assert (height[on] > 0.05).all()
+
+
+@pytest.mark.parametrize("x", [4.0, 5.0, 6.0])
+def test_the_ground_behind_a_person_on_a_hillside_is_found_by_the_rays_beside(x):
+    def hillside(x, y):
+        return -0.8 + np.minimum(0.02 * np.clip(x - 2, 0, None) ** 2, 0.08 + 0.35 * np.clip(x - 2, 0, None))
+
+    points, on = with_person(hillside, x, hillside(x, 0.0), np.deg2rad(np.linspace(-22.5, 22.5, 64)))
+    behind = ~on & (points[:, 0] > x + 0.7) & (points[:, 0] < 13.0) & (np.abs(points[:, 1]) < 2.0)
+    assert (np.abs(heights(points, ground(height_m=0.8, min_range_m=0.4), 0.8)[behind]) < 0.25).all()
 
 
 def test_heights_are_those_above_the_slope_below_each_point():

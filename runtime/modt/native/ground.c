@@ -21,7 +21,8 @@ typedef struct {
     i32 rings, sectors, flank_sectors, bonnet_ring; /* sectors are a power of two */
     float far_m;                                    /* points as far away have no position */
     float rings_per_unit, ring_step;                /* of the square root of range */
-    float max_slope, hill_slope, ramp_slope, near_m, slope_length_m, noise_m, max_gap_m, flank_m;
+    float max_slope, hill_slope, ramp_slope, near_m, slope_length_m, noise_m, max_gap_m, flank_m, hidden_m;
+    float max_rise_beside;
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
     const i32 *low_sectors SHAPE(near_rings); /* sectors to the left and right that a low thing does not reach */
     i32 near_rings, quarters;
@@ -42,7 +43,8 @@ typedef struct {
     u4 *below;                              /* (cells,) Below of the points of each cell */
     float (*ends)[2];                       /* (cells,) lowest return, and the highest, negated, side by side */
     uint8_t *kind;                          /* (cells,) flags of Kind */
-    float *rays;                            /* (4 * sectors,) */
+    float *rays;                            /* (7 * sectors,) */
+    uint8_t *may;                           /* (sectors,) Beside of the cells of a ring */
     float *z, *sqrt_range;                  /* (n,) */
     i32 *cell;                              /* (n + BLOCK,) */
     i64 *low_rows;                          /* (n + 1,) rows of the low points */
@@ -61,7 +63,8 @@ static i64 place_scratch(const Ground *g, i64 n, void *memory, GroundScratch *s)
     TAKE(&end, s->below, cells);
     TAKE(&end, s->ends, cells);
     TAKE(&end, s->kind, cells);
-    TAKE(&end, s->rays, 4 * g->sectors);
+    TAKE(&end, s->rays, 7 * g->sectors);
+    TAKE(&end, s->may, g->sectors);
     TAKE(&end, s->z, n);
     TAKE(&end, s->sqrt_range, n);
     TAKE(&end, s->cell, n + BLOCK);
@@ -84,8 +87,8 @@ typedef struct {
     int8_t *kind SHAPE(room);        /* PointKind of all points */
 } AboveGround;
 
-/* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is. */
-typedef enum { GROUND = 1, STEEP = 2, RAMP = 4 } Kind;
+/* Flags of a cell: it is ground; its ray is on a ramp; that ray or one beside it is; something stands in it. */
+typedef enum { GROUND = 1, STEEP = 2, RAMP = 4, STANDS = 8 } Kind;
 
 /* The x, y and z of n points, four at a time. */
 static ALWAYS_INLINE void take_columns(const u4 *points, i64 n, float *restrict x, float *restrict y,
@@ -195,41 +198,23 @@ static void measure_roughness(const Ground *g, const GroundScratch *s, float *to
     }
 }
 
+/* _position of ground.py: position of the lowest return of a cell in its ring, from 0 to 1. */
+static ALWAYS_INLINE float position_of(float lowest)
+{
+    return (float)(bits_of(lowest) & (POSITIONS - 1)) * (1.0f / POSITIONS);
+}
+
 /* GroundEstimator.range_m: range of the lowest return of a cell of a ring. */
 static ALWAYS_INLINE float range_of(float lowest, float ring, float ring_step)
 {
-    float position = (float)(bits_of(lowest) & (POSITIONS - 1)) * (1.0f / POSITIONS);
-    float sqrt_range = (ring + position) * ring_step;
+    float sqrt_range = (ring + position_of(lowest)) * ring_step;
     return sqrt_range * sqrt_range;
 }
 
-/* GroundEstimator.trace and _Rays.advance for one ring, with the cells of the ring and the last ground cell of each
- * ray. Height and range of the ground cell before the ring are left in `surface` and `range_before`. Something stands
- * in a cell if its highest return lies flat_m above the lowest, and more on ground that rises. */
-static void trace_ring(const Ground *g, i32 ring, float (*restrict ends)[2], float *restrict lowest,
-                       uint8_t *restrict kind, float *restrict height, float *restrict range, float *restrict slope,
-                       const float *restrict rise_range_m, float *restrict surface, float *restrict range_before)
+/* _lowered of ground.py: the height of a lowest return less `by_m`, with its position. */
+static ALWAYS_INLINE float lowered(float lowest, float by_m)
 {
-    const Ground c = *g; /* a copy, which no store through a pointer can change */
-    float flat_m = c.flat_m[ring], depth_m = c.depth_m[ring];
-    for (i32 k = 0; k < c.sectors; k++) {
-        lowest[k] = ends[k][0];
-        float range_m = range_of(lowest[k], (float)ring, c.ring_step);
-        float gap = range_m - range[k];
-        float rise = lowest[k] - height[k];
-        float residual = rise - slope[k] * minf(gap, c.max_gap_m);
-        float flat = -ends[k][1] - lowest[k] <= flat_m + maxf(slope[k], 0.0f) * depth_m ? 1.0f : 0.0f;
-        float bound = minf(gap, rise_range_m[k]) * c.max_slope * flat + c.noise_m;
-        int found = (residual < bound) & (residual > -(gap * c.max_slope + c.noise_m));
-        float newest = slope[k] + (rise - slope[k] * gap) / (gap + c.slope_length_m);
-        newest = minf(maxf(newest, -c.hill_slope), c.hill_slope);
-        surface[k] = height[k];
-        range_before[k] = range[k];
-        height[k] = found ? lowest[k] : height[k];
-        range[k] = found ? range_m : range[k];
-        slope[k] = found ? newest : slope[k];
-        kind[k] = (uint8_t)(found | (magnitude(slope[k]) > c.ramp_slope) << 1); /* GROUND, STEEP */
-    }
+    return float_of((bits_of(lowest - by_m) & ~(POSITIONS - 1)) | (bits_of(lowest) & (POSITIONS - 1)));
 }
 
 /* A row of `size` bytes with `step` of them from its other end on either side, so that no index wraps. */
@@ -240,12 +225,69 @@ static void close_round(const void *row, i64 step, i64 size, void *round)
     __builtin_memcpy((char *)round + step + size, row, step);
 }
 
-/* GroundEstimator.trace. Height, range and slope of the last ground cell of each ray, and the range over which the
- * ground may rise by max_slope from there, are the rows of `rays`. */
+/* What may become of a cell by the rays beside its own: ground, if it continues theirs; the foot of something, which
+ * is hidden, if it does not. */
+typedef enum { MAY_JOIN = 1, MAY_HIDE = 2 } Beside;
+
+/* The first half of Rays.advance for one ring: cells that continue the ground of their own rays, and cells in which
+ * something stands. Height and range of the ground cell before the ring are left in `surface` and `range_before`,
+ * the height of cells that are surely ground in `sure`. Something stands in a cell if its highest return lies flat_m
+ * above the lowest, and more on ground that rises. */
+static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], float *restrict lowest,
+                        uint8_t *restrict kind, const float *restrict height, const float *restrict range,
+                        const float *restrict slope, const float *restrict rise_range_m, float *restrict sure,
+                        uint8_t *restrict may, float *restrict surface, float *restrict range_before)
+{
+    const Ground c = *g; /* a copy, which no store through a pointer can change */
+    float flat_m = c.flat_m[ring], depth_m = c.depth_m[ring];
+    for (i32 k = 0; k < c.sectors; k++) {
+        lowest[k] = ends[k][0];
+        float gap = range_of(lowest[k], (float)ring, c.ring_step) - range[k];
+        float residual = lowest[k] - height[k] - slope[k] * minf(gap, c.max_gap_m);
+        int is_flat = -ends[k][1] - lowest[k] <= flat_m + maxf(slope[k], 0.0f) * depth_m;
+        float bound = minf(gap, rise_range_m[k]) * c.max_slope * (is_flat ? 1.0f : 0.0f) + c.noise_m;
+        int may_fall = residual > -(gap * c.max_slope + c.noise_m);
+        int is_below = residual < -c.noise_m;
+        int found = (residual < bound) & may_fall;
+        int stands = may_fall & (is_flat == 0);
+        surface[k] = height[k];
+        range_before[k] = range[k];
+        sure[k] = found & (is_flat | (is_below == 0)) ? lowest[k] : NAN;
+        may[k] = (uint8_t)((is_flat & (residual < gap * c.hill_slope)) | (stands & is_below & (gap > c.near_m)) << 1); /* Beside */
+        kind[k] = (uint8_t)(found | stands << 3); /* GROUND, STANDS */
+    }
+}
+
+/* The second half of Rays.advance: what becomes of cells by `beside`, the sure ground from the ray before the first
+ * to the ray after the last; and the rays after the ring. */
+static void join_rays(const Ground *g, i32 ring, const float *restrict beside, const uint8_t *restrict may,
+                      float *restrict lowest, uint8_t *restrict kind, float *restrict height, float *restrict range,
+                      float *restrict slope)
+{
+    const Ground c = *g; /* a copy, which no store through a pointer can change */
+    for (i32 k = 0; k < c.sectors; k++) {
+        float here = lowest[k], range_m = range_of(here, (float)ring, c.ring_step);
+        float max_rise_m = range_m * c.max_rise_beside;
+        int continues = (magnitude(here - beside[k]) < max_rise_m) | (magnitude(here - beside[k + 2]) < max_rise_m);
+        int found = (kind[k] & GROUND) | (may[k] & continues);
+        here = may[k] & (continues ? 0 : MAY_HIDE) ? lowered(here, c.hidden_m) : here;
+        float gap = range_m - range[k];
+        float newest = slope[k] + (here - height[k] - slope[k] * gap) / (gap + c.slope_length_m);
+        newest = minf(maxf(newest, -c.hill_slope), c.hill_slope);
+        lowest[k] = here;
+        height[k] = found ? here : height[k];
+        range[k] = found ? range_m : range[k];
+        slope[k] = found ? newest : slope[k];
+        kind[k] = (uint8_t)(kind[k] | found | (magnitude(slope[k]) > c.ramp_slope) << 1); /* GROUND, STEEP */
+    }
+}
+
+/* GroundEstimator.trace. */
 static void trace(const Ground *g, float height_m, const GroundScratch *s)
 {
     i32 sectors = g->sectors, flank = g->flank_sectors;
     float *height = s->rays, *range = height + sectors, *slope = range + sectors, *rise_range_m = slope + sectors;
+    float *sure = rise_range_m + sectors, *beside = sure + sectors;
     float near_m = g->near_m, max_gap_m = g->max_gap_m;
     for (i32 k = 0; k < sectors; k++) {
         height[k] = -height_m;
@@ -257,8 +299,10 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
         i32 row = ring * sectors;
         uint8_t *kind = s->kind + row;
         uint8_t *round = (uint8_t *)(s->ends + row); /* the ends of this ring are needed no more */
-        trace_ring(g, ring, s->ends + row, s->lowest + row, kind, height, range, slope, rise_range_m,
-                   s->surface + row, s->range_before + row);
+        follow_rays(g, ring, s->ends + row, s->lowest + row, kind, height, range, slope, rise_range_m, sure, s->may,
+                    s->surface + row, s->range_before + row);
+        close_round(sure, sizeof *sure, sectors * sizeof *sure, beside);
+        join_rays(g, ring, beside, s->may, s->lowest + row, kind, height, range, slope);
         close_round(kind, flank, sectors, round);
         for (i32 k = 0; k < sectors; k++) {
             i32 steep = (round[k] | round[k + flank] | round[k + 2 * flank]) & STEEP;
@@ -316,7 +360,8 @@ static void median_across(i32 sectors, i32 step, const float *row, float *restri
     }
 }
 
-/* The end of GroundEstimator.heights: medians across the rays, and the ground beside what stands or lies on it. */
+/* The end of GroundEstimator.heights: medians across the rays, the ground beside what stands or lies on it, and
+ * _below_what_stands. */
 static void smooth(const Ground *g, const GroundScratch *s, const float *top)
 {
     i32 sectors = g->sectors, cells = g->rings * sectors;
@@ -338,9 +383,13 @@ static void smooth(const Ground *g, const GroundScratch *s, const float *top)
             }
         }
         for (i32 k = row; k < row + sectors; k++) {
-            int is_clear = row < g->near_rings * sectors && top[k] - s->surface[k] > s->clear[k];
+            float inner = s->surface[k], outer = s->surface[k + sectors], lowest = s->lowest[k];
+            float above_m = inner + (outer - inner) * position_of(lowest) - lowest;
+            float drop_m = s->kind[k] & STANDS && above_m > g->noise_m ? above_m : 0.0f;
+            inner -= drop_m;
+            int is_clear = row < g->near_rings * sectors && top[k] - inner > s->clear[k];
             float foot = is_clear ? maxf(g->foot_share * s->clear[k], g->min_foot_m) : INFINITY;
-            s->below[k] = (u4){s->surface[k], s->surface[k + sectors], foot, is_clear ? s->clear[k] : INFINITY};
+            s->below[k] = (u4){inner, outer - drop_m, foot, is_clear ? s->clear[k] : INFINITY};
         }
     }
 }

@@ -24,6 +24,7 @@
 #define NONE (-1)
 #define AHEAD 64 /* entries whose memory is on its way into the cache */
 #define INFINITY __builtin_inff()
+#define NAN __builtin_nanf("")
 
 typedef int32_t i32;
 typedef int64_t i64;

@@ -80,8 +80,14 @@ class GroundEstimator:
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` more
     than the running slope of the ray over a short way, on and beside a ramp over a longer one. It may not rise more
     where something stands in the cell or, far away, right behind it, since it may be a flank. It may fall by
-    `max_slope_deg` more over any gap, since only ground lies lower. The surface is linear between the ground returns
-    of a ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
+    `max_slope_deg` more over any gap, since only ground lies lower. A ray that has lost the ground finds it again in
+    a cell where nothing stands, if that is as high as ground on a ray beside it. The surface is linear between the
+    ground returns of a ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
+
+    Behind a crest or an edge, the foot of what stands there is hidden. Where something stands more than `near_m` from
+    the last ground, and the lowest return of its cell is below the line of the ray, the ground is taken to be
+    `hidden_m` lower, unless ground on a ray beside it is as high. The surface lies above no lowest return of a cell
+    in which something stands.
 
     Args:
         sensor: range.
@@ -112,6 +118,7 @@ class GroundEstimator:
         self.near_rings = len(near_m)
         steepest_rad = np.deg2rad(max_slope_deg)
         self.max_slope, self.ramp_slope = np.tan([steepest_rad, tuning.ramp_share * steepest_rad]).tolist()
+        self.max_rise_beside = float(2 * np.pi / SECTORS * self.max_slope)  # from ray to ray, at a range of 1 m
         self.hill_slope = float(np.tan(2 * steepest_rad))  # of a hill, seen from the slope of the hill opposite
 
     def height_above(self, points: PointColumns, sensor_height_m: float) -> Float32:
@@ -128,8 +135,9 @@ class GroundEstimator:
         lowest = self._lowest(points, cell, sensor_height_m)
         highest = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS)
         clear_m = self.clear_m(lowest, highest)
-        is_ground, is_ramp, slope = self.trace(lowest, self._spread(highest, lowest), sensor_height_m)
-        surface = _median_across(self._interpolate(lowest, is_ground, slope, sensor_height_m))
+        rays = self.trace(lowest, self._spread(highest, lowest), sensor_height_m)
+        is_ramp = rays.is_ramp
+        surface = _median_across(self._interpolate(rays.lowest, rays.is_ground, rays.end_slope, sensor_height_m))
         # The ground under a vehicle, and under what stands on a ramp, is that of the rays beside it.
         beside = _median_across(surface, self.tuning.flank_sectors)
         flank = surface - beside > self.tuning.flank_m
@@ -139,14 +147,26 @@ class GroundEstimator:
             beside = _median_across(surface[[ring]], sectors)[0]
             raised = (surface[ring] - beside > self.tuning.low_m) & ~is_ramp[ring]
             np.copyto(surface[ring], beside, where=raised)
-        clear_m[highest - surface <= clear_m] = np.inf
+        inner_m, outer_m = self._below_what_stands(surface, rays.lowest, rays.stands)
+        clear_m[highest - inner_m <= clear_m] = np.inf
         clear_m[self.near_rings :] = np.inf
-        inner = surface.ravel().take(cell)
-        outer = np.concatenate([surface[1:], surface[-1:]]).ravel().take(cell)
+        inner = inner_m.ravel().take(cell)
+        outer = outer_m.ravel().take(cell)
         ring_of_point = (cell // SECTORS).astype(np.float32)
         share = points.sqrt_range * np.float32(self.grid.rings_per_unit) - ring_of_point
         height: Float32 = points.z - (inner + (outer - inner) * share)
         return height, clear_m.ravel().take(cell), highest
+
+    def _below_what_stands(self, surface: Float32, lowest: Float32, stands: Bool) -> tuple[Float32, Float32]:
+        """(rings, SECTORS) surface at the inner and at the outer edge of each cell [m].
+
+        Where something stands in a cell whose lowest return is below the surface, the surface of this cell goes down
+        to it.
+        """
+        outer = np.concatenate([surface[1:], surface[-1:]])
+        above_m = surface + (outer - surface) * _position(lowest) - lowest
+        drop_m = np.where(stands & (above_m > self.tuning.noise_m), above_m, np.float32(0))
+        return surface - drop_m, outer - drop_m
 
     def clear_m(self, lowest: Float32, highest: Float32) -> Float32:
         """(rings, SECTORS) height above the ground from which returns are clear of it [m].
@@ -183,8 +203,7 @@ class GroundEstimator:
 
     def range_m(self, lowest: Float32, ring: Int) -> Float32:
         """(...) range of the lowest returns of cells of rings [m]."""
-        position = (lowest.view(np.int32) & POSITION_MASK).astype(np.float32) * np.float32(1 / POSITIONS)
-        sqrt_range = (ring.astype(np.float32) + position) * np.float32(self.grid.ring_step)
+        sqrt_range = (ring.astype(np.float32) + _position(lowest)) * np.float32(self.grid.ring_step)
         range_m: Float32 = sqrt_range * sqrt_range
         return range_m
 
@@ -195,21 +214,17 @@ class GroundEstimator:
         highest[far:-1] = np.maximum(highest[far:-1], highest[far + 1 :])
         return highest - lowest
 
-    def trace(self, lowest: Float32, spread: Float32, sensor_height_m: float) -> tuple[Bool, Bool, Float32]:
-        """(rings, SECTORS) ground cells, and cells on and beside a ramp, where no surface is a vehicle's side.
+    def trace(self, lowest: Float32, spread: Float32, sensor_height_m: float) -> Rays:
+        """The rays at their ends, given the (rings, SECTORS) lowest return and height range of each cell [m].
 
-        With them comes the (SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0.
         All rays advance together, ring by ring, from the foot of the sensor.
         """
-        rays = _Rays(self, sensor_height_m)
-        is_ground = np.zeros(lowest.shape, np.bool_)
-        is_ramp = np.zeros(lowest.shape, np.bool_)
+        rays = Rays(self, lowest.copy(), sensor_height_m)
         range_m = self.range_m(lowest, np.arange(self.grid.rings)[:, None])
         for ring in range(self.grid.rings):
             flat = spread[ring] <= self.flat_m[ring] + np.maximum(rays.slope, 0) * self.depth_m[ring]
-            is_ground[ring] = rays.advance(range_m[ring], lowest[ring], flat)
-            is_ramp[ring] = rays.beside_ramp
-        return is_ground, is_ramp, rays.slope * rays.on_ramp
+            rays.advance(ring, range_m[ring], flat)
+        return rays
 
     def _interpolate(self, lowest: Float32, is_ground: Bool, slope: Float32, sensor_height_m: float) -> Float32:
         """(rings, SECTORS) surface at the inner edges of the rings, linear between the ground returns of a ray.
@@ -237,42 +252,92 @@ class GroundEstimator:
         return surface
 
 
-class _Rays:
-    """Last ground cell of each of the SECTORS rays, as all of them advance ring by ring."""
+class Rays:
+    """Last ground cell of each of the SECTORS rays, as all of them advance ring by ring, and the cells behind them.
 
-    def __init__(self, ground: GroundEstimator, sensor_height_m: float) -> None:
+    Attributes:
+        lowest: (rings, SECTORS) height of the ground of each cell in which there is a return, if it is ground [m].
+        is_ground: (rings, SECTORS) cells that are ground.
+        is_ramp: (rings, SECTORS) cells on and beside a ramp, where no surface is a vehicle's side.
+        stands: (rings, SECTORS) cells in which something stands.
+    """
+
+    def __init__(self, ground: GroundEstimator, lowest: Float32, sensor_height_m: float) -> None:
         self.ground = ground
+        self.lowest = lowest
+        self.is_ground: Bool = np.zeros(lowest.shape, np.bool_)
+        self.is_ramp: Bool = np.zeros(lowest.shape, np.bool_)
+        self.stands: Bool = np.zeros(lowest.shape, np.bool_)
         self.height_m = np.full(SECTORS, -sensor_height_m, np.float32)
         self.range_m = np.zeros(SECTORS, np.float32)
         self.slope = np.zeros(SECTORS, np.float32)  # running mean along the ray
-        self.on_ramp = np.zeros(SECTORS, np.bool_)
+        self.on_ramp: Bool = np.zeros(SECTORS, np.bool_)
         self.beside_ramp = self.on_ramp  # or on it
 
-    def advance(self, range_m: Float32, lowest: Float32, flat: Bool) -> Bool:
-        """(SECTORS,) rays that find ground in the next ring.
+    @property
+    def end_slope(self) -> Float32:
+        """(SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0."""
+        return self.slope * self.on_ramp
+
+    def advance(self, ring: int, range_m: Float32, flat: Bool) -> None:
+        """Find the rays that have ground in the next ring.
 
         Args:
+            ring: that ring.
             range_m: (SECTORS,) range of the lowest returns [m].
-            lowest: (SECTORS,) lowest return of each cell of the ring [m], infinite without any.
             flat: (SECTORS,) cells in which nothing stands: the ground does not rise in the others.
         """
         tuning = self.ground.tuning
+        lowest = self.lowest[ring]
         max_slope = self.ground.max_slope
         gap = range_m - self.range_m
-        rise = lowest - self.height_m
-        residual = rise - self.slope * np.minimum(gap, tuning.max_gap_m)
+        residual = lowest - self.height_m - self.slope * np.minimum(gap, tuning.max_gap_m)
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
         found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * flat + tuning.noise_m
-        found &= residual > -(gap * max_slope + tuning.noise_m)
+        may_fall = residual > -(gap * max_slope + tuning.noise_m)
+        found &= may_fall
+        below = residual < -tuning.noise_m
+        beside = self._continues_beside(lowest, range_m, found & (flat | ~below))
+        found |= beside & flat & (residual < gap * self.ground.hill_slope)
+        stands = ~flat & may_fall
+        hidden = ~beside & stands & below & (gap > tuning.near_m)
+        np.copyto(lowest, _lowered(lowest, tuning.hidden_m), where=hidden)
+        rise = lowest - self.height_m
         slope = self.slope + (rise - self.slope * gap) / (gap + np.float32(tuning.slope_length_m))
         steepest = self.ground.hill_slope
         np.copyto(self.slope, np.minimum(np.maximum(slope, -steepest), steepest), where=found)
         np.copyto(self.height_m, lowest, where=found)
         np.copyto(self.range_m, range_m, where=found)
+        self._keep(ring, found, stands)
+
+    def _continues_beside(self, lowest: Float32, range_m: Float32, is_ground: Bool) -> Bool:
+        """(SECTORS,) lowest returns of a ring that continue the ground of the same ring on a ray beside theirs."""
+        max_rise_m = range_m * np.float32(self.ground.max_rise_beside)
+        ground = np.where(is_ground, lowest, np.float32(np.nan))
+        left, right = (np.abs(lowest - np.roll(ground, step)) < max_rise_m for step in (1, -1))
+        return np.asarray(left | right)
+
+    def _keep(self, ring: int, found: Bool, stands: Bool) -> None:
+        """Note the cells of a ring."""
+        flank_sectors = self.ground.tuning.flank_sectors
         self.on_ramp = np.abs(self.slope) > self.ground.ramp_slope
-        left, right = (np.roll(self.on_ramp, step) for step in (tuning.flank_sectors, -tuning.flank_sectors))
+        left, right = (np.roll(self.on_ramp, step) for step in (flank_sectors, -flank_sectors))
         self.beside_ramp = self.on_ramp | left | right
-        return found
+        self.is_ground[ring] = found
+        self.is_ramp[ring] = self.beside_ramp
+        self.stands[ring] = stands
+
+
+def _position(lowest: Float32) -> Float32:
+    """(...) positions of lowest returns in their rings, from 0 to 1."""
+    return (lowest.view(np.int32) & POSITION_MASK).astype(np.float32) * np.float32(1 / POSITIONS)
+
+
+def _lowered(lowest: Float32, by_m: float) -> Float32:
+    """(...) heights of lowest returns less `by_m`, with their positions."""
+    height: Float32 = lowest - np.float32(by_m)
+    bits = (height.view(np.int32) & ~POSITION_MASK) | (lowest.view(np.int32) & POSITION_MASK)
+    return bits.view(np.float32)
 
 
 def _median_across(surface: Float32, step: int = 1) -> Float32:

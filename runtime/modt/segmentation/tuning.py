@@ -53,6 +53,9 @@ class GroundTuning:
     noise_m: float = 0.1
     """Greatest residual of a ground return on the plane of its ray [m]. More lifts the ground onto low objects.
     Chosen on: KITTI scans."""
+    hidden_m: float = 0.15
+    """Depth of the ground below the lowest return of something whose foot is hidden by a crest [m]. More keeps the
+    lowest returns of people there, and takes more of the ground for them. Chosen on: simulated hills and stairs."""
     near_m: float = 1.5
     """Greatest distance over which ground may rise by `max_slope_deg` between two ground cells of a ray [m].
     More takes flanks of cars for ground. Chosen on: KITTI scans."""
