@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from modt.classes import CLASS_NAMES, CLASSES, N_SHIPPED, OBJECTS, PERSON_HEIGHT_M
@@ -15,6 +15,7 @@ from modt.errors import MisuseError
 
 if TYPE_CHECKING:
     from modt.geometry.beams import Beams
+    from modt.types import Float64
 
 BATCH = 8
 """Proposals of one network call: few enough for their features to stay in the cache."""
@@ -427,9 +428,61 @@ class RecordingConfig(StageConfig):
     )
 
 
+def _vector(default: tuple[float, float, float], most: float, unit: str, meaning: str) -> Any:
+    """Field of three numbers within -most and most."""
+    facts = {"low": -most, "high": most, "least": 3, "most": 3, "unit": unit, "meaning": meaning}
+    return field(default=default, metadata=facts)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MountedSensor(StageConfig):
+    """One of several sensors of a robot, whose frame has x forward, y left, z up, and its origin on the ground."""
+
+    name: str = field(metadata={"meaning": "Its key in the section."})
+    profile: str = field(default="", metadata={"meaning": "Name or file of its profile."})
+    source: str = field(
+        default="",
+        metadata={"meaning": "Address of the sensor; in a recording its topic or port; or a recording of its own."},
+    )
+    position_m: tuple[float, ...] = _vector(
+        (0.0, 0.0, 0.0), 30.0, "m", "Place of the sensor on the robot: x, y, and height above the ground."
+    )
+    roll_pitch_yaw_deg: tuple[float, ...] = _vector(
+        (0.0, 0.0, 0.0), 360.0, "deg", "Turns of the sensor on the robot: left side up, nose down, counter-clockwise."
+    )
+
+    def __post_init__(self) -> None:
+        StageConfig.__post_init__(self)
+        if not self.profile:
+            raise ValueRangeError("profile", "is missing", "name the profile of this sensor")
+        SensorConfig(height_m=self.position_m[2])
+
+    def mounted(self, sensor: SensorConfig) -> SensorConfig:
+        """The sensor of its profile, with this mount."""
+        roll_deg, pitch_deg, _ = self.roll_pitch_yaw_deg
+        return replace(sensor, height_m=self.position_m[2], roll_deg=roll_deg, pitch_deg=pitch_deg)
+
+    @property
+    def T_robot_sensor(self) -> Float64:
+        """(4, 4) pose of the sensor on the robot."""
+        from modt.placement import mount_pose  # NumPy, as for `beams`
+
+        return mount_pose(self.position_m, self.roll_pitch_yaw_deg)
+
+    @property
+    def T_robot_level(self) -> Float64:
+        """(4, 4) pose on the robot of the level frame of the sensor."""
+        from modt.placement import mount_pose
+
+        return mount_pose(self.position_m, (0.0, 0.0, self.roll_pitch_yaw_deg[2]))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileConfig:
-    """The whole configuration: a sensor, a board and all stages, as profiles describe them."""
+    """The whole configuration: a sensor, a board and all stages, as profiles describe them.
+
+    With `sensors`, the sections `sensor` and `segmentation` are those of the first of them.
+    """
 
     sensor: SensorConfig = field(default_factory=SensorConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
@@ -443,6 +496,7 @@ class ProfileConfig:
     loop: LoopConfig = field(default_factory=LoopConfig)
     trust: TrustConfig = field(default_factory=TrustConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
+    sensors: tuple[MountedSensor, ...] = ()
 
     def __post_init__(self) -> None:
         cells = GRID_CELLS * self.sensor.max_range_m / self.segmentation.cell_m**2

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import logging
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from operator import index
@@ -25,9 +27,10 @@ from modt.config import ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, transform_boxes
 from modt.pipeline import ClassificationStage
+from modt.profile import load as load_profile
 from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
-from modt.sources.scan_file import sanitised
+from modt.sources.scan_file import PERIOD_S, sanitised
 from modt.sources.stream import Stream, no_seconds, unit_of
 from modt.types import (
     MOTION_NAMES,
@@ -47,18 +50,24 @@ __all__ = ["MOTION_NAMES", "Pipeline", "PointKind", "TrackedObjects", "open"]
 log = logging.getLogger(__name__)
 
 
-def open(path: str | PathLike[str], **capture: str) -> Stream:
+def open(path: str | PathLike[str], *, profile: profile.Names = None, **capture: str) -> Stream:
     """Open a recording: a KITTI drive, a folder of scans, a PCAP file or a recording of ROS 2.
 
     A frame has an index, a stamp_s [s], points (N, 4), and the recording's pose T_world_sensor, else None. The stream
     can be iterated repeatedly. `between(first, last)` selects a part of it, `info` describes it, and `faults` lists
     unusable scans. `capture` adds facts that a recording does not hold, as `--capture` of `modt replay`: model,
-    calibration or metadata of a sensor, the topic of a recording.
+    calibration or metadata of a sensor, the topic of a recording. With a `profile` of several sensors, by name or
+    file, the frames are those of the robot, which hold the sweeps of all sensors.
 
     Raises:
         MisuseError: there is no stream at the path, or an option does not apply.
         ModtError: the recording cannot be read.
     """
+    sensors = load_profile(profile).sensors if profile else ()
+    if sensors:
+        from modt.app.recorded_sensors import open_recordings
+
+        return open_recordings(sensors, Path(path), PERIOD_S)
     return open_stream(Path(path), capture=capture)
 
 
@@ -229,6 +238,25 @@ class Pipeline:
         pipeline._asked = names
         return pipeline
 
+    def _joined(self, points: Mapping[str, ArrayLike], stamp_s: float, turn_s: float, mid_rad: float) -> Frame:
+        """The frame of the sweeps of several sensors, by their names, at one time."""
+        from modt.sources.joining import joint_frame
+
+        sensors = self.config.sensors
+        names = [sensor.name for sensor in sensors]
+        if not sensors or not points:
+            there = ", ".join(names) or "an array, as the profile has one sensor"
+            raise MisuseError("points", "are of no sensor of the profile", f"give {there}")
+        for name in points:
+            if name not in names:
+                near = difflib.get_close_matches(name, names, n=1, cutoff=0.0)
+                raise MisuseError(f"sensor '{name}'", "is not in the profile", f"did you mean '{near[0]}'?")
+        sweeps = {
+            names.index(name): Frame(self._index, stamp_s, _checked_points(of_sensor), turn_s=turn_s, mid_rad=mid_rad)
+            for name, of_sensor in points.items()
+        }
+        return joint_frame(self._index, sweeps, sensors)
+
     def _checked_stamp(self, stamp_s: float | None) -> float:
         """Time of a sweep [s]."""
         if stamp_s is None:
@@ -250,7 +278,7 @@ class Pipeline:
 
     def step(
         self,
-        points: ArrayLike | Frame,
+        points: ArrayLike | Frame | Mapping[str, ArrayLike],
         stamp_s: float | None = None,
         T_world_sensor: ArrayLike | None = None,
         *,
@@ -261,9 +289,11 @@ class Pipeline:
 
         Args:
             points: a frame of `open`, which needs no other argument; or (N, 3) or (N, 4) x, y, z [m, sensor frame:
-                x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
+                x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return. A robot
+                with several sensors has such points by the name of the sensor, each in its own frame.
             stamp_s: time of the sweep [s], never before that of the last one.
-            T_world_sensor: (4, 4) pose at the stamp. None estimates the motion of the sensor from the proposals.
+            T_world_sensor: (4, 4) pose at the stamp; of the robot if it has several sensors. None estimates the
+                motion of the sensor from the proposals.
             turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
             mid_rad: as modt.types.Frame.mid_rad.
 
@@ -271,7 +301,11 @@ class Pipeline:
             MisuseError: an argument has another shape, a stamp goes back, or a matrix is no pose.
             ScanError: the columns are not x, y, z, reflectance.
         """
+        sweeps: tuple[Frame | None, ...] = ()
+        if isinstance(points, Mapping):
+            points = self._joined(points, self._checked_stamp(stamp_s), turn_s, mid_rad)
         if isinstance(points, Frame):
+            sweeps = points.sweeps
             stamp_s = points.stamp_s
             turn_s = points.turn_s
             mid_rad = points.mid_rad
@@ -279,7 +313,9 @@ class Pipeline:
             points = points.points
         stamp_s = self._checked_stamp(stamp_s)
         pose = _checked_pose(T_world_sensor)
-        frame = Frame(self._index, stamp_s, _checked_points(points), pose, turn_s=turn_s, mid_rad=mid_rad)
+        frame = Frame(
+            self._index, stamp_s, _checked_points(points), pose, turn_s=turn_s, mid_rad=mid_rad, sweeps=sweeps
+        )
         if self._index == 0:
             chosen = choose(self._asked, frame, None)
             if chosen.config != self.config:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +14,7 @@ from modt.energy.ledger import STAGES as LEDGER_STAGES
 from modt.energy.ledger import Ledger
 from modt.object_box.estimator import SeenBoxes
 from modt.observations import Located, StaticTracks
-from modt.placement import Mount
+from modt.placement import Placement
 from modt.sensor_fit.levelling import Leveller
 from modt.types import (
     UNLIMITED,
@@ -46,6 +46,46 @@ class SegmentationStage(Protocol):
 
     def facts(self) -> dict[str, str]:
         """Kernels of the segmenter, for the record of a run."""
+
+
+class ViewStage(Protocol):
+    """What the sensors of a robot see of a frame: the frame made level, and its proposals."""
+
+    def level(self, frame: Frame) -> Frame:
+        """The frame in the level frame in which the stages work."""
+
+    def segment(self, frame: Frame) -> Proposals:
+        """Proposals of a level frame."""
+
+    def finish(self, result: FrameResult, placement: Placement) -> FrameResult:
+        """The result in the frame in which it is given to others; `placement` is that of the level frame."""
+
+    def facts(self) -> dict[str, str]:
+        """Kernels of the segmenter, for the record of a run."""
+
+
+@dataclass(eq=False)
+class SensorView:
+    """The view of one sensor, whose level frame is that of the results."""
+
+    leveller: Leveller
+    segmenter: SegmentationStage
+
+    def level(self, frame: Frame) -> Frame:
+        """The sweep turned level."""
+        return self.leveller.level(frame)
+
+    def segment(self, frame: Frame) -> Proposals:
+        """Proposals of the points of a level sweep."""
+        return self.segmenter.segment(frame.points)
+
+    def finish(self, result: FrameResult, placement: Placement) -> FrameResult:
+        """The result as it is."""
+        return result
+
+    def facts(self) -> dict[str, str]:
+        """Kernels of the segmenter."""
+        return self.segmenter.facts()
 
 
 class OdometryStage(Protocol):
@@ -99,7 +139,7 @@ class FusionStage(Protocol):
 class Pipeline:
     """The stages in their order; a mode of the method is a choice of these parts."""
 
-    segmenter: SegmentationStage
+    view: ViewStage
     odometry: OdometryStage
     tracker: TrackingStage
     fusion: FusionStage
@@ -108,18 +148,12 @@ class Pipeline:
     decision: LikeliestClass
     boxes: SeenBoxes
     ledger: Ledger
-    leveller: Leveller = field(default_factory=Leveller)
-
-    @property
-    def mount(self) -> Mount:
-        """Attitude of the sensor in the last sweep."""
-        return self.leveller.attitude
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
         """Process a frame within a budget of classifications (Figs. 2 and 5)."""
         run = self.ledger.run
-        frame = self.leveller.level(frame)
-        proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
+        frame = self.view.level(frame)
+        proposals = run(SEGMENTATION, self.view.segment, frame)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
         tracked = run(TRACKING, self.tracker.track, frame.time_s, proposals, located, frame.points)
         proposals = tracked.proposals
@@ -138,7 +172,7 @@ class Pipeline:
         # Last, since it takes the snapshot of all columns, the reported class among them.
         tracks = run(TRACKING, self.tracker.confirm, rows, confirmed)
         placement = located.placement
-        return FrameResult(
+        result = FrameResult(
             frame=frame,
             T_world_sensor=placement.T_world_sensor,
             proposals=replace(proposals, box=placement.at_stamp(proposals.centroid, proposals.box)),
@@ -147,6 +181,7 @@ class Pipeline:
             n_deferred=chosen.deferred,
             classified=tracks.id[rows],
         )
+        return self.view.finish(result, placement)
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
         """(R, C) likelihoods. The ledger counts the points; the scheduler learns the cost where time is limited."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,6 +65,25 @@ class Mount:
 
 
 LEVEL = Mount()
+
+
+def mount_pose(position_m: Sequence[float], roll_pitch_yaw_deg: Sequence[float]) -> Float64:
+    """(4, 4) pose of a sensor on a robot."""
+    return se3(rotation_zyx(*np.deg2rad(roll_pitch_yaw_deg).tolist()), np.array(position_m))
+
+
+def moved_points(T: Float64, points: Float32) -> Float32:
+    """(N, 4) points moved by a (4, 4) transform; those without a return stay at the origin."""
+    out = points.copy()
+    out[:, :3] = points[:, :3] @ T[:3, :3].T.astype(np.float32) + T[:3, 3].astype(np.float32)
+    out[~points[:, :3].any(axis=1), :3] = 0.0
+    return out
+
+
+def joined_points(sweeps: Sequence[Frame | None], T_common: Sequence[Float64]) -> Float32:
+    """(N, 4) points of the sweeps, one after the other, moved by the (4, 4) transform of each sensor."""
+    moved = [moved_points(T, sweep.points) for sweep, T in zip(sweeps, T_common, strict=True) if sweep is not None]
+    return np.concatenate([*moved, np.zeros((0, 4), np.float32)])
 
 
 @dataclass(frozen=True, slots=True)

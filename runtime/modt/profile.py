@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from modt import assets
-from modt.config import ProfileConfig, StageConfig, ValueRangeError, check, completed
+from modt.config import MountedSensor, ProfileConfig, StageConfig, ValueRangeError, check, completed
 from modt.errors import MisuseError
 
 DEFAULT = "hdl-64e"
@@ -20,6 +20,10 @@ Names = str | Path | Sequence[str | Path] | None
 """Names or files of profiles; later ones win key by key."""
 MOUNT = frozenset({"height_m", "min_range_m", "max_range_m"})
 """Keys of the section `sensor` that go with any sensor. A profile with no others names no sensor."""
+SENSORS = "sensors"
+"""Section with the sensors of a robot that has several, by their names."""
+SENSOR_SECTIONS = ("sensor", "segmentation")
+"""Sections that belong into the profiles of the sensors where there are several."""
 EXTENDS = "extends"
 """Key that names the profiles on which a profile is based."""
 MAX_CHARACTERS = 100_000
@@ -80,6 +84,9 @@ def read(text: str, origin: Path | str, name: str) -> Layer:
         stage = stages.get(key)
         if isinstance(stage, type):
             settings[key] = _stage(stage, node, origin, line)
+        elif key == SENSORS:
+            sensors = _entries(node, origin, None, SENSORS, line)
+            settings[key] = {sensor: _stage(MountedSensor, keys, origin, at) for sensor, keys, at in sensors}
         else:
             place = f"{origin}:{line}"
             extends = _names(_plain(node, place), place)
@@ -101,7 +108,7 @@ def from_yaml(text: str, origin: Path | str) -> Any:
 
 def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int) -> dict[str, Any]:
     """Values of the keys of a stage."""
-    known = {f.name: f for f in fields(kind)}
+    known = {f.name: f for f in fields(kind) if f.name != "name"}
     settings: dict[str, Any] = {}
     for key, value, at in _entries(node, origin, known, kind.__name__, line):
         plain = _plain(value, f"{origin}:{at}")
@@ -134,14 +141,14 @@ def _plain(node: yaml.Node, place: str) -> Any:
 
 
 def _entries(
-    node: yaml.Node | None, origin: Path | str, known: Mapping[str, object], what: str, line: int = 1
+    node: yaml.Node | None, origin: Path | str, known: Mapping[str, object] | None, what: str, line: int = 1
 ) -> Iterator[tuple[str, yaml.Node, int]]:
     """Key, value and line of each entry of a mapping. A loader of values has no lines, so the nodes are walked.
 
     Args:
         node: the mapping.
         origin: file, for messages.
-        known: valid keys.
+        known: valid keys; None for any.
         what: name of the mapping, for messages.
         line: line of its key.
     """
@@ -153,7 +160,7 @@ def _entries(
     for key_node, value in node.value:
         key = str(key_node.value)
         at = key_node.start_mark.line + 1
-        if key not in known:
+        if known is not None and key not in known:
             near = difflib.get_close_matches(key, known, n=1, cutoff=0.0)
             raise MisuseError(f"{origin}:{at}", f"unknown key '{key}'", f"did you mean '{near[0]}'?")
         if key in seen:
@@ -177,7 +184,7 @@ class Resolved:
     def used(self, default: str) -> tuple[str, ...]:
         """Names of the profiles, after `default` if none of them is of a sensor."""
         names = tuple(layer.name for layer in self.layers)
-        return names if self.sensor else (default, *names)
+        return names if self.sensor or self.config.sensors else (default, *names)
 
     @property
     def sensor(self) -> str | None:
@@ -206,8 +213,25 @@ def resolve(names: Names = None) -> Resolved:
             line and the nearest valid key; profiles that extend one another in a circle.
     """
     layers = _layers((names,) if isinstance(names, str | Path) else names or ())
-    assumed = () if any(layer.of_sensor for layer in layers) else _layers([DEFAULT])
-    return Resolved(layers, _configured((*assumed, *layers), ProfileConfig()))
+    return Resolved(layers, _configured((*_assumed(layers), *layers), ProfileConfig()))
+
+
+def _assumed(layers: Sequence[Layer]) -> tuple[Layer, ...]:
+    """The profiles on which layers are based: none where one is of a sensor, else that of the first sensor.
+
+    Raises:
+        MisuseError: there are several sensors, and a layer sets what belongs into their profiles.
+    """
+    sensors = _merged(layers).get(SENSORS)
+    if not sensors:
+        return () if any(layer.of_sensor for layer in layers) else _layers([DEFAULT])
+    for layer in layers:
+        if section := next((name for name in SENSOR_SECTIONS if name in layer.settings), None):
+            raise MisuseError(
+                f"{layer.name}: {section}", f"stands beside {SENSORS}", "write it into the profiles of the sensors"
+            )
+    first = next(iter(sensors.values())).get("profile")
+    return _layers([first]) if first else ()
 
 
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
@@ -218,10 +242,14 @@ def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
     """A profile as plain data, with all defaults and tuples as lists."""
-    return {
-        stage: {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
-        for stage, values in asdict(config).items()
-    }
+    stages = asdict(config)
+    sensors = {sensor.pop("name"): _listed(sensor) for sensor in stages.pop(SENSORS)}
+    plain = {stage: _listed(values) for stage, values in stages.items()}
+    return {**plain, SENSORS: sensors} if sensors else plain
+
+
+def _listed(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
 
 
 def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:
@@ -262,16 +290,34 @@ def _read(path: Path) -> Layer:
     stage = layer.settings.get("classification", {})
     if isinstance(stage, dict) and (path.parent / str(stage.get("model", ""))).is_file():
         stage["model"] = str(path.parent / stage["model"])
+    for sensor in layer.settings.get(SENSORS, {}).values():
+        for key in ("profile", "source"):
+            beside = path.parent / sensor.get(key, "")
+            if beside.is_file() or (key == "source" and sensor.get(key) and beside.exists()):
+                sensor[key] = str(beside)
     return layer
 
 
-def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:
+def _merged(layers: Sequence[Layer]) -> dict[str, dict[str, Any]]:
+    """Settings of layers, of which later ones win key by key."""
     merged: dict[str, dict[str, Any]] = {}
     for layer in layers:
         for stage, values in layer.settings.items():
-            merged[stage] = {**merged.get(stage, {}), **values}
+            before = merged.get(stage, {})
+            if stage == SENSORS:
+                merged[stage] = {**before, **{key: {**before.get(key, {}), **keys} for key, keys in values.items()}}
+            else:
+                merged[stage] = {**before, **values}
+    return merged
+
+
+def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:
+    merged = _merged(layers)
+    of_sensors = merged.pop(SENSORS, {})
     try:
-        return replace(base, **{stage: replace(getattr(base, stage), **values) for stage, values in merged.items()})
+        sensors = tuple(MountedSensor(name=name, **keys) for name, keys in of_sensors.items()) or base.sensors
+        stages = {stage: replace(getattr(base, stage), **values) for stage, values in merged.items()}
+        return replace(base, **stages, sensors=sensors)
     except ValueRangeError as error:
         names = ", ".join(layer.name for layer in layers)
         raise MisuseError(f"{names}: {error.subject}", error.cause, error.remedy) from None

@@ -2,7 +2,15 @@
 
 from modt.app.account import closing_lines
 
-READ = {"used": 9, "messages": 9, "left_out": {}, "without_pose": 0, "poses": "/odom", "not_deskewed": {}}
+READ = {
+    "used": 9,
+    "messages": 9,
+    "left_out": {},
+    "without_pose": 0,
+    "alone": {},
+    "poses": "/odom",
+    "not_deskewed": {},
+}
 
 
 def test_only_what_is_missing_is_told():

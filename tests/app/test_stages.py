@@ -30,7 +30,7 @@ def stages_of(**request):
     return Stages(Request(**{"profile": ("vlp-16",), **request}), INFO, Ledger(), live=True)
 
 
-CALLS = ("segmenter.segment", "odometry.locate", "tracker.track", "fusion.observe", "fusion.asks", "scheduler.select")
+CALLS = ("view.segment", "odometry.locate", "tracker.track", "fusion.observe", "fusion.asks", "scheduler.select")
 CALLS += ("classifier.classify", "fusion.fuse", "decision.decide", "tracker.confirm")
 
 

@@ -9,6 +9,7 @@ from modt import profile
 from modt.app import assembly
 from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
+from modt.types import Frame
 from tests.sensor_fit.recordings import recording, with_mast
 
 
@@ -42,7 +43,7 @@ def test_the_robot_itself_is_no_proposal():
     sighted = dataclasses.replace(config, sensor=sensor)
     mode = assembly.MODES["accurate"]
     stages = [assembly.pipeline(mode, c, FieldOfView()) for c in (config, sighted)]
-    members = [stage.segmenter.segment(points).members for stage in stages]
+    members = [stage.view.segment(Frame(0, 0.0, points)).members for stage in stages]
     mast = len(points) - 800
     assert (members[0] >= mast).any()
     assert not (members[1] >= mast).any()

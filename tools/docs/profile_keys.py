@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 
 from modt import assets
-from modt.config import ProfileConfig
+from modt.config import MountedSensor, ProfileConfig
+from modt.profile import SENSORS
 from modt_commands.profile_group import value_text
 from modt_commands.profile_schema import FILE, keys, schema_text
 from tools.docs.sections import DOCS, replace_section, write
@@ -17,22 +18,19 @@ MARK = "tools.docs.profile_keys"
 
 def page() -> str:
     """The first sentence on the configuration of each stage, and a table of its keys."""
-    lines: list[str] = []
+    sections = []
     for stage in fields(ProfileConfig):
-        about = str(stage.default_factory.__doc__).partition("\n")[0]
-        lines += [
-            "",
-            f"## {stage.name}",
-            "",
-            about,
-            "",
-            "| key | default | from, to | meaning |",
-            "|---|---|---|---|",
-        ]
-        for key in keys():
-            head, _, name = key.path.partition(".")
-            if head == stage.name:
-                lines.append(f"| `{name}` | {value_text(key.default)} | {key.bounds} | {key.facts['meaning']} |")
+        if stage.name != SENSORS:
+            of_stage = [key for key in keys() if key.path.startswith(f"{stage.name}.")]
+            sections.append((stage.name, str(stage.default_factory.__doc__), of_stage))
+    of_sensor = [key for key in keys(MountedSensor) if key.path != "name"]
+    lines: list[str] = []
+    for name, about, of_section in [*sections, (f"{SENSORS}.NAME", str(MountedSensor.__doc__), of_sensor)]:
+        lines += ["", f"## {name}", "", about.partition("\n")[0], ""]
+        lines += ["| key | default | from, to | meaning |", "|---|---|---|---|"]
+        for key in of_section:
+            last = key.path.rpartition(".")[2]
+            lines.append(f"| `{last}` | {value_text(key.default)} | {key.bounds} | {key.facts['meaning']} |")
     return "\n".join(lines[1:])
 
 

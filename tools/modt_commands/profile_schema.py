@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from modt.cli import options
-from modt.config import ProfileConfig, StageConfig
-from modt.profile import EXTENDS
+from modt.config import MountedSensor, ProfileConfig, StageConfig
+from modt.profile import EXTENDS, SENSORS
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +54,8 @@ def keys(config: type[StageConfig] | type[ProfileConfig] = ProfileConfig, prefix
     """Every key, in the order of the configuration."""
     for f in fields(config):
         kind = f.default_factory
+        if f.name == SENSORS:
+            continue  # a section of sections, as below
         if isinstance(kind, type) and issubclass(kind, StageConfig):
             yield from keys(kind, f"{prefix}{f.name}.")
         else:
@@ -85,6 +87,10 @@ def schema_text() -> str:
     name = {"type": "string"}
     base = "name or file of the profiles that this one is based on"
     root["properties"][EXTENDS] = {"description": base, "anyOf": [name, {"type": "array", "items": name}]}
+    of_sensor = _mapping("sensor")
+    of_sensor["properties"] = {key.path: _value(key) for key in keys(MountedSensor) if key.path != "name"}
+    sensors = "sensors of a robot with several, by their names, in place of the sections sensor and segmentation"
+    root["properties"][SENSORS] = {"description": sensors, "type": "object", "additionalProperties": of_sensor}
     for key in keys():
         *groups, last = key.path.split(".")
         place = root

@@ -15,7 +15,8 @@ from modt.energy.ledger import LedgerLine
 from modt.energy.windows import EnergyWindow
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.placement import Mount
+from modt.placement import LEVEL, Mount
+from modt.profile import parse, to_yaml
 from modt.sinks.records import BROKEN
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
@@ -114,7 +115,8 @@ class RunRecord:
             stream = facts["stream"]["path"]
             sensor = Path(facts["recognition"]["used"]).stem
             placed = facts["profile"]["sensor"]
-            mount = Mount.of(placed["roll_deg"], placed["pitch_deg"])
+            several = "sensors" in facts["profile"]  # the frames of their robot are level
+            mount = LEVEL if several else Mount.of(placed["roll_deg"], placed["pitch_deg"])
             return cls(path, facts, Path(stream) if stream else None, sensor, mount)
         except (TypeError, KeyError) as error:
             raise MisuseError(path / RUN, f"describes no run ({error})", GIVE) from None
@@ -134,9 +136,10 @@ class RunRecord:
         """
         if self.live:
             return None
-        return LevelStream(
-            inputs.stream(inputs.Request(path=self.stream, capture=capture, frames=frames)), self.mount
-        )
+        recorded = self.facts["profile"]
+        config = parse(to_yaml(recorded), self.path / RUN) if "sensors" in recorded else None
+        request = inputs.Request(path=self.stream, capture=capture, frames=frames)
+        return LevelStream(inputs.stream(request, config), self.mount)
 
     def records(self) -> Iterator[Record]:
         """The record of every frame.

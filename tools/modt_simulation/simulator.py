@@ -220,7 +220,8 @@ class Simulator:
 
     `distort` leaves the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor: every
     sector is seen from the pose at its own time. Else they are as after deskewing. Weather and faults of the sensor
-    change the sweeps from the time on at which they begin.
+    change the sweeps from the time on at which they begin. The first sweep is at `first_s`, and the seed of the noise
+    of a receiver may differ from that of the bodies.
     """
 
     def __init__(
@@ -232,10 +233,14 @@ class Simulator:
         distort: bool = False,
         weather: Condition | None = None,
         faults: Sequence[Condition] = (),
+        first_s: float = 0.0,
+        noise_seed: int | None = None,
     ) -> None:
         self.world = world
         self.sensor = sensor
         self.seed = seed
+        self._first_s = first_s
+        self._noise_seed = seed if noise_seed is None else noise_seed
         self.distort = distort and sensor.rotating
         self.caster = RayCaster(sensor)
         self._sectors = Sector.of(sensor, turning=self.distort)
@@ -251,12 +256,12 @@ class Simulator:
 
     def sweep(self, index: int) -> tuple[Frame, Truth]:
         """Frame number index and its ground truth."""
-        rng = np.random.default_rng([self.seed, 2, index])
-        time_s = index * self.sensor.period_s
+        rng = np.random.default_rng([self._noise_seed, 2, index])
+        time_s = self._first_s + index * self.sensor.period_s
         depth = rng.standard_exponential(self.sensor.shape, np.float32)
         seen = Surfaces.join([self._surfaces(sector, time_s, depth) for sector in self._sectors])
         sensor = faulty(self.sensor, self._faults, time_s)
-        receiver = Receiver(sensor, np.random.default_rng([self.seed, 1]))
+        receiver = Receiver(sensor, np.random.default_rng([self._noise_seed, 1]))
         T_world_sensor = self.world.ego_pose(time_s)
         air = self._air(time_s)
         returns = receiver.receive(seen, rng, air.extinction_per_m if air else 0.0)

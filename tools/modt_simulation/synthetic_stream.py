@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from modt.config import MountedSensor
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Faults, Reading, StreamInfo
@@ -42,7 +43,8 @@ class SyntheticStream:
 
     `seed` is that of the scene, its traffic and the noise; `distort` leaves the motion during a sweep in the scans.
     The sensor is mounted as usual, or at `height_m`; `mount_deg`, its roll and pitch, adds to what is left of them
-    after it was levelled. Weather, gait and faults are texts, as those of `modt simulate`.
+    after it was levelled. Weather, gait and faults are texts, as those of `modt simulate`. A sensor of a robot with
+    several is mounted as `mounted` says, on a level robot; the first sweep is at `first_s`.
 
     Raises:
         MisuseError: an unknown scene, sensor, weather, gait or fault, or an invalid duration or seed.
@@ -61,6 +63,9 @@ class SyntheticStream:
         weather: str | None = None,
         gait: str | None = None,
         faults: Sequence[str] = (),
+        mounted: MountedSensor | None = None,
+        first_s: float = 0.0,
+        noise_seed: int | None = None,
     ) -> None:
         if scene not in SCENES:
             raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
@@ -69,9 +74,14 @@ class SyntheticStream:
         if seed < 0:
             raise MisuseError(seed, "no seed", "give an integer of at least 0")
         model = sensor_model(sensor)
+        if mounted is not None:
+            height_m = mounted.position_m[2]
         world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, height_m or model.height_m)
         roll, pitch = (np.deg2rad(mount_deg) + world.mount_rad).tolist()
         walk = Gait.of(gait, np.random.default_rng([seed, 4])) if gait else None
+        if mounted is not None:
+            world = replace(world, height_m=0.0, T_carrier_sensor=mounted.T_robot_sensor)
+            roll = pitch = 0.0
         self.simulator = Simulator(
             replace(world, mount_rad=(roll, pitch), gait=walk),
             model,
@@ -79,6 +89,8 @@ class SyntheticStream:
             distort=distort,
             weather=read_weather(weather) if weather else None,
             faults=read_faults(faults),
+            first_s=first_s,
+            noise_seed=noise_seed,
         )
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults = Faults()

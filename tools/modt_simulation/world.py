@@ -42,6 +42,7 @@ class World:
     sway_rad: float  # amplitude of the carrier's roll and pitch
     mount_rad: Pair  # roll and pitch of the sensor on its carrier
     gait: Gait | None = None  # gait of the carrier; None for wheels
+    T_carrier_sensor: Float64 | None = None  # (4, 4) further mount, of one of several sensors
 
     def __post_init__(self) -> None:
         at_rest = np.array([body.path.at_rest for body in self.bodies], np.bool_)
@@ -63,7 +64,9 @@ class World:
         pitch = self.mount_rad[1] - np.arctan2(rise, 2.6) + self.sway_rad * np.sin(2.9 * time_s)
         roll = self.mount_rad[0] + np.arctan2(bank, 1.6) + self.sway_rad * np.sin(2.1 * time_s + 1.0)
         T = se3(rotation_zyx(float(roll), float(pitch), yaw), np.array([x, y, self._smooth(x, y) + self.height_m]))
-        return T if self.gait is None else T @ self.gait.pose(time_s)
+        if self.gait is not None:
+            T = T @ self.gait.pose(time_s)
+        return T if self.T_carrier_sensor is None else T @ self.T_carrier_sensor
 
     def poses(self, time_s: float) -> Float64:
         """(n, 5) of each body x, y, z on the ground [m, world], heading [rad], speed [m/s]."""

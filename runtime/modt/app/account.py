@@ -62,6 +62,7 @@ def account(loop: Loop) -> dict[str, Any]:
         "corrected": dict(reading.corrected),
         "frame_id": reading.frame_id,
         "without_pose": reading.without_pose if own else 0,
+        "alone": dict(reading.alone),
         "poses": (reading.poses or "registration") if own else poses.name,
     }
 
@@ -72,6 +73,8 @@ def closing_lines(read: Mapping[str, Any]) -> list[str]:
     if read["left_out"]:
         what = "; ".join(f"{number} x {reason}" for reason, number in read["left_out"].items())
         lines.append(f"not all was read: {read['used']} frames of {read['messages']} messages; left out: {what}")
+    for sensor, number in read["alone"].items():
+        lines.append(f"{number} sweeps of sensor {sensor} have none of another sensor near them: they are used alone")
     if read["without_pose"]:
         lines.append(f"{read['without_pose']} frames have no pose of {read['poses']} near them: they are registered")
     kinds = read["not_deskewed"]

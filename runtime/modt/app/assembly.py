@@ -6,7 +6,7 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,7 +19,15 @@ from modt.classification.prior import Prior, make_prior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.scheduler import Scheduler
 from modt.classification.tuning import BatchingTuning, FusionTuning
-from modt.config import KERNELS, NATIVE, ClassificationConfig, FusionConfig, ProfileConfig, SensorConfig
+from modt.config import (
+    KERNELS,
+    NATIVE,
+    ClassificationConfig,
+    FusionConfig,
+    MountedSensor,
+    ProfileConfig,
+    SensorConfig,
+)
 from modt.config import NUMPY as NUMPY_NAME
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
@@ -32,8 +40,9 @@ from modt.native.library import NotAvailableError, load
 from modt.object_box.estimator import SeenBoxes
 from modt.object_box.native_estimator import whole_boxes_of
 from modt.odometry.pose_estimator import PoseEstimator
-from modt.pipeline import ClassificationStage, FusionStage, Pipeline, SegmentationStage
+from modt.pipeline import ClassificationStage, FusionStage, Pipeline, SegmentationStage, SensorView, ViewStage
 from modt.placement import Mount
+from modt.profile import load as load_profile
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
@@ -140,6 +149,41 @@ def segmenter(
     return BlindSectorFilter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
 
 
+def leveller(sensor: SensorConfig) -> Leveller:
+    """Levelling of the sweeps of a mounted sensor."""
+    return Leveller(Mount.of(sensor.roll_deg, sensor.pitch_deg), sensor.height_m, sensor.min_range_m)
+
+
+def view(
+    profile: ProfileConfig, fov: FieldOfView, kernels: Kernels, tuning: SegmentationTuning = SegmentationTuning()
+) -> ViewStage:
+    """The view of the sensor of a profile, or of all its sensors together.
+
+    Raises:
+        MisuseError: the profile of one of several sensors cannot be used.
+    """
+    if not profile.sensors:
+        return SensorView(leveller(profile.sensor), segmenter(profile, fov, kernels, tuning))
+    from modt.joint_view import JointView, SensorPart
+
+    parts = []
+    for mounted in profile.sensors:
+        config = sensor_profile(mounted)
+        stage = segmenter(config, FieldOfView(), kernels, tuning)
+        parts.append(SensorPart(mounted, config.sensor, leveller(config.sensor), stage))
+    return JointView(parts, kernels, tuning.joining)
+
+
+def sensor_profile(mounted: MountedSensor) -> ProfileConfig:
+    """The profile of one of several sensors, with its mount.
+
+    Raises:
+        MisuseError: there is no such profile, or it cannot be used.
+    """
+    config = load_profile(mounted.profile)
+    return replace(config, sensor=mounted.mounted(config.sensor))
+
+
 def network(
     config: ClassificationConfig, sensor: SensorConfig, tuning: BatchingTuning = BatchingTuning()
 ) -> PointNet:
@@ -199,7 +243,7 @@ def pipeline(
         mode,
         profile,
         model,
-        segmenter(profile, fov, kernels, tuning.segmentation),
+        view(profile, fov, kernels, tuning.segmentation),
         classifier,
         cost,
         ledger or Ledger(),
@@ -213,7 +257,7 @@ def stages(
     mode: Mode,
     profile: ProfileConfig,
     network: PointNet,
-    segmenter: SegmentationStage,
+    view: ViewStage,
     classifier: ClassificationStage,
     cost: LinearCost,
     ledger: Ledger,
@@ -221,7 +265,7 @@ def stages(
     continuity: Continuity | None = None,
     tuning: MethodTuning = MethodTuning(),
 ) -> Pipeline:
-    """A pipeline around a given segmenter, and the network or a substitute of the given cost as its classifier."""
+    """A pipeline around a given view, and the network or a substitute of the given cost as its classifier."""
     prior = make_prior(network.box_scores, network.class_frequency)
     continuity = continuity or Continuity()
     odometry = PoseEstimator(kernels, tuning.odometry)
@@ -235,7 +279,7 @@ def stages(
         decision = Decision(profile.decision, network.class_frequency, chosen.decision)
     boxes = whole_boxes_of(kernels, tuning.object_box) if profile.tracking.extensions == "all" else SeenBoxes()
     return Pipeline(
-        segmenter=segmenter,
+        view=view,
         odometry=odometry,
         tracker=Tracker(
             profile.tracking,
@@ -251,9 +295,4 @@ def stages(
         decision=decision,
         boxes=boxes,
         ledger=ledger,
-        leveller=Leveller(
-            Mount.of(profile.sensor.roll_deg, profile.sensor.pitch_deg),
-            profile.sensor.height_m,
-            profile.sensor.min_range_m,
-        ),
     )

@@ -26,6 +26,7 @@ from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecordin
 from modt.sinks.run_directory import RunDirectory
 
 if TYPE_CHECKING:
+    from modt.sources.live.joint_live import JointLive
     from modt.sources.live.live_stream import LiveStream
 
 log = logging.getLogger(__name__)
@@ -69,7 +70,7 @@ def replay(
 
 def service(
     request: inputs.Request,
-    source: LiveStream,
+    source: LiveStream | JointLive,
     sinks: Mapping[str, Sink],
     out: Path,
     metrics: Path | None,

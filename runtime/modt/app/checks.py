@@ -17,6 +17,7 @@ from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Kind
 from modt.errors import ModtError
+from modt.sources.live.joint_live import JointLive
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.stream import StreamEndedError
 from modt.trust.first_sweeps import doubts
@@ -149,7 +150,7 @@ def clock(state: int | None = None, now_s: float | None = None) -> Finding:
 
 
 def sensor(
-    open_source: Callable[[], LiveStream], timeout_s: float = REACH_S, config: ProfileConfig | None = None
+    open_source: Callable[[], LiveStream | JointLive], timeout_s: float = REACH_S, config: ProfileConfig | None = None
 ) -> list[Finding]:
     """Check that a source can be opened and sends sweeps; with a profile, that its sweeps are whole."""
     try:

@@ -56,6 +56,9 @@ def choose(requested: profile.Names | ProfileConfig, first: Frame | None, info: 
     Raises:
         MisuseError: a profile that cannot be used.
     """
+    config = requested if isinstance(requested, ProfileConfig) else profile.load(requested)
+    if config.sensors:
+        return _several(config, requested, first)
     if isinstance(requested, ProfileConfig):
         recognition = _compared(first, requested, GIVEN, replaced=False)
         return ChosenProfile(recognition.mounted(requested), GIVEN, (GIVEN,), recognition)
@@ -69,6 +72,20 @@ def choose(requested: profile.Names | ProfileConfig, first: Frame | None, info: 
     sensor = FOUND if recognition.differences else base
     config = _with_beams(profiles.applied_to(recognition.fitted), info)
     return ChosenProfile(config, sensor, profiles.used(sensor), recognition)
+
+
+def _several(config: ProfileConfig, requested: profile.Names | ProfileConfig, first: Frame | None) -> ChosenProfile:
+    """The profile of several sensors, whose first sweeps are compared with the profiles of theirs."""
+    differences: list[str] = []
+    sweeps = first.sweeps if first is not None and first.sweeps else (None,) * len(config.sensors)
+    for mounted, sweep in zip(config.sensors, sweeps, strict=True):
+        own = profile.load(mounted.profile)
+        own = replace(own, sensor=mounted.mounted(own.sensor))
+        found = _compared(sweep, own, f"{mounted.profile} of sensor {mounted.name}", replaced=False)
+        differences += [] if found.fits else [f"{mounted.name}: {difference}" for difference in found.differences]
+    names = (GIVEN,) if isinstance(requested, ProfileConfig) else profile.resolve(requested).used("")
+    of_sensors = " + ".join(mounted.profile for mounted in config.sensors)
+    return ChosenProfile(config, of_sensors, names, Recognition(tuple(differences), None, config))
 
 
 def _compared(first: Frame | None, config: ProfileConfig, name: str, *, replaced: bool) -> Recognition:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from modt import profile
-from modt.config import OdometryConfig
+from modt.config import OdometryConfig, ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.placement import LEVEL, Mount
@@ -21,6 +21,7 @@ from modt.schemes import POSES, open_poses, open_sensor
 from modt.sources.stream import Stream, StreamInfo
 
 if TYPE_CHECKING:
+    from modt.sources.live.joint_live import JointLive
     from modt.sources.live.live_stream import LiveStream
 
 # Values of --odometry that are no addresses
@@ -52,24 +53,28 @@ class Request:
         return cls(**{name: value for name, value in vars(arguments).items() if name in names})
 
 
-def stream(request: Request) -> Stream:
-    """The requested stream, or the embedded one without a path.
+def stream(request: Request, config: ProfileConfig | None = None) -> Stream:
+    """The requested stream, or the embedded one without a path; by default with the profile that is asked for.
 
     Raises:
         MisuseError: the path is no stream, or none is built in.
     """
-    if request.path is None:
+    config = config or profile.load(request.profile)
+    if config.sensors:
+        from modt.app.recorded_sensors import open_recordings
+
+        whole: Stream = open_recordings(config.sensors, request.path, config.sensor.period_s)
+    elif request.path is None:
         embedded = [*entry_points(group="modt.streams", name="embedded")]
         if not embedded:
             raise MisuseError(
                 "no recording", "none is built in here", "give one, or install modt with its tools again"
             )
-        whole: Stream = embedded[0].load()()
+        whole = embedded[0].load()()
     else:
         from modt.sources.recognise import open_stream
 
-        period_s = profile.load(request.profile).sensor.period_s
-        whole = open_stream(request.path, period_s, dict(request.capture))
+        whole = open_stream(request.path, config.sensor.period_s, dict(request.capture))
     cut = whole.between(*request.frames)
     if cut.info.n_frames == 0:
         first, last = request.frames
@@ -78,10 +83,12 @@ def stream(request: Request) -> Stream:
     return cut
 
 
-def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Path | None]:
+def live_source(
+    text: str, cores: frozenset[int] | None, names: profile.Names = None
+) -> tuple[LiveStream | JointLive, Path | None]:
     """A sensor by its address, or a recording by its path, played as if it were live. "" is the embedded stream.
 
-    `PATH?loop=yes` plays a recording for ever.
+    `PATH?loop=yes` plays a recording for ever. The sensors of a profile that has several take the place of the one.
 
     Returns:
         the source, and the path from which its frames can be read again by number; None if they cannot.
@@ -89,7 +96,14 @@ def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Pa
     Raises:
         MisuseError: no such sensor or recording.
     """
+    config = profile.load(names)
+    if config.sensors and not text:
+        from modt.sources.live.joint_live import JointLive
+
+        return JointLive(config.sensors, [open_sensor(sensor.source, cores) for sensor in config.sensors]), None
     if "://" in text:
+        if config.sensors:
+            raise MisuseError(text, "is one sensor, and the profile has several", "leave it out, or the profile")
         return open_sensor(text, cores), None
     from modt.sources.live.live_stream import LiveStream, PlayedReader
 
@@ -99,7 +113,7 @@ def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Pa
     if options or loop not in ("yes", "no"):
         raise MisuseError(text, f"option {query!r} is unknown", "write PATH or PATH?loop=yes")
     path = Path(place) if place else None
-    recording = stream(Request(path=path))
+    recording = stream(Request(path=path), config)
     reader = PlayedReader(recording, loop=loop == "yes")
     return LiveStream(recording.info, reader, cores=cores), None if loop == "yes" else path
 

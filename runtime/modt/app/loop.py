@@ -37,6 +37,7 @@ from modt.types import FrameResult, TrustLevel
 
 if TYPE_CHECKING:
     from modt.sinks.background import Background
+    from modt.sources.live.joint_live import JointLive
     from modt.sources.live.live_stream import LiveStream
 
 log = logging.getLogger(__name__)
@@ -70,7 +71,7 @@ class Loop:
         summary: the summary as written; empty before the end.
     """
 
-    source: LiveStream | Playback
+    source: LiveStream | JointLive | Playback
     stages: Stages
     recording: Recording
     sinks: Mapping[str, Sink]
@@ -254,7 +255,7 @@ class Service(Loop):
         reloads, refused_reloads: number of times that the profile was loaded anew, and that it could not be used.
     """
 
-    source: LiveStream
+    source: LiveStream | JointLive
     deadlines: Deadlines
     refusals: Sequence[str] = ()
     metrics: Path | None = None

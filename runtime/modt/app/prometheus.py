@@ -13,7 +13,7 @@ from modt.types import TrustLevel
 
 COUNTERS = re.compile(
     r"(frames|proposals|classifications|deferred|missed_deadlines|shed_sweeps|reloads|refused_reloads|steps_entered"
-    r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|written|failed|unsent|dropped)"
+    r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|written|failed|unsent|dropped|alone)"
 )
 """Names of counters, which never decrease."""
 LABELS = {
@@ -23,6 +23,7 @@ LABELS = {
     "failures": "kind",
     "refused_messages": "reason",
     "stages_J": "stage",
+    "alone": "sensor",
 }
 """Label of the keys of each table."""
 

@@ -66,7 +66,7 @@ def run_summary(loop: Loop) -> dict[str, Any]:
             "mode": stages.request.mode,
             "fov": stages.request.fov,
             "profile": stages.chosen.name,
-            **pipeline.segmenter.facts(),
+            **pipeline.view.facts(),
             "elapsed_s": elapsed_s,
             "frames_per_s": frames / elapsed_s,
             "real_time_factor": frames * stages.info.period_s / elapsed_s,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from modt.app.chosen_profile import ChosenProfile, choose
 from modt.app.trust_report import TrustReport
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
+from modt.errors import MisuseError
 from modt.pipeline import Pipeline
 from modt.placement import Mount
 from modt.poses.pose_source import PoseSource
@@ -24,6 +25,9 @@ from modt.trust.sample import REACH_SHARE
 from modt.trust.visibility import VisibilityEstimate
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import Budget, Frame, FrameResult, TrustLevel
+
+if TYPE_CHECKING:
+    from modt.app.joint_trust import JointWatch
 
 DOUBTED_S = 0.5
 """Time for which given poses are doubted before it is reported [s]."""
@@ -78,7 +82,7 @@ class Stages:
         self.chosen = self._choose(None)
         self._began_with: tuple[Frame | None, ChosenProfile] = None, self.chosen
         self.pipeline = self._new_pipeline(self.chosen.config)
-        self.trust = TrustReport(self.chosen.config.sensor)
+        self.trust = TrustReport(self.chosen.config.sensor, _watch(self.chosen.config))
         self.source_findings: dict[str, Finding] = {}
         self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
 
@@ -115,9 +119,7 @@ class Stages:
         """
         frame = self.odometry.place(frame)
         if reduced:
-            x, y = frame.points[:, :2].T
-            near = np.square(x) + np.square(y) <= (REACH_SHARE * self.config.sensor.max_range_m) ** 2
-            frame = replace(frame, points=frame.points[near])
+            frame = _within(frame, REACH_SHARE * self.config.sensor.max_range_m)
         result = self.pipeline.step(frame, budget)
         return replace(result, run_id=self.run_id, trust=self.trust.judge(result, self._findings()))
 
@@ -173,6 +175,8 @@ class Stages:
             ModtError: it is not valid; nothing has changed.
         """
         chosen = self._choose(self._chosen_for)
+        if [each.name for each in chosen.config.sensors] != [each.name for each in self.config.sensors]:
+            raise MisuseError("sensors", "are others than at the start", "start modt anew for other sensors")
         self._use(chosen)
         self._began_with = self._chosen_for, chosen
 
@@ -199,7 +203,7 @@ class Stages:
             "fov": request.fov,
             "core": core,
             "versions": host.versions(),
-            "segmentation": self.pipeline.segmenter.facts(),
+            "segmentation": self.pipeline.view.facts(),
             "model": self.pipeline.classifier.facts(),
             "host": host.description(),
             "recognition": {
@@ -230,9 +234,27 @@ class Stages:
         """Exchange the stages for those of another profile; the tracks are kept."""
         self.pipeline = self._new_pipeline(chosen.config)
         if chosen.config.sensor != self.config.sensor and not self.trust.watch.displaced:
-            watch = TrustWatch(chosen.config.sensor)
-            watch.adopt(self.trust.watch)
-            self.trust.watch = watch
+            self.trust.watch = _watch(chosen.config, self.trust.watch)
             self.trust.visibility = VisibilityEstimate(chosen.config.sensor)
         self.chosen = chosen
         host.release_freed_pages()
+
+
+def _within(frame: Frame, range_m: float) -> Frame:
+    """The frame, and each of its sweeps, without the points beyond a range."""
+    x, y = frame.points[:, :2].T
+    near = np.square(x) + np.square(y) <= range_m**2
+    sweeps = tuple(sweep and _within(sweep, range_m) for sweep in frame.sweeps)
+    return replace(frame, points=frame.points[near], sweeps=sweeps)
+
+
+def _watch(config: ProfileConfig, before: TrustWatch | JointWatch | None = None) -> TrustWatch | JointWatch:
+    """The checks of the sensor of a profile, or of each of its sensors; one sensor keeps the verdict before."""
+    if not config.sensors:
+        watch = TrustWatch(config.sensor)
+        if isinstance(before, TrustWatch):
+            watch.adopt(before)
+        return watch
+    from modt.app.joint_trust import JointWatch
+
+    return JointWatch([(mounted, assembly.sensor_profile(mounted).sensor) for mounted in config.sensors])

@@ -6,13 +6,16 @@ import logging
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from modt.config import SensorConfig
 from modt.sources.packets.turn_decoder import OTHER_SENSOR
 from modt.trust.visibility import VisibilityEstimate
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import FrameResult, Trust, TrustLevel
+
+if TYPE_CHECKING:
+    from modt.app.joint_trust import JointWatch
 
 log = logging.getLogger(__name__)
 
@@ -24,6 +27,7 @@ class TrustReport:
 
     Args:
         sensor: the sensor of the profile.
+        watch: the checks; by default those of this sensor.
 
     Attributes:
         watch: the checks; another sensor needs another one.
@@ -32,8 +36,8 @@ class TrustReport:
         frames: number of frames by level.
     """
 
-    def __init__(self, sensor: SensorConfig) -> None:
-        self.watch = TrustWatch(sensor)
+    def __init__(self, sensor: SensorConfig, watch: TrustWatch | JointWatch | None = None) -> None:
+        self.watch = watch or TrustWatch(sensor)
         self.trust = Trust()
         self.visibility = VisibilityEstimate(sensor)
         self.frames: Counter[str] = Counter({level.name.lower(): 0 for level in TrustLevel})

@@ -147,11 +147,17 @@ def proposal_features(proposals: Proposals, sensor: SensorConfig, beams: Beams |
         sensor: azimuth step, and the height where the proposals have no ground.
         beams: beams of the sensor, if at hand: looking them up in `sensor` takes time.
     """
-    box = proposals.box
+    beam_sr = proposals.beam_sr
+    if beam_sr is None:
+        beam_sr = solid_angles(proposals.box, sensor, beams)
+    return box_features(proposals.count, proposals.box, ground_z_m(proposals, slice(None), sensor), beam_sr)
+
+
+def solid_angles(box: Float64, sensor: SensorConfig, beams: Beams | None = None) -> Float64:
+    """(P,) solid angle of a point [sr] of boxes (P, 7) in the frame of a sensor; `beams` as in proposal_features."""
     tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
     elevation_step_rad = (beams or sensor.beams).step_rad(tangent.astype(np.float32))
-    beam_sr = np.asarray(np.deg2rad(sensor.azimuth_step_deg) * elevation_step_rad, np.float64)
-    return box_features(proposals.count, box, ground_z_m(proposals, slice(None), sensor), beam_sr)
+    return np.asarray(np.deg2rad(sensor.azimuth_step_deg) * elevation_step_rad, np.float64)
 
 
 def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None = None) -> BoxClassifier | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from modt import host
 from modt.cli import options
@@ -31,6 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app import assembly, checks
     from modt.app.inputs import live_source
     from modt.energy.meters.discovery import discover
+    from modt.schemes import open_sensor
 
     config = profile.load(arguments.profile)
     limits = config.classification
@@ -47,6 +49,9 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     if arguments.source is not None:
         found += checks.sensor(lambda: live_source(arguments.source, cores)[0], config=config)
+    for mounted in config.sensors:
+        opened = partial(open_sensor, mounted.source, cores)
+        found += checks.sensor(opened, config=assembly.sensor_profile(mounted))
     for finding in found:
         print(finding)
     return int(any(finding.level == checks.FAIL for finding in found))

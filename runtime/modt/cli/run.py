@@ -84,7 +84,7 @@ def _service(
     from modt.app.inputs import Request, live_source
     from modt.schemes import open_sinks
 
-    source, path = live_source(arguments.source, cores)
+    source, path = live_source(arguments.source, cores, arguments.profile)
     sinks = open_sinks([*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])])
     request = replace(Request.of(arguments), path=path)
     command = ["modt", *sys.argv[1:]]

@@ -377,6 +377,17 @@ class ViewEndTuning:
 
 
 @dataclass(frozen=True, slots=True)
+class JoiningTuning:
+    """Proposals of several sensors that are one object."""
+
+    cell_m: float = 0.12
+    """Side of the cells in which or beside which two sensors see the same [m]. Less leaves two proposals of an object
+    that they see from two sides; more joins what stands side by side. Chosen on: simulated yards."""
+    gap_m: float = 0.3
+    """Greatest gap in height between the parts of an object that two sensors see [m]. Chosen on: judgement."""
+
+
+@dataclass(frozen=True, slots=True)
 class SegmentationTuning:
     """All values of the stage."""
 
@@ -395,3 +406,4 @@ class SegmentationTuning:
     view: ViewTuning = ViewTuning()
     heading: HeadingTuning = HeadingTuning()
     view_ends: ViewEndTuning = ViewEndTuning()
+    joining: JoiningTuning = JoiningTuning()

@@ -278,6 +278,7 @@ def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingPr
         notes=(*_notes(sensors, sensor, stamped=stamped), *(() if parts is None else (parts.note(),))),
         pose_notes=notes,
         end=count,
+        began_s=first[0],
     )
     return BagStream(info, bag, chosen, first, poses, parts, sensor if len(sensors) > 1 else None, stamped=stamped)
 

@@ -105,7 +105,8 @@ def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") 
     apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
     stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(scans)}
     notes = [f"folder of scans: no calibration, frames {apart}"]
-    info = StreamInfo(folder.name, "folder of scans", period_s=period_s)
+    began_s = 0.0 if times is None else times[0] / 1e9
+    info = StreamInfo(folder.name, "folder of scans", period_s=period_s, began_s=began_s)
     poses: dict[int, Float64] = {}
     T_sensor_file: dict[int, Float64] = {}
     if suffix == ".pcd":

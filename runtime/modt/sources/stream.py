@@ -31,6 +31,7 @@ class StreamInfo:
     end: int | None = None  # index of the last frame plus one, None where unknown
     profile: str | None = None  # shipped profile of the sensor, where its messages identify it
     elevations_deg: tuple[float, ...] | None = None  # elevations of its beams, where its metadata have them
+    began_s: float = 0.0  # time of stamp 0 on the clock of the recording [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +118,7 @@ class Reading:
     frame_id: str = ""  # frame of the points, where messages name it
     poses: str = ""  # where the poses are from
     without_pose: int = 0  # frames that have none of these poses
+    alone: Counter[str] = field(default_factory=Counter)  # sweeps without one of another sensor, by sensor
 
 
 class Stream(Protocol):

@@ -29,6 +29,8 @@ class Frame:
         R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
         frame_id: name of the frame of the points in the messages they came in; "" where those name none.
         mid_rad: bearing that the head faces in the middle of the sweep [rad]; 0 is straight ahead.
+        sweeps: sweeps of a robot with several sensors, in their order, each in the frame of its sensor; None for one
+            without a sweep at this time. Points and pose are then those of the robot. Empty for one sensor.
     """
 
     index: int
@@ -41,6 +43,7 @@ class Frame:
     R_level_sensor: Float64 | None = None
     frame_id: str = ""
     mid_rad: float = 0.0
+    sweeps: tuple[Frame | None, ...] = ()
 
     def __repr__(self) -> str:
         pose = "no" if self.T_world_sensor is None else "its"

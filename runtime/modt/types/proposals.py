@@ -58,13 +58,14 @@ class Proposals:
     reflectance: Float64 | None = None  # (P, 5)
     kind: Int8 | None = None  # (N,) PointKind of each point of the frame, None where not known
     feet: Int | None = None  # (2, F) points of kind FOOT, and of each a point of what it belongs to
+    beam_sr: Float64 | None = None  # (P,) solid angle of a point of each [sr], None for one sensor
 
     def lock(self) -> Self:
         """These proposals, whose columns nobody can write to from here on.
 
         Members, offsets and coordinates are not marked, since C takes read-only arrays several times slower.
         """
-        for entries in (self.centroid, self.box, self.cut, self.ground_z_m, self.reflectance):
+        for entries in (self.centroid, self.box, self.cut, self.ground_z_m, self.reflectance, self.beam_sr):
             if entries is not None:
                 entries.setflags(write=False)
         return self
@@ -105,6 +106,7 @@ class Proposals:
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
             kind=self.kind,
             feet=self.feet,
+            beam_sr=None if self.beam_sr is None else self.beam_sr.take(source),
         )
 
     @classmethod

@@ -11,7 +11,7 @@ from modt.app import assembly
 from modt.classification.call_cost import LinearCost, padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
-from modt.pipeline import Pipeline
+from modt.pipeline import Pipeline, SensorView
 from modt.types import Self
 from modt_evaluation.experiments.drives import Drive
 from modt_evaluation.experiments.segmented import IdealTracking, PlayedBack, SegmentedDrive, segmented
@@ -107,7 +107,8 @@ class NetworkReplay:
         kernels = assembly.chosen_kernels(config.segmentation.kernels)
         ideal = IdealTracking(known, config, self.range_m) if self.ideal else None
         played = ideal or PlayedBack(known, self.range_m)
-        pipeline = assembly.stages(mode, config, known.network, played, played, cost, Ledger(), kernels)
+        view = SensorView(assembly.leveller(config.sensor), played)
+        pipeline = assembly.stages(mode, config, known.network, view, played, cost, Ledger(), kernels)
         return pipeline if ideal is None else replace(pipeline, odometry=ideal, tracker=ideal)
 
 

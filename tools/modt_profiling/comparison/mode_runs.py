@@ -113,7 +113,7 @@ def _tracked(request: inputs.Request, profile: ProfileConfig, frames: int | None
 def _warm_up(mode_run: ModeRun, frame: Frame) -> None:
     """Run the two stages without a state once: first calls allocate and load."""
     parts = mode_run.pipeline
-    proposals = parts.segmenter.segment(frame.points)
+    proposals = parts.view.segment(frame)
     parts.classifier.classify(frame.points, proposals, np.arange(len(proposals)))
 
 

@@ -68,6 +68,7 @@ class LiveStream:
         skewed: number of sweeps that are deskewed by the times of a turn.
         silences: number of times that the sensor fell silent.
         period_s: mean time between the last sweeps by their stamps, at first the nominal one.
+        arrived: notified of each sweep; streams that are not started may share one.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class LiveStream:
         self._cores = cores
         self._clock = clock
         self._pause = pause
-        self._arrived = threading.Condition()
+        self.arrived = threading.Condition()
         self._newest: Arrival | None = None
         self._error: Exception | None = None
         self._ended = False
@@ -138,9 +139,9 @@ class LiveStream:
         Raises:
             Exception: the error that ended the receiving thread, once the sweeps before it are taken.
         """
-        with self._arrived:
+        with self.arrived:
             if self._newest is None and self._error is None:
-                self._arrived.wait(timeout_s)
+                self.arrived.wait(timeout_s)
             if self._newest is None and self._error is not None:
                 raise self._error
             taken = self._newest
@@ -158,6 +159,11 @@ class LiveStream:
                 log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)
             return None
         return self._frame(taken)
+
+    @property
+    def has_news(self) -> bool:
+        """Whether `take` would return or raise at once; for those who hold `arrived`."""
+        return self._newest is not None or self._error is not None
 
     @property
     def reading(self) -> Reading:
@@ -203,9 +209,9 @@ class LiveStream:
             for sweep in self.reader.read(READ_S):
                 self._put(sweep)
         except (StreamEndedError, ModtError) as error:
-            with self._arrived:
+            with self.arrived:
                 self._error = error
-                self._arrived.notify()
+                self.arrived.notify()
         except Exception as error:
             if not self._ended and self.reader.reception.refuse(f"failed ({type(error).__name__})"):
                 remedy = "check its network interface" if isinstance(error, OSError) else "report this"
@@ -220,13 +226,13 @@ class LiveStream:
             flaws = [error.cause]
             usable = False
         self._follow_period(sweep.stamp_s)
-        with self._arrived:
+        with self.arrived:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
             self.skewed += sweep.turn_s != 0
             self._newest = Arrival(sweep, flaws, usable, self._clock() - sweep.waited_s)
-            self._arrived.notify()
+            self.arrived.notify()
 
     def _follow_period(self, stamp_s: float) -> None:
         """Follow the time between the sweeps, those included that nobody takes."""
