@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from modt.cli import options
 from modt.errors import MisuseError, ModtError
+
+if TYPE_CHECKING:
+    from modt_simulation.kitti_raw import DriveWriter
 
 
 def add_parser(commands: options.Commands) -> None:
@@ -14,6 +18,8 @@ def add_parser(commands: options.Commands) -> None:
     p = commands.add_parser("simulate", help="write a synthetic drive with its ground truth")
     p.add_argument("--scene", default="street", metavar="NAME", help="name of the scene (default: %(default)s)")
     p.add_argument("--sensor", default="hdl-64e", metavar="NAME", help="name of the sensor (default: %(default)s)")
+    several = "profile of a robot with several sensors, whose profiles name models; each has a drive in DIR/NAME"
+    p.add_argument("--profile", metavar="FILE", help=several)
     p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration [s] (default: %(default)g)")
     p.add_argument("--seed", type=int, default=0, metavar="K", help="random seed (default: %(default)s)")
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory in which the drive is written")
@@ -46,21 +52,62 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: no such scene, sensor or condition, or there is a drive already.
         ModtError: the drive cannot be written.
     """
+    out: Path = arguments.out
+    if arguments.profile:
+        return _simulate_robot(out, arguments)
+    writer = _written(out, arguments, arguments.sensor)
+    print(f"KITTI raw drive: {writer.drive}\nSemanticKITTI sequence: {writer.sequence}")
+    print(f"next: modt replay {writer.drive} --profile {arguments.sensor}")
+    return 0
+
+
+def _simulate_robot(out: Path, arguments: argparse.Namespace) -> int:
+    """Simulate the sensors of a robot, and write a profile with their drives as sources.
+
+    Raises:
+        MisuseError: the profile has no sensors, or as `run` does.
+    """
+    from modt import profile
+    from modt_simulation.robot_stream import NOISE_SEED_STEP
+
+    sensors = profile.load(arguments.profile).sensors
+    if not sensors:
+        raise MisuseError(arguments.profile, "has no section sensors", "give --sensor for one sensor")
+    sources = {}
+    for k, mounted in enumerate(sensors):
+        noise_seed = arguments.seed + k * NOISE_SEED_STEP
+        writer = _written(out / mounted.name, arguments, mounted.profile, mounted=mounted, noise_seed=noise_seed)
+        sources[mounted.name] = {"source": str(writer.drive.relative_to(out))}
+    robot = out / "robot.yaml"
+    base = str(Path(arguments.profile).resolve())
+    robot.write_text(profile.to_yaml({"extends": base, "sensors": sources}), encoding="utf-8")
+    print(f"drives of {', '.join(sources)}, and their profile: {robot}")
+    print(f"next: modt replay --profile {robot}")
+    return 0
+
+
+def _written(out: Path, arguments: argparse.Namespace, sensor: str, **place: Any) -> DriveWriter:
+    """Write the drive of a sensor; `place` are further arguments of SyntheticStream.
+
+    Raises:
+        MisuseError: there is a drive already, or a condition is invalid.
+        ModtError: the drive cannot be written.
+    """
     from modt_simulation.kitti_raw import DATE, DriveWriter
     from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
 
-    out: Path = arguments.out
     if (out / DATE).exists() or (out / "sequences").exists():
         raise MisuseError(out, "contains a drive already", "give another --out")
     stream = SyntheticStream(
         arguments.scene,
-        arguments.sensor,
+        sensor,
         arguments.seconds,
         arguments.seed,
         distort=arguments.distort,
         weather=arguments.weather,
         gait=arguments.gait,
         faults=arguments.fault,
+        **place,
     )
     try:
         writer = DriveWriter(out, CAMERA, all_around=arguments.all_around)
@@ -70,6 +117,4 @@ def run(arguments: argparse.Namespace) -> int:
     except OSError as error:
         remedy = "free or unlock the disk, or give another --out"
         raise ModtError(out, f"cannot be written ({error.strerror or error})", remedy) from None
-    print(f"KITTI raw drive: {writer.drive}\nSemanticKITTI sequence: {writer.sequence}")
-    print(f"next: modt replay {writer.drive} --profile {arguments.sensor}")
-    return 0
+    return writer
