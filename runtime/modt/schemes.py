@@ -7,7 +7,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from modt.address import Address, Scheme, open_address
-from modt.sources import drivers
 
 if TYPE_CHECKING:
     from modt.config import OdometryConfig
@@ -94,15 +93,21 @@ class _Sensors(Mapping[str, Scheme]):
     """Schemes of sensors: of topics, and of each driver, which is imported when its scheme is asked for."""
 
     def __getitem__(self, name: str) -> Scheme:
-        if name in drivers.names():
-            return drivers.driver(name).scheme(name)
-        return {"ros2": _TOPIC}[name]
+        if name == "ros2":
+            return _TOPIC
+        from modt.sources import drivers
+
+        if name not in drivers.names():
+            raise KeyError(name)
+        return drivers.driver(name).scheme(name)
 
     def __iter__(self) -> Iterator[str]:
+        from modt.sources import drivers
+
         return iter([*drivers.names(), "ros2"])
 
     def __len__(self) -> int:
-        return len(drivers.names()) + 1
+        return len([*self])
 
 
 SENSORS = _Sensors()

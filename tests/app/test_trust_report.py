@@ -4,7 +4,7 @@ import pytest
 
 from modt.app.trust_report import TrustReport, source_findings
 from modt.profile import load
-from modt.sources.packets.turn_decoder import OTHER_SENSOR
+from modt.sources.stream import OTHER_SENSOR
 from modt.types import TrustLevel
 
 

@@ -16,7 +16,6 @@ from modt.classification.decision import Decision, LikeliestClass
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
-from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.scheduler import Scheduler
 from modt.classification.tuning import BatchingTuning, FusionTuning
 from modt.config import (
@@ -80,19 +79,24 @@ MeanRule = Callable[[FusionConfig, Prior, FusionTuning], FusionStage]
 ProductRule = Callable[[FusionConfig, Prior], FusionStage]
 
 
-def _by_rule(mean: MeanRule, product: ProductRule) -> MeanRule:
-    """The fusion of the rule that the profile names; the product has nothing that was chosen."""
+def _by_rule(mean: MeanRule, product: str) -> MeanRule:
+    """The fusion of the rule that the profile names; the product, given by its name, has nothing that was chosen."""
 
     def fusion(config: FusionConfig, prior: Prior, tuning: FusionTuning) -> FusionStage:
-        return product(config, prior) if config.rule == "product" else mean(config, prior, tuning)
+        if config.rule != "product":
+            return mean(config, prior, tuning)
+        from modt.classification import product_fusion
+
+        of_product: ProductRule = getattr(product_fusion, product)
+        return of_product(config, prior)
 
     return fusion
 
 
 MODES = {
     "conventional": Mode(CONVENTIONAL, lambda config, prior, tuning: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, _by_rule(FirstViews, AnyView), _profile_budget),
-    "accurate": Mode(ACCURATE, _by_rule(FurtherViews, KeyViews), _profile_budget),
+    "efficient": Mode(EFFICIENT, _by_rule(FirstViews, "AnyView"), _profile_budget),
+    "accurate": Mode(ACCURATE, _by_rule(FurtherViews, "KeyViews"), _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from modt.config import SensorConfig
-from modt.sources.packets.turn_decoder import OTHER_SENSOR
+from modt.sources.stream import OTHER_SENSOR
 from modt.trust.visibility import VisibilityEstimate
 from modt.trust.watch import Finding, TrustWatch
 from modt.types import FrameResult, Trust, TrustLevel

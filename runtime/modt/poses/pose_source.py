@@ -9,7 +9,6 @@ from typing import Any
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.poses.leap_watch import LeapWatch
-from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.stream import StreamInfo
 from modt.types import Frame
 
@@ -65,6 +64,8 @@ class PoseFile(PoseSource):
     has_poses = True
 
     def __init__(self, path: Path, camera: Camera | None, end: int | None) -> None:
+        from modt.sources.pose_file import read_poses, sensor_poses  # used by this source of poses alone
+
         super().__init__()
         self.name = str(path)
         poses = read_poses(path)

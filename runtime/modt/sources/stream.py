@@ -189,6 +189,10 @@ class Reception:
         return self.refused[reason] == 1
 
 
+OTHER_SENSOR = "of another head: do several sensors send to this port?"
+"""Reason of the refusal of packets from where the head cannot be."""
+
+
 class SweepReader(Protocol):
     """Turns messages of one sensor into sweeps; used by one thread."""
 

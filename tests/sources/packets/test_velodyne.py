@@ -9,7 +9,7 @@ import pytest
 
 from modt.sources.drivers.velodyne import VelodyneDecoder, model_named
 from modt.sources.packets.pcap_file import PcapFile
-from modt.sources.packets.turn_decoder import OTHER_SENSOR
+from modt.sources.stream import OTHER_SENSOR
 from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets, scene
 from tools.send.ideal_packets import LAYOUTS, ideal_calibration, packets_of
 from tools.send.loops import VelodyneStamps

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from modt.sources.packets.device_clock import DeviceClock
 from modt.sources.packets.packet_decoder import PacketDecoder
-from modt.sources.stream import Sweep
+from modt.sources.stream import OTHER_SENSOR, Sweep
 from modt.types import Float32, Float64
 
 log = logging.getLogger(__name__)
@@ -148,8 +148,6 @@ FASTEST_HZ = 25.0
 """Greatest rate of a head."""
 SLACK = 500
 """Angle between two packets beside that which the head turns in the time between them [0.01 deg]."""
-OTHER_SENSOR = "of another head: do several sensors send to this port?"
-"""Reason of the refusal of packets from where the head cannot be."""
 SILENCE_S = 1.0
 """Longest gap in which packets count as missing [s]; beyond it the sensor was off."""
 NO_TURN = Turn(0.0, None)
