@@ -145,3 +145,14 @@ def transforms(*edges):
         values = {"header": header(0.0, parent), "child_frame_id": child, "transform": placed}
         stamped.append(made("geometry_msgs/TransformStamped", **values))
     return made("tf2_msgs/TFMessage", transforms=stamped)
+
+
+def single_pose(kind, stamp_s, position, quaternion, child):
+    """A PoseStamped, a PoseWithCovarianceStamped or a TransformStamped."""
+    if kind == "TransformStamped":
+        placed = {"translation": _named("xyz", position), "rotation": _named("xyzw", quaternion)}
+        values = {"child_frame_id": child, "transform": placed}
+    else:
+        placed = {"position": _named("xyz", position), "orientation": _named("xyzw", quaternion)}
+        values = {"pose": placed if kind == "PoseStamped" else {"pose": placed}}
+    return made(f"geometry_msgs/{kind}", header=header(stamp_s, "map"), **values)

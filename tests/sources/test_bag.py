@@ -322,6 +322,26 @@ def test_poses_come_from_any_namespace_and_from_transforms(write, tmp_path, othe
     assert x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
 
 
+@pytest.mark.parametrize("kind", ["PoseStamped", "PoseWithCovarianceStamped", "TransformStamped"])
+@pytest.mark.parametrize(("mount", "x"), [([static("/tf_static")], 11.0), ([], 10.0)], ids=["of base_link", "of it"])
+def test_single_poses_are_used_if_they_are_asked_for(write, tmp_path, kind, mount, x):
+    stamps = [BEGAN_S + k / 50 - 0.21 for k in range(40)]
+    child = "base_link" if mount else "lidar"
+    made = [messages.single_pose(kind, s, [10.0 + s - BEGAN_S, 0.0, 0.0], UP, child) for s in stamps]
+    name = f"geometry_msgs/msg/{kind}"
+    single = [("/pose", name, s + 0.001, messages.encode(m)) for s, m in zip(stamps, made, strict=True)]
+    path = write(tmp_path / "drive", by_time(clouds(), single, *mount))
+    unasked = open_stream(path)
+    assert not unasked.info.has_poses
+    assert "single poses are used if asked for, by --capture odometry=NAME: /pose" in " ".join(
+        unasked.info.pose_notes
+    )
+    stream = open_stream(path, capture={"odometry": "/pose"})
+    assert x_of(stream) == pytest.approx([x, x + 0.1, x + 0.2, x + 0.3], abs=1e-5)
+    named = kind == "TransformStamped"
+    assert named == (not stream.info.pose_notes)
+
+
 def test_an_option_chooses_one_of_several_topics_of_poses(write, tmp_path):
     recorded = by_time(clouds(), poses(), poses(topic="/wheels"))
     path = write(tmp_path / "drive", recorded)

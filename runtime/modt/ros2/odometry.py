@@ -1,4 +1,4 @@
-"""nav_msgs/Odometry, and tf2_msgs/TFMessage of /tf and /tf_static."""
+"""nav_msgs/Odometry and single poses, and tf2_msgs/TFMessage of /tf and /tf_static."""
 
 from __future__ import annotations
 
@@ -14,6 +14,13 @@ from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
 from modt.types import Float64
 
 TYPE = "nav_msgs/Odometry"
+NAMES_CHILD = {
+    TYPE: True,
+    "geometry_msgs/TransformStamped": True,
+    "geometry_msgs/PoseStamped": False,
+    "geometry_msgs/PoseWithCovarianceStamped": False,
+}
+"""Types of messages with a stamp and a pose, and whether they name the frame whose pose it is."""
 UNKNOWN = f"{8 * (36 + 6 + 36)}x"
 """Zeros for the covariance of the pose, and for the twist with its covariance."""
 
@@ -24,7 +31,7 @@ class OdometryMessage:
 
     Attributes:
         stamp_s: its time [s].
-        child_frame_id: the frame whose pose it is.
+        child_frame_id: the frame whose pose it is; "" where the message does not name it.
         T_odom_child: (4, 4) pose in the frame of the header.
     """
 
@@ -33,15 +40,15 @@ class OdometryMessage:
     T_odom_child: Float64
 
 
-def read_odometry(message: bytes) -> OdometryMessage:
-    """The pose in a message; covariance and velocity are not used.
+def read_odometry(message: bytes, kind: str = TYPE) -> OdometryMessage:
+    """The pose in a message of a kind in NAMES_CHILD; covariance and velocity are not used.
 
     Raises:
         MessageError: `malformed`, or `non_finite`.
     """
     cdr = CdrReader(message)
     stamp_s, _ = cdr.header()
-    child_frame_id = cdr.text()
+    child_frame_id = cdr.text() if NAMES_CHILD[kind] else ""
     return OdometryMessage(stamp_s, child_frame_id, pose_of(cdr.doubles(7)))
 
 

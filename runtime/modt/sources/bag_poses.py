@@ -24,6 +24,8 @@ READ_TRANSFORMS = 2000
 """Number of messages of transforms by which the frames of a robot and the fixed ones among them are known."""
 LATE_S = 5.0
 """Time that a localisation may need for a pose [s]; a stamp farther back is on another clock than the sweeps."""
+BASE = "base_link"
+"""Frame of a robot's poses that name none (REP 105)."""
 CONTINUOUS = "odom"
 """Last part of the name of the frame in which poses never jump (REP 105)."""
 
@@ -36,11 +38,13 @@ class PoseTopic:
         name: the topic.
         T_child_sensor: (4, 4) pose of the sensor in the frame whose poses they are.
         edge: parent and child of the transform that is the pose; None for a topic of odometry.
+        kind: type of the messages of a topic of odometry.
     """
 
     name: str
     T_child_sensor: Float64
     edge: tuple[str, str] | None = None
+    kind: str = odometry.TYPE
 
     def __str__(self) -> str:
         return self.name if self.edge is None else f"{self.name} ({self.edge[1]} in {self.edge[0]})"
@@ -52,7 +56,7 @@ class PoseTopic:
             MessageError: the message cannot be used.
         """
         if self.edge is None:
-            pose = read_odometry(message)
+            pose = read_odometry(message, self.kind)
             yield pose.stamp_s, pose.T_odom_child @ self.T_child_sensor
             return
         for transform in read_transforms(message):
@@ -73,37 +77,54 @@ def find_poses(bag: Bag, sensor: str, asked: str | None) -> tuple[PoseTopic | No
     """
     topics = {name: topic for name, topic in bag.topics().items() if topic.count and topic.encoding == "cdr"}
     odometries = sorted(name for name, topic in topics.items() if topic.type == odometry.TYPE)
+    # Single poses are goals or guesses as often as they are where the robot is, so none is used unasked.
+    single = sorted(
+        name for name, topic in topics.items() if topic.type in odometry.NAMES_CHILD.keys() - {odometry.TYPE}
+    )
     trees = sorted(name for name, topic in topics.items() if topic.type == odometry.TF)
     moving = [name for name in trees if not _is_static(name)]
     if asked is not None:
         asked = "/" + asked.strip("/")
-        if asked not in {*odometries, *moving}:
-            there = ", ".join([*odometries, *moving]) or "none"
-            raise MisuseError(asked, "no poses in this topic", f"topics of odometry and transforms: {there}")
-        odometries = [name for name in odometries if name == asked]
+        if asked not in {*odometries, *single, *moving}:
+            there = ", ".join([*odometries, *single, *moving]) or "none"
+            raise MisuseError(asked, "no poses in this topic", f"topics of odometry, poses and transforms: {there}")
+        odometries = [name for name in (*odometries, *single) if name == asked]
         moving = [name for name in moving if name == asked]
     if len(odometries) > 1:
         remedy = "choose by --capture odometry=NAME"
         return None, (f"several topics of odometry ({', '.join(odometries)}): none is used, no poses; {remedy}",)
     tree = _tree(bag, trees)
     if odometries:
-        return _of_odometry(bag, odometries[0], sensor, tree)
-    return _of_transforms(moving, sensor, tree)
+        return _of_odometry(bag, odometries[0], topics[odometries[0]].type, sensor, tree)
+    poses, notes = _of_transforms(moving, sensor, tree)
+    if poses is None and single:
+        notes = (
+            *notes,
+            f"topics of single poses are used if asked for, by --capture odometry=NAME: {', '.join(single)}",
+        )
+    return poses, notes
 
 
-def _of_odometry(bag: Bag, topic: str, sensor: str, tree: Transforms) -> tuple[PoseTopic | None, tuple[str, ...]]:
+def _of_odometry(
+    bag: Bag, topic: str, kind: str, sensor: str, tree: Transforms
+) -> tuple[PoseTopic | None, tuple[str, ...]]:
+    """Poses of a topic of odometry. Those that name no frame are of the robot's base, if it leads to the sensor."""
     base = ""
     for message in islice(bag.messages({topic}), READ_TRANSFORMS):
         with suppress(MessageError):
-            base = read_odometry(message.data).child_frame_id
+            base = read_odometry(message.data, kind).child_frame_id
             break
+    notes: tuple[str, ...] = ()
+    if not odometry.NAMES_CHILD[kind]:
+        base = BASE if tree.between(BASE, sensor) is not None else ""
+        notes = (f"poses of {topic} name no frame: taken as those of {base or 'the sensor'}",)
     if base.lstrip("/") == sensor.lstrip("/") or not base or not sensor:
-        return PoseTopic(topic, np.eye(4)), ()
+        return PoseTopic(topic, np.eye(4), kind=kind), notes
     T_base_sensor = tree.between(base, sensor)
     if T_base_sensor is None:
         where = f"/tf_static does not lead from {base}, their frame, to {sensor}, nor do other fixed transforms"
         return None, (f"poses of {topic} are not used: {where}",)
-    return PoseTopic(topic, T_base_sensor), ()
+    return PoseTopic(topic, T_base_sensor, kind=kind), notes
 
 
 def _of_transforms(topics: list[str], sensor: str, tree: Transforms) -> tuple[PoseTopic | None, tuple[str, ...]]:
