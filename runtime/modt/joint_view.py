@@ -103,6 +103,8 @@ class JointView:
             seen = part.segmenter.segment(sweep.points)
             delay_s = delays(seen.centroid, seen.box, sweep.turn_s, sweep.mid_rad)
             proposals = _moved(seen, T_common_level)
+            if part.sensor.reflectance != self._parts[0].sensor.reflectance:  # of another scale than the model's
+                proposals = replace(proposals, reflectance=None)
             step = self._motion.displacement(proposals.centroid[:, :2], delay_s + (sweep.stamp_s - frame.stamp_s))
             proposals = _shifted(proposals, step)
             range2_m2 = _range2_m2(seen) / _range2_m2(proposals)
