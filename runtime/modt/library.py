@@ -257,6 +257,20 @@ class Pipeline:
         }
         return joint_frame(self._index, sweeps, sensors)
 
+    def _checked(self, frame: Frame, T_world_sensor: ArrayLike | None) -> Frame:
+        """The next frame of this pipeline, with its own pose or a given one."""
+        return replace(
+            frame,
+            index=self._index,
+            stamp_s=self._checked_stamp(frame.stamp_s),
+            points=_checked_points(frame.points),
+            T_world_sensor=_checked_pose(frame.T_world_sensor if T_world_sensor is None else T_world_sensor),
+            restarts=0,
+            steady_s=None,
+            R_level_sensor=None,
+            frame_id="",
+        )
+
     def _checked_stamp(self, stamp_s: float | None) -> float:
         """Time of a sweep [s]."""
         if stamp_s is None:
@@ -301,28 +315,19 @@ class Pipeline:
             MisuseError: an argument has another shape, a stamp goes back, or a matrix is no pose.
             ScanError: the columns are not x, y, z, reflectance.
         """
-        sweeps: tuple[Frame | None, ...] = ()
         if isinstance(points, Mapping):
             points = self._joined(points, self._checked_stamp(stamp_s), turn_s, mid_rad)
-        if isinstance(points, Frame):
-            sweeps = points.sweeps
-            stamp_s = points.stamp_s
-            turn_s = points.turn_s
-            mid_rad = points.mid_rad
-            T_world_sensor = points.T_world_sensor if T_world_sensor is None else T_world_sensor
-            points = points.points
-        stamp_s = self._checked_stamp(stamp_s)
-        pose = _checked_pose(T_world_sensor)
-        frame = Frame(
-            self._index, stamp_s, _checked_points(points), pose, turn_s=turn_s, mid_rad=mid_rad, sweeps=sweeps
-        )
+        if not isinstance(points, Frame):
+            rows: Any = points  # checked below
+            points = Frame(self._index, self._checked_stamp(stamp_s), rows, turn_s=turn_s, mid_rad=mid_rad)
+        frame = self._checked(points, T_world_sensor)
         if self._index == 0:
             chosen = choose(self._asked, frame, None)
             if chosen.config != self.config:
                 self._use(chosen.config)
-        self._warn_of_unit(stamp_s)
+        self._warn_of_unit(frame.stamp_s)
         self._index += 1
-        self._stamp_s = stamp_s
+        self._stamp_s = frame.stamp_s
         result = self._pipeline.step(frame, self._budget)
         tracks = result.tracks
         visible = tracks.observed

@@ -117,11 +117,12 @@ def _partners(proposals: Proposals, sensor: Int, tuning: JoiningTuning) -> Int:
     n = len(proposals)
     cells = [_cells(proposals, np.flatnonzero(sensor == k), tuning.cell_m) for k in range(sensor.max(initial=-1) + 1)]
     pairs = [_shared(a, b, n) for a, b in combinations(cells, 2)]
-    a, b, shared = np.concatenate([*pairs, np.zeros((3, 0), np.int64)], axis=1)
+    pair = np.concatenate([*pairs, np.zeros((3, 0), np.int64)], axis=1)
+    a, b, _ = pair
     bottom = proposals.box[:, 2] - proposals.box[:, 5] / 2
     top = bottom + proposals.box[:, 5]
     near = np.maximum(bottom[a], bottom[b]) - np.minimum(top[a], top[b]) < tuning.gap_m
-    a, b, shared = a[near], b[near], shared[near]
+    a, b, shared = pair[:, near]
     most = np.zeros(n, np.int64)
     np.maximum.at(most, a, shared)
     np.maximum.at(most, b, shared)
