@@ -29,6 +29,8 @@ IS_RIDER: Bool = np.array([spec.kind is ClassKind.RIDER for spec in CLASSES])
 """(4,) whether the class is a vehicle with a person on it."""
 IS_VEHICLE: Bool = np.array([spec.kind is ClassKind.VEHICLE for spec in CLASSES])
 """(4,) whether the class is rigid, so that its parts are joined."""
+WHOLE_SIZE_M: Float64 = np.where(IS_VEHICLE[:, None], USUAL_CAR_M, MAX_SIZE_M)
+"""(4, 2) length and width that parts joined into an object of each class do not exceed."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, IS_VEHICLE, MAX_CAR_M, PART_PERSON, USUAL_CAR_M
+from modt.class_sizes import IS_PERSON, IS_RIDER, IS_VEHICLE, MAX_CAR_M, PART_PERSON, WHOLE_SIZE_M
 from modt.geometry.kdop import widths
 from modt.tracking.pairs import Situation, first_of_each, fit_together, mask_at
 from modt.types import NONE, Bool, Int
@@ -51,11 +51,12 @@ def _known_parts(now: Situation) -> Joins:
     hosts = host[joined]
 
     is_car = IS_VEHICLE[tracks.object_class]
+    is_rider = IS_RIDER[tracks.object_class]
     known_m = widths(tracks.known_kdops(rows))
     # A background track no longer than a car also joins parts, but no possible person and no part of a car.
     may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
     of_car = mask_at(is_car, now.assignment.track_of_proposal[parts])
-    joins = is_car[rows] | (may_be_car & ~_may_be_person(now, parts) & ~of_car)
+    joins = is_car[rows] | (~_may_be_person(now, parts) & (is_rider[rows] | (may_be_car & ~of_car)))
     kdop = now.observations.kdop
     together = np.maximum(kdop.take(parts, axis=1), kdop.take(hosts, axis=1))
     joins &= (widths(together) < known_m + now.tuning.max_excess_m).all(axis=0)
@@ -71,7 +72,8 @@ def _new_parts(now: Situation) -> Joins:
     proposal_of_track, owner = now.assignment
     kdop = now.observations.kdop
     count = now.observations.count
-    rows = (IS_VEHICLE[tracks.object_class] & (proposal_of_track != NONE)).nonzero()[0]
+    has_parts = (IS_VEHICLE | IS_RIDER)[tracks.object_class]
+    rows = (has_parts & (proposal_of_track != NONE)).nonzero()[0]
     new = (tracks.hits < now.tuning.min_hits) & ~IS_PERSON[tracks.object_class]
     parts = ((owner == NONE) | mask_at(new, owner)).nonzero()[0]
     around = kdop.take(proposal_of_track[rows], axis=1) + now.tuning.beside_m
@@ -81,13 +83,14 @@ def _new_parts(now: Situation) -> Joins:
     hosts = proposal_of_track[rows]
     together = np.maximum(tracks.known_kdops(rows), kdop.take(parts, axis=1))
     beside = (hosts != parts) & ((owner[parts] == NONE) | (count[parts] < count[hosts]))
-    beside &= widths(together).max(axis=0) < USUAL_CAR_M[0]
+    size_m = WHOLE_SIZE_M.take(tracks.object_class[rows], axis=0)
+    beside &= widths(together).max(axis=0) < size_m[:, 0]
     hosts = hosts[beside]
     parts = parts[beside]
     if not len(parts):
         return Joins(parts, hosts)
     box = now.observations.box
-    fit = fit_together(box[hosts], box[parts], np.array([USUAL_CAR_M])) & ~_may_be_person(now, parts)
+    fit = fit_together(box[hosts], box[parts], size_m[beside]) & ~_may_be_person(now, parts)
     return Joins(parts[fit], hosts[fit])
 
 

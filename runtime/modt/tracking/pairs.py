@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON
+from modt.class_sizes import IS_PERSON, IS_WALKER
 from modt.geometry.kdop import widths
 from modt.geometry.kernels import GeometryKernels
 from modt.observations import Observations
@@ -96,7 +96,7 @@ def _listed(
     expected = tracks.predicted_kdops()
     which, proposals = kernels.overlapping_pairs(known, observations.kdop)
     rows = listed[which]
-    joinable = ~IS_PERSON[tracks.object_class] | tracks.top_cut
+    joinable = ~IS_WALKER[tracks.object_class] | tracks.top_cut
     within = kernels.coverage(observations.kdop, known, proposals, which)
     around = kernels.coverage(expected, observations.kdop, rows, proposals)
     free = np.maximum(within, around) > min_coverage
