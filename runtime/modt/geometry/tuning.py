@@ -34,7 +34,7 @@ class ShapeTuning:
     that is less. Greater: the filter trusts such axes less.
     Chosen on: simulated drives, by the consistency of the filter (NEES)."""
 
-    near_cosine: float = 0.38
+    near_cosine: float = 0.5
     """Cosine of the angle between an axis and the line of sight from which one end along the axis is nearer to the
     sensor, and measures displacements. Less: the near side of what is seen across is taken for its end.
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""

@@ -163,10 +163,11 @@ static void mix_started(double x[N_STATE], double P[N_STATE][N_STATE], const dou
 
 /* motion_filter._moved */
 static void move(double x[N_STATE], double P[N_STATE][N_STATE], double dt_s, double acceleration_variance,
-                 double turn_variance)
+                 double speed_variance, double turn_variance)
 {
-    const double dt2 = dt_s * dt_s;
-    const double variance = acceleration_variance + turn_variance * (x[VX] * x[VX] + x[VX + 1] * x[VX + 1]);
+    const double dt2 = dt_s * dt_s, *v = &x[VX];
+    const double across = acceleration_variance + turn_variance * (v[0] * v[0] + v[1] * v[1]);
+    const double ahead = speed_variance - turn_variance;
     double cross[2][2];
     for (int i = 0; i < 2; i++) {
         x[i] += dt_s * x[i + VX];
@@ -178,11 +179,13 @@ static void move(double x[N_STATE], double P[N_STATE][N_STATE], double dt_s, dou
             P[i][k] += dt_s * (cross[i][k] + cross[k][i]) + dt2 * P[i + VX][k + VX];
             P[i][k + VX] += dt_s * P[i + VX][k + VX];
         }
-    for (int i = 0; i < 2; i++) {
-        P[i][i] += dt2 * dt2 / 4 * variance;
-        P[i][i + VX] += dt2 * dt_s / 2 * variance;
-        P[i + VX][i + VX] += dt2 * variance;
-    }
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++) {
+            const double noise = (i == k ? across : 0.0) + ahead * v[i] * v[k];
+            P[i][k] += dt2 * dt2 / 4 * noise;
+            P[i][k + VX] += dt2 * dt_s / 2 * noise;
+            P[i + VX][k + VX] += dt2 * noise;
+        }
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 2; k++)
             P[k + VX][i] = P[i][k + VX];
@@ -192,14 +195,14 @@ static void move(double x[N_STATE], double P[N_STATE][N_STATE], double dt_s, dou
 EXPORT void modt_predict_motion(double (*moving)[N_STATE], double (*moving_P)[N_STATE][N_STATE], double (*resting)[2],
                                 double (*resting_P)[2][2], i64 n, const double *resting_share,
                                 const double *moving_share, double dt_s, double start_variance, double creep_variance,
-                                double acceleration_variance, double turn_variance)
+                                double acceleration_variance, double speed_variance, double turn_variance)
 {
     for (i64 m = 0; m < n; m++) {
         const double position[2] = {moving[m][X], moving[m][Y]};
         const double position_P[2][2] = {{moving_P[m][X][X], moving_P[m][X][Y]}, {moving_P[m][Y][X], moving_P[m][Y][Y]}};
         mix_started(moving[m], moving_P[m], resting[m], resting_P[m], start_variance, resting_share[m]);
         mix(resting[m], resting_P[m], position, position_P, moving_share[m]);
-        move(moving[m], moving_P[m], dt_s, acceleration_variance, turn_variance);
+        move(moving[m], moving_P[m], dt_s, acceleration_variance, speed_variance, turn_variance);
         for (int i = 0; i < 2; i++)
             resting_P[m][i][i] += creep_variance;
     }

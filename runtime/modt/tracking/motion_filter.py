@@ -203,13 +203,17 @@ def _mixed(x: Float64, P: Float64, other: Float64, other_P: Float64, share: Floa
 
 
 def _moved(x: Float64, P: Float64, dt_s: float, tuning: MotionFilterTuning) -> tuple[Float64, Float64]:
-    """States and covariances dt_s later at constant velocity, disturbed by a white acceleration."""
+    """States and covariances dt_s later at constant velocity, disturbed by a white acceleration.
+
+    The acceleration ahead and the one to a side grow with the speed, each by a rate of its own.
+    """
     x = x.copy()
     P = P.copy()
-    vx = x[VELOCITY]
-    vy = x[VELOCITY + 1]
+    v = x[VELOCITY:].copy()
     dt2 = dt_s * dt_s
-    variance = tuning.acceleration_sigma_mps2**2 + tuning.turn_sigma_radps**2 * (vx * vx + vy * vy)
+    turn_variance = tuning.turn_sigma_radps**2
+    across = tuning.acceleration_sigma_mps2**2 + turn_variance * (v[X] * v[X] + v[Y] * v[Y])
+    ahead = tuning.relative_acceleration_sigma_per_s**2 - turn_variance
     for i in IN_PLANE:
         x[i] += dt_s * x[i + VELOCITY]
     velocity = P[VELOCITY:, VELOCITY:].copy()
@@ -219,9 +223,11 @@ def _moved(x: Float64, P: Float64, dt_s: float, tuning: MotionFilterTuning) -> t
             P[i, k] += dt_s * (cross[i, k] + cross[k, i]) + dt2 * velocity[i, k]
             P[i, k + VELOCITY] += dt_s * velocity[i, k]
     for i in IN_PLANE:
-        P[i, i] += dt2 * dt2 / 4 * variance
-        P[i, i + VELOCITY] += dt2 * dt_s / 2 * variance
-        P[i + VELOCITY, i + VELOCITY] += dt2 * variance
+        for k in IN_PLANE:
+            noise = (across if i == k else 0.0) + ahead * v[i] * v[k]
+            P[i, k] += dt2 * dt2 / 4 * noise
+            P[i, k + VELOCITY] += dt2 * dt_s / 2 * noise
+            P[i + VELOCITY, k + VELOCITY] += dt2 * noise
     P[VELOCITY:, :VELOCITY] = P[:VELOCITY, VELOCITY:].transpose(1, 0, 2)
     return x, P
 
@@ -262,6 +268,7 @@ class NativeMotionFilter(MotionFilter):
             tuning.start_sigma_mps**2,
             tuning.creep_mps**2 * step.dt_s,
             tuning.acceleration_sigma_mps2**2,
+            tuning.relative_acceleration_sigma_per_s**2,
             tuning.turn_sigma_radps**2,
         )
 

@@ -36,9 +36,14 @@ class MotionFilterTuning:
     jitter more.
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
-    turn_sigma_radps: float = 0.6
-    """Further process noise of the velocity, relative to the speed [rad/s]. Greater: fast objects are followed
-    through sharper turns and starts, and their velocities jitter more.
+    relative_acceleration_sigma_per_s: float = 0.8
+    """Further process noise of the speed, relative to the speed [1/s]. Greater: fast objects that brake or accelerate
+    are followed sooner, and their speeds jitter more.
+    Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
+
+    turn_sigma_radps: float = 0.3
+    """Further process noise of the velocity across its direction, relative to the speed [rad/s]. Greater: fast objects
+    are followed through sharper turns, and their directions jitter more.
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
     start_sigma_mps: float = 1.0
