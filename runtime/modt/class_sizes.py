@@ -28,7 +28,9 @@ IS_WALKER: Bool = np.array([spec.kind is ClassKind.WALKER for spec in CLASSES])
 IS_RIDER: Bool = np.array([spec.kind is ClassKind.RIDER for spec in CLASSES])
 """(4,) whether the class is a vehicle with a person on it."""
 IS_VEHICLE: Bool = np.array([spec.kind is ClassKind.VEHICLE for spec in CLASSES])
-"""(4,) whether the class is rigid, so that its parts are joined."""
+"""(4,) whether the class is a vehicle, which is rigid."""
+HAS_PARTS: Bool = IS_VEHICLE | IS_RIDER
+"""(4,) whether new parts are joined to an object of the class."""
 WHOLE_SIZE_M: Float64 = np.where(IS_VEHICLE[:, None], USUAL_CAR_M, MAX_SIZE_M)
 """(4, 2) length and width that parts joined into an object of each class do not exceed."""
 

@@ -41,6 +41,20 @@ def test_the_air_returns_in_front_of_surfaces_and_is_labelled(weather):
     assert again.points.tobytes() == frame.points.tobytes()
 
 
+def test_far_glossy_cars_return_fewer_points_and_all_else_the_same():
+    streams = [SyntheticStream("street", "hdl-64e", 0.5, 3, glossy=glossy) for glossy in (False, True)]
+    (plain, truth), (glossy, glossy_truth) = (stream.simulator.sweep(2) for stream in streams)
+    is_car = np.array([kind.name == "Car" for kind in truth.kinds])
+    range_m = np.hypot(*truth.boxes[:, :2].T)
+    far = is_car & (range_m > 30)
+    near = is_car & (range_m < 20)
+    assert far.sum() >= 5
+    assert glossy_truth.points[far].sum() < 0.75 * truth.points[far].sum()
+    assert glossy_truth.points[near].sum() > 0.9 * truth.points[near].sum()
+    ground = [frame.points[t.instance == -1] for frame, t in ((plain, truth), (glossy, glossy_truth))]
+    assert abs(len(ground[0]) - len(ground[1])) < 0.001 * len(ground[0])
+
+
 def test_weather_and_faults_begin_at_their_time():
     clear, _ = sweep()
     before, _ = sweep(weather="fog:50@0.5", faults=["beam:3@0.5"])

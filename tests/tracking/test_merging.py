@@ -74,6 +74,33 @@ def test_what_is_a_part(known, classes, seen, columns, is_part):
     assert groups == ([[0, 1]] if is_part else [[0], [1]])
 
 
+BICYCLE = box(10, 3, 1.8, 0.6, 1.7)
+RIDER = box(10.2, 3, 1.2, 0.6, 1.7)
+WHEEL = box(9.25, 3, 0.3, 0.2, 0.6, z=-1.6)
+SOMEONE = box(9.2, 3, 0.4, 0.4, 1.7)
+
+
+@pytest.mark.parametrize(
+    ("known", "classes", "seen", "hits", "is_part"),
+    [
+        ([BICYCLE], [CYCLIST], [RIDER, WHEEL], [10], True),
+        ([BICYCLE], [PEDESTRIAN], [RIDER, WHEEL], [10], False),
+        ([BICYCLE], [CYCLIST], [RIDER, SOMEONE], [10], False),  # may be a person
+        ([BICYCLE, WHEEL], [CYCLIST, BACKGROUND], [RIDER, WHEEL], [10, 5], True),
+        ([BICYCLE, WHEEL], [CYCLIST, PEDESTRIAN], [RIDER, WHEEL], [10, 5], False),
+        ([RIDER], [CYCLIST], [RIDER, WHEEL], [10], True),  # comes into view
+        ([RIDER, WHEEL], [CYCLIST, BACKGROUND], [RIDER, WHEEL], [10, 5], False),  # an established track
+        ([RIDER], [CYCLIST], [RIDER, box(8.7, 3, 0.3, 0.2, 0.6, z=-1.6)], [10], False),  # 2.25 m together
+    ],
+)
+def test_a_wheel_is_a_part_of_its_cyclist(known, classes, seen, hits, is_part):
+    tracks = tracks_at(known, *classes, hits=hits)
+    tracks.points[:] = POINTS * np.arange(len(known), 0, -1)
+    frame = associated(frame_of(seen, points=[POINTS, POINTS - 1])[1], range(len(known)))
+    after = regrouped(tracks, frame)
+    assert len(after.proposals) == (1 if is_part else 2)
+
+
 NEAR_END = box(10.5, 3, 2.0, 1.8, 1.5)
 NEXT = box(12.1, 3, 0.8, 1.8, 1.5)
 

@@ -25,6 +25,11 @@ def add_parser(commands: options.Commands) -> None:
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory in which the drive is written")
     p.add_argument("--all-around", action="store_true", help="annotate objects on all sides, not only in the camera")
     p.add_argument("--distort", action="store_true", help="keep the distortion of scans by the motion of the sensor")
+    p.add_argument(
+        "--glossy",
+        action="store_true",
+        help="paint mirrors light away, so far cars return as few points as real ones",
+    )
     weather = "rain:25, snow:2.5 [mm/h], fog:50 [m] or dust:1.5; fog:50@10 begins after 10 s, and so does a fault"
     p.add_argument("--weather", metavar="KIND:STRENGTH", help=weather)
     p.add_argument("--gait", metavar="DEG[:HZ]", help="amplitude of roll and pitch of a robot with legs (2 Hz)")
@@ -104,6 +109,7 @@ def _written(out: Path, arguments: argparse.Namespace, sensor: str, **place: Any
         arguments.seconds,
         arguments.seed,
         distort=arguments.distort,
+        glossy=arguments.glossy,
         weather=arguments.weather,
         gait=arguments.gait,
         faults=arguments.fault,

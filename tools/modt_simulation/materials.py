@@ -49,6 +49,10 @@ _TABLE = np.array([material.properties for material in Material], np.float32).T.
 
 REFLECTIVITY = _TABLE[0]
 """Share of the light that a surface returns, which decides whether a return is detected."""
+GLOSSY_REFLECTIVITY = REFLECTIVITY.copy()
+"""The same where paint mirrors most of the light away. The values were fitted to the shares of rays at visible cars,
+20 to 80 m away, that return in labelled frames of KITTI's object benchmark."""
+GLOSSY_REFLECTIVITY[[Material.CAR_PAINT, Material.CAR_DARK, Material.CAR_BLACK]] = 0.05, 0.03, 0.015
 DROPOUT = _TABLE[1]
 """Share of the pulses that a surface reflects away or transmits."""
 INTENSITY = _TABLE[2]

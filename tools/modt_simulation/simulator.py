@@ -16,6 +16,7 @@ from modt_simulation.kinds import Kind
 from modt_simulation.materials import (
     BODY_SIGMA,
     DROPOUT,
+    GLOSSY_REFLECTIVITY,
     GRAZING_LOSS,
     INTENSITY,
     POINT_SIGMA,
@@ -104,10 +105,11 @@ AIR_SEMANTIC = 1
 
 
 class Receiver:
-    """The receiver of a sensor; rng draws the constant errors of its beams."""
+    """The receiver of a sensor; rng draws the constant errors of its beams, `reflectivity` is that by material."""
 
-    def __init__(self, sensor: SensorModel, rng: Generator) -> None:
+    def __init__(self, sensor: SensorModel, rng: Generator, reflectivity: Float32 = REFLECTIVITY) -> None:
         self.sensor = sensor
+        self.reflectivity = reflectivity
         self.bias = rng.normal(0.0, sensor.beam_sigma_m, (sensor.shape[0], 1)).astype(np.float32)
         self.gain = rng.normal(1.0, 0.08, (sensor.shape[0], 1)).astype(np.float32)
         self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
@@ -124,7 +126,7 @@ class Receiver:
         near = np.where(hit, distance, np.float32(1e4))
         cosine = self._cos_incidence(near, solid)
         grain = noise[:, ::-1]  # a second sequence of random numbers, for the surface
-        reflectivity = REFLECTIVITY.take(material) * self.gain * (1 + np.float32(0.15) * grain)
+        reflectivity = self.reflectivity.take(material) * self.gain * (1 + np.float32(0.15) * grain)
         slant = near * self.secant
         signal = reflectivity * cosine * np.float32(10 * sensor.detect_m**2) / (slant * slant)
         if extinction_per_m:
@@ -219,9 +221,9 @@ class Simulator:
     """Renders sweeps, in any order, each reproducibly by the seed of the noise.
 
     `distort` leaves the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor: every
-    sector is seen from the pose at its own time. Else they are as after deskewing. Weather and faults of the sensor
-    change the sweeps from the time on at which they begin. The first sweep is at `first_s`, and the seed of the noise
-    of a receiver may differ from that of the bodies.
+    sector is seen from the pose at its own time. Else they are as after deskewing. `glossy` makes the paint of cars
+    mirror most of the light away. Weather and faults of the sensor change the sweeps from the time on at which they
+    begin. The first sweep is at `first_s`, and the seed of the noise of a receiver may differ from that of the bodies.
     """
 
     def __init__(
@@ -231,6 +233,7 @@ class Simulator:
         seed: int,
         *,
         distort: bool = False,
+        glossy: bool = False,
         weather: Condition | None = None,
         faults: Sequence[Condition] = (),
         first_s: float = 0.0,
@@ -244,6 +247,7 @@ class Simulator:
         self.distort = distort and sensor.rotating
         self.caster = RayCaster(sensor)
         self._sectors = Sector.of(sensor, turning=self.distort)
+        self._reflectivity = GLOSSY_REFLECTIVITY if glossy else REFLECTIVITY
         self._weather = weather
         self._faults = faults
         faulty(sensor, faults, np.inf)  # refuses what this sensor cannot have
@@ -261,7 +265,7 @@ class Simulator:
         depth = rng.standard_exponential(self.sensor.shape, np.float32)
         seen = Surfaces.join([self._surfaces(sector, time_s, depth) for sector in self._sectors])
         sensor = faulty(self.sensor, self._faults, time_s)
-        receiver = Receiver(sensor, np.random.default_rng([self._noise_seed, 1]))
+        receiver = Receiver(sensor, np.random.default_rng([self._noise_seed, 1]), self._reflectivity)
         T_world_sensor = self.world.ego_pose(time_s)
         air = self._air(time_s)
         returns = receiver.receive(seen, rng, air.extinction_per_m if air else 0.0)

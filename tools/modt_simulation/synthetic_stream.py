@@ -41,7 +41,8 @@ SCENES = {
 class SyntheticStream:
     """A drive through a synthetic scene; the same arguments give the same bytes.
 
-    `seed` is that of the scene, its traffic and the noise; `distort` leaves the motion during a sweep in the scans.
+    `seed` is that of the scene, its traffic and the noise. `distort` leaves the motion during a sweep in the scans.
+    `glossy` makes the paint of cars mirror most of the light away, as an HDL-64E sees it.
     The sensor is mounted as usual, or at `height_m`; `mount_deg`, its roll and pitch, adds to what is left of them
     after it was levelled. Weather, gait and faults are texts, as those of `modt simulate`. A sensor of a robot with
     several is mounted as `mounted` says, on a level robot; the first sweep is at `first_s`.
@@ -58,6 +59,7 @@ class SyntheticStream:
         seed: int = 0,
         *,
         distort: bool = False,
+        glossy: bool = False,
         height_m: float | None = None,
         mount_deg: tuple[float, float] = (0.0, 0.0),
         weather: str | None = None,
@@ -87,6 +89,7 @@ class SyntheticStream:
             model,
             seed,
             distort=distort,
+            glossy=glossy,
             weather=read_weather(weather) if weather else None,
             faults=read_faults(faults),
             first_s=first_s,

@@ -181,7 +181,7 @@ static void move(double x[N_STATE], double P[N_STATE][N_STATE], double dt_s, dou
         }
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 2; k++) {
-            const double noise = (i == k ? across : 0.0) + ahead * v[i] * v[k];
+            const double noise = (i == k ? across : 0.0) + ahead * (v[i] * v[k]);
             P[i][k] += dt2 * dt2 / 4 * noise;
             P[i][k + VX] += dt2 * dt_s / 2 * noise;
             P[i + VX][k + VX] += dt2 * noise;

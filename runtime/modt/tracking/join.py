@@ -1,4 +1,4 @@
-"""Join: parts of a car, or of background that may be one, are joined to the proposal of its track."""
+"""Join: parts of a car or a cyclist, or of background that may be a car, are joined to the proposal of its track."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modt.class_sizes import IS_PERSON, IS_RIDER, IS_VEHICLE, MAX_CAR_M, PART_PERSON, WHOLE_SIZE_M
+from modt.class_sizes import HAS_PARTS, IS_PERSON, IS_RIDER, IS_VEHICLE, MAX_CAR_M, PART_PERSON, WHOLE_SIZE_M
 from modt.geometry.kdop import widths
 from modt.tracking.pairs import Situation, first_of_each, fit_together, mask_at
 from modt.types import NONE, Bool, Int
@@ -20,10 +20,10 @@ class Joins(NamedTuple):
 
 
 def find_joins(now: Situation) -> Joins:
-    """Parts within the known extents of tracks, then parts that come into view beside cars."""
+    """Parts within the known extents of tracks, then parts that come into view beside cars and cyclists."""
     known = _known_parts(now)
     new = _new_parts(now)
-    # Priority of hosts: the most senior track that knows the part, else the last listed car beside it.
+    # Priority of hosts: the most senior track that knows the part, else the last listed track beside it.
     parts = np.concatenate([known.parts, new.parts[::-1]])
     hosts = np.concatenate([known.hosts, new.hosts[::-1]])
     first = first_of_each(parts, len(now.proposals))
@@ -51,12 +51,13 @@ def _known_parts(now: Situation) -> Joins:
     hosts = host[joined]
 
     is_car = IS_VEHICLE[tracks.object_class]
-    is_rider = IS_RIDER[tracks.object_class]
     known_m = widths(tracks.known_kdops(rows))
-    # A background track no longer than a car also joins parts, but no possible person and no part of a car.
+    # Cyclists and background no longer than a car join no possible person, background joins no part of a car.
     may_be_car = known_m.max(axis=0, initial=0.0) < MAX_CAR_M
     of_car = mask_at(is_car, now.assignment.track_of_proposal[parts])
-    joins = is_car[rows] | (~_may_be_person(now, parts) & (is_rider[rows] | (may_be_car & ~of_car)))
+    joins = is_car[rows] | (
+        ~_may_be_person(now, parts) & (IS_RIDER[tracks.object_class[rows]] | (may_be_car & ~of_car))
+    )
     kdop = now.observations.kdop
     together = np.maximum(kdop.take(parts, axis=1), kdop.take(hosts, axis=1))
     joins &= (widths(together) < known_m + now.tuning.max_excess_m).all(axis=0)
@@ -64,16 +65,15 @@ def _known_parts(now: Situation) -> Joins:
 
 
 def _new_parts(now: Situation) -> Joins:
-    """Proposals beside a car that fit into one car with all that is known of it, as the car comes into view.
+    """Proposals beside a car or a cyclist that fit into one with all that is known of it, as it comes into view.
 
-    Such a part belongs to no track, or to a new one of fewer points than the car shows.
+    Such a part belongs to no track, or to a new one of fewer points than the object shows.
     """
     tracks = now.tracks
     proposal_of_track, owner = now.assignment
     kdop = now.observations.kdop
     count = now.observations.count
-    has_parts = (IS_VEHICLE | IS_RIDER)[tracks.object_class]
-    rows = (has_parts & (proposal_of_track != NONE)).nonzero()[0]
+    rows = (HAS_PARTS[tracks.object_class] & (proposal_of_track != NONE)).nonzero()[0]
     new = (tracks.hits < now.tuning.min_hits) & ~IS_PERSON[tracks.object_class]
     parts = ((owner == NONE) | mask_at(new, owner)).nonzero()[0]
     around = kdop.take(proposal_of_track[rows], axis=1) + now.tuning.beside_m

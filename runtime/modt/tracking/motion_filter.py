@@ -224,7 +224,7 @@ def _moved(x: Float64, P: Float64, dt_s: float, tuning: MotionFilterTuning) -> t
             P[i, k + VELOCITY] += dt_s * velocity[i, k]
     for i in IN_PLANE:
         for k in IN_PLANE:
-            noise = (across if i == k else 0.0) + ahead * v[i] * v[k]
+            noise = (across if i == k else 0.0) + ahead * (v[i] * v[k])
             P[i, k] += dt2 * dt2 / 4 * noise
             P[i, k + VELOCITY] += dt2 * dt_s / 2 * noise
             P[i + VELOCITY, k + VELOCITY] += dt2 * noise

@@ -44,7 +44,7 @@ class Pairs(NamedTuple):
     within: Float64  # (K,) share of the proposal inside the known extent
     around: Float64  # (K,) share of the expected track inside the proposal
     free: Bool  # (K,) the track may take the proposal, and one covers enough of the other (min_coverage)
-    joinable: Bool  # (M,) tracks that may gain parts: all but people, and people whose upper half is cut off
+    joinable: Bool  # (M,) tracks that may gain parts: all but pedestrians, and those whose upper half is cut off
     expected: Float64  # (8, M) k-DOPs of the tracks, where the filter expects them
     max_width_m: Float64  # (P,) greatest width of the k-DOP of each proposal
 
@@ -110,8 +110,9 @@ def _listed(
 def _may_take(tracks: TrackTable, rank: Int, joinable: Bool, rows: Int, owners: Int) -> Bool:
     """(k,) tracks that may take a proposal of its owner: their own, or that of a junior track of a like class.
 
-    Background and cars are easily confused, so they count as alike. A person of whom only the legs are seen may take
-    either, since legs alone may be taken for either. People are taken by their own class alone.
+    Background and cars are easily confused, so they count as alike. A cyclist may take either, and so may a
+    pedestrian of whom only the legs are seen, since a wheel or legs alone may be taken for either. People are taken by
+    their own class alone.
     """
     alike = tracks.object_class[rows] == tracks.object_class[owners]
     alike |= joinable[rows] & ~IS_PERSON[tracks.object_class[owners]]

@@ -5,8 +5,9 @@ Pairs of a track and a proposal that overlaps its known extent are listed once. 
 which are records. Takes are applied first. Joins and splits are found from the result, and are applied together:
 
 - *Take*: a track takes the larger part of its object from a junior track, which gets the other part.
-- *Join*: parts of a car, or of background that may be one, are joined to the proposal of its track. So are new
-  proposals beside a car that fit into one car with it: a part that comes into view lies beside what is known.
+- *Join*: parts of a car or a cyclist, or of background that may be a car, are joined to the proposal of its track. So
+  are new proposals beside a car or a cyclist that fit into one with it: a part that comes into view lies beside what
+  is known.
 - *Split*: the track of an object that is expected within a longer proposal takes the points where it is expected, if
   it has no proposal of its own, one that is too long for its class, or one of few points.
 

@@ -37,13 +37,13 @@ class MotionFilterTuning:
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
     relative_acceleration_sigma_per_s: float = 0.8
-    """Further process noise of the speed, relative to the speed [1/s]. Greater: fast objects that brake or accelerate
-    are followed sooner, and their speeds jitter more.
+    """Further process noise of the speed, relative to the speed [1/s]. Greater: fast objects that brake or
+    accelerate are followed sooner, and their speeds jitter more.
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
     turn_sigma_radps: float = 0.3
-    """Further process noise of the velocity across its direction, relative to the speed [rad/s]. Greater: fast objects
-    are followed through sharper turns, and their directions jitter more.
+    """Further process noise of the velocity across its direction, relative to the speed [rad/s]. Greater: fast
+    objects are followed through sharper turns, and their directions jitter more.
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
     start_sigma_mps: float = 1.0
@@ -343,13 +343,13 @@ class RegroupingTuning:
 
     max_excess_m: float = 0.3
     """A known part is joined only if the joined object exceeds the known extent by less than this; a proposal that
-    exceeds the expected extent by more may be split [m]. New parts beside a car are limited by USUAL_CAR_M instead.
-    Greater: more is joined and less is split.
+    exceeds the expected extent by more may be split [m]. New parts beside an object are limited by WHOLE_SIZE_M
+    instead. Greater: more is joined and less is split.
     Chosen on: judgement."""
 
     beside_m: float = 0.6
-    """Greatest gap between a car and a new proposal that is joined with it [m]. Greater: more parts are joined, and
-    more neighbours.
+    """Greatest gap between a car or a cyclist and a new proposal that is joined with it [m]. Greater: more parts are
+    joined, and more neighbours.
     Chosen on: judgement."""
 
     margin_m: float = 0.2
