@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.types import MotionState, PointKind
 from tests.tracking.test_sight import scene, wall
@@ -87,6 +88,22 @@ def test_no_track_starts_to_move_as_it_reappears_and_one_that_moves_goes_on(stea
     scenes = [[box(8 + 0.15 * index, 2, 0.6, 0.5)] if is_seen else [] for index, is_seen in enumerate(seen)]
     motion, _ = follow(Follower(), scenes)
     assert {motion[index] for index in range(12, 24) if seen[index]} == {state}
+
+
+@pytest.mark.parametrize(
+    ("object_class", "probability", "state"),
+    [
+        (ObjectClass.PEDESTRIAN, 0.8, "MOVING"),
+        (ObjectClass.PEDESTRIAN, 0.4, "STILL"),
+        (ObjectClass.BACKGROUND, 0.8, "UNKNOWN"),
+    ],
+)
+def test_an_object_that_moves_does_so_until_it_is_more_likely_at_rest(object_class, probability, state):
+    follower = Follower()
+    assert follow(follower, [[box(8 + 0.15 * k, 2, 0.6, 0.5)] for k in range(12)])[0][-1] == "MOVING"
+    follower.set_class(0, object_class)
+    follower.tracks.moving_probability[:] = probability
+    assert follow(follower, [[]])[0] == [state]
 
 
 @pytest.mark.parametrize(("hidden", "moves"), [(True, False), (False, True)])

@@ -111,8 +111,8 @@ def _may_take(tracks: TrackTable, rank: Int, joinable: Bool, rows: Int, owners: 
     """(k,) tracks that may take a proposal of its owner: their own, or that of a junior track of a like class.
 
     Background and cars are easily confused, so they count as alike. A cyclist may take either, and so may a
-    pedestrian of whom only the legs are seen, since a wheel or legs alone may be taken for either. People are taken by
-    their own class alone.
+    pedestrian of whom only the legs are seen, since a wheel or legs alone may be taken for either. People are taken
+    by their own class alone.
     """
     alike = tracks.object_class[rows] == tracks.object_class[owners]
     alike |= joinable[rows] & ~IS_PERSON[tracks.object_class[owners]]

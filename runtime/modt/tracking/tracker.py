@@ -315,14 +315,18 @@ class Tracker:
 
         The covariance of a velocity becomes the published one, which the filter writes anew in each frame.
 
-        What flickers seems to move from one place to another, so no track starts to move as it reappears.
+        What flickers seems to move from one place to another, so no track starts to move as it reappears. An object
+        that moves does so until it is more likely at rest: who walks behind a trolley is bounded by it in most frames,
+        and shows little evidence of motion.
         """
         t = self.tracks
         evidence = self._evidence
-        went = self._from_rest_m() > evidence.min_distance_m
-        may_move = ~t.reappears | (t.motion == MotionState.MOVING.value)
-        moves = (t.moving_probability > evidence.moving) & went & may_move
-        is_decided = (moves | (t.moving_probability < 0.5)) & (t.hits >= evidence.min_hits)
+        probable = t.moving_probability > 0.5
+        moved = t.motion == MotionState.MOVING.value
+        keeps_moving = moved & probable & (t.object_class != ObjectClass.BACKGROUND.value)
+        may_move = (t.moving_probability > evidence.moving) & (moved | ~t.reappears)
+        moves = (may_move | keeps_moving) & (self._from_rest_m() > evidence.min_distance_m)
+        is_decided = (moves | ~probable) & (t.hits >= evidence.min_hits)
         t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
         t.motion[~is_decided] = MotionState.UNKNOWN.value
         t.velocity_covariance[moves & is_decided] *= evidence.velocity_variance
