@@ -306,7 +306,7 @@ class Tracker:
         stopped = ((x[:, SPEED] < rest.stopped_mps) & ~t.stationary[rows] & (hits > rest.min_hits)).nonzero()[0]
         position[stopped] = x[stopped, :2]
         step = x[:, :2] - position
-        near = np.hypot(step[:, 0], step[:, 1]) < rest.radius_m
+        near = _is_shorter(step, rest.radius_m)
         t.stationary[rows] = near & (hits >= rest.min_hits)
         t.rest_position[rows] = position + (rest.gain * near)[:, None] * step
 
@@ -316,8 +316,8 @@ class Tracker:
         The covariance of a velocity becomes the published one, which the filter writes anew in each frame.
 
         What flickers seems to move from one place to another, so no track starts to move as it reappears. An object
-        that moves does so until it is more likely at rest: who walks behind a trolley is bounded by it in most frames,
-        and shows little evidence of motion.
+        that moves does so until it is more likely at rest. Who walks behind a trolley, for example, is bounded by it
+        in most frames, and shows little evidence of motion.
         """
         t = self.tracks
         evidence = self._evidence
@@ -325,17 +325,11 @@ class Tracker:
         moved = t.motion == MotionState.MOVING.value
         keeps_moving = moved & probable & (t.object_class != ObjectClass.BACKGROUND.value)
         may_move = (t.moving_probability > evidence.moving) & (moved | ~t.reappears)
-        moves = (may_move | keeps_moving) & (self._from_rest_m() > evidence.min_distance_m)
+        moves = (may_move | keeps_moving) & ~_is_shorter(t.x[:, :2] - t.rest_position, evidence.min_distance_m)
         is_decided = (moves | ~probable) & (t.hits >= evidence.min_hits)
         t.motion[:] = np.where(moves, MotionState.MOVING.value, MotionState.STILL.value)
         t.motion[~is_decided] = MotionState.UNKNOWN.value
         t.velocity_covariance[moves & is_decided] *= evidence.velocity_variance
-
-    def _from_rest_m(self) -> Float64:
-        """(M,) distance of tracks from their rest positions [m]."""
-        step = self.tracks.x[:, :2] - self.tracks.rest_position
-        distance_m: Float64 = np.hypot(step[:, 0], step[:, 1])
-        return distance_m
 
     def _expire(self) -> Int:
         """End tracks unseen for more than max_missed + 0.5 periods (a9, a14, e6); returns the other rows (A,)."""
@@ -364,6 +358,13 @@ class Tracker:
         t.size_m[new] = observations.box.take(proposals, axis=0)[:, 3:6]
         t.centroid[new] = observations.centroid[proposals]
         self._update_extent(t, rows, proposals, observations, position, 0.0)
+
+
+def _is_shorter(step: Float64, length_m: float) -> Bool:
+    """(k,) which steps (k, 2) in the plane are shorter than a length [m]."""
+    x, y = step.T
+    shorter: Bool = x * x + y * y < length_m * length_m
+    return shorter
 
 
 def _top_m(box: Float64) -> Float64:
