@@ -223,7 +223,7 @@ class Simulator:
     `distort` leaves the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor: every
     sector is seen from the pose at its own time. Else they are as after deskewing. `glossy` makes the paint of cars
     mirror most of the light away. Weather and faults of the sensor change the sweeps from the time on at which they
-    begin. The first sweep is at `first_s`, and the seed of the noise of a receiver may differ from that of the bodies.
+    begin. The first sweep is at `first_s`. The seed of the noise of a receiver may differ from that of the bodies.
     """
 
     def __init__(
