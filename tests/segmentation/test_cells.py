@@ -4,10 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import connect, occupied_cells
+from modt.segmentation.cells import ClusterSizes, connect, moved, occupied_cells
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.segmentation.tuning import SegmentationTuning
+from modt.types import NONE
 from tests.segmentation import reference
 
 STEP = 0.03
@@ -56,3 +57,19 @@ def test_points_of_no_height_are_no_cluster(n):
     clusterer = Clusterer(SensorConfig(), SegmentationConfig())
     cells = clusterer.occupied_cells(PointColumns.from_array(points), np.full(n, 1.0, np.float32))
     assert clusterer.cluster(cells).n == 0
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 60))
+def test_each_cluster_has_the_points_of_its_cells_after_parts_of_several_clusters_have_left(seed, n):
+    """A cluster without cells that counted points would become a proposal without points, whose box is not finite."""
+    rng = np.random.default_rng(seed)
+    points = PointColumns.from_array(cloud(seed, 10 * n, 1.0))
+    if not len(points):
+        return
+    cells, _, sampled, _ = occupied_cells(SqrtRangeGrid(STEP, 80.0), points, points.z + 1.7)
+    beam_m = np.zeros(len(cells), np.float32)
+    cluster = rng.integers(0, 4, len(cells))
+    part = np.append(rng.integers(NONE, 4, len(cells) - 1), 0)
+    sizes, parts = (ClusterSizes.of_cells(cells, sampled, beam_m, labels) for labels in (cluster, part))
+    after, sizes_after = moved(cells, cluster, sizes, part, parts, rng.random(len(parts)) < 0.5)
+    assert np.array_equal(sizes_after.points, np.bincount(after, cells.entries, len(sizes_after)))

@@ -658,18 +658,18 @@ static ClusterSizes sizes_from(const ClusterSizes *s, i64 n)
 }
 
 /* moved: the parts whose `cluster_of_part` is not NONE leave their clusters. A part that stays keeps its number, with
- * no points. Of a cluster that parts leave, the number of points alone is corrected. `cluster` is read for all parts
- * before their cells are moved. */
-static void move_parts(const ClusterScratch *s, i64 n_used, i64 n_parts, i64 *cluster, const ClusterSizes *sizes,
-                       const ClusterSizes *parts)
+ * no points. Of a cluster that parts leave, the number of points alone is corrected. */
+static void move_parts(const Cells *cells, const ClusterScratch *s, i64 n_used, i64 n_parts, i64 *cluster,
+                       const ClusterSizes *sizes, const ClusterSizes *parts)
 {
-    for (i64 p = 0; p < n_parts; p++) {
+    for (i64 p = 0; p < n_parts; p++)
         parts->points[p] = s->cluster_of_part[p] == NONE ? 0 : parts->points[p];
-        sizes->points[cluster[parts->cell[p]]] -= parts->points[p];
-    }
     for (i64 k = 0; k < n_used; k++)
-        if (s->cluster_of_part[s->part[k]] != NONE)
-            cluster[s->used[k]] = s->cluster_of_part[s->part[k]];
+        if (s->cluster_of_part[s->part[k]] != NONE) {
+            i32 i = s->used[k];
+            sizes->points[cluster[i]] -= cells->entries[i];
+            cluster[i] = s->cluster_of_part[s->part[k]];
+        }
 }
 
 /* CellClusterer._before_surfaces, of n clusters: uses the cells that are free, and sets their `before_m`. Returns how
@@ -803,7 +803,7 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structu
         int leaves = parts.of_oversized[p] || may_be_person_part(rules, person, &parts, p);
         s->cluster_of_part[p] = leaves ? (i32)(n + p) : NONE;
     }
-    move_parts(s, n_used, n_parts, cluster, sizes, &parts);
+    move_parts(cells, s, n_used, n_parts, cluster, sizes, &parts);
     n += n_parts;
 
     /* 3. Parts before surfaces. */
@@ -814,7 +814,7 @@ EXPORT i64 modt_cluster(const ClusterRules *rules, const StructureRules *structu
     parts = sizes_from(sizes, n);
     measure(cells, sampled, beam_m, s->part, n_used, n_parts, s, &parts);
     find_leaving(rules, structure, person, n_used, cluster, sizes, n, &parts, n_parts, s);
-    move_parts(s, n_used, n_parts, cluster, sizes, &parts);
+    move_parts(cells, s, n_used, n_parts, cluster, sizes, &parts);
     return n + n_parts;
 }
 

@@ -245,13 +245,14 @@ class CellClusterer:
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         of_oversized = oversized.take(cluster.take(parts.cell))
         parts = replace(parts, of_oversized=of_oversized)
-        cluster, sizes = moved(cluster, sizes, part, parts, of_oversized | self._may_be_person(parts))
+        leaves = of_oversized | self._may_be_person(parts)
+        cluster, sizes = moved(cells, cluster, sizes, part, parts, leaves)
 
         free, before_m = self._before_surfaces(cells, sampled, cluster, sizes)
         part = connect(self.fine, cells, max_gap_m, free)
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
         extent_m = sizes.extent_m.take(cluster.take(parts.cell))
-        return moved(cluster, sizes, part, parts, self._leaves_surface(parts, part, before_m, extent_m))
+        return moved(cells, cluster, sizes, part, parts, self._leaves_surface(parts, part, before_m, extent_m))
 
     def _before_surfaces(
         self, cells: Cells, sampled: PointColumns, cluster: Int, sizes: ClusterSizes
@@ -329,21 +330,20 @@ class CellClusterer:
 
 
 def moved(
-    cluster: Int, sizes: ClusterSizes, part: Int, parts: ClusterSizes, leaves: Bool
+    cells: Cells, cluster: Int, sizes: ClusterSizes, part: Int, parts: ClusterSizes, leaves: Bool
 ) -> tuple[Int, ClusterSizes]:
     """(C,) cluster of each cell, and sizes, after some of the (C,) parts have left their clusters.
 
     Parts are numbered after the clusters. One that stays keeps its number, with no points. Of a cluster that parts
-    leave, only the number of points is corrected.
+    leave, only the number of points is corrected. A part may have cells of several clusters.
     """
-    whole = cluster.take(parts.cell)  # cluster that each part is of, before any cell leaves it
-    points = parts.points * leaves
-    points_left = sizes.points - np.bincount(whole, points, len(sizes)).astype(np.int64)
     in_part = np.flatnonzero(part != NONE)
     moving = in_part[leaves.take(part.take(in_part))]
+    gone = np.bincount(cluster.take(moving), cells.entries.take(moving), len(sizes)).astype(np.int64)
     after = cluster.copy()
     after[moving] = len(sizes) + part[moving]
-    return after, replace(sizes, points=points_left).followed_by(replace(parts, points=points))
+    left = replace(sizes, points=sizes.points - gone)
+    return after, left.followed_by(replace(parts, points=parts.points * leaves))
 
 
 @dataclass(frozen=True, slots=True)

@@ -104,7 +104,7 @@ class Clusterer:
         if not n:
             return cluster, sizes
         parts = ClusterSizes.of_cells(cells, sampled, beam_m, part)
-        return moved(cluster, sizes, part, parts, np.ones(n, np.bool_))
+        return moved(cells, cluster, sizes, part, parts, np.ones(n, np.bool_))
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""
