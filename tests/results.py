@@ -116,6 +116,7 @@ def status(rate_hz: float = 9.96, **power: Any) -> dict[str, Any]:
     """A status as `modt run` writes it."""
     times = {"p50": 0.1, "p99": 0.9}
     recording = {"keep": "all", "lines": 40, "lost_lines": 0, "thinned_lines": 0, "pauses": 0, "parts": 1}
+    recording["fates"] = {"written": 20, "waiting": 0}
     totals = {"frames": 20, "proposals": 60, "classifications": 9, "deferred": 0}
     return {
         "schema": "modt.status/1",

@@ -299,9 +299,13 @@ def judged(folder: Path, pair: Sequence[LiveEpisode], began_s: float) -> Iterato
     """Faults of a pair that were silent in the records of a run, and records that are missing."""
     lines = [json.loads(line) for line in (folder / "tracks.jsonl").read_text().splitlines()]
     status = status_of(folder)
-    missing = status["counts"]["frames"] - len(lines) - status["recording"]["lost_lines"]
-    if missing:
+    fates = dict(status["recording"]["fates"])
+    if fates.pop("written") != len(lines):
+        yield f"{len(lines)} frames are recorded, and others counted"
+    if missing := status["counts"]["frames"] - len(lines) - sum(fates.values()):
         yield f"{missing} frames are neither recorded nor counted as lost"
+    if lost := {fate: n for fate, n in fates.items() if n}:
+        yield f"frames are lost: {lost}"
     sweep = (np.array([line["stamp_s"] for line in lines]) - began_s) / PERIOD_S
     good = np.array([line["trust"]["level"] == "good" for line in lines])
     for episode, other in (pair, pair[::-1]):

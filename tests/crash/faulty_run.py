@@ -234,6 +234,8 @@ class FaultyRun:
         health = self.service.recording.health()
         recording: Any = self.service.recording
         missing = recording.write.call_count + recording.ledger.call_count - sum(map(len, records.values()))
+        assert sum(health.fates.values()) == recording.write.call_count
+        assert health.fates["waiting"] == 0
         for schema, numbers in records.items():
             assert len(numbers) == len({*numbers}), f"{schema} twice"
         assert missing <= health.lost_lines, f"{missing} lines are missing, {health.lost_lines} are counted"

@@ -93,6 +93,14 @@ def test_a_failure_is_logged_once_counted_and_tried_again(error, said, slow, cap
     assert slow.items == ["again"]
 
 
+def test_what_cannot_be_encoded_is_counted_as_failed(slow):
+    background = Background("test", slow, 10, encode=int)
+    with pytest.raises(ValueError, match="invalid literal"):
+        background.write("not a number")
+    assert background.health()["failed"] == 1
+    background.close()
+
+
 def test_the_end_does_not_wait_for_a_writer_that_hangs(slow, caplog):
     background = Background("test", slow, 10)
     for n in range(3):

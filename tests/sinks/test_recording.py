@@ -1,15 +1,23 @@
 """Records of a service: parts within the limit, a full disk is waited out, nothing is lost in silence."""
 
+import dataclasses
+import json
 import logging
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from modt.config import RecordingConfig
-from modt.sinks.recording import KEPT, RETRY_S, AtOnce, WholeRecording
+from modt.sinks.recording import KEPT, RETRY_S, WholeRecording
 from modt.sinks.run_directory import RunDirectory, status_paths
 from tests.results import ledger_line
-from tests.sinks.recordings import OURS, Time, begun, files_of_at_most, frame, frames, parts
+from tests.sinks.recordings import OURS, Disk, Queue, Time, begun, files_of_at_most, frame, frames, parts
 
 
 @pytest.mark.parametrize("keep", KEPT)
@@ -99,14 +107,90 @@ def test_another_profile_changes_what_is_kept_and_the_description(tmp_path):
     assert (tmp_path / "run" / "run.yaml").read_text() == OURS
 
 
-def test_lines_that_the_writer_has_no_room_for_are_counted(tmp_path, monkeypatch):
-    recording = begun(tmp_path)
-    dropped = []
-    monkeypatch.setattr(AtOnce, "write", lambda _, job: dropped.append(job))
-    monkeypatch.setattr(AtOnce, "health", lambda _: {"dropped": len(dropped)}, raising=False)
+def test_lines_that_the_writer_has_no_room_for_are_counted(tmp_path):
+    queue = Queue(2)
+    recording = begun(tmp_path, writer=queue)  # beginning the first part is a job
     recording.write(frame(0))
     recording.ledger(ledger_line(0))
+    recording.write(frame(1))
+    recording.ledger(ledger_line(1))
     assert recording.health().lost_lines == 2
+    assert recording.health().fates == {"written": 0, "waiting": 1, "dropped": 1}
+
+
+def test_a_frame_whose_line_has_no_number_counts_as_lost(tmp_path):
+    recording = begun(tmp_path)
+    with pytest.raises(ValueError, match="JSON compliant"):
+        recording.write(dataclasses.replace(frame(0), T_world_sensor=np.full((4, 4), np.nan)))
+    recording.write(frame(1))
+    recording.finish()
+    assert recording.health().fates == {"written": 1, "waiting": 0, "not_encoded": 1}
+    assert recording.health().lost_lines == 1
+
+
+@pytest.mark.parametrize("hangs", [False, True])
+def test_the_last_document_knows_the_fate_of_lines_that_waited(tmp_path, hangs):
+    queue = Queue(100)
+    recording = begun(tmp_path, writer=queue)
+    for k in range(5):
+        recording.write(frame(k))
+    queue.at_end = 3 if hangs else 100  # the first part is begun, and two lines are written
+    recording.end(lambda health: {"status.json": json.dumps(dataclasses.asdict(health))})
+    assert frames(tmp_path) == list(range(2 if hangs else 5))
+    fates = {"written": 2, "waiting": 0, "dropped": 3} if hangs else {"written": 5, "waiting": 0}
+    assert recording.health().fates == fates
+    status = tmp_path / "run" / "status.json"
+    assert hangs or json.loads(status.read_text())["fates"] == fates
+    recording.finish()
+
+
+EVENTS = st.one_of(
+    st.sampled_from(["write", "write", "nan", "ledger", "status", "full", "room", "unsynced", "synced", "remove"]),
+    st.integers(1, 8),
+)
+
+
+@given(events=st.lists(EVENTS, max_size=60), depth=st.integers(1, 12), at_end=st.integers(0, 40), hangs=st.booleans())
+@settings(max_examples=150, deadline=None)
+def test_each_frame_is_written_or_lost_for_one_reason_in_any_order_of_faults(events, depth, at_end, hangs):
+    """The queue is run by numbers among the events, and after the last one for `at_end` jobs; then it may hang."""
+    given_frames = 0
+    disk = Disk()
+    with TemporaryDirectory() as name, disk.installed():
+        folder = Path(name)
+        queue = Queue(depth, Time())
+        recording = begun(folder, writer=queue, time=queue.time)
+        for event in events:
+            queue.time.now += 0.3
+            if isinstance(event, int):
+                queue.run(event)
+            elif event == "ledger":
+                recording.ledger(ledger_line(given_frames))
+            elif event == "status":
+                queue.write(lambda: recording.write_status("{}"))
+            elif event == "remove":
+                shutil.rmtree(folder / "run", ignore_errors=True)
+            elif event in ("write", "nan"):
+                result = frame(given_frames)
+                T = result.T_world_sensor * (np.nan if event == "nan" else 1.0)
+                with suppress(ValueError):
+                    recording.write(dataclasses.replace(result, T_world_sensor=T))
+                given_frames += 1
+            else:
+                disk.event(event)
+            health = recording.health()
+            assert sum(health.fates.values()) == given_frames
+        queue.at_end = at_end
+        queue.hangs = hangs
+        recording.end(lambda health: {})
+        queue.run(1)  # the disk that hung does its work after the end
+        recording.finish()
+        fates = recording.health().fates
+        assert sum(fates.values()) == given_frames
+        assert fates["waiting"] == 0
+        kept = frames(folder)
+        assert len(kept) == len({*kept})
+        assert fates["written"] <= len(kept) <= fates["written"] + fates.get("not_synced", 0) + fates.get("held", 0)
 
 
 def test_beyond_the_bytes_of_a_day_frames_are_left_out_evenly_and_counted(tmp_path, monkeypatch):

@@ -22,7 +22,7 @@ from modt.energy.meters.discovery import discover
 from modt.energy.meters.meter import Kind
 from modt.errors import MisuseError
 from modt.sinks.output import Sink
-from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecording
+from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecording, count_dropped
 from modt.sinks.run_directory import RunDirectory
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def service(
         return profile.to_yaml(stages.facts(core, command) | {"service": True})
 
     # A disk or a file system that hangs stops one of these threads, and neither the loop nor the others.
-    writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
+    writer = Background("recording", AtOnce(), JOBS, on_drop=count_dropped, close_s=CLOSE_S)
     return Service(
         source=source,
         stages=stages,

@@ -8,7 +8,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,8 +30,9 @@ from modt.errors import ModtError
 from modt.pipeline import SINK
 from modt.reporting.summary import Summary
 from modt.sinks.output import LedgerSink, Sink, StatusSink, Writer, close_together
-from modt.sinks.recording import AtOnce, Job, Recording
+from modt.sinks.recording import AtOnce, Job, Recording, RecordingHealth
 from modt.sinks.records import fields_of
+from modt.sinks.run_directory import STATUS, SUMMARY
 from modt.sources.stream import Received, StreamEndedError
 from modt.types import FrameResult, TrustLevel
 
@@ -233,15 +234,19 @@ class Loop:
         self.summary = run_summary(self)
         self.stages.read = self.summary["read"]
         self.failures.contain("status", self._finish_status)
-        text = json.dumps(self.summary, indent=2, default=fields_of) + "\n"
-        writer = self.recording.writer
-        writer.write(self.recording.redescribe)
-        writer.write(self.recording.finish)
-        writer.write(lambda: self.recording.write_summary(text))
-        writer.close()
+        self.recording.end(self._last_documents)
+        self._account_for(self.recording.health())
 
     def _finish_status(self) -> None:
         """Add the last status to the summary. A replay has none."""
+
+    def _account_for(self, recording: RecordingHealth) -> None:
+        """Correct the last status by the final counts of the records."""
+
+    def _last_documents(self, recording: RecordingHealth) -> dict[str, str]:
+        """Documents beside the records, by their names, given the final counts of these."""
+        self._account_for(recording)
+        return {SUMMARY: json.dumps(self.summary, indent=2, default=fields_of) + "\n"}
 
 
 @dataclass(kw_only=True, eq=False)
@@ -319,9 +324,17 @@ class Service(Loop):
         for name in ("status", "metrics"):
             self.writers[name].close()
 
+    def _account_for(self, recording: RecordingHealth) -> None:
+        if "status" in self.summary:
+            self.summary["status"] = replace(self.summary["status"], recording=recording)
+
+    def _last_documents(self, recording: RecordingHealth) -> dict[str, str]:
+        documents = super()._last_documents(recording)
+        return documents | {STATUS: _document(self.summary["status"])} if "status" in self.summary else documents
+
     def _write_status(self, status: Status) -> None:
         """Hand the status to a thread for each place, so that one that hangs keeps it from no other."""
-        text = json.dumps(status, indent=1, default=fields_of) + "\n"
+        text = _document(status)
         self.recording.writer.write(lambda: self.recording.write_status(text))
         self.writers["status"].write(lambda: self.recording.keep_status(text))
         showing = [sink for sink in self.sinks.values() if isinstance(sink, StatusSink)]
@@ -336,3 +349,7 @@ class Service(Loop):
         if self.metrics is not None:
             path = self.metrics
             self.writers["metrics"].write(lambda: write_metrics(path, metrics))
+
+
+def _document(status: Status) -> str:
+    return json.dumps(status, indent=1, default=fields_of) + "\n"

@@ -35,7 +35,8 @@ class Background(Generic[T]):
         name: subject of log messages.
         writer: used by the thread alone.
         depth: length of the queue.
-        encode: converts an item, before it is queued, to what the writer takes.
+        encode: converts an item, before it is queued, to what the writer takes. Its failures are counted, and raised.
+        on_drop: called with each item that is dropped, as it is for the writer.
         retry_s: pause after a failure.
         close_s: time limit of `close`.
         clock: [s].
@@ -48,6 +49,7 @@ class Background(Generic[T]):
         depth: int,
         *,
         encode: Callable[[Any], T] | None = None,
+        on_drop: Callable[[T], None] = lambda item: None,
         retry_s: float = RETRY_S,
         close_s: float = CLOSE_S,
         clock: Callable[[], float] = time.monotonic,
@@ -56,24 +58,30 @@ class Background(Generic[T]):
         self._writer = writer
         self._depth = depth
         self._encode = encode
+        self._on_drop = on_drop
         self._retry_s = retry_s
         self._close_s = close_s
         self._clock = clock
-        # The queue and the two fields after it are guarded by `_changed`; the counts belong to the thread.
-        self._jobs: deque[Callable[[], None]] = deque()
+        # The queue and the fields up to `_dropped` are guarded by `_changed`. The next two counts are the thread's.
+        self._jobs: deque[tuple[Callable[[], None], Callable[[], None]]] = deque()  # each with what drops it
         self._changed = threading.Condition()
         self._end_s: float | None = None
         self._dropped = 0
         self._written = 0
         self._failed = 0
+        self._unencoded = 0
         self._state = "ok"
         self._thread = threading.Thread(target=self._work, name="sink", daemon=True)
         self._thread.start()
 
     def write(self, item: Any, /) -> None:
         """Queue an item without waiting."""
-        encoded: T = item if self._encode is None else self._encode(item)
-        self._put(lambda: self._writer.write(encoded))
+        try:
+            encoded: T = item if self._encode is None else self._encode(item)
+        except Exception:
+            self._unencoded += 1
+            raise
+        self._put(lambda: self._writer.write(encoded), lambda: self._on_drop(encoded))
 
     def ledger(self, line: LedgerLine | EnergyWindow, /) -> None:
         """Queue a line of the ledger, if the writer takes them."""
@@ -88,7 +96,7 @@ class Background(Generic[T]):
             **counts_of_writer,
             "written": self._written,
             "dropped": self._dropped,
-            "failed": self._failed,
+            "failed": self._failed + self._unencoded,
             "waiting": len(self._jobs),
             "state": self._state,
         }
@@ -101,22 +109,25 @@ class Background(Generic[T]):
             self._changed.notify()
         self._thread.join(self._close_s)
         with self._changed:
-            self._dropped += len(self._jobs)
-            self._jobs.clear()
+            while self._jobs:
+                self._drop(self._jobs.popleft()[1])
         if self._thread.is_alive():
             log.warning("%s: does not end within %g s and is left alone", self.name, self._close_s)
 
-    def _put(self, job: Callable[[], None]) -> None:
+    def _put(self, job: Callable[[], None], on_drop: Callable[[], None] = lambda: None) -> None:
         """Queue a job. A full queue drops its oldest one, a closed one the new one."""
         with self._changed:
             if self._end_s is not None:
-                self._dropped += 1
+                self._drop(on_drop)
                 return
             if len(self._jobs) == self._depth:
-                self._dropped += 1
-                self._jobs.popleft()
-            self._jobs.append(job)
+                self._drop(self._jobs.popleft()[1])
+            self._jobs.append((job, on_drop))
             self._changed.notify()
+
+    def _drop(self, on_drop: Callable[[], None]) -> None:
+        self._dropped += 1
+        on_drop()
 
     def _work(self) -> None:
         """Run the jobs, then close the writer. This is the thread."""
@@ -145,7 +156,7 @@ class Background(Generic[T]):
         with self._changed:
             self._changed.wait_for(lambda: self._jobs or self._end_s is not None)
             late = self._end_s is not None and self._clock() > self._end_s
-            return self._jobs.popleft() if self._jobs and not late else None
+            return self._jobs.popleft()[0] if self._jobs and not late else None
 
     def _fail(self, error: Exception) -> None:
         """Count a failure, log the first in a row, and pause."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,10 +14,23 @@ from modt.energy.ledger import LedgerLine
 from modt.energy.windows import EnergyWindow
 from modt.errors import ModtError
 from modt.geometry import Camera
+from modt.sinks.fates import (
+    DROPPED,
+    FAILED,
+    LOST,
+    NOT_ENCODED,
+    NOT_KEPT,
+    NOT_SYNCED,
+    REMOVED,
+    THINNED,
+    WAITING,
+    WRITTEN,
+    Fates,
+)
 from modt.sinks.kitti import KittiResults, PointLabels
 from modt.sinks.output import Health, LineFile, Writer
 from modt.sinks.records import line
-from modt.sinks.run_directory import LEDGER, RUN, STATUS, SUMMARY, TRACKS, RunDirectory
+from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
 from modt.sinks.tracks import frame_line
 from modt.types import FrameResult
 
@@ -62,7 +75,8 @@ class RecordingHealth:
     """Counts of a recording, for status and summary."""
 
     keep: str  # as in the configuration
-    lines: int  # written
+    fates: Mapping[str, int]  # number of frames by the fate of their line (`modt.sinks.fates`)
+    lines: int  # written, of all files
     lost_lines: int  # not written, or perhaps missing since their file was removed or not synced
     thinned_lines: int  # left out to keep to `gb_per_day`
     pauses: int  # how often writing failed
@@ -70,8 +84,29 @@ class RecordingHealth:
     failing: str | None  # why nothing can be written now
 
 
+@dataclass(frozen=True, slots=True)
+class LineJob:
+    """Job that appends a line to a file of a recording."""
+
+    recording: Recording
+    name: str
+    text: str
+
+    def __call__(self) -> None:
+        """Append it."""
+        self.recording.append(self.name, self.text)
+
+
+def count_dropped(job: Job) -> None:
+    """Count the line of a job that a full queue drops. The other jobs come again."""
+    if isinstance(job, LineJob):
+        job.recording.fates[job.name].move(WAITING, DROPPED)
+
+
 class Recording(Writer[FrameResult]):
     """tracks.jsonl and ledger.jsonl. While they cannot be written, lines are lost and counted.
+
+    Every line that is handed over has one fate at any time, and none waits after `end`.
 
     Once a second it checks that its files are in place, and begins another part if they were removed or moved.
 
@@ -79,8 +114,11 @@ class Recording(Writer[FrameResult]):
         directory: directory of the records.
         config: choice of the records and their limits.
         writer: runs what writes, in a thread; `write`, `ledger`, `start` and `configure` are for the loop, the rest
-            for that thread.
+            for that thread. One that drops jobs calls `count_dropped`.
         describe: text of run.yaml for a new part.
+
+    Attributes:
+        fates: fates of the lines of each file.
     """
 
     def __init__(
@@ -96,10 +134,8 @@ class Recording(Writer[FrameResult]):
         self.writer = writer
         self._describe = describe
         self._clock = clock
+        self.fates = {TRACKS: Fates(), LEDGER: Fates()}
         # Counts, as in RecordingHealth
-        self._lines = 0
-        self._lost = 0
-        self._thinned = 0
         self._pauses = 0
         self._parts = 0
         self._failing: str | None = None
@@ -109,7 +145,7 @@ class Recording(Writer[FrameResult]):
         self._begun = False
         self._files: dict[str, LineFile[str]] = {}
         self._bytes = 0
-        self._unsynced_lines = 0  # a power cut may take them
+        self._unsynced = dict.fromkeys(self.fates, 0)  # lines of each file that a power cut may take
         self._synced_files = 0  # files whose names survive a power cut
         self._retry_s = float("-inf")  # time of the next attempt after a failure
         # A token bucket: what may be written of the tracks, and when it was last filled
@@ -121,17 +157,33 @@ class Recording(Writer[FrameResult]):
         self.writer.write(self._begin)
 
     def write(self, result: FrameResult, /) -> None:
-        """Hand over the line of a frame."""
-        if TRACKS in KEPT[self.config.keep] and self._allows():
-            text = frame_line(result)
+        """Hand over the line of a frame.
+
+        Raises:
+            ValueError: the line has a number that is not finite. It counts as lost.
+        """
+        fates = self.fates[TRACKS]
+        if TRACKS not in KEPT[self.config.keep]:
+            fates.give(NOT_KEPT)
+        elif not self._allows():
+            fates.give(THINNED)
+        else:
+            try:
+                text = frame_line(result)
+            except ValueError:
+                fates.give(NOT_ENCODED)
+                raise
             self._allowed_bytes -= len(text)
-            self.writer.write(lambda: self._append(TRACKS, text))
+            self._hand_over(TRACKS, text)
 
     def ledger(self, costs: LedgerLine | EnergyWindow, /) -> None:
         """Hand over a line of the ledger."""
         if LEDGER in KEPT[self.config.keep]:
-            text = line(costs)
-            self.writer.write(lambda: self._append(LEDGER, text))
+            self._hand_over(LEDGER, line(costs))
+
+    def _hand_over(self, name: str, text: str) -> None:
+        self.fates[name].give()
+        self.writer.write(LineJob(self, name, text))
 
     def configure(self, config: RecordingConfig) -> None:
         """Record as another profile says, and describe that profile in run.yaml."""
@@ -139,12 +191,13 @@ class Recording(Writer[FrameResult]):
         self.writer.write(self.redescribe)
 
     def health(self) -> RecordingHealth:
-        """Counts so far. Lines that wait for a hanging disk are dropped, and count as lost."""
+        """Counts so far."""
         return RecordingHealth(
             keep=self.config.keep,
-            lines=self._lines,
-            lost_lines=self._lost + int(self.writer.health()["dropped"]),
-            thinned_lines=self._thinned,
+            fates=self.fates[TRACKS].counts(),
+            lines=self._sum(WRITTEN),
+            lost_lines=self._sum(*LOST),
+            thinned_lines=self._sum(THINNED),
             pauses=self._pauses,
             parts=self._parts,
             failing=self._failing,
@@ -174,18 +227,33 @@ class Recording(Writer[FrameResult]):
         hangs = self._clock() - self._status_s > STATUS_LATE_S
         self.directory.in_memory(status if hangs or self._status_failed else None)
 
-    def write_summary(self, text: str) -> None:
-        """Write the summary beside the records, if any could be begun."""
+    def end(self, documents: Callable[[RecordingHealth], Mapping[str, str]]) -> None:
+        """Close the files after all lines, then write documents beside them, and end the writer's thread.
+
+        The thread makes the documents, by their names, from the final counts. What it has not done within its time
+        is left out, and counts as lost.
+        """
+        self.writer.write(self.redescribe)
+        self.writer.write(self.finish)
+        self.writer.write(lambda: self._write_last(documents))
+        self.writer.close()
+        for fates in self.fates.values():
+            fates.end()
+
+    def _write_last(self, documents: Callable[[RecordingHealth], Mapping[str, str]]) -> None:
+        """Write the last documents, if any part could be begun."""
         if self._parts:
-            self.directory.write(SUMMARY, text)
+            for name, text in documents(self.health()).items():
+                self.directory.write(name, text)
 
     def sync(self) -> None:
         """Make the lines so far survive a power cut. If that fails, they count as lost."""
-        if self._failing is None and self._unsynced_lines:
+        if self._failing is None and any(self._unsynced.values()):
             if not self._attempt(self._sync):
-                self._lost += self._unsynced_lines
+                for name, n in self._unsynced.items():
+                    self.fates[name].move(WRITTEN, NOT_SYNCED, n)
                 self._close_files()
-            self._unsynced_lines = 0
+            self._unsynced = dict.fromkeys(self.fates, 0)
 
     def finish(self) -> None:
         """Close the files."""
@@ -199,18 +267,20 @@ class Recording(Writer[FrameResult]):
         filled_bytes = 1e9 * self.config.gb_per_day / DAY_S * max(now_s - self._filled_s, 0.0)
         self._filled_s = now_s
         self._allowed_bytes = min(self._allowed_bytes + filled_bytes, WHOLE_BYTES)
-        self._thinned += self._allowed_bytes < 0
         return self._allowed_bytes >= 0
 
-    def _append(self, name: str, text: str) -> None:
+    def _sum(self, *fates: str) -> int:
+        return sum(of_file.sum(*fates) for of_file in self.fates.values())
+
+    def append(self, name: str, text: str) -> None:
         """Append a line to the present part, or to another one where it is full. A line that fails is lost."""
         if self._begun and self._bytes + len(text) > 1e6 * self.config.disk_mb / PARTS:
             self.finish()
         if not self._ready() or not self._attempt(lambda: self._line(name, text)):
-            self._lost += 1
+            self.fates[name].move(WAITING, FAILED)
             return
-        self._lines += 1
-        self._unsynced_lines += 1
+        self.fates[name].move(WAITING, WRITTEN)
+        self._unsynced[name] += 1
         self._bytes += len(text)
 
     def _ready(self) -> bool:
@@ -230,10 +300,12 @@ class Recording(Writer[FrameResult]):
     def _check_files(self) -> None:
         """Close a part whose files were moved or removed. The lines of removed files count as lost."""
         if self._begun and not (self.directory.present() and all(file.present() for file in self._files.values())):
-            removed = sum(int(file.health()["written"]) for file in self._files.values() if file.removed())
-            self._lost += removed
-            self._unsynced_lines = 0
-            log.warning("%s: records were removed or moved; %d lines are lost", self.directory.path, removed)
+            removed = {name: int(f.health()["written"]) for name, f in self._files.items() if f.removed()}
+            for name, n in removed.items():
+                self.fates[name].move(WRITTEN, REMOVED, n)
+            self._unsynced = dict.fromkeys(self.fates, 0)
+            n_lost = sum(removed.values())
+            log.warning("%s: records were removed or moved; %d lines are lost", self.directory.path, n_lost)
             self._close_files()
 
     def _close_files(self) -> None:
@@ -277,7 +349,7 @@ class Recording(Writer[FrameResult]):
             self._retry_s = self._clock() + RETRY_S
             return False
         if self._failing is not None:
-            log.warning("%s: recording again; %d lines are lost", self.directory.path, self._lost)
+            log.warning("%s: recording again; %d lines are lost", self.directory.path, self._sum(*LOST))
             self._failing = None
         return True
 
