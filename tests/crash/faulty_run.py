@@ -66,7 +66,7 @@ class InTurn(Background[Any]):
         with patch("threading.Thread.start"):
             super().__init__(name, writer, 128, encode=encode, retry_s=0.0, clock=lambda: faults.now_s)
 
-    def _put(self, job: Callable[[], None]) -> None:
+    def _put(self, job: Callable[[], None], on_drop: Callable[[], None] = lambda: None) -> None:
         self._attempt(job)
 
     def close(self) -> None:
