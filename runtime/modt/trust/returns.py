@@ -48,7 +48,7 @@ class ReturnsCheck:
         self._tuning = tuning
         self._span: tuple[float, float] | None = None  # tangents between which the bands lie
         self._usual = np.zeros((SECTORS, BANDS))
-        self._last: tuple[Sample, Float64] | None = None  # the last count, and of what
+        self._counted: list[tuple[Sample, Float64]] = []  # the last counts, and of what
         self._lost: Bool = np.zeros(SECTORS, np.bool_)
         self._dead: Bool = np.zeros(BANDS, np.bool_)
         self.gained = False  # nearly all cells had more returns than usual at the last look that judged all of them
@@ -87,7 +87,7 @@ class ReturnsCheck:
         blind = n_lost >= tuning.blind_share * max(n_expected, 1)
         if not blind:  # few that are lost are none, whether they ended at once or not
             enough = n_lost >= tuning.degraded_sectors
-            lost &= self._lost | self._ended(samples, usual, 1) if enough else self._lost
+            lost &= self._lost | self._ended(samples, usual, lost, 1) if enough else self._lost
             n_lost = int(np.count_nonzero(lost))
         self._lost = lost
         if n_lost < tuning.degraded_sectors:
@@ -102,19 +102,23 @@ class ReturnsCheck:
         around = (self._usual > weight).sum(axis=0) >= AROUND
         count = self._count(samples[-1]).sum(axis=0)
         dead = around & (usual > BAND_POINTS * weight) & (count < self._tuning.beam_share * usual)
-        self._dead = dead & (self._dead | self._ended(samples, usual, 0)) if dead.any() else dead
+        self._dead = dead & (self._dead | self._ended(samples, usual, dead, 0)) if dead.any() else dead
         n_dead = int(np.count_nonzero(self._dead))
         share = usual[self._dead].sum() / max(usual.sum(), 1.0)
         if n_dead < MIN_DEAD and share <= DEAD_SHARE:
             return None
         return Loss(n_dead * 3 >= BANDS, f"no returns from {_bands(self._dead)} beams, in any direction")
 
-    def _ended(self, samples: Sequence[Sample], usual: Float64, axis: int) -> Bool:
-        """(n,) whether the returns of each sector or band ended at once, from one of the sweeps to the next."""
+    def _ended(self, samples: Sequence[Sample], usual: Float64, missing: Bool, axis: int) -> Bool:
+        """(n,) whether the returns of each sector or band ended at once, from one of the sweeps to the next.
+
+        Only those that are `missing` (n,) count. If all of them were already in the first sweep, none is looked for.
+        """
+        whole = self._tuning.whole_share * usual
+        if not (missing & (self._count(samples[0]).sum(axis=axis) > whole)).any():
+            return np.zeros(len(usual), np.bool_)
         count = np.array([self._count(sample).sum(axis=axis) for sample in samples])
-        was_whole = count[:-1] > self._tuning.whole_share * usual
-        ended = count[1:] < self._tuning.lost_share * usual
-        return np.asarray((was_whole & ended).any(axis=0))
+        return np.asarray(((count[:-1] > whole) & (count[1:] < self._tuning.lost_share * usual)).any(axis=0))
 
     def _thinned(self, count: Float64, least: float) -> Loss | None:
         """Returns that are missing everywhere alike."""
@@ -132,11 +136,13 @@ class ReturnsCheck:
 
     def _count(self, sample: Sample) -> Float64:
         """(SECTORS, BANDS) returns of a sweep."""
-        if self._last is None or self._last[0] is not sample:
-            self._last = sample, self._counted(sample)
-        return self._last[1]
+        for known, count in self._counted:
+            if known is sample:
+                return count
+        self._counted = [*self._counted[-1:], (sample, self._count_anew(sample))]
+        return self._counted[-1][1]
 
-    def _counted(self, sample: Sample) -> Float64:
+    def _count_anew(self, sample: Sample) -> Float64:
         assert self._span is not None
         low, high = self._span
         steps = (sample.xyz[2] / sample.range_m - np.float32(low)) * np.float32(BANDS / (high - low))

@@ -123,8 +123,7 @@ class SceneCheck:
         fell = agreed < tuning.suspected and agreed < self._agreed - tuning.fall
         self._agreed = agreed
         if fell or agreed < tuning.same or not self.change.is_none:
-            agreements = [(agreement(*pair, self.change), pair) for pair in pairs]
-            least, pair = min(agreements, key=lambda each: each[0])
+            least, pair = self._least_agreeing(pairs, agreed)
             if least < tuning.suspected:
                 self._explain(*pair, least, on_moved_ground=on_moved_ground)
         if self._before is None:
@@ -134,6 +133,26 @@ class SceneCheck:
         if self._looks >= back_looks or self.change.is_none:
             self.change = SAME
             self._before = None
+
+    def _least_agreeing(
+        self, pairs: Sequence[tuple[Sample, Sample]], agreed: float
+    ) -> tuple[float, tuple[Sample, Sample]]:
+        """Least share of the obstacle points that stood still within a pair, and the pair.
+
+        The pairs are halved. Where enough points stood still from the first to the last sweep, no pair is looked at.
+
+        Args:
+            pairs: sweeps in a row.
+            agreed: the same share from the first to the last of them.
+        """
+        if len(pairs) == 1 or agreed >= self._tuning.suspected:
+            return agreed, pairs[-1]
+        middle = len(pairs) // 2
+        halves = (
+            self._least_agreeing(half, agreement(half[0][0], half[-1][1], self.change))
+            for half in (pairs[:middle], pairs[middle:])
+        )
+        return min(halves, key=lambda each: each[0])
 
     def _moves_as_before(self, first: Sample, now: Sample) -> bool:
         """Whether obstacles move by the pose as in a scene that is not changed, and not as in the changed one."""
@@ -166,8 +185,7 @@ def _cells(x: Float32, y: Float32, turn: Float32) -> Int:
 def places(before: Sample, after: Sample, change: Change) -> tuple[Int, Int]:
     """Cells of the obstacle points of two sweeps in the frame of the second one, where both have returns at all."""
     a = change.motion(before, after).astype(np.float32)
-    x, y, z = before.xyz.take(before.obstacles, axis=1)
-    x, y = (a[k, 0] * x + a[k, 1] * y + a[k, 2] * z + a[k, 3] for k in (0, 1))
+    x, y = a[:2, :3] @ before.xyz.take(before.obstacles, axis=1) + a[:2, 3:]
     known = _cells(x, y, turn_of(x, y))
     x, y, _ = after.xyz.take(after.obstacles, axis=1)
     cells = _cells(x, y, after.turn.take(after.obstacles))
