@@ -17,7 +17,7 @@ from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, MeterLostError, Scope
 from modt.pipeline import Pipeline
 from modt.sinks.output import LineFile, writing
-from modt.types import Budget, Frame, FrameResult
+from modt.types import Budget, Float64, Frame, FrameResult
 from tools.send.faults import PacketFaults
 from tools.send.loops import VelodyneStamps
 
@@ -38,6 +38,13 @@ BLOCKS = 12
 """Blocks of a Velodyne's packet."""
 BLOCK_BYTES = 100
 """Bytes of a block: a head of four bytes and 32 returns."""
+LASERS = 16
+TURN = 36_000
+FEW_LASERS = np.arange(LASERS) % 8 == 0
+LOWER_LASERS = np.arange(LASERS) % 2 == 0
+"""The lasers of a VLP-16 alternate: -15, 1, -13, 3 deg and so on; from the last to the first they are upside down."""
+DOUBTED_S = 6.0
+"""Time of a fault that the trust has to tell [s]."""
 CELL = np.dtype([("distance", "<u2"), ("reflectance", "u1")])
 """A return in a block."""
 
@@ -117,6 +124,7 @@ class Fault:
         clock_s: step of the sensor's clock when the fault begins [s].
         switch: turns it on and off in the world.
         silent_if_steady: no report is needed while results stay regular.
+        of_scene: results go on and are not trusted, so it is over when they are trusted again.
     """
 
     name: str
@@ -127,14 +135,33 @@ class Fault:
     clock_s: float = 0.0
     switch: Callable[[World, bool], None] = lambda world, on: None
     silent_if_steady: bool = False
+    of_scene: bool = False
 
 
-def _few_lasers(payload: bytes, _rng: np.random.Generator) -> bytes:
-    """Two of the sixteen lasers, a tenth nearer."""
-    raw = np.frombuffer(payload, np.uint8).copy()
-    cells = raw[: BLOCKS * BLOCK_BYTES].reshape(BLOCKS, BLOCK_BYTES)[:, 4:].view(CELL)
-    cells["distance"] = np.where(np.arange(cells.shape[1]) % 8 == 0, 0.9 * cells["distance"], 0)
-    return raw.tobytes()
+def _of_scene(
+    distance: Callable[[Float64, Float64], Float64] = lambda distance, azimuth_deg: distance, turned_deg: float = 0.0
+) -> Callable[[bytes, np.random.Generator], bytes]:
+    """Fault of the scene in a packet: a turn of the head, and a change of the distances.
+
+    `distance` takes those of the blocks and lasers (BLOCKS, 2, 16), and the azimuths of the blocks (BLOCKS, 1, 1).
+    """
+
+    def change(payload: bytes, _rng: np.random.Generator) -> bytes:
+        raw = np.frombuffer(payload, np.uint8).copy()
+        blocks = raw[: BLOCKS * BLOCK_BYTES].reshape(BLOCKS, BLOCK_BYTES)
+        azimuth = blocks[:, 2:4].view("<u2")
+        cells = blocks[:, 4:].view(CELL)
+        before = cells["distance"].reshape(BLOCKS, -1, LASERS).astype(np.float64)
+        after = distance(before, azimuth[..., None] / 100).reshape(cells.shape)
+        cells["distance"] = np.minimum(after, np.iinfo(np.uint16).max)
+        azimuth[:] = (azimuth + round(100 * turned_deg)) % TURN
+        return raw.tobytes()
+
+    return change
+
+
+def _behind(azimuth_deg: Float64) -> Float64:
+    return np.asarray((azimuth_deg > 90) & (azimuth_deg < 270), np.float64)
 
 
 def _lie(payload: bytes, rng: np.random.Generator) -> bytes:
@@ -169,6 +196,22 @@ def _incomplete(service: Any) -> int:
     return int(health["incomplete_sweeps"] + health["lost_messages"])
 
 
+def _doubted(service: Any) -> int:
+    """Frames that are not trusted."""
+    frames = service.stages.trust.frames
+    return int(frames.total() - frames["good"])
+
+
+SCENE_FAULTS = {
+    "covered": _of_scene(lambda d, _: 0 * d),
+    "front missing": _of_scene(lambda d, azimuth_deg: d * _behind(azimuth_deg)),
+    "upper beams dead": _of_scene(lambda d, _: d * LOWER_LASERS),
+    "twice as far": _of_scene(lambda d, _: 2 * d),
+    "half as far": _of_scene(lambda d, _: d / 2),
+    "upside down": _of_scene(lambda d, _: d[..., ::-1]),
+    "turned by 90 deg": _of_scene(turned_deg=90.0),
+}
+"""Changes of the packets by which the sweeps show what cannot be."""
 NO_FAULT = Fault("none", 0.0, lambda s: 0)
 FAULTS = (
     Fault("silence", 4.0, lambda s: s.source.silences, PacketFaults(lost=1.0)),
@@ -176,7 +219,8 @@ FAULTS = (
     Fault("loss", 2.0, _incomplete, PacketFaults(lost=0.3)),
     Fault("duplicates", 2.0, _refused, PacketFaults(duplicated=1.0), silent_if_steady=True),
     Fault("reordering", 2.0, _refused, PacketFaults(reordered=0.5), silent_if_steady=True),
-    Fault("other sensor", 3.0, lambda s: s.stages.misfits, packet=_few_lasers),
+    Fault("other sensor", 3.0, lambda s: s.stages.misfits, packet=_of_scene(lambda d, _: 0.9 * d * FEW_LASERS)),
+    *(Fault(name, DOUBTED_S, _doubted, packet=packet, of_scene=True) for name, packet in SCENE_FAULTS.items()),
     Fault("lying stamps", 2.0, _refused, packet=_lie),
     Fault("clock set back", 0.2, _refused, clock_s=-100.0),
     Fault(FULL_DISK, 3.0, lambda s: s.recording.health().lost_lines, switch=_switch("disk_full")),

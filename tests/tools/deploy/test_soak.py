@@ -46,11 +46,12 @@ def test_the_clock_of_the_sensor_is_set_once_by_its_fault():
         assert step_us - stamps.wrap_us // 2 == 1e6 * faulty.fault.clock_s
 
 
-def result_log(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0, stall_s=0.0):
+def result_log(full_from=0.0, trusted_from=0.0, missed_at=(), growth=0.0, leaks=0.0, stall_s=0.0):
     seen = ResultLog()
     times_s = 0.1 * np.arange(1, 2000)
     seen.times_s = (times_s + stall_s * (times_s > 49.0)).tolist()
     seen.full = [not 50 < t < full_from for t in times_s]
+    seen.trusted = [not 50 < t < trusted_from for t in times_s]
     seen.missed = [sum(at <= t for at in missed_at) for t in times_s]
     seen.resident_mb = (150.0 * (1 + growth * times_s / 100)).tolist()
     seen.descriptors = (12 + (leaks * times_s / 100).astype(int)).tolist()
@@ -68,6 +69,8 @@ FIRST = FAULTS[0].name
         (result_log(missed_at=(49.0, 51.0)), FIRST, 1, 0, None),
         (result_log(), FIRST, 0, 0, "were not counted"),
         (result_log(full_from=55.0), FIRST, 1, 0, "recovery took 5.0 s"),
+        (result_log(trusted_from=54.0), "covered", 1, 0, None),
+        (result_log(trusted_from=56.0), "covered", 1, 0, "recovery took 6.0 s"),
         (result_log(missed_at=(30.0,)), FIRST, 1, 0, None),
         (result_log(missed_at=(30.0, 31.0)), FIRST, 1, 0, "2 deadlines missed between faults"),
         (result_log(growth=0.3), FIRST, 1, 0, "memory grew"),
