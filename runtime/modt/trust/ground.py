@@ -79,7 +79,7 @@ class GroundCheck:
     def _known(self) -> bool:
         return self._known_looks >= KNOWN_LOOKS
 
-    def look(self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int) -> None:
+    def look(self, first: Sample, now: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int) -> None:
         """Notice a ground that moves at once, and one that is back.
 
         It is back where it stands as before the step or fits the known plane in enough looks, and at once if a step
@@ -87,12 +87,12 @@ class GroundCheck:
 
         Args:
             first: the sweep of the look before.
-            pairs: sweeps in a row since then, with the one after each; the last one is looked at.
+            now: the sweep that is looked at.
+            pairs: sweeps since `first`, each with the one that came soon after it.
             back_looks: number of looks in a row in which it has to be back.
         """
-        if not pairs or not self._known:
+        if not self._known:
             return
-        now = pairs[-1][1]
         if self._size(_moved_between(first, now)) >= self._least():
             self._add(pairs)
         if self._before is None:

@@ -108,21 +108,24 @@ class SceneCheck:
         self._looks = 0  # in a row in which the scene is back
 
     def look(
-        self, first: Sample, pairs: Sequence[tuple[Sample, Sample]], back_looks: int, *, on_moved_ground: bool = False
+        self,
+        first: Sample,
+        now: Sample,
+        pairs: Sequence[tuple[Sample, Sample]],
+        back_looks: int,
+        *,
+        on_moved_ground: bool = False,
     ) -> None:
         """Notice a scene that changes at once, and one that is back; arguments as those of the ground's check.
 
         On a ground that has moved, obstacles are less sure, so a change has to explain nearly all of them. A scale is
         told by the ground alone.
         """
-        if not pairs:
-            return
         tuning = self._tuning
-        now = pairs[-1][1]
         agreed = agreement(first, now, self.change)
         fell = agreed < tuning.suspected and agreed < self._agreed - tuning.fall
         self._agreed = agreed
-        if fell or agreed < tuning.same or not self.change.is_none:
+        if pairs and (fell or agreed < tuning.same or not self.change.is_none):
             least, pair = self._least_agreeing(pairs, agreed)
             if least < tuning.suspected:
                 self._explain(*pair, least, on_moved_ground=on_moved_ground)

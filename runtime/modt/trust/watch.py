@@ -196,20 +196,21 @@ class TrustWatch:
         pairs = [(a, b) for a, b in pairwise(self._samples) if b.time_s - a.time_s <= MAX_SUDDEN_S]
         first = self._samples[0]
         ground = self._ground.present
-        self._ground.look(first, pairs, self._tuning.back_looks)
+        self._ground.look(first, self._samples[-1], pairs, self._tuning.back_looks)
         moves = bool((self._ground.present != ground).any())
         if moves:  # the obstacles of this sweep, the first one of the next look, stand on it as it is after the step
             self._samples[-1] = replace(self._samples[-1], plane=self._ground.present)
             pairs = [(first, self._samples[-1])]
+        now = self._samples[-1]
         on_moved_ground = moves or bool(self._ground.phrase)
-        self._scene.look(first, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
+        self._scene.look(first, now, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
 
     def _look_past(self, before: Sample, now: Sample) -> None:
         """Compare the sweeps before and after a time in which nothing was seen."""
         same_place = bool(np.hypot(*(now.T_world_sensor - before.T_world_sensor)[:2, 3]) < SAME_PLACE_M)
         self._ground.look_past(before, now, same_place=same_place)
         if not self._ground.phrase and same_place:
-            self._scene.look(before, [(before, now)], self._tuning.back_looks)
+            self._scene.look(before, now, [(before, now)], self._tuning.back_looks)
 
 
 GAP_S = 1.0
