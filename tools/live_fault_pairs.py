@@ -136,6 +136,11 @@ class Sender:
         self.began_s = 0.0  # stamp of the first sweep of the drive
         self.latest_s = 0.0  # greatest delay of a packet, as on a busy machine
 
+    @property
+    def too_late(self) -> bool:
+        """Whether the machine is too busy for the run to count."""
+        return self.latest_s > MOST_LATE_S
+
     def _active(self, sweep: int) -> list[LiveEpisode]:
         return [episode for episode in self._pair if episode.begin <= sweep < episode.end]
 
@@ -161,7 +166,7 @@ class Sender:
         return [replace(first, points=np.hstack([first.points[:, :3] * n, first.points[:, 3:]])) for n in noise]
 
     def run(self) -> None:
-        """Send the drive in real time. All that takes long is done before."""
+        """Send the drive in real time, until it is too late. All that takes long is done before."""
         given = self._given()
         drive = [payload for _, payload in packets_of(given, SENSOR, PERIOD_S)]
         waiting = [payload for _, payload in packets_of(self._waiting(), SENSOR, PERIOD_S)]
@@ -177,7 +182,7 @@ class Sender:
             timed = ((at_s, _stamped(payload, at_s)) for at_s, payload in zip(times_s, drive, strict=True))
             end = repeat((np.inf, bytes(PACKET_BYTES)))
             for at_s, payload in self._faulty.applied(chain(timed, end)):
-                if np.isinf(at_s):
+                if np.isinf(at_s) or self.too_late:
                     break
                 while said < min(int((at_s - self.began_s) / PERIOD_S), len(given) - 1):
                     self._switch(said, said + 1)
@@ -189,7 +194,7 @@ class Sender:
         """Send sweeps of the beginning until the run is ready; returns the stamp of the next packet."""
         at_s = first_s = time.time()
         n = 0
-        while n < MOST_WAITING * len(waiting) and not (n and self._ready()):
+        while n < MOST_WAITING * len(waiting) and not self.too_late and not (n and self._ready()):
             for payload in waiting:
                 if n % PACKETS_PER_SWEEP == 0:
                     self._send_poses(poses, [self._frames[0]] * 2, at_s)
@@ -274,22 +279,22 @@ def tried(frames: Sequence[Frame], pair: Sequence[LiveEpisode]) -> list[str] | N
         command += ["--odometry", f"udp://127.0.0.1:{poses}", "--out", str(folder)]
         with (Path(name) / "log").open("wb") as log:
             run = subprocess.Popen([sys.executable, *command], stdout=log, stderr=log)
+        sender = Sender(
+            frames, pair, (packets, poses), lambda number: os.kill(run.pid, number), lambda: started(folder)
+        )
         try:
-            sender = Sender(
-                frames, pair, (packets, poses), lambda number: os.kill(run.pid, number), lambda: started(folder)
-            )
             sender.run()
             if run.poll() is not None:
                 return [f"the run ended with {run.returncode}"]
             run.send_signal(signal.SIGTERM)
             run.wait(ENDED_S)
         except subprocess.TimeoutExpired:
-            return ["the run did not end"]
+            return None if sender.too_late else ["the run did not end"]
         finally:
             if run.poll() is None:
                 run.kill()
                 run.wait()
-        if sender.latest_s > MOST_LATE_S:
+        if sender.too_late:
             return None
         broken = [] if run.returncode == 0 else [f"the run ended with {run.returncode}"]
         return [*broken, *judged(folder, pair, sender.began_s)]
