@@ -311,6 +311,7 @@ def judged(folder: Path, pair: Sequence[LiveEpisode], began_s: float) -> Iterato
         yield f"{missing} frames are neither recorded nor counted as lost"
     if lost := {fate: n for fate, n in fates.items() if n}:
         yield f"frames are lost: {lost}"
+    yield from _of_sweeps(status, json.loads((folder / "summary.json").read_bytes())["faults"]["skipped"])
     sweep = (np.array([line["stamp_s"] for line in lines]) - began_s) / PERIOD_S
     good = np.array([line["trust"]["level"] == "good" for line in lines])
     for episode, other in (pair, pair[::-1]):
@@ -323,6 +324,15 @@ def judged(folder: Path, pair: Sequence[LiveEpisode], began_s: float) -> Iterato
         late = (sweep > visible + change.limit_s / PERIOD_S + 1) & (sweep < episode.end - 1)
         if (good & late).any():
             yield f"{change.name}: good in {np.count_nonzero(good & late)} of {np.count_nonzero(late)} frames"
+
+
+def _of_sweeps(status: dict[str, Any], skipped: int) -> Iterator[str]:
+    """Sweeps that are neither frames nor counted as left out."""
+    sensor = status["sensor"]
+    failed = sum(n for kind, n in status["loop"]["failures"].items() if kind.startswith(("frame:", "source:")))
+    left_out = sensor["dropped_sweeps"] + status["loop"]["shed_sweeps"] + skipped + failed
+    if missing := sensor["sweeps"] - status["counts"]["frames"] - left_out:
+        yield f"{missing} sweeps are neither frames nor counted as left out"
 
 
 def _tried_number(frames: Sequence[Frame], seed: int, number: int) -> list[str] | None:

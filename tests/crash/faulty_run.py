@@ -234,6 +234,10 @@ class FaultyRun:
         health = self.service.recording.health()
         recording: Any = self.service.recording
         missing = recording.write.call_count + recording.ledger.call_count - sum(map(len, records.values()))
+        source = self.service.source
+        failed = sum(n for kind, n in self.service.failures.counts.items() if kind.startswith(("frame:", "source:")))
+        left_out = source.dropped + source.faults.skipped + self.service.deadlines.shed + failed
+        assert source.sweeps == self.service.totals.frames + left_out
         assert sum(health.fates.values()) == recording.write.call_count
         assert health.fates["waiting"] == 0
         for schema, numbers in records.items():

@@ -36,7 +36,7 @@ class DeadlineFigures:
     other_stages_ms: float  # cost of a frame beside its classification
     step: str  # of load shedding
     steps_entered: Mapping[str, int]
-    shed_sweeps: int  # sweeps left out by the last step, or that arrived during the first frame
+    shed_sweeps: int  # sweeps left out by the last step, during the first frame, or after a signal to stop
 
 
 class Deadlines:
@@ -87,6 +87,10 @@ class Deadlines:
         shed = self._shed_last or (self._warm_s is not None and arrived_s < self._warm_s)
         self.shed += shed
         return not shed
+
+    def leave_out(self) -> None:
+        """Count a sweep that came together with a signal to stop."""
+        self.shed += 1
 
     def budget(self, whole: Budget, arrived_s: float, frame: int) -> Budget:
         """Budget of a frame that starts now, at most the `whole` budget of its profile."""
@@ -152,6 +156,9 @@ class NoDeadlines:
     def admit(self, arrived_s: float) -> bool:
         """True."""
         return True
+
+    def leave_out(self) -> None:
+        """No effect."""
 
     def budget(self, whole: Budget, arrived_s: float, frame: int) -> Budget:
         """The whole budget."""

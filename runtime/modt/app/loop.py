@@ -159,7 +159,10 @@ class Loop:
             except Exception as error:
                 self.failures.fail(error, "source")
                 received = None
-            if received is not None and self.stop.signal is None:
+            if received is not None:
+                if self.stop.signal is not None:
+                    self.deadlines.leave_out()
+                    return
                 yield received
             notifier.alive()
             self._serve(notifier)

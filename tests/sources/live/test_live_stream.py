@@ -61,6 +61,9 @@ def test_the_newest_of_several_sweeps_is_taken_and_the_others_are_counted(driven
     assert driven.stream.take(0.0) is None
     health = driven.stream.health()
     assert (health["sweeps"], health["dropped_sweeps"], health["incomplete_sweeps"]) == (3, 2, 1)
+    driven.stream._put(sweep(1.3))
+    driven.stream.close()
+    assert driven.stream.health()["dropped_sweeps"] == 3, "nobody takes the last one"
 
 
 @pytest.mark.parametrize(

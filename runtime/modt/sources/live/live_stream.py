@@ -63,8 +63,8 @@ class LiveStream:
     Attributes:
         info: properties of the stream, with n_frames None.
         faults: unusable sweeps and points.
-        sweeps, incomplete, dropped: numbers of sweeps received, of sweeps with missing messages, and of sweeps
-            replaced by a newer one before they were taken.
+        sweeps, incomplete, dropped: numbers of sweeps received, of sweeps with missing messages, and of sweeps that
+            were not taken before a newer one or the end.
         skewed: number of sweeps that are deskewed by the times of a turn.
         silences: number of times that the sensor fell silent.
         period_s: mean time between the last sweeps by their stamps, at first the nominal one.
@@ -196,6 +196,9 @@ class LiveStream:
         self.reader.close()
         if self._thread.is_alive():
             self._thread.join(2 * READ_S)
+        with self._arrived:
+            self.dropped += self._newest is not None
+            self._newest = None
 
     def _receive(self) -> None:
         if refused := host.serve_loop(self._cores):
