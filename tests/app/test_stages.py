@@ -205,6 +205,22 @@ def test_a_sensor_that_does_not_fit_the_requested_profile_is_named_until_it_does
     assert stages.misfits == 2
 
 
+def test_an_exchange_that_was_the_effect_of_a_fault_is_taken_back_without_another_sign_of_it():
+    """The fault began and ended while nothing was seen, so no reason changes when it ends."""
+    stages = stages_of(profile="vlp-16")
+    first = frames()[0]
+    stages.choose_profile(first)
+    stages._compare(dataclasses.replace(first, points=first.points[::2]))
+    stages.adapt(first)
+    for time_s, found in ((1.9, ["profile"]), (2.0, []), (9.0, [])):
+        stages.adapt(dataclasses.replace(first, stamp_s=time_s, steady_s=time_s))
+        if stages.comparison is not None:
+            stages.comparison.join()
+        stages.adapt(dataclasses.replace(first, stamp_s=time_s, steady_s=time_s))
+        assert list(stages._findings()) == found
+    assert stages.misfits == 2
+
+
 def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatch):
     stages = stages_of()
     may_end = threading.Event()

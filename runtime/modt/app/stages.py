@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 DOUBTED_S = 0.5
 """Time for which given poses are doubted before it is reported [s]."""
+RECOMPARED_S = 2.0
+"""Time between two comparisons with the profiles while the present one is not that of the begin [s]."""
 POSES_REMEDY = "check the odometry: its scale, units, frames, and whether it stands still"
 
 
@@ -78,6 +80,7 @@ class Stages:
         self.read: dict[str, Any] | None = None  # account of what was read, at the end
         self.comparison: Thread | None = None
         self._chosen_by_thread: list[tuple[Frame | None, ChosenProfile]] = []  # chosen by the thread `comparison`
+        self._compared_s = 0.0  # time of the sweep that was last compared with the profiles
         self._continuity = assembly.Continuity()
         self.chosen = self._choose(None)
         self._began_with: tuple[Frame | None, ChosenProfile] = None, self.chosen
@@ -143,14 +146,18 @@ class Stages:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it.
 
         A sensor that was knocked or turned keeps its profile: one that fits the view from there would hide that.
+        After an exchange sweeps are compared at intervals, as the exchange may be the effect of a fault that ends.
         """
         watch = self.trust.watch
+        exchanged = self.chosen is not self._began_with[1]
+        wanted = watch.compare_profiles or (exchanged and frame.time_s - self._compared_s >= RECOMPARED_S)
         if self._chosen_by_thread:
             self.misfits += 1
             self._chosen_for, chosen = self._chosen_by_thread.pop()
             self._use(chosen)
-        elif watch.compare_profiles and not watch.displaced and self._live and not self._thread_runs:
+        elif wanted and not watch.displaced and self._live and not self._thread_runs:
             watch.compare_profiles = False
+            self._compared_s = frame.time_s
             self.comparison = Thread(target=self._compare, args=(frame,), name="recognition", daemon=True)
             self.comparison.start()
 
