@@ -196,7 +196,7 @@ class LiveStream:
         self.reader.close()
         if self._thread.is_alive():
             self._thread.join(2 * READ_S)
-        with self._arrived:
+        with self.arrived:
             self.dropped += self._newest is not None
             self._newest = None
 
