@@ -70,11 +70,11 @@ PART_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
 
 
 def unknown_near(result: FrameResult) -> Bool:
-    """(M,) visible background tracks that may be people: the view ends below a third of a person's height."""
+    """(M,) visible background tracks that may be people: less than half of a person's height is in view."""
     proposals = result.proposals
     length_m = proposals.box[:, 3]
     height_m = proposals.box[:, 5]
-    may_be_person = (proposals.cut & Cut.TOP > 0) & (height_m < PERSON_HEIGHT_M / 3) & (length_m < MAX_PERSON_M)
+    may_be_person = (proposals.cut & Cut.TOP > 0) & (height_m < PERSON_HEIGHT_M / 2) & (length_m < MAX_PERSON_M)
     visible = result.tracks.proposal != NONE
     unknown: Bool = visible & (result.tracks.object_class == ObjectClass.BACKGROUND)
     unknown[unknown] = may_be_person[result.tracks.proposal[unknown]]

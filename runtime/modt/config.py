@@ -338,7 +338,7 @@ class SensorConfig(StageConfig):
 
     @property
     def person_seen_from_m(self) -> float | None:
-        """Distance from which a third of a person is in view [m]; None if the mount or the beams are unknown."""
+        """Distance from which half of a person is in view [m]; None if the mount or the beams are unknown."""
         if self.height_m is None or self.span_deg is None:
             return None
         low, high = (math.tan(math.radians(deg)) for deg in self.span_deg)
@@ -346,7 +346,7 @@ class SensorConfig(StageConfig):
             distance_m = decimetres / 10
             top_m = min(self.height_m + distance_m * high, PERSON_HEIGHT_M)
             bottom_m = max(self.height_m + distance_m * low, 0.0)
-            if top_m - bottom_m >= PERSON_HEIGHT_M / 3:
+            if top_m - bottom_m >= PERSON_HEIGHT_M / 2:
                 return distance_m
         return None
 

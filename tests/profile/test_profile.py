@@ -140,7 +140,7 @@ def test_a_shown_profile_can_be_read_and_says_who_set_each_key():
     assert "height_m: 1.0 # os1-64" in lines
     assert "elevation_step_deg: 1.45 # os1-32" in lines
     assert "period_s: 0.1 # default" in lines
-    assert "from 0.7 m on" in shown, "people are in view"
+    assert "from 1.1 m on" in shown, "people are in view"
     assert "min_range_m: 2.0 # hdl-64e" in profile_group.shown(profile.resolve("raspberry-pi-5"))
 
 

@@ -29,7 +29,8 @@ def test_a_record_counts_what_was_done_in_its_frame():
     [
         ((0.5, 0.4, 0.5), Cut.TOP, {}, UNKNOWN_NEAR),
         ((0.5, 0.4, 0.5), Cut.BOTTOM, {}, None),
-        ((0.5, 0.4, 0.6), Cut.TOP, {}, None),  # more than a third of a person is in view
+        ((0.5, 0.4, 0.8), Cut.TOP, {}, UNKNOWN_NEAR),
+        ((0.5, 0.4, 0.9), Cut.TOP, {}, None),  # more than half of a person is in view
         ((1.2, 0.4, 0.5), Cut.TOP, {}, None),  # longer than a person
         ((0.5, 0.4, 0.5), Cut.TOP, {11: PEDESTRIAN}, None),
     ],
@@ -115,7 +116,7 @@ def tracks_one_by_one(r):
             "size": np.round(t.size_m[k], 3).tolist(),
             "world": dict(zip(WORLD_KEYS, np.round(t.x[k], 3).tolist(), strict=True)),
             "motion": MOTION_NAMES[t.motion[k]],
-            "moving": round(float(t.moving_probability[k]), 3),
+            "moving": float(np.round(t.moving_probability[k], 3)),
             "velocity": np.round(t.velocity[k], 3).tolist(),
             "velocity_covariance": [xx, xy, yy],
         }

@@ -61,7 +61,7 @@ def shown(found: profile.Resolved) -> str:
             set_by = next((layer.name for layer in layers if key in layer.settings.get(stage, ())), "default")
             text += f"  {key}: {value_text(value)} # {set_by}\n"
     near_m = found.config.sensor.person_seen_from_m
-    return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
+    return text if near_m is None else f"{text}# half of a person's height is in view from {near_m:.1f} m on\n"
 
 
 def value_text(value: Any) -> str:

@@ -116,12 +116,12 @@ def model(config: ClassificationConfig, load: Callable[[], dict[str, str]]) -> F
 
 
 def near(sensor: SensorConfig) -> Finding:
-    """Check that enough of a person is in view from 0.7 m on."""
+    """Check that half of a person is in view from 1.1 m on."""
     seen_m = sensor.person_seen_from_m
     if seen_m is None:
         return Finding(OK, "near", "how much is seen of people is not known", "set height_m, elevation_span_deg")
-    what = f"a third of a person is in view from {seen_m:.1f} m on; nearer ones may be 'unknown, near'"
-    return Finding(OK if seen_m <= 0.7 else WARN, "near", what, "beams that spread wider show more")
+    what = f"half of a person is in view from {seen_m:.1f} m on; nearer ones may be 'unknown, near'"
+    return Finding(OK if seen_m <= 1.1 else WARN, "near", what, "beams that spread wider show more")
 
 
 def disk(out: Path, config: ProfileConfig, free_bytes: Callable[[Path], int] | None = None) -> Finding:
