@@ -43,6 +43,12 @@ BEAM_STEP_SHARE = (0.5, 0.3, 0.2)
 """Share of the crops with each of these n."""
 MAX_ELEVATION_DEG = 2.0
 """Greatest angle between two beams that are kept."""
+NOISY_SHARE = 0.6
+"""Share of the crops of worn sensors with noisy ranges."""
+MAX_NOISE_M = 0.12
+"""Greatest standard deviation of the noise of a range."""
+LOST_BEAMS = (0.0, 0.15, 0.3, 0.5)
+"""Share of the beams of a crop that a worn sensor loses; each is as frequent as the others."""
 
 
 def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sensors]:
@@ -64,6 +70,24 @@ def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sens
     xyz[:, 2] += (rng.normal(0, 1, n) * (GROUND_NOISE_M + GROUND_NOISE_SLOPE * rho))[crop_of_point]
     offsets = np.append(0, np.cumsum(np.bincount(crop_of_point[keep], minlength=n)))
     return Crops(xyz[keep].astype(np.float32), offsets), sensors
+
+
+def worn(crops: Crops, sensors: Sensors, rng: Generator) -> Crops:
+    """Each crop as a worn sensor measures it: with noisy ranges, and without some of its beams."""
+    n = len(crops)
+    crop_of_point = np.repeat(np.arange(n), crops.count)
+    xyz = crops.xyz.astype(np.float64)
+    sigma_m = np.where(rng.random(n) < NOISY_SHARE, rng.uniform(0.0, MAX_NOISE_M, n), 0.0)
+    error_m = sigma_m[crop_of_point] * rng.standard_normal(len(xyz))
+    elevation_deg = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1])))
+    beam = np.floor(elevation_deg / sensors.elevation_deg[crop_of_point] + rng.random(n)[crop_of_point])
+    _, beam_of_crop = np.unique(crop_of_point << 16 | beam.astype(np.int64) + 32768, return_inverse=True)
+    lost_share = rng.choice(LOST_BEAMS, n)
+    is_lost = rng.random(len(xyz))[beam_of_crop] < lost_share[crop_of_point]
+    keep = _keep_enough(np.ones(len(xyz), np.bool_), ~is_lost, crop_of_point, n)
+    xyz *= 1.0 + (error_m / np.linalg.norm(xyz, axis=1))[:, None]
+    offsets = np.append(0, np.cumsum(np.bincount(crop_of_point[keep], minlength=n)))
+    return Crops(xyz[keep].astype(np.float32), offsets)
 
 
 def subsample(crops: Crops, limit: int, rng: Generator) -> Crops:

@@ -8,7 +8,7 @@ ones are not validated either. Every scan is segmented by the profile of its sen
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, cycle
 from pathlib import Path
 
@@ -35,6 +35,7 @@ from tools.train.paste import cut_objects, paste_objects
 from tools.train.people_scans import people_scans
 from tools.train.rider_scans import rider_scans
 from tools.train.synthetic_scans import label_files, scans_from_labels
+from tools.train.worn_scans import worn_scans
 
 SYNTHETIC_CELL_SCALES = (0.75, 1.0, 1.0, 1.4)
 """Cell sizes of simulated sweeps, in turn, relative to the profile's."""
@@ -44,6 +45,8 @@ PASTES = 120
 """Pasting attempts in each scan of KITTI."""
 MIN_HOST_POINTS = 60_000
 """Objects are pasted into scans of more points."""
+SPARSE = ("vlp-16", "vlp-16", "mid-360")
+"""Sensors of few beams, or of few points a sweep."""
 SEEDS_APART = 100_000
 """Number of worlds between the first ones of two seeds."""
 
@@ -117,16 +120,27 @@ def bare_crops(path: Path, worlds: int, seed: int) -> None:
     _save_simulated(path, scans, {"bare": worlds, "seed": seed})
 
 
-def people_crops(path: Path, worlds: int, seed: int) -> None:
-    """Write crops of simulated sweeps of people in all postures, one sweep of each world."""
-    scans = people_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
+def people_crops(path: Path, worlds: int, seed: int, sensors: Sequence[str] = tuple(SENSORS)) -> None:
+    """Write crops of simulated sweeps of people in all postures, one sweep of each world, by the sensors in turn."""
+    scans = people_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds), sensors)
     _save_simulated(path, scans, {"people": worlds, "seed": seed})
+
+
+def sparse_people_crops(path: Path, worlds: int, seed: int) -> None:
+    """Write such crops of sensors of few beams alone."""
+    people_crops(path, worlds, seed, SPARSE)
 
 
 def rider_crops(path: Path, worlds: int, seed: int) -> None:
     """Write crops of simulated sweeps of roads with rows of parked two-wheelers, one sweep of each world."""
     scans = rider_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
     _save_simulated(path, scans, {"riders": worlds, "seed": seed})
+
+
+def worn_crops(path: Path, worlds: int, seed: int) -> None:
+    """Write crops of simulated sweeps by worn sensors, some sweeps of each world."""
+    scans = worn_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
+    _save_simulated(path, scans, {"worn": worlds, "seed": seed})
 
 
 def street_crops(path: Path, worlds: int, seed: int) -> None:

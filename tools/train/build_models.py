@@ -3,11 +3,11 @@
     python -m tools.train.build_models WORK_DIR [--kitti ROOT] [--scans FOLDER --profile PROFILE] [--further]
 
 Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/pointnet-kitti. With --further it trains
-the shipped ones on sweeps of heaps, people and riders alone (tools.train.train_further), which takes minutes. With
---scans it builds WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given,
-KITTI's data. The scans have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never
-split in the validation. Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x
-right, y down, z forward).
+the shipped ones on sweeps of heaps, people, riders and worn sensors alone (tools.train.train_further), and then the
+networks beside them, which takes minutes. With --scans it builds WORK_DIR/pointnet-scans instead, from your own
+labelled scans, the simulator and, where given, KITTI's data. The scans have the layout of KITTI's object benchmark
+and are named DRIVE_NUMBER: drives are never split in the validation. Without calib/ the labels must cover the full
+circle, in a camera frame at the sensor (x right, y down, z forward).
 """
 
 from __future__ import annotations
@@ -25,14 +25,16 @@ from tools.train.build_crops import (
     own_crops,
     people_crops,
     rider_crops,
+    sparse_people_crops,
     street_crops,
     synthetic_crops,
+    worn_crops,
 )
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
 """Simulated worlds of each kind."""
-NEAR_WORLDS = {1: 3000, 2: 550}
+NEAR_WORLDS = {1: 1200, 2: 220}
 """Seed and number of the worlds near the sensor, first for training, then for the card."""
 NEAR_STEPS = 4000
 """Training steps of the network for near crops."""
@@ -42,6 +44,10 @@ BARE_WORLDS = {3: 880, 4: 110}
 """Seed and number of the worlds without objects, first for training, then for the card."""
 PEOPLE_WORLDS = {5: 400, 7: 400, 6: 220}
 """Seed and number of the worlds of people in all postures, the last for the card, the others for training."""
+SPARSE_WORLDS = {12: 260}
+"""The same for sensors of few beams alone, for training."""
+WORN_WORLDS = {10: 220, 11: 24}
+"""Seed and number of the worlds of worn sensors, first for training, then for the card."""
 RIDER_WORLDS = {8: 220, 9: 60}
 """Seed and number of the roads with rows of two-wheelers, first for training, then for the card."""
 STREET_WORLDS = {900_000: 44, 900_500: 44}
@@ -79,19 +85,19 @@ def build(crops: list[Path], work: Path, out: Path, steps: int, data: str, licen
     """
     run("train_pointnet", out, *crops, "--steps", steps, "--data", data, "--licence", licence)
     train_further(crops, work, out, min(steps, FURTHER_STEPS))
-    options = ["--steps", str(NEAR_STEPS), "--licence", licence]
-    beside = out.with_stem(f"{out.stem}-near")
-    near, held = (work / f"near-{seed}.npz" for seed in NEAR_WORLDS)
-    run("train_near", out, beside, *options, "--near", near, "--held", held, "--crops", *crops)
+    train_near(crops, work, out, licence)
 
 
 def further_crops(work: Path) -> None:
-    """Write the crops of the further training."""
+    """Write the crops of the further training, and of the training of the network beside a model."""
     for name, write, worlds_of_seed in (
         ("bare", bare_crops, BARE_WORLDS),
         ("people", people_crops, PEOPLE_WORLDS),
+        ("people", sparse_people_crops, SPARSE_WORLDS),
         ("rider", rider_crops, RIDER_WORLDS),
+        ("worn", worn_crops, WORN_WORLDS),
         ("street", street_crops, STREET_WORLDS),
+        ("near", near_crops, NEAR_WORLDS),
     ):
         for seed, worlds in worlds_of_seed.items():
             write(work / f"{name}-{seed}.npz", worlds, seed)
@@ -100,12 +106,21 @@ def further_crops(work: Path) -> None:
 def train_further(crops: list[Path], work: Path, out: Path, steps: int) -> None:
     """Train a model on worlds without objects and on worlds of people. Its own data sets are `crops`."""
     bare = [work / f"bare-{seed}.npz" for seed in BARE_WORLDS]
-    people = [work / f"people-{seed}.npz" for seed in PEOPLE_WORLDS]
+    people = [work / f"people-{seed}.npz" for seed in (*SPARSE_WORLDS, *PEOPLE_WORLDS)]
     riders = [work / f"rider-{seed}.npz" for seed in RIDER_WORLDS]
+    worn = [work / f"worn-{seed}.npz" for seed in WORN_WORLDS]
     streets = [work / f"street-{seed}.npz" for seed in STREET_WORLDS]
-    data: list[str | Path] = ["--bare", *bare, "--people", *people, "--riders", *riders]
+    data: list[str | Path] = ["--bare", *bare, "--people", *people, "--riders", *riders, "--worn", *worn]
     data += ["--streets", *streets, "--crops", *crops]
     run("train_further", out, *data, "--steps", steps)
+
+
+def train_near(crops: list[Path], work: Path, out: Path, licence: str) -> None:
+    """Train the network beside a model for what the view cuts, with its card."""
+    options = ["--steps", str(NEAR_STEPS), "--licence", licence]
+    beside = out.with_stem(f"{out.stem}-near")
+    near, held = (work / f"near-{seed}.npz" for seed in NEAR_WORLDS)
+    run("train_near", out, beside, *options, "--near", near, "--held", held, "--crops", *crops)
 
 
 def main() -> None:
@@ -123,9 +138,6 @@ def main() -> None:
     real = args.work / "kitti.npz"
     scans = args.work / "scans.npz"
     further_crops(args.work)
-    if not args.further:
-        for seed, worlds in NEAR_WORLDS.items():
-            near_crops(args.work / f"near-{seed}.npz", worlds, seed)
     if args.kitti:
         kitti_crops(real, args.kitti)
         synthetic_crops(placed, WORLDS, args.kitti / "object" / "training_all_labels")
@@ -145,6 +157,7 @@ def main() -> None:
     for crops, out, data, licence in shipped:
         if args.further:
             train_further(crops, args.work, out, FURTHER_STEPS)
+            train_near(crops, args.work, out, licence)
         else:
             build(crops, args.work, out, args.steps, data, licence)
 

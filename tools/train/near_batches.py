@@ -17,7 +17,8 @@ from modt.types import Cut, Float64, Int
 from modt_simulation.sensors import SENSORS
 from modt_training.augment import distance_m, subsample
 from modt_training.dataset import SYNTHETIC, Dataset, Pools, Sensors, draw_batch
-from tools.train.near_scans import HEIGHT_M, MIN_RANGE_M, RANGE_M
+from tools.train.mounts import MIN_RANGE_M
+from tools.train.near_scans import HEIGHT_M, RANGE_M
 
 SHARE = np.array([0.5, 0.08, 0.38, 0.04])
 """Shares of the classes in a batch."""

@@ -9,8 +9,6 @@ from itertools import cycle
 import numpy as np
 from numpy.random import Generator
 
-from modt import profile
-from modt.config import ProfileConfig
 from modt_simulation import kinds, scenery
 from modt_simulation.builder import SceneBuilder
 from modt_simulation.materials import Material
@@ -23,6 +21,8 @@ from modt_simulation.world import World
 from modt_simulation.yard import enclose, floor
 from modt_training.scan import Scan
 from modt_training.simulated import labelled_scan
+from tools.train import people_scans
+from tools.train.mounts import MIN_RANGE_M, mounted
 
 HEIGHT_M = (0.2, 1.0)
 """Least and greatest height of the sensor's mount."""
@@ -36,19 +36,21 @@ CAR_SHARE = 0.05
 """Share of the directions in which a car stands."""
 EMPTY_SHARE = 0.15
 """Share of the directions in which nothing stands."""
+POSED_SHARE = 0.6
+"""Share of the people who are in any posture, with any load or aid."""
+LIKE_PEOPLE_SHARE = 0.4
+"""Share of the things that are taken for people in postures."""
+ROWS_SHARE = 0.15
+"""Share of the scenes with rows of vines or young trees on both sides of the robot."""
 ROBOT_M = (0.4, 0.4)
 """Length and width of the robot, which nothing overlaps."""
-MIN_RANGE_M = 0.2
-"""Nearest range used."""
-LOW_M = 0.5
-"""Height of the mount below which a sensor is low."""
-LOW_CLEARANCE_M = 0.12
-"""Least height above the ground of a point of an object, for a low sensor."""
 
 
 def near_scene(rng: Generator, height_m: float) -> World:
     """A robot at rest among people, furniture, bins, posts, trees and cars."""
     builder = SceneBuilder(rng, 4.0)
+    if rng.random() < ROWS_SHARE:
+        people_scans.rows(builder)
     for k in range(SLOTS):
         draw = rng.random()
         bearing = 2 * np.pi * (k + rng.uniform(-0.25, 0.25)) / SLOTS
@@ -61,7 +63,8 @@ def near_scene(rng: Generator, height_m: float) -> World:
             out = 1.0 + 2.5 / distance
             builder.vehicle(kinds.CAR if rng.random() < 0.7 else kinds.VAN, Path.standing(out * x, out * y, turn))
         elif draw < 1.0 - EMPTY_SHARE:
-            thing = THINGS[rng.choice(len(THINGS))](rng)
+            things = people_scans.THINGS if rng.random() < LIKE_PEOPLE_SHARE else THINGS
+            thing = things[rng.choice(len(things))](rng)
             out = 1.0 + 0.5 * rng.random() / distance
             builder.scenery(thing, out * x, out * y, turn)
     half = tuple(rng.uniform(4.0, 12.0, 2).tolist())
@@ -71,7 +74,10 @@ def near_scene(rng: Generator, height_m: float) -> World:
 
 
 def _person(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
-    """Add a person who stands, walks or, rarely, sits."""
+    """Add a person who stands, walks or, rarely, sits, or who is in any posture."""
+    if builder.rng.random() < POSED_SHARE:
+        people_scans.person(builder, x, y, turn)
+        return
     draw = builder.rng.random()
     if draw < 0.5:
         builder.pedestrian(Path.standing(x, y, turn))
@@ -123,15 +129,6 @@ THINGS: tuple[Callable[[Generator], Solids], ...] = (
     table, chair, chair, shelf, pallets, scenery.bin_, scenery.tree, _shrub, _post, _post, _posts, _posts, _crate,
     _crate, _bench,
 )  # fmt: skip
-
-
-def mounted(sensor: str, height_m: float) -> ProfileConfig:
-    """The profile of a sensor, for a mount at this height on a small robot."""
-    config = profile.load(sensor)
-    stage = config.segmentation
-    low = replace(stage, clearance_m=min(stage.clearance_m, LOW_CLEARANCE_M)) if height_m < LOW_M else stage
-    mount = replace(config.sensor, height_m=height_m, min_range_m=MIN_RANGE_M)
-    return replace(config, sensor=mount, segmentation=low)
 
 
 def near_scans(seeds: Sequence[int], sensors: Sequence[str] = tuple(SENSORS)) -> Iterator[Scan]:

@@ -27,7 +27,7 @@ from modt_simulation.yard import enclose, floor
 from modt_training.scan import Scan
 from modt_training.simulated import labelled_scan
 from tools.train import bare_scans
-from tools.train.near_scans import mounted
+from tools.train.mounts import mounted
 
 HEIGHT_M = (0.25, 2.2)
 """Least and greatest height of a mount that is not the usual one of its sensor."""
@@ -59,7 +59,7 @@ def people_scene(rng: Generator, height_m: float) -> World:
     """A robot at rest among people in all postures and things of their size, in the open or between walls."""
     builder = SceneBuilder(rng, 4.0)
     if rng.random() < ROWS_SHARE:
-        _rows(builder)
+        rows(builder)
     for k in range(SLOTS):
         draw = rng.random()
         bearing = 2 * np.pi * (k + rng.uniform(-0.3, 0.3)) / SLOTS
@@ -67,7 +67,7 @@ def people_scene(rng: Generator, height_m: float) -> World:
         x, y = distance * np.cos(bearing), distance * np.sin(bearing)
         turn = float(rng.uniform(-np.pi, np.pi))
         if draw < PERSON_SHARE:
-            _person(builder, x, y, turn)
+            person(builder, x, y, turn)
             if rng.random() < PAIR_SHARE:
                 apart = rng.uniform(0.55, 0.9)
                 across = bearing + np.pi / 2
@@ -93,7 +93,7 @@ def _backing(builder: SceneBuilder, distance_m: float, bearing: float) -> None:
     builder.scenery(block(size, Material.WALL), away * np.cos(bearing), away * np.sin(bearing), bearing)
 
 
-def _rows(builder: SceneBuilder) -> None:
+def rows(builder: SceneBuilder) -> None:
     """Add rows of vines or young trees along the way of the robot."""
     rng = builder.rng
     plant = (belongings.stake, bare_scans.sapling)[rng.integers(2)]
@@ -149,7 +149,7 @@ def _upright(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
     builder.pedestrian(path, speed, height)
 
 
-def _person(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
+def person(builder: SceneBuilder, x: float, y: float, turn: float) -> None:
     """Add a person in any posture, with any belongings."""
     rng = builder.rng
     way = WAYS[rng.choice(len(WAYS))]

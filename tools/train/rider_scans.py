@@ -23,7 +23,7 @@ from modt_simulation.world import World
 from modt_simulation.yard import floor
 from modt_training.scan import Scan
 from modt_training.simulated import labelled_scan
-from tools.train.near_scans import mounted
+from tools.train.mounts import mounted
 
 HEIGHT_M = (0.4, 2.2)
 """Least and greatest height of a mount that is not the usual one of its sensor."""

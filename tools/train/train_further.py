@@ -1,12 +1,14 @@
 """Train a model further: heaps, rows of scooters, and people in every posture (extra [train]).
 
     python -m tools.train.train_further MODEL.onnx --bare BARE.npz HELD.npz --people PEOPLE.npz... HELD.npz
-                         --riders RIDERS.npz HELD.npz --streets STREETS.npz... --crops CROPS.npz... [--steps N]
+                         --riders RIDERS.npz HELD.npz --worn WORN.npz HELD.npz --streets STREETS.npz...
+                         --crops CROPS.npz... [--steps N]
 
 Streets have no heaps, few scooters, and their people stand and walk. A network that has seen nothing else takes a
-heap or a row of scooters for a car, and who sits or crouches for background. The network is trained on with five
-kinds of crops beside one another: those of --bare are background, those of --people, --riders and --streets have the
-labels of the simulator, and those of --crops, the data of the model, keep the posterior that the network gives them.
+heap or a row of scooters for a car, and who sits or crouches for background. The network is trained on with six
+kinds of crops beside one another: those of --bare are background, those of --people, --riders, --worn and --streets
+have the labels of the simulator, and those of --crops, the data of the model, keep the posterior that the network
+gives them. A share of these is changed as worn sensors would measure them, and keeps the posterior of the unchanged.
 So the class frequencies that the posteriors assume hold on streets. Crops of that data that are as narrow and low as
 a person are drawn oftener: bins, plants, signs and posts of streets stay background. The box classifier
 is trained alike, without augmentation: the box of a car of which a part is cut off is the box of a heap. The model is
@@ -19,7 +21,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,20 +32,24 @@ from scipy.special import softmax
 
 from modt.classes import CLASS_NAMES, N_CLASSES, ObjectClass
 from modt.classification import box_classifier
-from modt.classification.crops import Crops
+from modt.classification.crops import Crops, canonical
 from modt.types import Bool, Float64, Int
-from modt_training.augment import distance_m
+from modt_training.augment import augment, distance_m, subsample, worn
 from modt_training.dataset import (
     BATCH_SIZE,
     CLUSTERED,
     SEED,
     Dataset,
     dataset_features,
+    draw_batch,
     load,
+    sampling_pools,
 )
 from modt_training.fine_tuning import (
     BOX_CROPS,
     BOX_STEPS,
+    MAX_POINTS,
+    POINTS,
     Boxes,
     Examples,
     Model,
@@ -115,6 +121,12 @@ RIDER_FREQUENCY = np.array([0.89, 0.07, 0.03, 0.01])
 """Frequency of the classes among proposals of such roads."""
 MIN_RIDER_POINTS = 10
 """Least number of points of such a crop."""
+WORN_SIZE = 96
+"""Number of crops of worn sensors of a step, of simulated sweeps and of the data of the model, each."""
+WORN_BATCHES = 240
+"""Batches of such crops of the data of the model."""
+BOX_WORN_SIZE = 160
+"""Number of crops of worn sensors of a step of the box classifier."""
 BOX_BARE_SIZE = 96
 """Number of bare crops of a step of the box classifier."""
 BOX_PEOPLE_SIZE = 192
@@ -231,6 +243,19 @@ def rider_boxes(riders: Dataset, rng: Generator) -> Boxes:
     return Boxes.of(dataset_features(riders, drawn), wanted, BOX_RIDER_SIZE, np.log(RIDER_SHARE / RIDER_FREQUENCY))
 
 
+def worn_examples(model: Model, data: Dataset, rng: Generator) -> Examples:
+    """Crops of the data of the model as worn sensors measure them, with the posterior of what sound ones measure."""
+    pools = sampling_pools(data, np.arange(len(data)))
+    sound = []
+    of_worn_sensors = []
+    for _ in range(WORN_BATCHES):
+        rows = draw_batch(pools, rng)
+        crops, sensors = augment(subsample(data.take(rows), MAX_POINTS, rng), data.sensors.take(rows), rng)
+        for kept, part in ((sound, crops), (of_worn_sensors, worn(crops, sensors, rng))):
+            kept.append(canonical(subsample(part, POINTS, rng), sensors.ground_z_m))
+    return Examples(joined(of_worn_sensors), model.network_posterior(joined(sound)), WORN_SIZE, np.zeros(N_CLASSES))
+
+
 def bare_boxes(bare: Dataset) -> Boxes:
     """Boxes without an object."""
     feature = dataset_features(bare, np.flatnonzero(bare.crops.count >= MIN_BOX_POINTS))
@@ -283,8 +308,8 @@ def people_called(before: Model, after: Model, held: Dataset) -> list[str]:
     return lines
 
 
-def called_on_roads(before: Model, after: Model, held: Dataset) -> list[str]:
-    """Markdown of the objects called on roads with rows of two-wheelers, and of the false ones, by class."""
+def called_by_class(before: Model, after: Model, held: Dataset) -> list[str]:
+    """Markdown of the objects called, and of the false ones, by class."""
     posteriors = [model.posterior(held) for model in (before, after)]
     rows = _of_riders(held)
     label = held.label[rows]
@@ -319,6 +344,7 @@ class Held:
     people: Dataset
     bare: Dataset
     riders: Dataset
+    worn: Dataset
 
 
 def section(before: Model, after: Model, held: Held, data: Dataset, facts: Sequence[str]) -> str:
@@ -326,6 +352,7 @@ def section(before: Model, after: Model, held: Held, data: Dataset, facts: Seque
     people_sweeps = held.people.provenance[0]["people"]
     bare_sweeps = held.bare.provenance[0]["bare"]
     rider_sweeps = held.riders.provenance[0]["riders"]
+    worn_worlds = held.worn.provenance[0]["worn"]
     lines = [
         SECTION,
         "",
@@ -347,7 +374,12 @@ def section(before: Model, after: Model, held: Held, data: Dataset, facts: Seque
         f"Roads with riders and with rows of parked scooters and bicycles, in {rider_sweeps} sweeps that nothing was",
         f"trained on: proposals with a posterior above {CALLED}.",
         "",
-        *called_on_roads(before, after, held.riders),
+        *called_by_class(before, after, held.riders),
+        "",
+        "Streets, crossings and yards by sensors with dead beams, ranges that scatter by up to 12 cm, and tilted",
+        f"mounts, in {worn_worlds} worlds that nothing was trained on: proposals with a posterior above {CALLED}.",
+        "",
+        *called_by_class(before, after, held.worn),
         "",
         "False objects a sweep among heaps, banks, boulders, rubble, stacks, bushes and young trees, in",
         f"{bare_sweeps} sweeps that nothing was trained on: proposals with an object posterior above {CALLED}.",
@@ -371,6 +403,7 @@ def main() -> None:
         "--people", type=Path, nargs="+", required=True, help="sweeps of people; the last ones held out"
     )
     options.add_argument("--riders", type=Path, nargs=2, required=True, help="sweeps of riders; others, held out")
+    options.add_argument("--worn", type=Path, nargs=2, required=True, help="sweeps of worn sensors; others, held out")
     options.add_argument("--streets", type=Path, nargs="+", required=True, help="sweeps of simulated streets")
     options.add_argument("--crops", type=Path, nargs="+", required=True, help="data of the model")
     options.add_argument("--steps", type=int, default=1800, help="of the training (default: %(default)s)")
@@ -381,8 +414,9 @@ def main() -> None:
     data = load(*args.crops)
     bare, held_bare = (load(path) for path in args.bare)
     riders, held_riders = (load(path) for path in args.riders)
+    worn_sweeps, held_worn = (load(path) for path in args.worn)
     people = load(*args.people[:-1])
-    held = Held(load(args.people[-1]), held_bare, held_riders)
+    held = Held(load(args.people[-1]), held_bare, held_riders, held_worn)
     streets = load(*args.streets)
     rng = np.random.default_rng(SEED)
     kept = kept_examples(before, data, rng)
@@ -392,6 +426,8 @@ def main() -> None:
         street_examples(streets, rng),
         narrow_examples(before, data, rng),
         rider_examples(riders, rng),
+        replace(street_examples(worn_sweeps, rng), size=WORN_SIZE),
+        worn_examples(before, data, rng),
     ]
     after = train_network(before, kept, others, args.steps, SEED)
     boxes = [
@@ -400,6 +436,7 @@ def main() -> None:
         street_boxes(streets),
         narrow_boxes(before, data),
         rider_boxes(riders, rng),
+        replace(street_boxes(worn_sweeps), size=BOX_WORN_SIZE),
     ]
     after = train_boxes(after, data, boxes, BOX_STEPS * args.steps, SEED)
     first_sha256 = hashlib.sha256(args.model.read_bytes()).hexdigest()
@@ -409,6 +446,7 @@ def main() -> None:
         _sources("of sweeps without objects", bare),
         _sources("of sweeps of people", people),
         _sources("of roads with riders", riders),
+        _sources("of worn sensors", worn_sweeps),
         _sources("of streets", streets),
         _sources("of the data of the model, which keep their posteriors", data),
     ]

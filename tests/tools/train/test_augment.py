@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from modt.classification.crops import Crops, gather
 from modt.config import SensorConfig
 from modt.types import Cut
-from modt_training.augment import augment, subsample
+from modt_training.augment import MAX_NOISE_M, augment, subsample, worn
 from modt_training.dataset import Sensors
 from tests.classification.scenes import blobs
 from tests.tools.train.datasets import data_of
@@ -56,6 +56,19 @@ def boards(n: int, height_m: float = 1.8) -> tuple[Crops, Sensors]:
     ground = np.full(n, -1.73)
     step = np.full(n, 0.4)
     return crops, Sensors(ground, step, step)
+
+
+def test_a_worn_sensor_moves_points_along_their_rays_and_loses_whole_beams():
+    rng = np.random.default_rng(3)
+    crops, sensors = boards(300)
+    found = worn(crops, sensors, rng)
+    range_m = np.linalg.norm(found.xyz, axis=1)
+    depth_m = found.xyz[:, 0] / range_m
+    assert (np.abs(range_m - 10.0 / depth_m) < 6 * MAX_NOISE_M).all()
+    lost = crops.count - found.count
+    assert (lost >= 0).all()
+    assert 0.2 < (lost == 0).mean() < 0.5
+    assert (found.count >= 6).all()
 
 
 @given(st.integers(0, 2**32 - 1))
