@@ -313,9 +313,7 @@ def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None
     for _ in range(2):  # the second time with the seam where the first fit has it
         if not inside.any():
             return None, np.inf
-        centred = turned[inside] - turned[inside].mean()
-        slope = float(centred @ since_s[inside] / max(centred @ centred, 1e-9))
-        offset_s = float(since_s[inside].mean() - slope * turned[inside].mean())
+        slope, offset_s = _line(turned[inside], since_s[inside])
         off_s = np.abs(since_s - offset_s - slope * turned)
         inside = off_s <= MAX_RESIDUAL * 2 * np.pi * abs(slope)
         if not inside.any() or slope <= 0:
@@ -330,6 +328,13 @@ def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None
     # The middle of what the head has swept by the time of the last point, which is a whole turn or less.
     middle_s = float(since_s[inside].max()) / 2
     return _turned(way, begin_rad, (middle_s - offset_s) / slope, slope, offset_s), residual
+
+
+def _line(angle_rad: Float64, time_s: Float64) -> tuple[float, float]:
+    """Slope [s/rad] and offset [s] of the line that fits times over angles best."""
+    centred = angle_rad - angle_rad.mean()
+    slope = float(centred @ time_s / max(centred @ centred, 1e-9))
+    return slope, float(time_s.mean() - slope * angle_rad.mean())
 
 
 def _turned(way: float, begin_rad: float, swept: float, slope: float, offset_s: float) -> Turn:

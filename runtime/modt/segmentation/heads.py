@@ -46,13 +46,8 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
     lower = _is_lower(at, high, square_m2.min(axis=0), tuning)
     heads = []  # rows of peaks
     for k, peak in enumerate(peaks):
-        if not lower[peak]:
-            continue
         own = (nearest == k) & lower
-        body = own & near[k]
-        top = own & (high > high[peak] - tuning.head_height_m)
-        stands = low[body].min() < tuning.max_bottom_m
-        if stands and entries[body].sum() >= tuning.min_points and _extent_m(at[:, top]) < tuning.max_head_m:
+        if lower[peak] and _is_head(at, low, high, entries, own, near[k], peak, tuning):
             heads.append(k)
     if not heads:
         return person
@@ -65,6 +60,16 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
     around = near[nearest, np.arange(len(x))] & lower
     person[around] = person_of_peak[nearest[around]]
     return person
+
+
+def _is_head(
+    at: Float64, low: Float32, high: Float32, entries: Int, own: Bool, near: Bool, peak: int, tuning: HeadTuning
+) -> bool:
+    """Whether a peak is the head of a person, given its own cells (m,) and the cells near it (m,)."""
+    body = own & near
+    top = own & (high > high[peak] - tuning.head_height_m)
+    stands = low[body].min() < tuning.max_bottom_m and entries[body].sum() >= tuning.min_points
+    return bool(stands and _extent_m(at[:, top]) < tuning.max_head_m)
 
 
 def _is_lower(at: Float64, high: Float32, peak_m2: Float64, tuning: HeadTuning) -> Bool:
