@@ -106,7 +106,7 @@ def stages_with(odometry: PoseSocket) -> Mock:
     config = ProfileConfig()
     chosen = SimpleNamespace(name="default", config=config)
     decision = SimpleNamespace(frequency=np.full(4, 0.25))
-    pipeline = SimpleNamespace(segmenter=SimpleNamespace(facts=dict), decision=decision)
+    pipeline = SimpleNamespace(view=SimpleNamespace(facts=dict), decision=decision)
     stages = Mock(info=INFO, request=request, chosen=chosen, config=config, misfits=0, budget=UNLIMITED, step=step)
     stages.configure_mock(odometry=odometry, ledger=Ledger(), pipeline=pipeline)
     stages.configure_mock(run_id="", trust=TrustReport(config.sensor), source_findings={})

@@ -13,6 +13,7 @@ from modt_training.simulated import simulated_scans
 from tests.recorded import written
 from tools.study import ego_drift, mounts
 from tools.study.boards import BOARDS, Work, rating_of, table
+from tools.study.drives import simulated
 from tools.study.filter_consistency import BodyTrack, body_tracks, study
 from tools.study.segmentation_recall import Tally
 
@@ -99,9 +100,9 @@ def test_the_filter_is_nearly_consistent(kind, tracks, mean, beyond, consistenci
 
 @pytest.mark.slow
 def test_a_row_over_mounts_has_recall_and_precision_of_people():
-    stream = SyntheticStream("crowd", "vlp-16", 1.0, 3, height_m=0.8, mount_deg=(0.0, 10.0))
-    drive = mounts.run(stream, "accurate", mounts.of_mount("vlp-16", 0.8))
-    *_, people, _cars = mounts.row("vlp-16", [drive]).strip("| ").split(" | ")
+    drive = simulated("crowd", "vlp-16", 1.0, 3, height_m=0.8, mount_deg=(0.0, 10.0))
+    judged = mounts.run(drive, "accurate", mounts.of_mount("vlp-16", 0.8))
+    *_, people, _cars = mounts.row("vlp-16", [judged]).strip("| ").split(" | ")
     number, _, shares = people.partition(": ")
     detected, recall, precision = map(int, shares.split(" / "))
     assert int(number) > 10
