@@ -67,7 +67,7 @@ from modt_training.fine_tuning import (
 )
 from tools.options import make_torch_deterministic, parser
 
-BARE_SIZE = 112
+BARE_SIZE = 48
 """Number of bare crops of a step, beside BATCH_SIZE crops that keep their posterior."""
 BARE_BATCHES = 160
 """Batches of augmented bare crops."""
@@ -77,7 +77,7 @@ MIN_BARE_POINTS = 20
 """Least number of points of an augmented bare crop: fewer tell no heap from a part of a car."""
 MAX_RANGE_M = 45.0
 """Greatest distance of an augmented bare crop, for the same reason."""
-PEOPLE_SIZE = 208
+PEOPLE_SIZE = 160
 """Number of crops of people, and of things beside them, of a step: as many of the one as of the other."""
 PEOPLE_BATCHES = 250
 """Batches of such crops, half of them augmented."""
@@ -127,9 +127,9 @@ WORN_BATCHES = 240
 """Batches of such crops of the data of the model."""
 BOX_WORN_SIZE = 160
 """Number of crops of worn sensors of a step of the box classifier."""
-BOX_BARE_SIZE = 176
+BOX_BARE_SIZE = 96
 """Number of bare crops of a step of the box classifier."""
-BOX_PEOPLE_SIZE = 240
+BOX_PEOPLE_SIZE = 192
 """Number of crops of people and things of such a step."""
 BOX_NARROW_SIZE = 256
 """Number of narrow crops of the data of the model of such a step."""
