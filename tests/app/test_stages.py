@@ -192,12 +192,18 @@ def test_compare_profiles_is_noticed_and_followed_and_the_first_one_is_believed_
     assert (stages.misfits, stages.chosen.name) == (2, "hdl-64e")
 
 
-def test_a_sensor_that_does_not_fit_the_requested_profile_is_named_until_it_does():
+def with_exchanged_profile():
+    """Stages whose profile was exchanged for a sweep that lacks half of its points, and the whole sweep."""
     stages = stages_of(profile="vlp-16")
     first = frames()[0]
     stages.choose_profile(first)
     stages._compare(dataclasses.replace(first, points=first.points[::2]))
     stages.adapt(first)
+    return stages, first
+
+
+def test_a_sensor_that_does_not_fit_the_requested_profile_is_named_until_it_does():
+    stages, first = with_exchanged_profile()
     assert list(stages._findings()) == ["profile"]
     stages._compare(first)
     stages.adapt(first)
@@ -207,11 +213,7 @@ def test_a_sensor_that_does_not_fit_the_requested_profile_is_named_until_it_does
 
 def test_an_exchange_that_was_the_effect_of_a_fault_is_taken_back_without_another_sign_of_it():
     """The fault began and ended while nothing was seen, so no reason changes when it ends."""
-    stages = stages_of(profile="vlp-16")
-    first = frames()[0]
-    stages.choose_profile(first)
-    stages._compare(dataclasses.replace(first, points=first.points[::2]))
-    stages.adapt(first)
+    stages, first = with_exchanged_profile()
     for time_s, found in ((1.9, ["profile"]), (2.0, []), (9.0, [])):
         stages.adapt(dataclasses.replace(first, stamp_s=time_s, steady_s=time_s))
         if stages.comparison is not None:

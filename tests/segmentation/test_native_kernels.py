@@ -382,7 +382,7 @@ def test_every_pass_is_compiled():
 @given(SEEDS)
 def test_people_within_a_cluster_are_the_same(kernels, seed):
     rng = np.random.default_rng(seed)
-    heads = [person(*rng.uniform(-1, 1, 2), rng.uniform(1.2, 2.0)) for _ in range(rng.integers(4))]
+    heads = [person(*rng.uniform(-1, 1, 2), rng.uniform(1.2, 2.6)) for _ in range(rng.integers(4))]
     parts = [*heads, *[part for part in (TROLLEY - [5.5, 0, 0, 0, 0], *BICYCLE) if rng.random() < 0.4], person(0, 0)]
     x, y, low, high, points, tuning = arguments(*parts)
     seen = rng.random(len(x)) < rng.uniform(0.3, 1.0)

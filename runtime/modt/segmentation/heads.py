@@ -51,7 +51,7 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
             heads.append(k)
     if not heads:
         return person
-    # Peaks come from the highest on.
+    # Peaks come from the highest on, so something higher than a person is the first of them.
     is_divided = len(heads) > 1 or not lower[peaks[0]] or _pushes(at, high, entries, peaks[heads[0]], tuning)
     if not is_divided:
         return person
