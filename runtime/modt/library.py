@@ -204,7 +204,7 @@ class Pipeline:
             raise MisuseError(f"mode {mode!r}", "unknown", f"use one of {', '.join(assembly.MODES)}")
         self.mode = mode
         self._classifier = classifier
-        self._asked: profile.Names | ProfileConfig = config
+        self._asked: profile.Resolved | ProfileConfig = config
         self._use(config)
         self._index = 0
         self._stamp_s = -math.inf  # of the last sweep
@@ -234,8 +234,9 @@ class Pipeline:
         Raises:
             MisuseError: the profile or mode does not exist, or a profile has an error, whose line is named.
         """
-        pipeline = cls(profile.load(names), mode, classifier)
-        pipeline._asked = names
+        asked = profile.resolve(names)
+        pipeline = cls(asked.config, mode, classifier)
+        pipeline._asked = asked
         return pipeline
 
     def _joined(self, points: Mapping[str, ArrayLike], stamp_s: float, turn_s: float, mid_rad: float) -> Frame:

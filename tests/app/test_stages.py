@@ -113,6 +113,17 @@ def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
     stages.step(frames()[9], stages.budget, reduced=False)
 
 
+def test_a_profile_is_read_at_the_start_and_at_reloads_alone(tmp_path):
+    own = tmp_path / "robot.yaml"
+    own.write_text("sensor: {height_m: 1.5}")
+    stages = stages_of(profile=(own,))
+    own.write_text("sensor: {hight_m: 1.5}")
+    stages.choose_profile(frames()[0])
+    assert stages.config.sensor.height_m == 1.5
+    with pytest.raises(MisuseError, match="hight_m"):
+        stages.reload()
+
+
 def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():
     tilted = SyntheticStream("yard", "vlp-16", 0.2, 3, mount_deg=(0.0, 12.0))
     stages = stages_of(profile=None)
@@ -259,7 +270,7 @@ BEAMS_DEG = (-15.1, *(float(v) for v in range(-13, 14, 2)), 15.2)
 def test_beams_that_the_source_knows_are_used_unless_a_sensor_is_asked_for(asked, named, sensor, beams):
     info = dataclasses.replace(INFO, profile=named, elevations_deg=BEAMS_DEG)
     for first in (None, frames()[0]):
-        chosen = choose(asked, first, info)
+        chosen = choose(profile.resolve(asked), first, info)
         assert chosen.config.sensor.elevations_deg == beams
     assert chosen.sensor == sensor
 

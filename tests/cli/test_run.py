@@ -47,9 +47,14 @@ class Service:
         self.process = begin("run", *arguments, "--out", self.out, cwd=folder, env={**environment(), **notified})
 
     def hear(self, beginning):
-        """The next message that begins with some word; the test fails if none comes."""
-        while not (message := self.socket.recv(4096).decode()).startswith(beginning):
-            pass
+        """The next message that begins with some word; without one the test fails with what the service said."""
+        try:
+            while not (message := self.socket.recv(4096).decode()).startswith(beginning):
+                pass
+        except TimeoutError:
+            status = self.process.poll()
+            self.process.kill()
+            pytest.fail(f"no {beginning} from a service of status {status}: {self.process.communicate()[1]}")
         return message
 
     def end(self):
@@ -60,8 +65,8 @@ class Service:
 
     def close(self):
         self.socket.close()
-        if self.process.poll() is None:
-            self.process.kill()
+        self.process.kill()
+        if not self.process.stderr.closed:
             self.process.communicate()
 
 

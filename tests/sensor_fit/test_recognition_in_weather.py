@@ -38,7 +38,7 @@ def test_a_start_while_walking_names_the_sensor(seed, as_driver):
     frame, _ = stream.simulator.sweep(7)
     if as_driver == "moved":
         frame = twisted(frame, stream.simulator.world)
-    assert choose((), frame, None).recognition.nearest == "vlp-16"
-    named = choose((), frame, replace(stream.info, profile="vlp-16"))
+    assert choose(profile.resolve(), frame, None).recognition.nearest == "vlp-16"
+    named = choose(profile.resolve(), frame, replace(stream.info, profile="vlp-16"))
     assert named.sensor == "vlp-16"
-    assert choose("vlp-16", frame, None).recognition.differences == ()
+    assert choose(profile.resolve("vlp-16"), frame, None).recognition.differences == ()

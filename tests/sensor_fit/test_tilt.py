@@ -54,7 +54,7 @@ def test_the_sensor_of_kitti_is_level(kitti_root):
 def test_a_tilt_that_a_profile_leaves_open_is_named_once_and_applied(mount_deg, named, caplog):
     tilted = stream("yard", "vlp-16", mount_deg)
     with caplog.at_level(logging.WARNING):
-        chosen = choose("vlp-16", next(iter(tilted)), tilted.info)
+        chosen = choose(profile.resolve("vlp-16"), next(iter(tilted)), tilted.info)
     assert [named in record.message for record in caplog.records] == [True]
     assert chosen.recognition.differences == ()  # the height above all
     sensor = chosen.config.sensor

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from modt import profile
 from modt.config import ProfileConfig
+from modt.profile import Resolved
 from modt.sensor_fit.recognition import Recognition, recognise
 from modt.sources.stream import StreamInfo
 from modt.types import Frame
@@ -46,7 +47,7 @@ class ChosenProfile:
         return self.sensor == FOUND or self.recognition.fits
 
 
-def choose(requested: profile.Names | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:
+def choose(requested: Resolved | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:
     """Choose the profile of a stream by its first frame, and log the differences as warnings.
 
     The findings of the first frame replace the default profile, or the profile that the source names. They never
@@ -56,25 +57,31 @@ def choose(requested: profile.Names | ProfileConfig, first: Frame | None, info: 
     Raises:
         MisuseError: a profile that cannot be used.
     """
-    config = requested if isinstance(requested, ProfileConfig) else profile.load(requested)
-    if config.sensors:
-        return _several(config, requested, first)
     if isinstance(requested, ProfileConfig):
-        recognition = _compared(first, requested, GIVEN, replaced=False)
-        return ChosenProfile(recognition.mounted(requested), GIVEN, (GIVEN,), recognition)
-    profiles = profile.resolve(requested)
-    if profiles.sensor:
-        recognition = _compared(first, profiles.config, profiles.sensor, replaced=False)
-        return ChosenProfile(recognition.mounted(profiles.config), profiles.sensor, profiles.used(""), recognition)
+        return _given(requested, first)
+    config = requested.config
+    if config.sensors:
+        return _several(config, requested.used(""), first)
+    if requested.sensor:
+        recognition = _compared(first, config, requested.sensor, replaced=False)
+        return ChosenProfile(recognition.mounted(config), requested.sensor, requested.used(""), recognition)
     base = info.profile if info and info.profile else profile.DEFAULT
     name = base if info and info.profile else f"{base} (the default)"
-    recognition = _compared(first, _with_beams(profiles.applied_to(profile.load(base)), info), name, replaced=True)
+    recognition = _compared(first, _with_beams(requested.applied_to(profile.load(base)), info), name, replaced=True)
     sensor = FOUND if recognition.differences else base
-    config = _with_beams(profiles.applied_to(recognition.fitted), info)
-    return ChosenProfile(config, sensor, profiles.used(sensor), recognition)
+    config = _with_beams(requested.applied_to(recognition.fitted), info)
+    return ChosenProfile(config, sensor, requested.used(sensor), recognition)
 
 
-def _several(config: ProfileConfig, requested: profile.Names | ProfileConfig, first: Frame | None) -> ChosenProfile:
+def _given(config: ProfileConfig, first: Frame | None) -> ChosenProfile:
+    """The configuration that a program has given."""
+    if config.sensors:
+        return _several(config, (GIVEN,), first)
+    recognition = _compared(first, config, GIVEN, replaced=False)
+    return ChosenProfile(recognition.mounted(config), GIVEN, (GIVEN,), recognition)
+
+
+def _several(config: ProfileConfig, names: tuple[str, ...], first: Frame | None) -> ChosenProfile:
     """The profile of several sensors, whose first sweeps are compared with the profiles of theirs."""
     differences: list[str] = []
     sweeps = first.sweeps if first is not None and first.sweeps else (None,) * len(config.sensors)
@@ -83,7 +90,6 @@ def _several(config: ProfileConfig, requested: profile.Names | ProfileConfig, fi
         own = replace(own, sensor=mounted.mounted(own.sensor))
         found = _compared(sweep, own, f"{mounted.profile} of sensor {mounted.name}", replaced=False)
         differences += [] if found.fits else [f"{mounted.name}: {difference}" for difference in found.differences]
-    names = (GIVEN,) if isinstance(requested, ProfileConfig) else profile.resolve(requested).used("")
     of_sensors = " + ".join(mounted.profile for mounted in config.sensors)
     return ChosenProfile(config, of_sensors, names, Recognition(tuple(differences), None, config))
 

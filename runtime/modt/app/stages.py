@@ -82,6 +82,7 @@ class Stages:
         self._chosen_by_thread: list[tuple[Frame | None, ChosenProfile]] = []  # chosen by the thread `comparison`
         self._compared_s = 0.0  # time of the sweep that was last compared with the profiles
         self._continuity = assembly.Continuity()
+        self._requested = profile.resolve(request.profile)
         self.chosen = self._choose(None)
         self._began_with: tuple[Frame | None, ChosenProfile] = None, self.chosen
         self.pipeline = self._new_pipeline(self.chosen.config)
@@ -181,10 +182,12 @@ class Stages:
         Raises:
             ModtError: it is not valid; nothing has changed.
         """
-        chosen = self._choose(self._chosen_for)
+        requested = profile.resolve(self.request.profile)
+        chosen = choose(requested, self._chosen_for, self._info)
         if [each.name for each in chosen.config.sensors] != [each.name for each in self.config.sensors]:
             raise MisuseError("sensors", "are others than at the start", "start modt anew for other sensors")
         self._use(chosen)
+        self._requested = requested
         self._began_with = self._chosen_for, chosen
 
     def facts(self, core: int | None, command: Sequence[str]) -> dict[str, Any]:
@@ -230,7 +233,7 @@ class Stages:
         self._chosen_by_thread.append(self._began_with if back else (frame, self._choose(frame)))
 
     def _choose(self, first: Frame | None) -> ChosenProfile:
-        return choose(self.request.profile, first, self._info)
+        return choose(self._requested, first, self._info)
 
     def _new_pipeline(self, config: ProfileConfig) -> Pipeline:
         mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)

@@ -14,6 +14,7 @@ from modt.app.chosen_profile import choose
 from modt.energy.meters.discovery import discover
 from modt.energy.meters.meter import Conditions, Kind
 from modt.errors import MisuseError
+from modt.profile import resolve
 from modt_profiling.comparison.compare_report import Basis, compare_tree
 from modt_profiling.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
 from modt_profiling.comparison.prediction_report import against, observed_tree, read_prediction
@@ -49,7 +50,7 @@ def compare(
     info = stream.info
     asked = {**identity(request, info), "fov": request.fov, "asked": list(request.frames)}
     predicted = None if prediction is None else read_prediction(prediction, asked)
-    profile = choose(request.profile, next(iter(stream), None), info).config
+    profile = choose(resolve(request.profile), next(iter(stream), None), info).config
     meters = choose_meter(discover(profile.energy), meter_name).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
     comparison = Comparison(request, profile, core, meters if metered else ())

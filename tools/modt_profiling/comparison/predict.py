@@ -11,6 +11,7 @@ import numpy as np
 from modt.app import inputs
 from modt.app.chosen_profile import choose
 from modt.errors import MisuseError
+from modt.profile import resolve
 from modt_profiling.comparison.mode_runs import identity, observe
 from modt_profiling.comparison.prediction import forecast
 from modt_profiling.comparison.prediction_report import prediction_tree, read_calibration
@@ -37,7 +38,7 @@ def predict(
     info = stream.info
     itself = identity(request, info)
     calibration = [read_calibration(path, itself, request.fov) for path in calibrations]
-    profile = choose(request.profile, next(iter(stream), None), info).config
+    profile = choose(resolve(request.profile), next(iter(stream), None), info).config
     first = info.n_frames
     if first is not None and not observe_all:
         first = -(-first // _THIRD)

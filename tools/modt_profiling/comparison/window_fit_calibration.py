@@ -20,6 +20,7 @@ from modt.energy.meters.meter import Conditions, Facts
 from modt.energy.windows import Clocks, EnergyWindow, Windows
 from modt.errors import ModtError
 from modt.geometry import FieldOfView
+from modt.profile import resolve
 from modt.types import Float32, Float64, Frame, Int, Proposals
 from modt_profiling.energy.board_fit import CLASS, IDLE, SEG, Fit, fit, unit_energy_J, usable_windows
 from modt_profiling.energy.named_meter import choose_meter
@@ -131,7 +132,7 @@ def open_workload(
     frames = list(stream)
     if not frames:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
-    profile = choose(request.profile, frames[0], stream.info).config
+    profile = choose(resolve(request.profile), frames[0], stream.info).config
     meters = choose_meter(discover(profile.energy), meter_name).meters
     kernels = assembly.chosen_kernels(profile.segmentation.kernels)
     workload = Workload(
