@@ -42,7 +42,7 @@ def flood_fill(cells, beam_m):
     return component
 
 
-def trace(lowest, spread, estimator, height_m, max_slope_deg):
+def trace(lowest, top, estimator, height_m, max_slope_deg):
     """(rings, SECTORS) ground cells, cells on and beside a ramp, and cells in which something stands.
 
     Then the (rings, SECTORS) height of each cell if it is ground, and (SECTORS,) slope of the ramp at a ray's end.
@@ -62,9 +62,14 @@ def trace(lowest, spread, estimator, height_m, max_slope_deg):
             gap = range_m[ring, ray] - at
             off = lowest[ring, ray] - height - slope * min(gap, ground.max_gap_m)
             near = ground.max_gap_m if ring and ramp[ring - 1, ray] else ground.near_m
-            flat = spread[ring, ray] <= estimator.flat_m[ring] + max(slope, 0.0) * estimator.depth_m[ring]
+            flat_m = estimator.flat_m[ring] + max(slope, 0.0) * estimator.depth_m[ring]
+            here, behind = top[ring : ring + 2, ray][[0, -1]] - lowest[ring, ray]
+            flat = here <= flat_m
+            may_rise = flat and (behind <= flat_m or at > 0)
             may_fall = off > -gap * max_slope - ground.noise_m
-            is_ground[ring, ray] = may_fall and off < (min(gap, near) * max_slope if flat else 0.0) + ground.noise_m
+            is_ground[ring, ray] = (
+                may_fall and off < (min(gap, near) * max_slope if may_rise else 0.0) + ground.noise_m
+            )
             stands[ring, ray] = may_fall and not flat
             sure[ray] = is_ground[ring, ray] and (flat or off >= -ground.noise_m)
             if stands[ring, ray] and off < -ground.noise_m and gap > ground.near_m:

@@ -115,6 +115,17 @@ def test_sides_of_objects_are_not_ground(boxes, sensor, scan, atol):
     assert (np.abs(height[on == 0]) < 0.1).mean() > 0.98
 
 
+def test_a_car_that_hides_all_ground_before_it_is_not_ground():
+    """Its bumper is the first return of its rays, and one beam meets each of its heights, as behind another car."""
+    front = [(6.48, 0.5), (6.58, 0.58), (6.68, 0.8), (6.78, 0.92), (7.4, 0.93), (8.0, 0.98), (8.3, 1.25), (8.9, 1.4)]
+    y = np.linspace(-0.9, 0.9, 40)
+    car = np.array([(x, side, up_m - HEIGHT_M, 0.5) for x, up_m in front for side in y], np.float32)
+    beside = on_floor(PROFILES["flat"])
+    hidden = (beside[:, 0] > 0) & (np.abs(beside[:, 1]) < 0.2 * beside[:, 0])
+    height = heights(np.concatenate([car[:, :3], beside[~hidden]]))[: len(car)]
+    assert height == pytest.approx(car[:, 2] + HEIGHT_M, abs=0.15)
+
+
 def test_reflections_below_the_ground_do_not_lower_it():
     points, _ = scans.scan()
     rng = np.random.default_rng(3)
@@ -136,9 +147,10 @@ def test_tracing_equals_a_loop_over_rays_and_rings(seed):
     fast = ground()
     lowest = rng.normal(-HEIGHT_M, 0.25, (fast.grid.rings, SECTORS)).astype(np.float32)
     lowest[rng.random(lowest.shape) < 0.3] = np.inf
-    spread = np.where(np.isfinite(lowest), rng.uniform(0.0, 0.6, lowest.shape), -np.inf).astype(np.float32)
-    expected = reference.trace(lowest, spread, fast, HEIGHT_M, MAX_SLOPE_DEG)
-    rays = fast.trace(lowest, spread, HEIGHT_M)
+    spread = np.where(np.isfinite(lowest), rng.uniform(0.0, 0.6, lowest.shape), 0.0)
+    top = np.where(np.isfinite(lowest), lowest + spread, -np.inf).astype(np.float32)
+    expected = reference.trace(lowest, top, fast, HEIGHT_M, MAX_SLOPE_DEG)
+    rays = fast.trace(lowest, top, HEIGHT_M)
     found = np.array([rays.is_ground, rays.is_ramp, rays.stands])
     assert (found == expected[:3]).mean() > 0.999  # float32 against float64
     assert np.isclose(rays.lowest, expected[3], atol=2e-3).mean() > 0.999

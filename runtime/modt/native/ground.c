@@ -229,14 +229,15 @@ static void close_round(const void *row, i64 step, i64 size, void *round)
  * is hidden, if it does not. */
 typedef enum { MAY_JOIN = 1, MAY_HIDE = 2 } Beside;
 
-/* The first half of Rays.advance for one ring: cells that continue the ground of their own rays, and cells in which
+/* The first half of Rays.advance for one ring, behind which are the ends `behind`: cells that continue the ground of their own rays, and cells in which
  * something stands. Height and range of the ground cell before the ring are left in `surface` and `range_before`,
  * the height of cells that are surely ground in `sure`. Something stands in a cell if its highest return lies flat_m
  * above the lowest, and more on ground that rises. */
-static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], float *restrict lowest,
-                        uint8_t *restrict kind, const float *restrict height, const float *restrict range,
-                        const float *restrict slope, const float *restrict rise_range_m, float *restrict sure,
-                        uint8_t *restrict may, float *restrict surface, float *restrict range_before)
+static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], float (*restrict behind)[2],
+                        float *restrict lowest, uint8_t *restrict kind, const float *restrict height,
+                        const float *restrict range, const float *restrict slope, const float *restrict rise_range_m,
+                        float *restrict sure, uint8_t *restrict may, float *restrict surface,
+                        float *restrict range_before)
 {
     const Ground c = *g; /* a copy, which no store through a pointer can change */
     float flat_m = c.flat_m[ring], depth_m = c.depth_m[ring];
@@ -244,8 +245,10 @@ static void follow_rays(const Ground *g, i32 ring, float (*restrict ends)[2], fl
         lowest[k] = ends[k][0];
         float gap = range_of(lowest[k], (float)ring, c.ring_step) - range[k];
         float residual = lowest[k] - height[k] - slope[k] * minf(gap, c.max_gap_m);
-        int is_flat = -ends[k][1] - lowest[k] <= flat_m + maxf(slope[k], 0.0f) * depth_m;
-        float bound = minf(gap, rise_range_m[k]) * c.max_slope * (is_flat ? 1.0f : 0.0f) + c.noise_m;
+        float max_spread_m = flat_m + maxf(slope[k], 0.0f) * depth_m;
+        int is_flat = -ends[k][1] - lowest[k] <= max_spread_m;
+        int may_rise = is_flat & ((-behind[k][1] - lowest[k] <= max_spread_m) | (range[k] > 0.0f));
+        float bound = minf(gap, rise_range_m[k]) * c.max_slope * (may_rise ? 1.0f : 0.0f) + c.noise_m;
         int may_fall = residual > -(gap * c.max_slope + c.noise_m);
         int is_below = residual < -c.noise_m;
         int found = (residual < bound) & may_fall;
@@ -299,7 +302,8 @@ static void trace(const Ground *g, float height_m, const GroundScratch *s)
         i32 row = ring * sectors;
         uint8_t *kind = s->kind + row;
         uint8_t *round = (uint8_t *)(s->ends + row); /* the ends of this ring are needed no more */
-        follow_rays(g, ring, s->ends + row, s->lowest + row, kind, height, range, slope, rise_range_m, sure, s->may,
+        float (*behind)[2] = ring + 1 < g->rings ? s->ends + row + sectors : s->ends + row;
+        follow_rays(g, ring, s->ends + row, behind, s->lowest + row, kind, height, range, slope, rise_range_m, sure, s->may,
                     s->surface + row, s->range_before + row);
         close_round(sure, sizeof *sure, sectors * sizeof *sure, beside);
         join_rays(g, ring, beside, s->may, s->lowest + row, kind, height, range, slope);

@@ -79,10 +79,11 @@ class GroundEstimator:
 
     The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` more
     than the running slope of the ray over a short way, on and beside a ramp over a longer one. It may not rise more
-    where something stands in the cell or, far away, right behind it, since it may be a flank. It may fall by
-    `max_slope_deg` more over any gap, since only ground lies lower. A ray that has lost the ground finds it again in
-    a cell where nothing stands, if that is as high as ground on a ray beside it. The surface is linear between the
-    ground returns of a ray; beyond its last one, the ground is level, but a ramp goes on for `max_gap_m`.
+    where something stands in the cell or, far away or on a ray that has met no ground yet, right behind it, since it
+    may be a flank or a bumper. It may fall by `max_slope_deg` more over any gap, since only ground lies lower. A ray
+    that has lost the ground finds it again in a cell where nothing stands, if that is as high as ground on a ray
+    beside it. The surface is linear between the ground returns of a ray; beyond its last one, the ground is level,
+    but a ramp goes on for `max_gap_m`.
 
     Behind a crest or an edge, the foot of what stands there is hidden. Where something stands more than `near_m` from
     the last ground, and the lowest return of its cell is below the line of the ray, the ground is taken to be
@@ -135,7 +136,7 @@ class GroundEstimator:
         lowest = self._lowest(points, cell, sensor_height_m)
         highest = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS)
         clear_m = self.clear_m(lowest, highest)
-        rays = self.trace(lowest, self._spread(highest, lowest), sensor_height_m)
+        rays = self.trace(lowest, self._tops(highest), sensor_height_m)
         is_ramp = rays.is_ramp
         surface = _median_across(self._interpolate(rays.lowest, rays.is_ground, rays.end_slope, sensor_height_m))
         # The ground under a vehicle, and under what stands on a ramp, is that of the rays beside it.
@@ -207,23 +208,25 @@ class GroundEstimator:
         range_m: Float32 = sqrt_range * sqrt_range
         return range_m
 
-    def _spread(self, highest: Float32, lowest: Float32) -> Float32:
-        """(rings, SECTORS) height of the highest return in each cell, or right behind it, above its lowest [m]."""
-        highest = highest.copy()
+    def _tops(self, highest: Float32) -> Float32:
+        """(rings, SECTORS) highest return in each cell or, far away, right behind it [m]."""
+        tops = highest.copy()
         far = self.bonnet_ring
-        highest[far:-1] = np.maximum(highest[far:-1], highest[far + 1 :])
-        return highest - lowest
+        tops[far:-1] = np.maximum(highest[far:-1], highest[far + 1 :])
+        return tops
 
-    def trace(self, lowest: Float32, spread: Float32, sensor_height_m: float) -> Rays:
-        """The rays at their ends, given the (rings, SECTORS) lowest return and height range of each cell [m].
+    def trace(self, lowest: Float32, top: Float32, sensor_height_m: float) -> Rays:
+        """The rays at their ends, given the (rings, SECTORS) lowest return and top of each cell [m].
 
         All rays advance together, ring by ring, from the foot of the sensor.
         """
         rays = Rays(self, lowest.copy(), sensor_height_m)
         range_m = self.range_m(lowest, np.arange(self.grid.rings)[:, None])
         for ring in range(self.grid.rings):
-            flat = spread[ring] <= self.flat_m[ring] + np.maximum(rays.slope, 0) * self.depth_m[ring]
-            rays.advance(ring, range_m[ring], flat)
+            flat_m = self.flat_m[ring] + np.maximum(rays.slope, 0) * self.depth_m[ring]
+            behind = min(ring + 1, self.grid.rings - 1)
+            flat, flat_behind = (top[at] - lowest[ring] <= flat_m for at in (ring, behind))
+            rays.advance(ring, range_m[ring], flat, flat_behind)
         return rays
 
     def _interpolate(self, lowest: Float32, is_ground: Bool, slope: Float32, sensor_height_m: float) -> Float32:
@@ -279,13 +282,14 @@ class Rays:
         """(SECTORS,) slope at the last ground cell of each ray that ends on a ramp, else 0."""
         return self.slope * self.on_ramp
 
-    def advance(self, ring: int, range_m: Float32, flat: Bool) -> None:
+    def advance(self, ring: int, range_m: Float32, flat: Bool, flat_behind: Bool) -> None:
         """Find the rays that have ground in the next ring.
 
         Args:
             ring: that ring.
             range_m: (SECTORS,) range of the lowest returns [m].
             flat: (SECTORS,) cells in which nothing stands: the ground does not rise in the others.
+            flat_behind: (SECTORS,) cells right behind which nothing stands.
         """
         tuning = self.ground.tuning
         lowest = self.lowest[ring]
@@ -293,7 +297,8 @@ class Rays:
         gap = range_m - self.range_m
         residual = lowest - self.height_m - self.slope * np.minimum(gap, tuning.max_gap_m)
         rise_range_m = np.where(self.beside_ramp, np.float32(tuning.max_gap_m), np.float32(tuning.near_m))
-        found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * flat + tuning.noise_m
+        may_rise = flat & (flat_behind | (self.range_m > 0))
+        found: Bool = residual < np.minimum(gap, rise_range_m) * max_slope * may_rise + tuning.noise_m
         may_fall = residual > -(gap * max_slope + tuning.noise_m)
         found &= may_fall
         below = residual < -tuning.noise_m
