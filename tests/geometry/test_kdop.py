@@ -119,7 +119,10 @@ def slow_measured(a, b, sight, variance, before):
     for k in range(4):
         seen_along = AXES[:, k] @ sight
         shift, disagreement = slow_shift_along(a, b, k, seen_along)
-        doubt = TUNING.near_disagreement if abs(seen_along) > TUNING.near_cosine else TUNING.disagreement
+        along, across = seen_along, np.sqrt(max(1 - seen_along**2, 0.0))
+        doubt = TUNING.disagreement
+        if abs(seen_along) > TUNING.near_cosine:
+            doubt = np.hypot(along * TUNING.near_disagreement, across * TUNING.disagreement)
         by_ends = disagreement * (doubt * growth[k]) ** 2
         by_ends = max(by_ends, TUNING.end_variance_decay * before[k])
         end_variance.append(min(by_ends, (doubt * max(width)) ** 2))
@@ -165,6 +168,20 @@ def test_what_hides_its_own_far_end_moves_as_its_near_end(far_m):
     shift, covariance, _ = NUMPY_GEOMETRY.measured(before, after, sight, 0.05**2, np.zeros((4, 1)))
     np.testing.assert_allclose(shift[0], (-0.8, 0.0), atol=0.05)
     assert covariance[0, 0, 0] < 0.2**2
+
+
+@pytest.mark.parametrize("bearing_deg", [-15.0, 0.0, 15.0])
+def test_a_side_that_comes_into_view_leaves_the_displacement_across_the_line_of_sight_in_doubt(bearing_deg):
+    # A car drives away by 0.4 m, and its left side comes out of hiding.
+    before = kdop_of_rectangle(20.0, 24.0, 0.6)
+    after = kdop_of_rectangle(20.4, 24.4, 0.6)
+    after[2] += 0.65  # the end to the left
+    after[[1, 3]] += 0.65 / np.sqrt(2)
+    bearing = np.deg2rad(bearing_deg)
+    sight = np.array([[np.cos(bearing)], [np.sin(bearing)]])
+    shift, covariance, _ = NUMPY_GEOMETRY.measured(before, after, sight, 0.05**2, np.zeros((4, 1)))
+    assert shift[0, 0] == pytest.approx(0.4, abs=0.1)
+    assert abs(shift[0, 1]) < 3 * np.sqrt(covariance[0, 1, 1])
 
 
 @given(st.integers(0, 6), st.integers(0, 2**16))

@@ -212,7 +212,9 @@ def shift_between(a: Float64, b: Float64, tuning: ShapeTuning) -> Float64:
 
 
 def nearer_ends(sight: Float64, tuning: ShapeTuning) -> Float64:
-    """(4, K) which end of each axis is nearer to the sensor: 1 the one behind, -1 the one ahead, 0 neither.
+    """(4, K) cosine between each axis and the line of sight; 0 where neither end is nearer to the sensor.
+
+    The end behind is the nearer one where it is positive, the end ahead where it is negative.
 
     Args:
         sight: (2, K) unit vectors from the sensor to the objects.
@@ -220,14 +222,14 @@ def nearer_ends(sight: Float64, tuning: ShapeTuning) -> Float64:
     """
     x, y = sight
     along = np.stack([x, HALF_ROOT * (x + y), y, HALF_ROOT * (y - x)])
-    nearer: Float64 = np.sign(along) * (np.abs(along) > tuning.near_cosine)
+    nearer: Float64 = along * (np.abs(along) > tuning.near_cosine)
     return nearer
 
 
 def shift_along_axes(
     a: Float64, b: Float64, tuning: ShapeTuning, nearer: Float64 | None = None
 ) -> tuple[Float64, Float64, Float64]:
-    """Displacement along each axis from k-DOPs a to b (8, K), given which ends are nearer to the sensor (4, K).
+    """Displacement along each axis from k-DOPs a to b (8, K), given the (4, K) `nearer_ends`.
 
     Returns:
         shift: (4, K) mean of both ends where they agree, else that of the nearer end, or else of the end that moved
@@ -246,7 +248,7 @@ def shift_along_axes(
     # end ahead. Towards zero by half of it, it is that of the end that moved less.
     to_end = np.copysign(growth, both)
     if nearer is not None:
-        to_end = np.where(nearer != 0.0, nearer * growth, to_end)
+        to_end = np.where(nearer != 0.0, np.sign(nearer) * growth, to_end)
     return (both - disagreement * to_end) / 2, disagreement, growth
 
 

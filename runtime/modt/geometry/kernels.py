@@ -159,8 +159,11 @@ class GeometryKernels:
         tuning = self.shape_tuning
         nearer = nearer_ends(sight, tuning)
         along, disagreement, growth = shift_along_axes(a, b, tuning, nearer)
-        near = tuning.near_disagreement * tuning.near_disagreement
-        doubt = np.where(nearer != 0.0, near, tuning.disagreement * tuning.disagreement)
+        # What comes into view across the line of sight moves the nearer end of an oblique axis too.
+        doubt_near = tuning.near_disagreement * tuning.near_disagreement
+        doubt_across = tuning.disagreement * tuning.disagreement
+        near_share = nearer * nearer
+        doubt = near_share * doubt_near + (1 - near_share) * doubt_across
         end_variance = np.maximum(doubt * disagreement * np.square(growth), tuning.end_variance_decay * before)
         np.minimum(end_variance, doubt * np.square(widths(b).max(axis=0)), out=end_variance)
         # The four axes together weigh as much as one measurement in each direction.

@@ -40,7 +40,8 @@ class ShapeTuning:
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
     near_disagreement: float = 0.05
-    """As `disagreement`, where the nearer end measures. Greater: what grows in view is followed later.
+    """As `disagreement`, where the nearer end measures along the line of sight; the more oblique an axis, the nearer
+    it is to `disagreement`. Greater: what grows in view is followed later.
     Chosen on: simulated streets with vehicles that accelerate, by the error of velocities."""
 
     end_variance_decay: float = 0.97

@@ -281,7 +281,8 @@ EXPORT void modt_measured(const double *a, const double *b, const double *sight,
             double agreement = maxd(1 - relative_growth * relative_growth, 0.0);
             double disagreement = 1 - agreement * agreement;
             const int is_near = __builtin_fabs(seen_along[k]) > tuning->near_cosine;
-            const double doubt = is_near ? doubt_near : doubt_across;
+            const double near_share = is_near ? seen_along[k] * seen_along[k] : 0;
+            const double doubt = near_share * doubt_near + (1 - near_share) * doubt_across;
             const double to_end = is_near ? __builtin_copysign(1.0, seen_along[k]) * growth[k]
                                           : __builtin_copysign(growth[k], both[k]);
             double by_ends = maxd(doubt * disagreement * (growth[k] * growth[k]),
