@@ -140,7 +140,25 @@ def test_bearings_that_fit_no_turn_at_all_are_of_no_head():
     points = np.zeros((100, 4), np.float32)
     points[:, 0] = 5 * np.cos(bearing)
     points[:, 1] = 5 * np.sin(bearing)
-    assert turn_of(points, np.linspace(0, 0.1, 100)) == "their points' times are of no turning head"
+    turn = turn_of(points, np.linspace(0, 0.1, 100))
+    assert (turn.turn_s, turn.mid_s) == (0.0, pytest.approx(0.05))
+
+
+@pytest.mark.parametrize(("kind", "unit", "begin"), [("u4", 1e-9, 0.0), ("f8", 1e-9, 1000.0), ("f4", 1.0, -0.1)])
+def test_a_sensor_without_a_head_is_stamped_in_the_middle_of_its_times_and_each_point_has_its_delay(kind, unit, begin):
+    rng = np.random.default_rng(5)
+    since_s = np.linspace(0.0, 0.1, 2000)
+    points = np.zeros((1, 2000), [*((axis, "f4") for axis in "xyz"), ("timestamp", kind)])
+    points["x"], points["y"] = rng.uniform(-20, 20, (2, 1, 2000))
+    points["timestamp"] = (begin + since_s) / unit
+    if kind[0] == "f":
+        points["timestamp"][0, 7] = np.nan
+    cloud = read_cloud(messages.encode(messages.cloud(points, stamp_s=1000.0)))
+    middle_s = 1000.05 + min(begin, 0.0)
+    assert (cloud.turn_s, cloud.stamp_s) == (0.0, pytest.approx(middle_s, abs=2e-4))
+    wild = np.isnan(points["timestamp"].reshape(-1).astype(float))
+    delay_s = np.where(wild, 0.0, since_s - 0.05)
+    np.testing.assert_allclose(cloud.delay_s, delay_s, atol=2e-4)
 
 
 @pytest.mark.parametrize("odd", [{"turn_s": 3.0, "unit": 1.0}, {"turn_s": 0.0}])

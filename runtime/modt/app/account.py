@@ -56,7 +56,7 @@ def account(loop: Loop) -> dict[str, Any]:
         "left_out": dict(loop.source.faults.left_out),
         "joined": reading.joined,
         "deskewed": reading.times[DESKEWED],
-        "not_deskewed": {kind: number for kind, number in reading.times.items() if kind != DESKEWED},
+        "not_deskewed": {kind: number for kind, number in reading.times.items() if number and kind != DESKEWED},
         "mean_speed_mps": round(loop.travel.mean_mps, 2),
         "shift_in_a_sweep_m": round(skewed_m, 2),
         "corrected": dict(reading.corrected),

@@ -141,6 +141,9 @@ class PoseEstimator:
         delay_s = None
         if not first and frame.turn_s:
             delay_s = delays(proposals.centroid, proposals.box, frame.turn_s, frame.mid_rad)
+        elif not first and frame.delay_s is not None:
+            delay_s = np.add.reduceat(frame.delay_s[proposals.members], proposals.offsets[:-1], dtype=np.float64)
+            delay_s /= proposals.count
         return _Sweep(proposals, self._T_world_last, dt_s, frame.turn_s, delay_s, self._kernels, frame.mid_rad)
 
     def _register(self, sweep: _Sweep, landmarks: Landmarks) -> Placement:

@@ -125,15 +125,15 @@ class ReceivedPoses(PoseSource):
                     self._keep(*self._read(message), frame.stamp_s)
                 except Exception as error:
                     self._refuse(error)
-            T = self._poses.accepted.at(frame.stamp_s)
+            placed = self._poses.accepted.placed(frame)
         except Exception as error:  # poses are optional, so the run goes on without
-            T = None
+            placed = replace(frame, T_world_sensor=None)
             self._refuse(error)
-        if T is None:
+        if placed.T_world_sensor is None:
             self.unposed += 1
         else:
             self.posed += 1
-        return replace(frame, T_world_sensor=T, restarts=self.restarts)
+        return replace(placed, restarts=self.restarts)
 
     def report(self) -> dict[str, Any]:
         """Counts of received, dropped, used and refused messages, of restarts, of frames with and without a pose."""

@@ -30,6 +30,8 @@ FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_
 OPTICAL = "_optical_frame"
 """End of the name of a frame whose x axis points right, y down and z forward (REP 103)."""
 MAX_FIELDS = 64
+NO_TURN = "their points' times are of no turning head"
+"""Kind of the times of sweeps whose stamp is the middle of their points' times."""
 MAX_DELAY_S = 1.0
 """Greatest difference of the times of points from the header's stamp [s]. Beyond it they count from that stamp."""
 FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))
@@ -56,6 +58,7 @@ class PointCloud:
         began_s: time of the first point [s], the stamp where points have no times.
         times: what the times of the points are, for the account of what was read.
         corrected: what the message says of its own layout and is not so; empty if all is as it says.
+        delay_s: as in Frame.
     """
 
     stamp_s: float
@@ -66,6 +69,7 @@ class PointCloud:
     began_s: float = 0.0
     times: str = COMPENSATED
     corrected: str = ""
+    delay_s: Float32 | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +114,13 @@ def cloud_of(stamp_s: float, frame_id: str, table: Table) -> PointCloud:
     since_s = 0.0 if not stamp_s or abs(turn.mid_s - stamp_s) < MAX_DELAY_S else stamp_s
     seen_s = turn.mid_s + since_s if stamp_s else 0.0
     began_s = turn.began_s + since_s if stamp_s else 0.0
-    forms = (turn.turn_s, turn.mid_rad, began_s, DESKEWED, table.corrected)
-    return PointCloud(seen_s, frame_id, points, *forms)
+    if turn.turn_s:
+        forms = (turn.turn_s, turn.mid_rad, began_s, DESKEWED, table.corrected)
+        return PointCloud(seen_s, frame_id, points, *forms)
+    delay_s = _delays(table.rows[name].reshape(-1), turn)
+    return PointCloud(
+        seen_s, frame_id, points, began_s=began_s, times=NO_TURN, corrected=table.corrected, delay_s=delay_s
+    )
 
 
 def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
@@ -256,6 +265,8 @@ FIRST_SHARE = 0.05
 """Share of the points by which the bearing is known at which a sweep begins."""
 MARGIN_RAD = 0.35
 """Angle before that bearing in which points still count as seen at the begin [rad]."""
+MARGIN_S = 0.01
+"""Time beyond the first and the last sampled point within which other points of a sweep lie [s]."""
 EDGE_RAD = 0.02
 """Angle before the fitted begin of a sweep in which points still count as seen at the begin [rad]."""
 AHEAD_RAD = 0.2
@@ -264,16 +275,21 @@ AHEAD_RAD = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A turn of a head: turn_s, mid_rad as in Frame, times of its first point and of mid_rad by the points' clock."""
+    """A turn of a head: turn_s, mid_rad as in Frame, times of its first point and of mid_rad by the points' clock.
+
+    A sensor without a turning head has turn_s 0, and mid_s is the middle of its times. The unit of the times is that
+    of the message.
+    """
 
     turn_s: float
     mid_rad: float
     began_s: float
     mid_s: float
+    unit_s: float = 1.0
 
 
 def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | str:
-    """The turn that the times of the points tell, wherever its seam is; the reason if they tell none.
+    """The turn that the times of the points tell, wherever its seam is; the reason if they span no sweep.
 
     Args:
         points: (N, 4) points of the sweep; those at the origin are ignored.
@@ -296,10 +312,19 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | str:
     since_s = (t[used] - begin) * unit_s
     bearing = np.arctan2(y[used], x[used])
     turn = min((_fitted(bearing, since_s, way) for way in (1.0, -1.0)), key=lambda fit: fit[1])[0]
-    if turn is None:
-        return "their points' times are of no turning head"
     began_s = float(begin * unit_s)
+    if turn is None:
+        return Turn(0.0, 0.0, began_s, began_s + float(np.ptp(since_s)) / 2, unit_s)
     return Turn(turn.turn_s, turn.mid_rad, began_s, began_s + turn.mid_s)
+
+
+def _delays(times: NDArray[np.generic], turn: Turn) -> Float32:
+    """(N,) times after the middle of a sweep [s]; 0 for wild ones."""
+    with np.errstate(all="ignore"):
+        delay_s = (times.astype(np.float64) - turn.mid_s / turn.unit_s) * turn.unit_s
+        wild = ~(np.abs(delay_s) <= turn.mid_s - turn.began_s + MARGIN_S)
+    delay_s[wild] = 0.0
+    return delay_s.astype(np.float32)
 
 
 def _fitted(bearing: Float64, since_s: Float64, way: float) -> tuple[Turn | None, float]:

@@ -14,14 +14,14 @@ from types import MappingProxyType
 from modt.errors import MisuseError, ModtError
 from modt.ros2 import foxglove_cloud, point_cloud2
 from modt.ros2.cdr import CdrReader, MessageError
-from modt.ros2.point_cloud2 import PointCloud
+from modt.ros2.point_cloud2 import NO_TURN, PointCloud
 from modt.sources.bag_file import BagMessage, BagTopic
 from modt.sources.bag_files import Bag
 from modt.sources.bag_poses import PoseTopic, RecordedPoses, find_poses
 from modt.sources.stamp_check import STEP_S, StampCheck
 from modt.sources.stream import Faults, Reading, StreamInfo, Sweep, reason_of
 from modt.sources.turn_parts import TurnParts
-from modt.types import Frame, Self
+from modt.types import DESKEWED, Frame, Self
 
 log = logging.getLogger(__name__)
 
@@ -95,6 +95,9 @@ class BagStream:
         for frame in self._held(poses):
             used += 1
             placed = poses.place(frame)
+            if frame.delay_s is not None and placed.delay_s is None:
+                self.reading.times[NO_TURN] -= 1
+                self.reading.times[DESKEWED] += 1
             self.reading.without_pose += bool(poses.topics) and placed.T_world_sensor is None
             yield placed
         if poses.lost:
@@ -230,6 +233,7 @@ class BagStream:
         self.reading.sweeps += 1
         self.reading.times[cloud.times] += 1
         sweep = Sweep(self._stamp_s(cloud, message), cloud.points, cloud.turn_s, mid_rad=cloud.mid_rad)
+        sweep = replace(sweep, delay_s=cloud.delay_s)
         return stamps.frame(sweep, message.recorded_s, index, self._topic, self.faults, began_s=self._began[0])
 
     def _pass_over(self, message: BagMessage, stamps: StampCheck) -> None:

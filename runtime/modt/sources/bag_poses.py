@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
@@ -206,4 +206,4 @@ class RecordedPoses:
 
     def place(self, frame: Frame) -> Frame:
         """The frame with its pose, None where the latest poses are too old."""
-        return replace(frame, T_world_sensor=self._buffer.at(frame.stamp_s))
+        return self._buffer.placed(frame)

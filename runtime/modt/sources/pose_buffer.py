@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
 from modt.config import OdometryConfig
 from modt.geometry import se3, turn_between
-from modt.types import Float64
+from modt.placement import PlanarMotion
+from modt.types import Float64, Frame
 
 CAPACITY = 256
 """Greatest number of poses kept, and of messages read for a frame; the newest remain."""
@@ -19,6 +21,8 @@ MAX_ACCELERATION_MPS2 = 10.0
 """Greatest acceleration of the sensor [m/s2]; a pose that needs more is doubted."""
 POSITION_NOISE_M = 0.5
 """Distance between two poses that is attributed to noise, not to speed [m]."""
+MIN_SPAN_S = 0.02
+"""Least time over which the motion of a sensor is taken for that in a sweep [s]."""
 _LEVER_M = 5.0
 """Displacement that counts as much as a turn of one radian [m]."""
 _UNKNOWN_INTERVAL_S = 0.5
@@ -92,6 +96,26 @@ class PoseBuffer:
         share = (stamp_s - t0) / (t1 - t0)
         T = se3(turn_between(a, b, share), a[:3, 3] + share * (b[:3, 3] - a[:3, 3]))
         return None if stamp_s > t1 and self.leaps(stamp_s, T) else T
+
+    def placed(self, frame: Frame) -> Frame:
+        """The frame with its pose, None where the latest poses are too old; its points are moved to its stamp.
+
+        Those of a turning head are moved with their proposals, by the odometry.
+        """
+        T = self.at(frame.stamp_s)
+        placed = replace(frame, T_world_sensor=T)
+        if T is None or frame.delay_s is None or not len(frame.points):
+            return placed
+        before_s = max(float(-frame.delay_s.min()), MIN_SPAN_S)
+        T_before = self.at(frame.stamp_s - before_s)
+        if T_before is None:
+            return placed
+        motion = PlanarMotion.between(T_before, T, before_s)
+        points = frame.points.copy()
+        step_m = motion.displacement(points[:, :2].astype(np.float64), frame.delay_s.astype(np.float64))
+        step_m[~np.any(points[:, :3], axis=1)] = 0.0  # no return
+        points[:, :2] += step_m
+        return replace(placed, points=points, delay_s=None)
 
     def _ends(self, stamp_s: float) -> list[tuple[float, Float64]] | None:
         """Stamps and poses to interpolate between; both are the same if a pose has this time, None without two.

@@ -133,4 +133,4 @@ class StampCheck:
             faults.report(index, subject, "; ".join(flaws), skipped=False)
         self._framed = (sweep.stamp_s, arrived_s)
         stamp_s = sweep.stamp_s + self.shift_s - began_s
-        return Frame(index, stamp_s, points, turn_s=sweep.turn_s, mid_rad=sweep.mid_rad)
+        return Frame(index, stamp_s, points, turn_s=sweep.turn_s, mid_rad=sweep.mid_rad, delay_s=sweep.delay_s)

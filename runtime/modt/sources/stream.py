@@ -155,8 +155,8 @@ class Sweep:
     """One turn of a sensor.
 
     Attributes:
-        stamp_s, points, turn_s, mid_rad, frame_id: as in modt.types.Frame; points may hold values that are not
-            finite.
+        stamp_s, points, turn_s, mid_rad, frame_id, delay_s: as in modt.types.Frame; points may hold values that are
+            not finite.
         complete: no message of the turn is known to be missing.
         index: index of the frame in its recording; None numbers the sweeps as they come.
         waited_s: time for which its last message lay in the kernel before it was read [s].
@@ -170,6 +170,7 @@ class Sweep:
     frame_id: str = ""
     waited_s: float = 0.0
     mid_rad: float = 0.0
+    delay_s: Float32 | None = None
 
 
 @dataclass(slots=True)

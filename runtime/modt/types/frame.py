@@ -31,6 +31,8 @@ class Frame:
         mid_rad: bearing that the head faces in the middle of the sweep [rad]; 0 is straight ahead.
         sweeps: sweeps of a robot with several sensors, in their order, each in the frame of its sensor; None for one
             without a sweep at this time. Points and pose are then those of the robot. Empty for one sensor.
+        delay_s: (N,) float32 time after the stamp at which each point was seen [s], of a sensor whose head does not
+            turn; None where that is not known, and once the points are where they are seen at the stamp.
     """
 
     index: int
@@ -44,6 +46,7 @@ class Frame:
     frame_id: str = ""
     mid_rad: float = 0.0
     sweeps: tuple[Frame | None, ...] = ()
+    delay_s: Float32 | None = None
 
     def __repr__(self) -> str:
         pose = "no" if self.T_world_sensor is None else "its"

@@ -267,6 +267,7 @@ class LiveStream:
             mid_rad=sweep.mid_rad,
             steady_s=self._steady_s,
             frame_id=sweep.frame_id,
+            delay_s=sweep.delay_s,
         )
         return Received(frame, taken.arrived_s)
 
