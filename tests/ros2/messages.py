@@ -156,3 +156,22 @@ def single_pose(kind, stamp_s, position, quaternion, child):
         placed = {"position": _named("xyz", position), "orientation": _named("xyzw", quaternion)}
         values = {"pose": placed if kind == "PoseStamped" else {"pose": placed}}
     return made(f"geometry_msgs/{kind}", header=header(stamp_s, "map"), **values)
+
+
+LIVOX_POINT = "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line"
+LIVOX = (
+    "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\nCustomPoint[] points"
+)
+
+
+def livox(stamp_s, xyz, package):
+    """A CustomMsg of points that are seen one after the other over 0.1 s."""
+    found = store()
+    point = f"{package}/msg/CustomPoint"
+    if point not in found.types:
+        found.register(get_types_from_msg(LIVOX_POINT, point))
+        found.register(get_types_from_msg(LIVOX, f"{package}/msg/CustomMsg"))
+    offsets_ns = np.linspace(0, 1e8, len(xyz), endpoint=False).astype(int)
+    points = [found.types[point](int(t), *map(float, p), 77, 16, 0) for t, p in zip(offsets_ns, xyz, strict=True)]
+    about = {"timebase": round(stamp_s * 1e9), "point_num": len(xyz), "lidar_id": 1, "points": points}
+    return encode(made(f"{package}/CustomMsg", header=header(stamp_s, "livox_frame"), **about))

@@ -145,7 +145,9 @@ def test_bearings_that_fit_no_turn_at_all_are_of_no_head():
 
 
 @pytest.mark.parametrize(("kind", "unit", "begin"), [("u4", 1e-9, 0.0), ("f8", 1e-9, 1000.0), ("f4", 1.0, -0.1)])
-def test_a_sensor_without_a_head_is_stamped_in_the_middle_of_its_times_and_each_point_has_its_delay(kind, unit, begin):
+def test_a_sensor_without_a_head_is_stamped_in_the_middle_of_its_times_and_each_point_has_its_delay(
+    kind, unit, begin
+):
     rng = np.random.default_rng(5)
     since_s = np.linspace(0.0, 0.1, 2000)
     points = np.zeros((1, 2000), [*((axis, "f4") for axis in "xyz"), ("timestamp", kind)])

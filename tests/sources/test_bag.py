@@ -103,7 +103,7 @@ def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
     assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
 
 
-@pytest.mark.parametrize("unit_s", [0.0, 1e-3])
+@pytest.mark.parametrize("unit_s", [0.0, 1e-3, 1e3])
 def test_stamps_that_stand_still_are_replaced_by_the_times_of_the_recording(write, tmp_path, unit_s):
     recorded = []
     for k in range(6):
@@ -322,6 +322,33 @@ def test_poses_come_from_any_namespace_and_from_transforms(write, tmp_path, othe
     assert x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("namespace", "posed"), [({"lidar": "robot/lidar"}, True), ({"lidar": "a/lidar", "x": "b/lidar"}, False)]
+)
+def test_the_frame_of_the_points_may_lack_the_namespace_of_the_transforms(write, tmp_path, namespace, posed):
+    edges = [("base_link", name, [1.0, 0.0, 2.0], UP) for name in namespace.values()]
+    mount = [("/tf_static", TF, BEGAN_S - 1, messages.encode(messages.transforms(*edges)))]
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), poses("base_link"), mount)))
+    assert stream.info.has_poses == posed
+    assert not posed or x_of(stream) == pytest.approx([11.0, 11.1, 11.2, 11.3], abs=1e-5)
+
+
+@pytest.mark.parametrize("package", ["livox_ros_driver2", "livox_ros_driver"])
+def test_messages_of_livox_own_type_are_read_with_the_times_of_their_points(write, tmp_path, package):
+    rng = np.random.default_rng(0)
+    xyz = rng.uniform(-20, 20, (500, 3)).astype(np.float32)
+    recorded = [
+        ("/livox/lidar", f"{package}/msg/CustomMsg", BEGAN_S + k / 10, messages.livox(BEGAN_S + k / 10, xyz, package))
+        for k in range(5)
+    ]
+    frames = [*open_stream(write(tmp_path / "drive", by_time(recorded, poses("livox_frame"))))]
+    assert len(frames) == 5
+    np.testing.assert_allclose(frames[1].points[:, 1:3], xyz[:, 1:], atol=1e-6)
+    since_middle_s = np.linspace(-0.05, 0.05, 500, endpoint=False)
+    np.testing.assert_allclose(frames[1].points[:, 0], xyz[:, 0] + since_middle_s, atol=1e-3)  # at 1 m/s along x
+    assert frames[1].points[0, 3] == pytest.approx(77 / 255)
+
+
 @pytest.mark.parametrize("kind", ["PoseStamped", "PoseWithCovarianceStamped", "TransformStamped"])
 @pytest.mark.parametrize(("mount", "x"), [([static("/tf_static")], 11.0), ([], 10.0)], ids=["of base_link", "of it"])
 def test_single_poses_are_used_if_they_are_asked_for(write, tmp_path, kind, mount, x):
@@ -351,3 +378,23 @@ def test_an_option_chooses_one_of_several_topics_of_poses(write, tmp_path):
     assert stream.reading.poses == "/wheels"
     with pytest.raises(MisuseError, match=r"/gps: no poses in this topic; .*/odom, /wheels"):
         open_stream(path, capture={"odometry": "gps"})
+
+
+@pytest.mark.parametrize(("apart", "lost"), [(1, 0), (4, 1)])
+def test_parts_of_turns_that_are_recorded_out_of_order_are_joined_in_theirs(write, tmp_path, apart, lost):
+    """Those that come much later are counted."""
+    bearing = np.linspace(np.pi, -np.pi, 3000, endpoint=False)
+    layout = [(axis, "f4") for axis in "xyz"]
+    recorded = []
+    for k in range(36):
+        points = np.zeros((1, 1000), layout)
+        seen = bearing[k % 3 * 1000 :][:1000]
+        points["x"], points["y"] = 9 * np.cos(seen), 9 * np.sin(seen)
+        stamp_s = BEGAN_S + k / 30
+        cloud = messages.encode(messages.cloud(points, stamp_s=stamp_s))
+        recorded.append(("/points", CLOUD, stamp_s + 0.03 + (apart + 0.5) / 30 * (k == 20), cloud))
+    stream = open_stream(write(tmp_path / "drive", by_time(recorded)))
+    frames = [*stream]
+    assert len(frames) == 12
+    assert sum(len(frame.points) for frame in frames) == pytest.approx(36_000 - 1000 * lost, abs=5)
+    assert stream.faults.left_out.total() == lost

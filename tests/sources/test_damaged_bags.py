@@ -128,6 +128,18 @@ def test_a_lost_file_of_a_split_recording_is_counted_by_its_metadata(tmp_path):
     assert stream.faults.left_out["messages of /points are missing"] == N - 7
 
 
+def test_a_file_that_the_metadata_list_twice_and_out_of_order_is_read_once_in_its_place(tmp_path):
+    folder = tmp_path / "drive"
+    folder.mkdir()
+    for k in range(3):
+        write_mcap(folder / f"drive_{k}", clouds(N)[4 * k : 4 * k + 4])
+    listed = "\n".join(f"    - drive_{k}.mcap" for k in (2, 0, 1, 0))
+    (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:\n{listed}\n")
+    stream, frames = read(folder)
+    assert frames == list(range(N))
+    assert not stream.faults.count
+
+
 def pages_of(raw):
     return [raw[at : at + 4096] for at in range(0, len(raw), 4096)]
 

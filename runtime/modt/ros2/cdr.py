@@ -60,6 +60,10 @@ class CdrReader:
         """A sequence of octets, not copied."""
         return self._bytes(self.count())
 
+    def rest(self) -> memoryview:
+        """What follows, not copied."""
+        return self._message[self._at :]
+
     def doubles(self, n: int) -> Float64:
         """(n,) 64-bit numbers."""
         return np.frombuffer(self._bytes(8 * n, 8), self.order + "f8").astype(np.float64)

@@ -148,10 +148,17 @@ class Transforms:
 
     def chain(self, frame: str) -> list[str]:
         """A frame and those above it, up to the root."""
-        chain = [frame.lstrip("/")]
+        chain = [self._known(frame.lstrip("/"))]
         while chain[-1] in self._parents and len(chain) <= len(self._parents):  # ends if the transforms form a loop
             chain.append(self._parents[chain[-1]][0])
         return chain
+
+    def _known(self, frame: str) -> str:
+        """The frame, or the only one that has its name in a namespace, or without that of the frame."""
+        names = self._parents.keys() | {parent for parent, _ in self._parents.values()}
+        alike = {name for name in names if name.rpartition("/")[2] == frame.rpartition("/")[2]}
+        alike = {name for name in alike if "/" not in name or "/" not in frame}  # another namespace is another robot
+        return alike.pop() if frame not in names and len(alike) == 1 else frame
 
     def _pose(self, chain: list[str], end: str) -> Float64:
         """(4, 4) pose of the first frame of a chain in another one of it."""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import copy
+import heapq
 import logging
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, islice, pairwise
 from pathlib import Path
+from statistics import median
 from types import MappingProxyType
 
 from modt.errors import MisuseError, ModtError
-from modt.ros2 import foxglove_cloud, point_cloud2
+from modt.ros2 import foxglove_cloud, livox_cloud, point_cloud2
 from modt.ros2.cdr import CdrReader, MessageError
+from modt.ros2.livox_cloud import read_livox_cloud
 from modt.ros2.point_cloud2 import NO_TURN, PointCloud
 from modt.sources.bag_file import BagMessage, BagTopic
 from modt.sources.bag_files import Bag
@@ -33,6 +36,10 @@ MAX_HELD = 20
 """Greatest number of frames that wait for their poses, which a localisation may give seconds later."""
 STANDING_SHARE = 0.01
 """Stamps that pass by less than this share of the recorded times are no times in seconds, or stand still."""
+MAX_PERIOD_S = 5.0
+"""Stamps of sweeps that are farther apart are no times in seconds, if they were recorded nearer to one another [s]."""
+HELD_PARTS = 2
+"""Number of parts of turns that wait for an earlier one, which may be recorded after them."""
 OPTIONS = frozenset({"topic", "odometry", "frame"})
 """Options of `open_bag`."""
 ROS1 = "pip install rosbags; rosbags-convert --src FILE --dst FOLDER; give FOLDER"
@@ -75,6 +82,7 @@ class BagStream:
         self._bag = bag
         self._topic = topic
         self._encoding = bag.topics()[topic].encoding
+        self._reader = _reader(bag.topics()[topic]) or point_cloud2.read_cloud
         self._began = began
         self._poses = poses
         self._parts = parts
@@ -158,20 +166,39 @@ class BagStream:
         """Frames of messages that are parts of a sweep."""
         last: BagMessage | None = None
         index = -1
-        for message in self._messages(poses):
-            if message is None:
+        for found in self._parts_in_order(poses, abs(parts.turn_s)):
+            if found is None:
                 yield None
                 continue
+            part, message = found
             last = message
-            part = self._cloud(index, message)
-            cloud = None if part is None else parts.add(part, message.recorded_s)
+            cloud = parts.add(part, message.recorded_s)
             index += cloud is not None
             if self._last is not None and index >= self._last:
                 return
             yield None if cloud is None or index < self._first else self._frame(index, cloud, message, stamps)
         if last is not None and (cloud := parts.finish()) is not None:
             yield self._frame(index + 1, cloud, last, stamps)
+        if parts.late:
+            reason = "parts of turns came after their turn"
+            self.faults.leave_out(self.reading.messages, self._topic, reason, parts.late)
         self._account_for_damage()
+
+    def _parts_in_order(self, poses: RecordedPoses, turn_s: float) -> Iterator[tuple[PointCloud, BagMessage] | None]:
+        """Parts of turns by their times, unless a clock was set back; None after a message without one."""
+        waiting: list[tuple[float, int, PointCloud, BagMessage]] = []
+        for number, message in enumerate(self._messages(poses)):
+            part = None if message is None else self._cloud(number, message)
+            if message is None or part is None:
+                yield None
+                continue
+            time_s = part.began_s or message.recorded_s
+            clock_set = bool(waiting) and time_s < waiting[0][0] - turn_s
+            while waiting and (clock_set or len(waiting) > HELD_PARTS):
+                yield heapq.heappop(waiting)[2:]
+            heapq.heappush(waiting, (time_s, number, part, message))
+        while waiting:
+            yield heapq.heappop(waiting)[2:]
 
     def _messages(self, poses: RecordedPoses) -> Iterator[BagMessage | None]:
         """Messages of the sensor; None after one of a pose. Those of other sensors in the topic are counted."""
@@ -193,7 +220,7 @@ class BagStream:
         if self._sensor is None or message.flaw:
             return None
         try:
-            frame_id = _read(message, self._encoding).frame_id
+            frame_id = self._reader(message.data).frame_id
         except MessageError:
             return None
         return None if frame_id == self._sensor else frame_id
@@ -217,7 +244,7 @@ class BagStream:
         try:
             if message.flaw:
                 raise MessageError("damaged", message.flaw)
-            cloud = _read(message, self._encoding)
+            cloud = self._reader(message.data)
         except MessageError as error:
             self.faults.report(max(index, 0), self._topic, str(error), skipped=True)
             return None
@@ -261,7 +288,7 @@ def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingPr
     bag = Bag(path)
     topics = bag.topics()
     chosen = _choose(path, topics, options.get("topic"))
-    began = _first_clouds(path, bag, chosen, topics[chosen].encoding)
+    began = _first_clouds(path, bag, chosen)
     sensors = [*dict.fromkeys(cloud.frame_id for cloud, _ in began)]
     sensor = _sensor(path, sensors, options.get("frame"))
     began = [(cloud, message) for cloud, message in began if cloud.frame_id == sensor]
@@ -288,11 +315,15 @@ def open_bag(path: Path, period_s: float, options: Mapping[str, str] = MappingPr
 
 
 def _pass(clouds: list[tuple[PointCloud, BagMessage]]) -> bool:
-    """Whether the stamps of the first sweeps pass, as their recorded times do."""
+    """Whether the stamps of the first sweeps pass as their recorded times do, or as in a conversion, faster."""
     stamps = [cloud.stamp_s for cloud, _ in clouds]
     steps_s = (b.recorded_s - a.recorded_s for (_, a), (_, b) in pairwise(clouds))
     recorded_s = sum(step_s for step_s in steps_s if 0 < step_s < STEP_S)  # but for clocks that were set
-    return len(clouds) < COMPARED or not recorded_s or max(stamps) - min(stamps) >= STANDING_SHARE * recorded_s
+    if len(clouds) < COMPARED or not recorded_s:
+        return True
+    stand = max(stamps) - min(stamps) < STANDING_SHARE * recorded_s
+    leap = median(abs(b - a) for a, b in pairwise(stamps)) > MAX_PERIOD_S > recorded_s / len(stamps)
+    return not stand and not leap
 
 
 def _sensor(path: Path, sensors: list[str], asked: str | None) -> str:
@@ -312,7 +343,7 @@ def _notes(sensors: list[str], sensor: str, *, stamped: bool) -> Iterator[str]:
     if others := ", ".join(other for other in sensors if other != sensor):
         yield f"several sensors share the topic: {sensor} is read; --capture frame=NAME chooses among it and {others}"
     if not stamped:
-        yield "the stamps of the sweeps stand still: their times are those of the recording"
+        yield "the stamps of the sweeps stand still, or are no seconds: their times are those of the recording"
 
 
 def _frame_note(frame_id: str) -> tuple[str, ...]:
@@ -325,7 +356,7 @@ def _frame_note(frame_id: str) -> tuple[str, ...]:
 
 
 def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
-    clouds = sorted(name for name, topic in topics.items() if topic.count and _is_read(topic))
+    clouds = sorted(name for name, topic in topics.items() if topic.count and _reader(topic))
     if asked is not None:
         asked = "/" + asked.strip("/")
         if asked not in clouds:
@@ -345,23 +376,18 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
     return clouds[0]
 
 
-def _is_read(topic: BagTopic) -> bool:
-    """Whether the messages of a topic are point clouds that can be read."""
-    if topic.type == point_cloud2.TYPE:
-        return topic.encoding == "cdr"
-    return topic.type == foxglove_cloud.TYPE and topic.encoding in foxglove_cloud.READERS
+CDR_READERS = {point_cloud2.TYPE: point_cloud2.read_cloud} | dict.fromkeys(livox_cloud.TYPES, read_livox_cloud)
+"""Readers of messages in CDR by their types."""
 
 
-def _read(message: BagMessage, encoding: str) -> PointCloud:
-    """The points of a message.
-
-    Raises:
-        MessageError: it cannot be used.
-    """
-    return foxglove_cloud.READERS.get(encoding, point_cloud2.read_cloud)(message.data)
+def _reader(topic: BagTopic) -> Callable[[bytes], PointCloud] | None:
+    """Reader of the messages of a topic; None if they are no point clouds."""
+    if topic.encoding == "cdr":
+        return CDR_READERS.get(topic.type)
+    return foxglove_cloud.READERS.get(topic.encoding) if topic.type == foxglove_cloud.TYPE else None
 
 
-def _first_clouds(path: Path, bag: Bag, topic: str, encoding: str) -> list[tuple[PointCloud, BagMessage]]:
+def _first_clouds(path: Path, bag: Bag, topic: str) -> list[tuple[PointCloud, BagMessage]]:
     """First usable messages, at least one, and enough to tell whether they are parts of a turn.
 
     Raises:
@@ -369,11 +395,12 @@ def _first_clouds(path: Path, bag: Bag, topic: str, encoding: str) -> list[tuple
     """
     clouds: list[tuple[PointCloud, BagMessage]] = []
     refused = "no message"
+    read = _reader(bag.topics()[topic]) or point_cloud2.read_cloud
     for message in islice(bag.messages({topic}), PEEKED):
         try:
             if message.flaw:
                 raise MessageError("damaged", message.flaw)
-            clouds.append((_read(message, encoding), message))
+            clouds.append((read(message.data), message))
         except MessageError as error:
             refused = str(error)
         if len(clouds) >= COMPARED and not TurnParts.may_be([cloud for cloud, _ in clouds]):

@@ -150,7 +150,10 @@ def _listed(path: Path) -> tuple[list[Path], dict[str, int]]:
         counts = {topic["topic_metadata"]["name"]: int(topic["message_count"]) for topic in topics}
     except (OSError, UnicodeError, ModtError, LookupError, TypeError, ValueError, AttributeError):
         pass  # the files themselves tell as much
-    listed = [_as_stored(path / name) for name in names if kind_of(Path(name)) in KINDS]
+    listed = [*dict.fromkeys(_as_stored(path / name) for name in names if kind_of(Path(name)) in KINDS)]
+    numbers = [_NUMBER.search(file.name.partition(".")[0]) for file in listed]
+    if len({_stem(file) for file in listed}) == 1 and all(numbers):
+        listed.sort(key=lambda file: (len(file.name.removesuffix(ZSTD)), file.name))
     stems = {_stem(file) for file in listed}
     further = [file for file in there if file not in listed]
     absent = [file for file in listed if not file.is_file()]

@@ -71,12 +71,14 @@ class TurnParts:
     Attributes:
         turn_s: duration of a turn, as in Frame.
         n_parts: number of messages in a turn.
+        late: number of parts that came after their turn was complete, and are in none.
     """
 
     def __init__(self, way: float, turn_s: float, n_parts: float) -> None:
         """`way`: 1 for a head that turns clockwise, -1 for others."""
         self.turn_s = way * turn_s
         self.n_parts = n_parts
+        self.late = 0
         self._way = way
         self._points: list[Float32] = []
         self._marks: list[tuple[float, float]] = []  # time [s] and phase since behind the sensor [rad] of each part
@@ -125,7 +127,8 @@ class TurnParts:
         phase = float(np.mod(np.pi - self._way * arc.begin_rad(self._way), 2 * np.pi))
         phase, another = self._place(cloud, time_s, phase)
         if phase < -MARGIN_RAD:
-            return None  # a late part of the turn before
+            self.late += 1
+            return None
         phase = max(phase, 0.0)
         done = self._turn(cloud.frame_id) if another else None
         bearing = np.arctan2(cloud.points[:, 1], cloud.points[:, 0]).astype(np.float64)
