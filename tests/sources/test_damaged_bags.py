@@ -104,6 +104,17 @@ def test_records_behind_damaged_bytes_are_found_without_an_index(tmp_path, heade
     assert stream.reading.messages + stream.faults.left_out.total() >= N
 
 
+@pytest.mark.parametrize("left", [1, 4, 8])
+def test_a_file_that_ends_within_the_head_of_a_record_is_not_whole(tmp_path, left):
+    path = write_mcap(tmp_path / "drive", clouds(N), use_chunking=False)
+    raw = path.read_bytes()
+    at = raw.index(struct.pack("<Q", round(clouds(N)[7][2] * 1e9))) - 15  # begin of a message
+    path.write_bytes(raw[: at + left])
+    stream, frames = read(path)
+    assert frames == list(range(7))
+    assert stream.faults.left_out
+
+
 def test_a_bad_file_of_a_split_recording_costs_no_other(tmp_path, caplog):
     recorded = clouds(N)
     for k in range(3):

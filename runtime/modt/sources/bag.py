@@ -37,7 +37,7 @@ MAX_HELD = 20
 STANDING_SHARE = 0.01
 """Stamps that pass by less than this share of the recorded times are no times in seconds, or stand still."""
 MAX_PERIOD_S = 5.0
-"""Stamps of sweeps that are farther apart are no times in seconds, if they were recorded nearer to one another [s]."""
+"""Stamps of sweeps that are farther apart are no times in seconds, if they were recorded nearer to each other [s]."""
 HELD_PARTS = 2
 """Number of parts of turns that wait for an earlier one, which may be recorded after them."""
 OPTIONS = frozenset({"topic", "odometry", "frame"})

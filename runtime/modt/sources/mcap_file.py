@@ -346,6 +346,8 @@ def _scanned(view: View) -> Contents:
             ended = ended or view[at] == DATA_END
         at = end
     if not ended:
+        if at < len(view):  # cut off within the head of a record
+            contents.gaps.append(at)
         _end_index(contents.pieces)
     contents.pieces = _in_order(contents.pieces)
     return contents
