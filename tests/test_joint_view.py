@@ -51,17 +51,35 @@ def test_one_sensor_in_the_middle_gives_the_result_of_a_sensor_alone():
         assert other.proposals.box[:, 2] - one.proposals.box[:, 2] == pytest.approx(0.6, abs=1e-3)
 
 
-def test_results_are_in_the_frame_of_the_robot():
-    frames = drive(0.4)
+@pytest.mark.parametrize("phase_s", [0.0, 0.04])
+def test_results_are_in_the_frame_of_the_robot(phase_s):
+    frames = drive(0.4, phase_s=phase_s)
     for (frame, truth), result in zip(frames, steps(robot(*CORNERS), [f for f, _ in frames]), strict=True):
         assert result.T_world_sensor == pytest.approx(frame.T_world_sensor, abs=1e-3)
-        assert result.frame.points == pytest.approx(frame.points, abs=1e-3)
+        assert phase_s or result.frame.points == pytest.approx(frame.points, abs=1e-3)
+        assert result.frame.frame_id == "base_footprint"
         ground = result.frame.points[result.labels == modt.PointKind.GROUND]
         near = np.hypot(ground[:, 0], ground[:, 1]) < 6
         assert np.median(ground[near, 2]) == pytest.approx(0.0, abs=0.1)
         assert len(truth.instance) == len(result.frame.points)
         members = result.proposals.members
         assert pytest.approx(result.proposals.coordinates, abs=0.2) == result.frame.points[members, :3].T
+
+
+def test_points_of_a_sensor_that_turns_later_are_where_they_are_at_the_stamp():
+    frames = drive(0.6, scene="street", phase_s=0.05)
+    for (frame, truth), result in [*zip(frames, steps(robot(*CORNERS), [f for f, _ in frames]), strict=True)][2:]:
+        seen = [sweep for sweep in frame.sweeps if sweep is not None]
+        world = [transform(sweep.T_world_sensor, sweep.points[:, :3].astype(float)) for sweep in seen]
+        placed = transform(result.T_world_sensor, result.frame.points[:, :3].astype(float))
+        assert len(truth.instance) == len(placed)
+        unmoved = transform(result.T_world_sensor, frame.points[:, :3].astype(float))
+        near = np.linalg.norm(result.frame.points[:, :2], axis=1) < 20
+        off_m, off_unmoved_m = (
+            np.linalg.norm((at - np.concatenate(world))[near, :2], axis=1) for at in (placed, unmoved)
+        )
+        assert np.quantile(off_unmoved_m, 0.9) > 0.1
+        assert np.quantile(off_m, 0.9) < 0.03
 
 
 def round_the_robot(rng, seconds, height_m):

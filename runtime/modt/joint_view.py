@@ -22,7 +22,7 @@ from modt.segmentation.joining import SensorProposals, join
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.tuning import JoiningTuning
 from modt.sensor_fit.levelling import Leveller
-from modt.types import Float64, Frame, FrameResult, Proposals
+from modt.types import Float32, Float64, Frame, FrameResult, Proposals
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class JointView:
         """The result in the frame of the robot. The motion of the robot is kept for the next frame."""
         self._motion = placement.motion
         T = self.T_robot_common
-        frame = replace(result.frame, points=moved_points(T, result.frame.points))
+        frame = replace(result.frame, points=self._points(result.frame, placement.motion))
         if (T_world_common := frame.T_world_sensor) is not None:
             frame = replace(frame, T_world_sensor=T_world_common @ inverse(T))
         return replace(
@@ -123,6 +123,19 @@ class JointView:
             T_world_sensor=result.T_world_sensor @ inverse(T),
             proposals=_moved(result.proposals, T).lock(),
         )
+
+    def _points(self, frame: Frame, motion: PlanarMotion) -> Float32:
+        """(N, 4) points of a frame in the frame of the robot, each sweep moved from its stamp to that of the frame."""
+        begin = 0
+        moved = [np.zeros((0, 4), np.float32)]
+        for sweep in frame.sweeps:
+            if sweep is None:
+                continue
+            end = begin + len(sweep.points)
+            T = self.T_robot_common @ motion.T_stamp_seen(sweep.stamp_s - frame.stamp_s)
+            moved.append(moved_points(T, frame.points[begin:end]))
+            begin = end
+        return np.concatenate(moved)
 
 
 def _range2_m2(proposals: Proposals) -> Float64:

@@ -118,6 +118,12 @@ class PlanarMotion:
         xy: Float64 = step.view(np.float64).reshape(-1, 2)
         return xy
 
+    def T_stamp_seen(self, delay_s: float) -> Float64:
+        """(4, 4) transform of what was seen delay_s after the stamp to the frame of the sensor at the stamp."""
+        yaw = self.yaw_rate_radps * delay_s
+        step = self.velocity_mps * delay_s * np.exp(0.5j * yaw)
+        return se3(rotation_zyx(0.0, 0.0, yaw), np.array([step.real, step.imag, 0.0]))
+
 
 def from_middle(bearing: Float64, mid_rad: float) -> Float64:
     """Bearings [rad] relative to the middle of a sweep, from -pi to pi."""

@@ -20,6 +20,8 @@ log = logging.getLogger(__name__)
 JOINED_PERIODS = 0.6
 """Greatest time between the sweeps of one frame [periods of the faster sensor]. The nearest sweep is half a period
 away at most; the rest keeps sensors that are half a period apart from changing partners with every jitter."""
+ROBOT = "base_footprint"
+"""Name of the frame of a robot whose origin is on the ground (REP 120)."""
 Sweeps = dict[int, Frame]
 """Sweeps of one frame by the numbers of their sensors."""
 
@@ -69,7 +71,8 @@ def joint_frame(index: int, sweeps: Sweeps, sensors: Sequence[MountedSensor]) ->
     first = sweeps[lead]
     T = first.T_world_sensor
     T_world_robot = None if T is None else T @ inverse(sensors[lead].T_robot_sensor)
-    return Frame(index, first.stamp_s, points, T_world_robot, steady_s=first.steady_s, sweeps=by_sensor)
+    frame = Frame(index, first.stamp_s, points, T_world_robot, steady_s=first.steady_s, sweeps=by_sensor)
+    return replace(frame, frame_id=ROBOT)
 
 
 def joined_reading(parts: Sequence[Reading], alone: Counter[str]) -> Reading:
