@@ -125,7 +125,7 @@ class JointView:
         )
 
     def _points(self, frame: Frame, motion: PlanarMotion) -> Float32:
-        """(N, 4) points of a frame in the frame of the robot, each sweep moved from its stamp to that of the frame."""
+        """(N, 4) points of a frame in the frame of the robot, each sweep moved from its stamp to the frame's."""
         begin = 0
         moved = [np.zeros((0, 4), np.float32)]
         for sweep in frame.sweeps:

@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
-from modt.types import COMPENSATED, DESKEWED, UNRECORDED, Float32, Float64
+from modt.types import COMPENSATED, DESKEWED, NO_TURN, UNRECORDED, Float32, Float64
 
 TYPE = "sensor_msgs/PointCloud2"
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -30,8 +30,6 @@ FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_
 OPTICAL = "_optical_frame"
 """End of the name of a frame whose x axis points right, y down and z forward (REP 103)."""
 MAX_FIELDS = 64
-NO_TURN = "their points' times are of no turning head"
-"""Kind of the times of sweeps whose stamp is the middle of their points' times."""
 MAX_DELAY_S = 1.0
 """Greatest difference of the times of points from the header's stamp [s]. Beyond it they count from that stamp."""
 FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))

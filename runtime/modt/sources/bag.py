@@ -17,14 +17,14 @@ from modt.errors import MisuseError, ModtError
 from modt.ros2 import foxglove_cloud, livox_cloud, point_cloud2
 from modt.ros2.cdr import CdrReader, MessageError
 from modt.ros2.livox_cloud import read_livox_cloud
-from modt.ros2.point_cloud2 import NO_TURN, PointCloud
+from modt.ros2.point_cloud2 import PointCloud
 from modt.sources.bag_file import BagMessage, BagTopic
 from modt.sources.bag_files import Bag
 from modt.sources.bag_poses import PoseTopic, RecordedPoses, find_poses
 from modt.sources.stamp_check import STEP_S, StampCheck
 from modt.sources.stream import Faults, Reading, StreamInfo, Sweep, reason_of
 from modt.sources.turn_parts import TurnParts
-from modt.types import DESKEWED, Frame, Self
+from modt.types import DESKEWED, NO_TURN, Frame, Self
 
 log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.pcap_file import PcapFile
 from modt.sources.stamp_check import StampCheck
 from modt.sources.stream import Faults, Reading, StreamInfo, Sweep
-from modt.types import COMPENSATED, DESKEWED, Frame, Self
+from modt.types import Frame, Self
 
 CHOICES = frozenset({"host", "port"})
 """Options that choose one of several sensors in a capture."""
@@ -57,7 +57,7 @@ class PacketStream:
         for index, (arrived_s, sweep) in enumerate(sweeps):
             self.reading.messages = self.reception.messages
             self.reading.sweeps += 1
-            self.reading.times[DESKEWED if sweep.turn_s else COMPENSATED] += 1
+            self.reading.times[sweep.times] += 1
             missing = self.reception.lost - lost
             lost = self.reception.lost
             if index < self._first:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from modt.geometry import Camera
-from modt.types import Float32, Frame, Self
+from modt.types import COMPENSATED, DESKEWED, NO_TURN, Float32, Frame, Self
 
 log = logging.getLogger(__name__)
 
@@ -171,6 +171,13 @@ class Sweep:
     waited_s: float = 0.0
     mid_rad: float = 0.0
     delay_s: Float32 | None = None
+
+    @property
+    def times(self) -> str:
+        """Kind of the times of its points."""
+        if self.turn_s:
+            return DESKEWED
+        return COMPENSATED if self.delay_s is None else NO_TURN
 
 
 @dataclass(slots=True)

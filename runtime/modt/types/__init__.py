@@ -9,7 +9,7 @@ from __future__ import annotations
 from modt.types.arrays import N_REFLECTANCE, NONE, UNRECORDED, Bool, Float32, Float64, Int, Int8, Self
 from modt.types.budget import UNLIMITED, Budget
 from modt.types.columns import Columns, column
-from modt.types.frame import COMPENSATED, DESKEWED, Frame
+from modt.types.frame import COMPENSATED, DESKEWED, NO_TURN, Frame
 from modt.types.proposals import LEFT_OUT, OBSTACLES, Cut, PointKind, Proposals, copy_runs, sort_members
 from modt.types.result import FrameResult
 from modt.types.tracks import (
@@ -31,6 +31,7 @@ __all__ = [
     "LEFT_OUT",
     "MOTION_NAMES",
     "NONE",
+    "NO_TURN",
     "N_REFLECTANCE",
     "OBSTACLES",
     "TRUSTED",

@@ -8,7 +8,9 @@ from modt.types.arrays import Float32, Float64
 
 DESKEWED = "by the times of the turn"
 COMPENSATED = "without times of points"
-"""Kinds of the times of sweeps: those of a turn, by which they are deskewed, and none, as if seen at the stamp."""
+NO_TURN = "their points' times are of no turning head"
+"""Kinds of the times of sweeps: those of a turn, by which they are deskewed, none, as if seen at the stamp, and those
+in whose middle the stamp is."""
 
 
 @dataclass(frozen=True, slots=True)

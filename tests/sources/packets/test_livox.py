@@ -118,6 +118,7 @@ def test_noise_of_an_avia_is_left_out_and_other_packets_are_refused():
     imu = old_packet(0.01, 6, bytes(24))
     sweeps, reception = decoded(LivoxDecoder("sensor"), [*timed_avia, (BEGAN_S + 1, imu), (BEGAN_S + 1, body[:-1])])
     assert len(sweeps[0].points) == 250 * 48
+    assert (sweeps[0].delay_s.min(), sweeps[0].delay_s.max()) == pytest.approx((-0.05, 0.05), abs=1e-3)
     assert reception.refused == {"no packet of points of a Livox": 2}
 
 

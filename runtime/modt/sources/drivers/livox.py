@@ -138,9 +138,12 @@ class LivoxDecoder(PacketDecoder):
         gaps_ns = np.diff([before_ns, *stamps_ns])
         lost = int(np.maximum(np.rint(gaps_ns / np.median(gaps_ns)) - 1, 0).sum())  # lying stamps have gaps near 0
         self.reception.lost += lost
-        points = np.concatenate([_points(self._packets[stamp_ns]) for stamp_ns in stamps_ns])
-        middle_s = (self._window + 0.5) * SWEEP_NS * 1e-9
-        return [Sweep(middle_s + self._clock.offset_s, points, complete=lost == 0)]
+        parts = [_points(self._packets[stamp_ns]) for stamp_ns in stamps_ns]
+        middle_ns = self._window * SWEEP_NS + SWEEP_NS // 2
+        delays_s = np.array([(stamp_ns - middle_ns) * 1e-9 for stamp_ns in stamps_ns], np.float32)
+        delay_s = delays_s.repeat([len(part) for part in parts])
+        stamp_s = middle_ns * 1e-9 + self._clock.offset_s
+        return [Sweep(stamp_s, np.concatenate(parts), complete=lost == 0, delay_s=delay_s)]
 
 
 def is_packet(payload: bytes) -> bool:
