@@ -33,6 +33,7 @@ from modt.profile import load
 from modt.ros2 import odometry, point_cloud2
 from modt.sources.bag import open_bag
 from modt.types import NONE, Bool, Float64, Frame, Proposals
+from modt_evaluation.experiments.markdown import commit
 from modt_simulation.motion import Path as Route
 from modt_simulation.synthetic_stream import SCENES, SyntheticStream
 from tools.docs.sections import DOCS, update
@@ -344,7 +345,7 @@ def main() -> None:
             rows.append(f"| {' | '.join([sensor, scene, f'{speed:g}', cut, str(seed), *cells])} |")
             print(rows[-1], flush=True)
     if args.write:
-        made = f"Made by `python -m {MARK}`; 90 % quantiles [m]."
+        made = f"At commit `{commit()}`, {args.seconds:g} s each; made by `python -m {MARK}`; 90 % quantiles [m]."
         update(DOCS / "odometry.md", MARK, f"{made}\n\n{table(rows)}")
 
 
