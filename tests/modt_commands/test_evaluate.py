@@ -134,3 +134,23 @@ def test_runs_judged_by_several_processes_have_the_same_figures(drives, capsys):
 )
 def test_misuse_of_experiments_is_one_line(words, named, capsys, tmp_path):
     assert named in refusal(capsys, "evaluate", *words, "--out", tmp_path)
+
+
+def test_a_run_of_two_sensors_is_judged_in_the_frame_of_the_robot(tmp_path, capsys):
+    places = {"front": ([0.5, 0.35, 0.6], [0, 0, 45]), "rear": ([-0.5, -0.35, 0.6], [0, 0, -135])}
+    sensors = {
+        name: {"profile": "vlp-16", "source": "velodyne://", "position_m": place, "roll_pitch_yaw_deg": turn}
+        for name, (place, turn) in places.items()
+    }
+    (tmp_path / "robot.yaml").write_text(json.dumps({"sensors": sensors}))
+    sim = tmp_path / "sim"
+    assert (
+        here("simulate", "--profile", tmp_path / "robot.yaml", "--seconds", "0.5", "--seed", "5", "--out", sim) == 0
+    )
+    run = tmp_path / "run"
+    options = ("--profile", sim / "robot.yaml", "--labels", "--quiet", "--core", "none", "--out", run)
+    assert here("replay", *options) == 0
+    (scores,) = json.loads(evaluated(capsys, run, sim, "--json"))["sensors"].values()
+    cars = scores["ranges"]["0-20"]["segmentation"]["car"]
+    assert cars["objects"] > 10
+    assert cars["recall"] > 0.8

@@ -11,6 +11,7 @@ from modt.errors import MisuseError, ModtError
 
 if TYPE_CHECKING:
     from modt_simulation.kitti_raw import DriveWriter
+    from modt_simulation.synthetic_stream import SyntheticStream
 
 
 def add_parser(commands: options.Commands) -> None:
@@ -73,7 +74,7 @@ def _simulate_robot(out: Path, arguments: argparse.Namespace) -> int:
         MisuseError: the profile has no sensors, or as `run` does.
     """
     from modt import profile
-    from modt_simulation.robot_stream import NOISE_SEED_STEP
+    from modt_simulation.robot_stream import NOISE_SEED_STEP, write_truth
 
     sensors = profile.load(arguments.profile).sensors
     if not sensors:
@@ -83,10 +84,11 @@ def _simulate_robot(out: Path, arguments: argparse.Namespace) -> int:
         noise_seed = arguments.seed + k * NOISE_SEED_STEP
         writer = _written(out / mounted.name, arguments, mounted.profile, mounted=mounted, noise_seed=noise_seed)
         sources[mounted.name] = {"source": str(writer.drive.relative_to(out))}
+    write_truth(out, _stream(arguments, sensors[0].profile, mounted=sensors[0]), sensors[0])
     robot = out / "robot.yaml"
     base = str(Path(arguments.profile).resolve())
     robot.write_text(profile.to_yaml({"extends": base, "sensors": sources}), encoding="utf-8")
-    print(f"drives of {', '.join(sources)}, and their profile: {robot}")
+    print(f"drives of {', '.join(sources)}, their profile: {robot}, and labels in the frame of the robot: {out}")
     print(f"next: modt replay --profile {robot}")
     return 0
 
@@ -99,11 +101,31 @@ def _written(out: Path, arguments: argparse.Namespace, sensor: str, **place: Any
         ModtError: the drive cannot be written.
     """
     from modt_simulation.kitti_raw import DATE, DriveWriter
-    from modt_simulation.synthetic_stream import CAMERA, SyntheticStream
+    from modt_simulation.synthetic_stream import CAMERA
 
     if (out / DATE).exists() or (out / "sequences").exists():
         raise MisuseError(out, "contains a drive already", "give another --out")
-    stream = SyntheticStream(
+    stream = _stream(arguments, sensor, **place)
+    try:
+        writer = DriveWriter(out, CAMERA, all_around=arguments.all_around)
+        for frame, truth in stream.sweeps():
+            writer.write(frame, truth)
+        writer.close()
+    except OSError as error:
+        remedy = "free or unlock the disk, or give another --out"
+        raise ModtError(out, f"cannot be written ({error.strerror or error})", remedy) from None
+    return writer
+
+
+def _stream(arguments: argparse.Namespace, sensor: str, **place: Any) -> SyntheticStream:
+    """The drive of a sensor; `place` are further arguments of SyntheticStream.
+
+    Raises:
+        MisuseError: a condition is invalid.
+    """
+    from modt_simulation.synthetic_stream import SyntheticStream
+
+    return SyntheticStream(
         arguments.scene,
         sensor,
         arguments.seconds,
@@ -115,12 +137,3 @@ def _written(out: Path, arguments: argparse.Namespace, sensor: str, **place: Any
         faults=arguments.fault,
         **place,
     )
-    try:
-        writer = DriveWriter(out, CAMERA, all_around=arguments.all_around)
-        for frame, truth in stream.sweeps():
-            writer.write(frame, truth)
-        writer.close()
-    except OSError as error:
-        remedy = "free or unlock the disk, or give another --out"
-        raise ModtError(out, f"cannot be written ({error.strerror or error})", remedy) from None
-    return writer

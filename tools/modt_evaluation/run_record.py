@@ -176,13 +176,15 @@ class RunRecord:
         Args:
             truth: labels of the recording of the run.
             proposed: assigns points to proposals; None: the labels that replay --labels has written.
-            stream: the recording; None: the scans of the truth.
+            stream: the recording; None: the scans of the truth, or those of all sensors of the robot.
             records: records of labelled frames; None for all records.
 
         Raises:
             MisuseError: the run is of another recording, empty or without labels, or a record is broken.
         """
         stream = truth.scans if stream is None else stream
+        if stream is None and "sensors" in self.facts["profile"]:
+            stream = self.source(())
         if stream is None:
             raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
         fov = self._fov(stream)

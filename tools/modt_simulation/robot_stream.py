@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from modt.config import MountedSensor
+from modt.geometry import inverse
 from modt.sources.joining import JointStream
 from modt.types import Frame
 from modt_simulation.simulator import Truth
@@ -79,6 +81,29 @@ class RobotStream:
                 kept[k].truths.pop(sweep.index) if sweep is not None else None for k, sweep in enumerate(frame.sweeps)
             ]
             yield frame, _joined(frame, [truth for truth in truths if truth is not None])
+
+
+def write_truth(folder: Path, stream: SyntheticStream, mounted: MountedSensor) -> None:
+    """Write the labels of a drive in the frame of the robot, a table of cuboids and the poses of the robot.
+
+    Args:
+        folder: where `truth.csv` and `poses.txt` are written.
+        stream: the first sensor of the robot.
+        mounted: its mount.
+    """
+    world = stream.simulator.world
+    named = [number for number, body in enumerate(world.bodies) if body.kind.name]
+    rows = ["frame,track,label,x,y,z,l,w,h,yaw"]
+    poses = []
+    for index in range(stream.info.end or 0):
+        time_s = index * stream.info.period_s
+        poses.append((world.ego_pose(time_s) @ inverse(mounted.T_robot_sensor))[:3].ravel())
+        boxes = world.boxes(time_s)
+        for number in named:
+            numbers = ",".join(f"{value:.4f}" for value in boxes[number])
+            rows.append(f"{index},{number},{world.bodies[number].kind.name},{numbers}")
+    (folder / "truth.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    np.savetxt(folder / "poses.txt", poses, fmt="%.9f")
 
 
 def _joined(frame: Frame, truths: Sequence[Truth]) -> Truth:
