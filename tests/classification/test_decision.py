@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.classification.decision import Decision, LikeliestClass
+from modt.classification.decision import Decision, LikeliestClass, Lookalikes
 from modt.classification.tuning import DecisionTuning
 from modt.config import DecisionConfig
 from modt.types import NONE, Tracks
@@ -95,3 +95,27 @@ def test_no_object_becomes_rarer_than_the_model_assumes_and_what_is_not_seen_tea
         seen = tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60))
         decision.decide(seen, seen, seen)
     assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("alike", "walks", "reported"), [(25, 0.6, BACKGROUND), (25, 0.95, PEDESTRIAN), (3, 0.6, PEDESTRIAN)]
+)
+def test_among_many_things_that_resemble_people_a_little_only_a_clear_person_is_reported(alike, walks, reported):
+    decision = Decision(DecisionConfig(), ASSUMED)
+    little = [[0.92, 0.0, 0.08, 0.0]] * alike
+    plain = [[0.99, 0.005, 0.005, 0.0]] * (60 - alike)
+    for _ in range(30):
+        seen = tracks([1 - walks, 0.0, walks, 0.0], *little, *plain)
+        decision.decide(seen, seen, seen)
+    assert seen.object_class[0] == reported
+    assert not seen.object_class[1:].any()
+
+
+def test_lookalikes_are_forgotten():
+    lookalikes = Lookalikes(DecisionTuning(lookalike_memory=500))
+    for _ in range(20):
+        lookalikes.learn(np.full(60, 0.1))
+    assert lookalikes.odds < 0.1
+    for _ in range(50):
+        lookalikes.learn(np.zeros(60))
+    assert lookalikes.odds == 1.0

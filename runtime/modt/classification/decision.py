@@ -6,6 +6,10 @@ probabilities", Neural Computation 2002), slowly and within bounds: no object be
 since the first of its class may yet come. Doubtful people count as background, since posteriors of what the model
 has not learnt are not calibrated: vines that resemble people a little would make people frequent, and so be people.
 
+Background that resembles people a little has a tail that resembles them more. Where a large share of the proposals
+resembles them a little, as among vines, a posterior just above the threshold is of that tail. So people are then
+rarer than the model assumes, and only what clearly is a person is reported.
+
 An object is reported where its expected cost, if it were missed, exceeds that of a false one. A reported class is
 kept down to `kept_probability`, since a posterior also falls while the object is half hidden. For this its posterior
 is raised by the same ratio, so it is also preferred to other classes that are more probable by less than that.
@@ -66,6 +70,7 @@ class Decision(LikeliestClass):
         # Sums of the posteriors of proposals: as if seen before the start, and seen since then.
         self._start_mass = tuning.start_proposals * self.frequency
         self._mass = np.zeros(N_CLASSES)
+        self._lookalikes = Lookalikes(tuning)
         # A reported class is kept down to this share of its threshold, and preferred to others by its inverse.
         self._kept_share = np.append(1.0, np.minimum(tuning.kept_probability / self._threshold, 1.0))
 
@@ -80,11 +85,14 @@ class Decision(LikeliestClass):
         self._report(decisions, weight)
         rows = motion.observed.nonzero()[0]
         is_doubtful = IS_PERSON[:, None] & (posterior < self._tuning.certain_probability)
+        self._lookalikes.learn(posterior[IS_PERSON].sum(axis=0).take(rows))
         self._learn(adapted.take(rows, axis=1), is_doubtful.take(rows, axis=1))
 
     def adapted(self, posterior: Float64) -> Float64:
         """(C, M) posteriors under the frequencies of the stream."""
-        weighted = posterior * (self.frequency / self._assumed)[:, None]
+        ratio = self.frequency / self._assumed
+        ratio[IS_PERSON] *= self._lookalikes.odds
+        weighted = posterior * ratio[:, None]
         adapted: Float64 = weighted / weighted.sum(axis=0)
         return adapted
 
@@ -107,3 +115,32 @@ class Decision(LikeliestClass):
         ]
         frequency = [max(1.0 - sum(objects), self._tuning.min_background_frequency), *objects]
         self.frequency = np.array(frequency) / sum(frequency)
+
+
+class Lookalikes:
+    """Proposals of the last seconds that resemble people a little.
+
+    Args:
+        tuning: what resembles a person, which share of it is usual, and the memory.
+
+    Attributes:
+        odds: factor of the odds of a person, 1 where the share is usual.
+    """
+
+    def __init__(self, tuning: DecisionTuning) -> None:
+        self.odds = 1.0
+        self._tuning = tuning
+        self._n_seen = tuning.lookalike_start
+        self._n_alike = 0.0
+
+    def learn(self, person: Float64) -> None:
+        """Add the proposals of a frame, given the posterior (R,) of a person of any class."""
+        tuning = self._tuning
+        self._n_seen += len(person)
+        self._n_alike += np.count_nonzero((person > tuning.min_lookalike) & (person < tuning.max_lookalike))
+        if self._n_seen > tuning.lookalike_memory:
+            self._n_alike *= tuning.lookalike_memory / self._n_seen
+            self._n_seen = tuning.lookalike_memory
+        share = self._n_alike / self._n_seen
+        # The tail is thinner than the share by about its square.
+        self.odds = min(1.0, tuning.usual_lookalikes / share) ** 2 if share else 1.0

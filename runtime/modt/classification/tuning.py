@@ -216,6 +216,34 @@ class DecisionTuning:
 
     Chosen on: judgement.
     """
+    min_lookalike: float = 0.02
+    """Posterior of a person from which a proposal resembles one a little. With less, plain background counts too.
+
+    Chosen on: simulated vines, with a check on simulated streets, markets, car parks and postures.
+    """
+    max_lookalike: float = 0.15
+    """Posterior of a person from which a proposal resembles one more than a little. With more, people in rare
+    postures make each other doubtful.
+
+    Chosen on: as `min_lookalike`.
+    """
+    usual_lookalikes: float = 0.12
+    """Share of the proposals that may resemble people a little before the odds of people fall, by the square of the
+    share. With less, people are reported later wherever bushes and posts stand.
+
+    Chosen on: as `min_lookalike`.
+    """
+    lookalike_start: float = 100.0
+    """Weight of the usual scene at the start, as a number of proposals. With more, vines are people for longer.
+
+    Chosen on: as `min_lookalike`.
+    """
+    lookalike_memory: float = 1_000.0
+    """Greatest number of proposals that count for the share, one to five seconds of them. With more, people are
+    reported later after a robot has left an orchard.
+
+    Chosen on: judgement.
+    """
 
 
 @dataclass(frozen=True, slots=True)
