@@ -64,6 +64,12 @@ def test_who_pushes_a_trolley_is_a_person_and_the_trolley_is_not():
     assert people(person(5.1, 0), TROLLEY) == [0, NONE]
 
 
+def test_a_post_of_a_stall_leaves_without_the_goods_around_it():
+    post = column(5, 1.3, 0.06, 0.06, 0.3, 1.9, points=12)
+    goods = column(5, 1.6, 0.3, 0.36, 0.3, 1.0)
+    assert people(person(5, 0), column(5, 0.8, 0.6, 0.6, 0.3, 0.9), post, goods) == [1, NONE, 0, NONE]
+
+
 @pytest.mark.parametrize(
     "parts",
     [

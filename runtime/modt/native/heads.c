@@ -4,8 +4,8 @@
 
 /* HeadTuning: values by the names that they have there. */
 typedef struct {
-    double min_top_m, max_top_m, reach_m, max_apart_m, min_dip_m, head_height_m, max_head_m, max_bottom_m, load_m,
-        min_load_top_m;
+    double min_top_m, max_top_m, reach_m, max_apart_m, min_dip_m, head_height_m, max_head_m, shoulders_m, min_shoulders_m,
+        post_reach_m, max_bottom_m, load_m, min_load_top_m;
     i64 min_points;
 } HeadTuning;
 
@@ -94,11 +94,34 @@ static int is_lower(const HeadTuning *r, const Cluster *c, i64 i, i64 peak, int 
     return 1;
 }
 
-/* Whether peak k is the head of a person, given the peak to which each cell belongs */
-static int is_head(const HeadTuning *r, const Cluster *c, const i64 *owner, i64 k, i64 peak)
+/* Rectangle around cells */
+typedef struct {
+    double least[2], greatest[2];
+} Bounds;
+
+static inline void extend(Bounds *b, const Cluster *c, i64 i)
 {
-    double least[2] = {INFINITY, INFINITY}, greatest[2] = {-INFINITY, -INFINITY};
-    float bottom = INFINITY, top_from = c->high[peak] - (float)r->head_height_m;
+    b->least[0] = mind(c->x[i], b->least[0]);
+    b->least[1] = mind(c->y[i], b->least[1]);
+    b->greatest[0] = maxd(c->x[i], b->greatest[0]);
+    b->greatest[1] = maxd(c->y[i], b->greatest[1]);
+}
+
+/* _extent_m */
+static double extent_m(const Bounds *b)
+{
+    double width = b->greatest[0] - b->least[0], depth = b->greatest[1] - b->least[1];
+    return __builtin_sqrt(width * width + depth * depth);
+}
+
+/* Square of the distance within which cells belong to peak k [m2], 0 where it is neither a person nor a post, given
+   the peak to which each cell belongs */
+static double reach_m2(const HeadTuning *r, const Cluster *c, const i64 *owner, i64 k, i64 peak)
+{
+    const Bounds empty = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    Bounds head = empty, shoulders = empty;
+    float bottom = INFINITY, head_from = c->high[peak] - (float)r->head_height_m;
+    float shoulders_from = c->high[peak] - (float)r->shoulders_m;
     i64 points = 0;
     for (i64 i = 0; i < c->m; i++) {
         if (owner[i] != k)
@@ -106,17 +129,16 @@ static int is_head(const HeadTuning *r, const Cluster *c, const i64 *owner, i64 
         if (square_m2(c, i, peak) < r->reach_m * r->reach_m) {
             bottom = minf(c->low[i], bottom);
             points += c->entries[i];
+            if (c->high[i] > shoulders_from)
+                extend(&shoulders, c, i);
         }
-        if (c->high[i] > top_from) {
-            least[0] = mind(c->x[i], least[0]);
-            least[1] = mind(c->y[i], least[1]);
-            greatest[0] = maxd(c->x[i], greatest[0]);
-            greatest[1] = maxd(c->y[i], greatest[1]);
-        }
+        if (c->high[i] > head_from)
+            extend(&head, c, i);
     }
-    double width = greatest[0] - least[0], depth = greatest[1] - least[1];
-    return bottom < (float)r->max_bottom_m && points >= r->min_points &&
-           __builtin_sqrt(width * width + depth * depth) < r->max_head_m;
+    if (!(bottom < (float)r->max_bottom_m && points >= r->min_points && extent_m(&head) < r->max_head_m))
+        return 0.0;
+    double reach = extent_m(&shoulders) < r->min_shoulders_m ? r->post_reach_m : r->reach_m;
+    return reach * reach;
 }
 
 /* _pushes */
@@ -145,9 +167,9 @@ static int pushes(const HeadTuning *r, const Cluster *c, i64 peak)
     return along >= -r->reach_m * __builtin_sqrt(most);
 }
 
-/* find_people, given room for m peaks, and for the person of each peak, NONE where it is no head */
+/* find_people, given room for m peaks, and for the person of each peak, NONE where it is none, and its reach */
 EXPORT void modt_find_people(const HeadTuning *r, const float *x, const float *y, const float *low, const float *high,
-                             const i64 *entries, i64 m, i64 *peaks, i64 *person_of_peak, i64 *person)
+                             const i64 *entries, i64 m, i64 *peaks, i64 *person_of_peak, double *reach, i64 *person)
 {
     const Cluster cluster = {x, y, low, high, entries, m}, *c = &cluster;
     i64 n = find_peaks(r, c, person, peaks), n_heads = 0, head = NONE;
@@ -160,7 +182,8 @@ EXPORT void modt_find_people(const HeadTuning *r, const float *x, const float *y
     }
     for (i64 k = 0; k < n; k++) {
         person_of_peak[k] = NONE;
-        if (!is_head(r, c, owner, k, peaks[k]))
+        reach[k] = reach_m2(r, c, owner, k, peaks[k]);
+        if (reach[k] == 0.0)
             continue;
         person_of_peak[k] = n_heads++;
         head = peaks[k];
@@ -168,7 +191,7 @@ EXPORT void modt_find_people(const HeadTuning *r, const float *x, const float *y
     int divided = n_heads > 1 || (n_heads == 1 && (any_higher || pushes(r, c, head)));
     for (i64 i = 0; i < m; i++) {
         i64 k = owner[i];
-        int around = divided && k != NONE && square_m2(c, i, peaks[k]) < r->reach_m * r->reach_m;
+        int around = divided && k != NONE && square_m2(c, i, peaks[k]) < reach[k];
         person[i] = around ? person_of_peak[k] : NONE;
     }
 }

@@ -22,10 +22,11 @@ CORRIDOR_HALF_WIDTH_M = 0.3
 def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: Int, tuning: HeadTuning) -> Int:
     """(m,) person to whom each cell of one cluster belongs, NONE where it is nobody's.
 
-    There is nobody, or there are two or more people, or one beside something higher than any person, or one with
-    something to push. That lies to one side of the person, is as high as a trolley, and ends below the shoulders. A
-    rider has a wheel on each side, which is lower. One head without any of this divides nothing, so its cells are
-    nobody's: the cluster is then one object.
+    There is nobody, or there are two or more people or posts, or one beside something higher than any person, or one
+    with something to push. That lies to one side of the person, is as high as a trolley, and ends below the
+    shoulders. A rider has a wheel on each side, which is lower. One head without any of this divides nothing, so its
+    cells are nobody's: the cluster is then one object. A post has no shoulders. It leaves like a person, but without
+    what lies around it.
 
     Args:
         x: (m,) a point of each cell [m, sensor frame].
@@ -45,10 +46,15 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
     nearest = square_m2.argmin(axis=0)
     lower = _is_lower(at, high, square_m2.min(axis=0), tuning)
     heads = []  # rows of peaks
+    reach_m2 = np.zeros(len(peaks))  # cells of a peak that is nothing stay
     for k, peak in enumerate(peaks):
         own = (nearest == k) & lower
-        if lower[peak] and _is_head(at, low, high, entries, own, near[k], peak, tuning):
-            heads.append(k)
+        if not (lower[peak] and _stands(at, low, high, entries, own, near[k], peak, tuning)):
+            continue
+        heads.append(k)
+        shoulders = own & near[k] & (high > high[peak] - np.float32(tuning.shoulders_m))
+        is_post = _extent_m(at[:, shoulders]) < tuning.min_shoulders_m
+        reach_m2[k] = (tuning.post_reach_m if is_post else tuning.reach_m) ** 2
     if not heads:
         return person
     # Peaks come from the highest on, so something higher than a person is the first of them.
@@ -57,15 +63,15 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
         return person
     person_of_peak = np.full(len(peaks), NONE)
     person_of_peak[heads] = np.arange(len(heads))
-    around = near[nearest, np.arange(len(x))] & lower
+    around = (square_m2.min(axis=0) < reach_m2[nearest]) & lower
     person[around] = person_of_peak[nearest[around]]
     return person
 
 
-def _is_head(
+def _stands(
     at: Float64, low: Float32, high: Float32, entries: Int, own: Bool, near: Bool, peak: int, tuning: HeadTuning
 ) -> bool:
-    """Whether a peak is the head of a person, given its own cells (m,) and the cells near it (m,)."""
+    """Whether a peak is of a person or a post, given its own cells (m,) and the cells near it (m,)."""
     body = own & near
     top = own & (high > high[peak] - tuning.head_height_m)
     stands = low[body].min() < tuning.max_bottom_m and entries[body].sum() >= tuning.min_points

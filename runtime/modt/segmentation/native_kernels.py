@@ -229,8 +229,9 @@ class NativeKernels(NativeGeometryKernels, Kernels):
         """(m,) person to whom each cell of one cluster belongs, NONE where it is nobody's."""
         m = len(x)
         peaks, person_of_peak, person = np.empty((3, m), np.int64)
+        reach_m2 = np.empty(m)
         rules = self._structure(HEAD_TUNING.of, tuning)
-        self.library.modt_find_people(rules, x, y, low, high, entries, m, peaks, person_of_peak, person)
+        self.library.modt_find_people(rules, x, y, low, high, entries, m, peaks, person_of_peak, reach_m2, person)
         return person
 
     def view_bounds(self, clusters: Clusters, strip_of_cluster: Int, n: int) -> ViewBounds:

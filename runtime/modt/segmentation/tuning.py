@@ -208,6 +208,13 @@ class HeadTuning:
     """Height of a head [m]: cells that reach into it are the head."""
     max_head_m: float = 0.55
     """Greatest extent of a head [m]. More takes roofs of cars for heads."""
+    shoulders_m: float = 0.4
+    """Height from the top of a head down to the shoulders [m]. More takes goods beside a post for shoulders."""
+    min_shoulders_m: float = 0.25
+    """Least extent of head and shoulders [m]; what has less is a post. With less, the posts of stalls are people.
+    With more, people seen from the side lose their arms. Chosen on: simulated stalls, with a check on pairs."""
+    post_reach_m: float = 0.2
+    """Distance to a post within which cells belong to it [m]. More adds goods, and the post is taken for a person."""
     max_bottom_m: float = 0.45
     """Greatest height of the bottom of a person [m]. More divides treetops."""
     min_points: int = 20
