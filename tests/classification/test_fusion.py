@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
+from modt.classes import ObjectClass
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews, FusedTracks
 from modt.classification.motion_likelihood import MotionLikelihood
 from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.classification.tuning import ClassificationTuning
 from modt.config import FusionConfig
-from modt.types import NONE, MotionState
+from modt.types import NONE, Cut, MotionState
 from tests.classification.scenes import ROW, Fused, with_points
 
 CONFIG = FusionConfig()
@@ -93,6 +94,25 @@ def test_what_shows_enough_points_nearby_gets_one_view_whatever_its_box_says(x, 
     assert subject.asks() == [asked] * 2
 
 
+@pytest.mark.parametrize(
+    ("x", "length_m", "cut", "is_less"),
+    [
+        (3.0, 2.5, 0, True),
+        (3.0, 1.9, 0, False),
+        (3.0, 4.0, 0, False),
+        (9.0, 2.5, 0, False),
+        (3.0, 2.5, Cut.SIDE, False),
+    ],
+)
+def test_a_near_thing_between_the_width_and_the_length_of_a_car_is_hardly_one(x, length_m, cut, is_less):
+    subject = Fused(FusedTracks(CONFIG, FixedPrior(CAR)), 50)
+    subject.proposals.box[:, :2] = x, 0.0
+    subject.proposals.cut[:] = cut
+    subject.tracks.size_m[:] = length_m, 1.0, 1.2
+    subject.fusion.observe(subject.tracks, subject.tracks, subject.proposals)
+    assert (subject.tracks.motion_evidence[0, ObjectClass.CAR] < -2.0) == is_less
+
+
 @pytest.mark.parametrize("mode", [FirstViews, FurtherViews])
 def test_a_hidden_person_is_not_asked_about_and_keeps_what_is_known_of_the_box(mode):
     subject = Fused(mode(CONFIG, FixedPrior(CAR, CAR)), 50, 50, frames=3)
@@ -120,7 +140,7 @@ def test_posterior_is_that_of_the_plain_formula(views, boxes, counts, moved_m, p
     tracks.observed_s[:] = 3.0
     tracks.size_m[:] = 1.0
     motion = MotionLikelihood(ClassificationTuning().fusion.motion).log_ratio(
-        tracks.moved_m, tracks.observed_s, tracks.size_m
+        tracks.moved_m, tracks.observed_s, tracks.size_m, np.zeros(len(tracks), np.bool_)
     )[:, 0]
     log_frequency = np.log(FREQUENCY / FREQUENCY.sum())
     seen = []

@@ -14,9 +14,10 @@ from modt.classification.tuning import MotionTuning
 CAR, PEDESTRIAN, CYCLIST = (int(c) for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST))
 
 
-def ratios(moved_m, observed_s, length_m, width_m=0.4):
+def ratios(moved_m, observed_s, length_m, width_m=0.4, is_whole=False):
     size_m = np.array([[length_m, width_m, 1.5]])
-    return MotionLikelihood(MotionTuning()).log_ratio(np.array([moved_m]), np.array([observed_s]), size_m)[:, 0]
+    motion = MotionLikelihood(MotionTuning())
+    return motion.log_ratio(np.array([moved_m]), np.array([observed_s]), size_m, np.array([is_whole]))[:, 0]
 
 
 @given(st.floats(0, 1e3), st.floats(0, 1e4), st.floats(0, 1e3))
@@ -51,6 +52,14 @@ def test_motion_tells_classes_apart(moved_m, observed_s, length_m, likely, unlik
 )
 def test_what_was_seen_too_small_or_too_large_for_a_class_is_hardly_one(class_, less, more):
     assert ratios(*less)[class_] < 0 < ratios(*more)[class_]
+
+
+@pytest.mark.parametrize(("length_m", "is_less"), [(1.9, False), (2.5, True), (3.5, False)])
+def test_what_shows_itself_whole_is_as_long_as_a_vehicle_or_as_wide(length_m, is_less):
+    apart = ratios(0.0, 3.0, length_m)
+    whole = ratios(0.0, 3.0, length_m, is_whole=True)
+    assert apart[CAR] - whole[CAR] == (MotionTuning().between_penalty if is_less else 0.0)
+    assert (whole == apart)[[PEDESTRIAN, CYCLIST]].all()
 
 
 def test_a_young_track_weighs_little():

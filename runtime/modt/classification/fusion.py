@@ -30,7 +30,7 @@ from modt.classification.pool import pooled_prior
 from modt.classification.prior import Prior
 from modt.classification.tuning import FusionTuning
 from modt.config import FusionConfig
-from modt.types import Bool, Evidence, Float64, Int, Motion, MotionState, Proposals
+from modt.types import Bool, Cut, Evidence, Float64, Int, Motion, MotionState, Proposals
 
 MIN_PROBABILITY = 1e-4
 """Floor of every likelihood and posterior: no class is excluded for good."""
@@ -127,6 +127,7 @@ class FusedTracks:
         self._weights = tuning.evidence
         self._conditions = tuning.requests
         self._motion_likelihood = MotionLikelihood(tuning.motion)
+        self._whole_m = tuning.motion.whole_m
         self._weight_of_views = np.arange(_MAX_VIEWS) ** tuning.evidence.view_exponent
         self._log_frequency = log_frequency_of(prior)
         self._is_confirmed = Confirmation(
@@ -138,7 +139,10 @@ class FusedTracks:
         rows = motion.observed.nonzero()[0]
         prior = self._prior.probability(proposals).T.take(motion.proposal[rows], axis=1)
         size_m = motion.size_m.take(rows, axis=0)
-        motion_evidence = self._motion_likelihood.log_ratio(motion.moved_m[rows], motion.observed_s[rows], size_m)
+        is_whole = self._shows_whole(proposals).take(motion.proposal[rows])
+        motion_evidence = self._motion_likelihood.log_ratio(
+            motion.moved_m[rows], motion.observed_s[rows], size_m, is_whole
+        )
         # Plain mean of the first boxes, then an exponential one; boxes of hidden people are left out.
         box_evidence = _by_class(evidence.box_evidence, rows)
         gain = np.maximum(1.0 / motion.hits[rows], 1.0 - self._weights.box_memory) * ~motion.top_cut[rows]
@@ -193,6 +197,13 @@ class FusedTracks:
         posterior = (1.0 - self._weights.mismatch_probability) * from_log_weights(log_weight)
         posterior += self._weights.mismatch_probability * prior
         return posterior
+
+    def _shows_whole(self, proposals: Proposals) -> Bool:
+        """(P,) proposals that are near, and not cut at a side."""
+        x, y = proposals.box[:, :2].T
+        whole: Bool = x * x + y * y < self._whole_m**2
+        whole &= (proposals.cut & (Cut.SIDE | Cut.NEAR).value) == 0
+        return whole
 
     def _may_be_object(self, probability: Float64) -> Bool:
         """(R,) whether probabilities (R, C) leave an object likely enough for a classification."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.class_sizes import IS_RIDER, IS_VEHICLE, IS_WALKER, MAX_SIZE_M
+from modt.class_sizes import IS_RIDER, IS_VEHICLE, IS_WALKER, MAX_SIZE_M, USUAL_SIZE_M, USUAL_SPREAD_M
 from modt.classes import N_CLASSES
 from modt.classification.tuning import MotionTuning
-from modt.types import Float64, Int
+from modt.types import Bool, Float64, Int
 
 # Cells of the table, fixed when it was counted.
 YOUNG_S: Float64 = np.array((0.5, 1.5))
@@ -76,24 +76,35 @@ def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int
 class MotionLikelihood:
     """Likelihood of motion and size under each class.
 
+    A vehicle of which both sides or one can be seen from near by shows its whole length, or its width alone. What is
+    longer than a vehicle is wide, and shorter than one is long, is a stall, a bench or a heap.
+
     Args:
-        tuning: penalty of what is larger than a rider.
+        tuning: penalties of sizes that a class does not have.
     """
 
     def __init__(self, tuning: MotionTuning) -> None:
         self._penalty = tuning.oversize_penalty
         self._max_length_m, self._max_width_m = tuning.oversize_ratio * MAX_SIZE_M[IS_RIDER].max(axis=0)
+        spread_m = tuning.vehicle_deviations * USUAL_SPREAD_M
+        self._widest_m = (USUAL_SIZE_M + spread_m)[:, 1, None]
+        self._shortest_m = (USUAL_SIZE_M - spread_m)[:, 0, None]
+        self._between_penalty = tuning.between_penalty * IS_VEHICLE[:, None]
 
-    def log_ratio(self, moved_m: Float64, observed_s: Float64, size_m: Float64) -> Float64:
+    def log_ratio(self, moved_m: Float64, observed_s: Float64, size_m: Float64, is_whole: Bool) -> Float64:
         """(C, R) log P(motion, size | class) over that of background.
 
         Args:
             moved_m: (R,) displacement from the k-DOP lagged by about `ExtentTuning.lag_s` [m].
             observed_s: (R,) sum of the time steps that ended with a proposal [s].
             size_m: (R, 3) length, width and height of the track [m].
+            is_whole: (R,) tracks that are near enough to show the whole object, and not cut at a side.
         """
         length_band, cell = cells(moved_m, observed_s, size_m[:, 0])
         ratio: Float64 = _BY_CLASS.take(length_band * LOG_LIKELIHOOD_RATIO.shape[2] + cell, axis=1)
         is_larger = (size_m[:, 0] > self._max_length_m) | (size_m[:, 1] > self._max_width_m)
         ratio[IS_RIDER] -= self._penalty * is_larger
+        if is_whole.any():
+            is_between = is_whole & (size_m[:, 0] > self._widest_m) & (size_m[:, 0] < self._shortest_m)
+            ratio -= self._between_penalty * is_between
         return ratio

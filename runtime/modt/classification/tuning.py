@@ -35,6 +35,24 @@ class MotionTuning:
 
     Chosen on: parts of hidden cars that were reported as cyclists for 30 frames.
     """
+    whole_m: float = 6.0
+    """Distance below which a vehicle shows its whole length or its width alone [m]. With more, partly hidden cars are
+    reported later.
+
+    Chosen on: simulated stalls, with a check on simulated streets and car parks.
+    """
+    vehicle_deviations: float = 3.0
+    """Standard deviations from the usual length and width of a vehicle beyond which there is hardly any. With less,
+    short cars are reported later.
+
+    Chosen on: judgement.
+    """
+    between_penalty: float = 4.0
+    """Log-likelihood that a vehicle loses where a near track is longer than one is wide and shorter than one is long.
+    With less, stalls are cars. With more, near cars that something hides in part are reported later.
+
+    Chosen on: as `whole_m`.
+    """
 
 
 @dataclass(frozen=True, slots=True)
