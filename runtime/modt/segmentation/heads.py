@@ -45,20 +45,16 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
     near = square_m2 < tuning.reach_m * tuning.reach_m
     nearest = square_m2.argmin(axis=0)
     lower = _is_lower(at, high, square_m2.min(axis=0), tuning)
-    heads = []  # rows of peaks
     reach_m2 = np.zeros(len(peaks))  # cells of a peak that is nothing stay
     for k, peak in enumerate(peaks):
         own = (nearest == k) & lower
-        if not (lower[peak] and _stands(at, low, high, entries, own, near[k], peak, tuning)):
-            continue
-        heads.append(k)
-        shoulders = own & near[k] & (high > high[peak] - np.float32(tuning.shoulders_m))
-        is_post = _extent_m(at[:, shoulders]) < tuning.min_shoulders_m
-        reach_m2[k] = (tuning.post_reach_m if is_post else tuning.reach_m) ** 2
-    if not heads:
-        return person
+        if lower[peak]:
+            reach_m2[k] = _reach_m2(at, low, high, entries, own, near[k], peak, tuning)
+    heads = reach_m2.nonzero()[0]
     # Peaks come from the highest on, so something higher than a person is the first of them.
-    is_divided = len(heads) > 1 or not lower[peaks[0]] or _pushes(at, high, entries, peaks[heads[0]], tuning)
+    is_divided = len(heads) > 1
+    if len(heads) == 1:
+        is_divided = not lower[peaks[0]] or _pushes(at, high, entries, peaks[heads[0]], tuning)
     if not is_divided:
         return person
     person_of_peak = np.full(len(peaks), NONE)
@@ -68,14 +64,22 @@ def find_people(x: Float32, y: Float32, low: Float32, high: Float32, entries: In
     return person
 
 
-def _stands(
+def _reach_m2(
     at: Float64, low: Float32, high: Float32, entries: Int, own: Bool, near: Bool, peak: int, tuning: HeadTuning
-) -> bool:
-    """Whether a peak is of a person or a post, given its own cells (m,) and the cells near it (m,)."""
+) -> float:
+    """Square of the distance within which cells belong to a peak [m2]; 0 where it is neither a person nor a post.
+
+    The peak is given with its own cells (m,) and the cells near it (m,).
+    """
     body = own & near
     top = own & (high > high[peak] - tuning.head_height_m)
     stands = low[body].min() < tuning.max_bottom_m and entries[body].sum() >= tuning.min_points
-    return bool(stands and _extent_m(at[:, top]) < tuning.max_head_m)
+    if not (stands and _extent_m(at[:, top]) < tuning.max_head_m):
+        return 0.0
+    shoulders = body & (high > high[peak] - np.float32(tuning.shoulders_m))
+    is_post = _extent_m(at[:, shoulders]) < tuning.min_shoulders_m
+    reach_m = tuning.post_reach_m if is_post else tuning.reach_m
+    return reach_m * reach_m
 
 
 def _is_lower(at: Float64, high: Float32, peak_m2: Float64, tuning: HeadTuning) -> Bool:
