@@ -251,7 +251,7 @@ class DecisionTuning:
 
     Chosen on: as `min_lookalike`.
     """
-    lookalike_start: float = 100.0
+    lookalike_start: float = 200.0
     """Weight of the usual scene at the start, as a number of proposals. With more, vines are people for longer.
 
     Chosen on: as `min_lookalike`.
