@@ -98,7 +98,7 @@ def check(declared: Field[Any], value: object) -> None:
     key = declared.name
     kind = str(declared.type)
     bounds = declared.metadata
-    if value is None and "None" in kind:
+    if not bounds or (value is None and "None" in kind):
         return
     if "options" in bounds:
         if value not in bounds["options"]:
@@ -518,3 +518,15 @@ class ProfileConfig:
         by_energy = stage.energy_mJ_per_frame
         limits = [stage.cpu_ms_per_frame, None if by_energy is None else by_energy / self.energy.active_W]
         return min((limit for limit in limits if limit is not None), default=None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadSensor(MountedSensor):
+    """One of several sensors of a robot, with its profile as it was read together with that of the robot."""
+
+    read: ProfileConfig
+
+    @classmethod
+    def of(cls, mounted: MountedSensor, read: ProfileConfig) -> ReadSensor:
+        """A mounted sensor with its profile."""
+        return cls(**{f.name: getattr(mounted, f.name) for f in fields(mounted)}, read=read)

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from modt import assets
-from modt.config import MountedSensor, ProfileConfig, StageConfig, ValueRangeError, check, completed
+from modt.config import MountedSensor, ProfileConfig, ReadSensor, StageConfig, ValueRangeError, check, completed
 from modt.errors import MisuseError
 
 DEFAULT = "hdl-64e"
@@ -213,7 +213,19 @@ def resolve(names: Names = None) -> Resolved:
             line and the nearest valid key; profiles that extend one another in a circle.
     """
     layers = _layers((names,) if isinstance(names, str | Path) else names or ())
-    return Resolved(layers, _configured((*_assumed(layers), *layers), ProfileConfig()))
+    return Resolved(layers, _with_sensors(_alone(layers)))
+
+
+def _alone(layers: tuple[Layer, ...]) -> ProfileConfig:
+    """Configuration of layers, without the profiles of its sensors."""
+    return _configured((*_assumed(layers), *layers), ProfileConfig())
+
+
+def _with_sensors(config: ProfileConfig) -> ProfileConfig:
+    """A configuration with the profiles of its sensors."""
+    read = [_alone(_layers((mounted.profile,))) for mounted in config.sensors]
+    sensors = tuple(ReadSensor.of(mounted, own) for mounted, own in zip(config.sensors, read, strict=True))
+    return replace(config, sensors=sensors)
 
 
 def _assumed(layers: Sequence[Layer]) -> tuple[Layer, ...]:
@@ -237,13 +249,17 @@ def _assumed(layers: Sequence[Layer]) -> tuple[Layer, ...]:
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
     """Configuration of a YAML text and of the profiles that it extends; raises as `resolve` does."""
     layers = _chain(read(text, origin, str(origin)), Path(origin), ())
-    return _configured(tuple(layers.values()), ProfileConfig())
+    return _with_sensors(_configured(tuple(layers.values()), ProfileConfig()))
 
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
     """A profile as plain data, with all defaults and tuples as lists."""
     stages = asdict(config)
-    sensors = {sensor.pop("name"): _listed(sensor) for sensor in stages.pop(SENSORS)}
+    sensors = {}
+    for sensor in stages.pop(SENSORS):
+        sensor.pop("read", None)  # its name is written
+        name = sensor.pop("name")
+        sensors[name] = _listed(sensor)
     plain = {stage: _listed(values) for stage, values in stages.items()}
     return {**plain, SENSORS: sensors} if sensors else plain
 

@@ -251,6 +251,28 @@ def test_a_sink_records_and_status_that_fail_cost_no_frame(broken, kind):
     assert live.failures.in_a_row == 0
 
 
+@pytest.mark.parametrize("error", [MisuseError("model", "gone", "restore it"), OSError("disk")])
+@pytest.mark.parametrize("broken", ["choose_profile", "adapt", "recover"])
+def test_files_that_are_gone_while_the_service_runs_cost_no_frame_and_are_said(broken, error, caplog):
+    live = Live(2.0, fails={3: RuntimeError("its frame")} if broken == "recover" else {})
+    getattr(live.stages, broken).side_effect = error
+    live.run()
+    assert len(live.seen) == 20 - (broken == "recover")
+    kind = f"{'recovery' if broken == 'recover' else 'profile'}: {type(error).__name__}"
+    assert live.failures.counts[kind] == (20 if broken == "adapt" else 1)
+    assert caplog.text.count(f"{kind}; later ones are only counted") == 1
+
+
+def test_a_reload_that_fails_in_any_way_is_refused_and_said(caplog):
+    live = Live(2.0)
+    live.stages.reload = Mock(side_effect=OSError("disk"))
+    live.stop.take_reload = Mock(side_effect=[True, *[False] * 99])
+    live.run()
+    assert len(live.seen) == 20
+    assert (live.service.reloads, live.service.refused_reloads) == (0, 1)
+    assert "disk; the profile before stays in use" in caplog.text
+
+
 def test_a_log_has_one_line_a_second_of_each_kind():
     now_s = [0.0]
     limit = OncePerSecond(lambda: now_s[0])

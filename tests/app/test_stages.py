@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from modt import profile
+from modt import assets, profile
 from modt.app.chosen_profile import FOUND, choose
 from modt.app.inputs import Request
 from modt.app.stages import Stages
@@ -122,6 +122,104 @@ def test_a_profile_is_read_at_the_start_and_at_reloads_alone(tmp_path):
     assert stages.config.sensor.height_m == 1.5
     with pytest.raises(MisuseError, match="hight_m"):
         stages.reload()
+
+
+@pytest.fixture
+def installation(monkeypatch):
+    """Takes away the files of the installation, and gives them back."""
+    there = assets._ROOTS
+
+    def switch(*, gone):
+        monkeypatch.setattr(assets, "_ROOTS", () if gone else there)
+
+    return switch
+
+
+def awaited(stages, frame):
+    """Adapt to a sweep of some time, after the comparison that this begins."""
+    stages.adapt(frame)
+    if stages.comparison is not None:
+        stages.comparison.join()
+    stages.adapt(frame)
+
+
+def test_a_first_sweep_that_cannot_be_compared_keeps_the_profile_and_a_later_one_is(installation):
+    stages = stages_of(profile=None)
+    began_with = stages.chosen
+    first = frames()[0]
+    installation(gone=True)
+    with pytest.raises(MisuseError, match="installation"):
+        stages.choose_profile(first)
+    assert stages.chosen is began_with
+    assert "cannot be compared" in stages._findings()["profile"].cause
+    assert len(stages.step(first, UNLIMITED, reduced=False).proposals)
+    with pytest.raises(MisuseError, match="installation"):
+        awaited(stages, dataclasses.replace(first, steady_s=2.0))
+    installation(gone=False)
+    awaited(stages, dataclasses.replace(first, steady_s=4.0))
+    assert stages.chosen.recognition.differences
+    assert not stages._findings()
+    assert stages.misfits == 0
+
+
+def test_an_exchanged_sensor_that_cannot_be_compared_is_said_until_it_can(installation):
+    stages = stages_of(profile=None)
+    first = frames()[0]
+    stages.choose_profile(first)
+    chosen = stages.chosen
+    assert not stages._findings()
+    other, *_ = SyntheticStream("street", "hdl-64e", 0.1, 0)
+    installation(gone=True)
+    stages.trust.watch.compare_profiles = True
+    with pytest.raises(MisuseError, match="installation"):
+        awaited(stages, dataclasses.replace(other, steady_s=2.0))
+    assert stages.chosen is chosen
+    assert "cannot be compared" in stages._findings()["profile"].cause
+    stages.step(dataclasses.replace(other, T_world_sensor=None), UNLIMITED, reduced=False)
+    installation(gone=False)
+    awaited(stages, dataclasses.replace(other, steady_s=4.0))
+    assert stages.chosen is not chosen
+    assert "another sensor" in stages._findings()["profile"].cause
+
+
+def test_stages_that_cannot_be_renewed_go_on_without_tracks(installation):
+    stages = stages_of()
+    before = [stages.step(frame, UNLIMITED, reduced=False) for frame in frames()[:5]]
+    installation(gone=True)
+    with pytest.raises(MisuseError, match="installation"):
+        stages.recover(anew=True)
+    after = stages.step(frames()[5], UNLIMITED, reduced=False)
+    assert not set(after.tracks.id.tolist()) & {i for r in before for i in r.tracks.id.tolist()}
+
+
+def test_a_reload_that_fails_changes_nothing(installation):
+    stages = stages_of()
+    stages.choose_profile(frames()[0])
+    chosen = stages.chosen
+    pipeline = stages.pipeline
+    installation(gone=True)
+    with pytest.raises(MisuseError, match="installation"):
+        stages.reload()
+    assert stages.chosen is chosen
+    assert stages.pipeline is pipeline
+    installation(gone=False)
+    stages.reload()
+
+
+def test_profiles_of_several_sensors_are_read_at_the_start_and_at_reloads_alone(tmp_path):
+    own = tmp_path / "corner.yaml"
+    own.write_text("extends: vlp-16")
+    robot = tmp_path / "robot.yaml"
+    mounted = f"{{profile: {own}, position_m: [0, 0, 0.8]}}"
+    robot.write_text(f"sensors: {{one: {mounted}, other: {mounted}}}")
+    stages = stages_of(profile=(robot,))
+    own.write_text("extends: vlp-61")
+    sweep = frames()[0]
+    stages.choose_profile(dataclasses.replace(sweep, sweeps=(sweep, sweep)))
+    stages.recover(anew=True)
+    with pytest.raises(MisuseError, match="vlp-61"):
+        stages.reload()
+    assert profile.dump(stages.config)["sensors"]["one"]["profile"] == str(own)
 
 
 def test_a_reload_keeps_the_sensor_that_the_first_sweep_showed():

@@ -25,6 +25,7 @@ from modt.config import (
     FusionConfig,
     MountedSensor,
     ProfileConfig,
+    ReadSensor,
     SensorConfig,
 )
 from modt.config import NUMPY as NUMPY_NAME
@@ -179,12 +180,12 @@ def view(
 
 
 def sensor_profile(mounted: MountedSensor) -> ProfileConfig:
-    """The profile of one of several sensors, with its mount.
+    """The profile of one of several sensors with its mount, as it was read, or from disk if it was not.
 
     Raises:
         MisuseError: there is no such profile, or it cannot be used.
     """
-    config = load_profile(mounted.profile)
+    config = mounted.read if isinstance(mounted, ReadSensor) else load_profile(mounted.profile)
     return replace(config, sensor=mounted.mounted(config.sensor))
 
 

@@ -6,6 +6,7 @@ import logging
 from dataclasses import dataclass, replace
 
 from modt import profile
+from modt.app.assembly import sensor_profile
 from modt.config import ProfileConfig
 from modt.profile import Resolved
 from modt.sensor_fit.recognition import Recognition, recognise
@@ -86,9 +87,9 @@ def _several(config: ProfileConfig, names: tuple[str, ...], first: Frame | None)
     differences: list[str] = []
     sweeps = first.sweeps if first is not None and first.sweeps else (None,) * len(config.sensors)
     for mounted, sweep in zip(config.sensors, sweeps, strict=True):
-        own = profile.load(mounted.profile)
-        own = replace(own, sensor=mounted.mounted(own.sensor))
-        found = _compared(sweep, own, f"{mounted.profile} of sensor {mounted.name}", replaced=False)
+        found = _compared(
+            sweep, sensor_profile(mounted), f"{mounted.profile} of sensor {mounted.name}", replaced=False
+        )
         differences += [] if found.fits else [f"{mounted.name}: {difference}" for difference in found.differences]
     of_sensors = " + ".join(mounted.profile for mounted in config.sensors)
     return ChosenProfile(config, of_sensors, names, Recognition(tuple(differences), None, config))

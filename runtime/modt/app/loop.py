@@ -46,6 +46,7 @@ log = logging.getLogger(__name__)
 WAIT_S = 0.2
 """Longest wait for a sweep without a check of the signals and the watchdog [s]."""
 RECORDING = "recording"
+PROFILE = "profile"
 UNLESS_BLIND = "unless_blind"
 """Value of trust.results that withholds the results from the sinks while the trust is blind."""
 REPORT_S = 1.0
@@ -142,7 +143,7 @@ class Loop:
         first = next(sweeps, None)
         if first is None:
             return
-        self.stages.choose_profile(first.frame, self.source.profile)
+        self.failures.contain(PROFILE, self.stages.choose_profile, first.frame, self.source.profile)
         for received in chain([first], sweeps):
             if self.deadlines.admit(received.arrived_s):
                 self._process(received)
@@ -180,11 +181,11 @@ class Loop:
         except Exception as error:
             self.stages.ledger.close_frame(received.frame.index)
             self.failures.fail(error, "frame")
-            self.stages.recover(anew=self.failures.in_a_row == RENEW_AFTER)
+            self.failures.contain("recovery", self.stages.recover, anew=self.failures.in_a_row == RENEW_AFTER)
             return
         self.failures.succeed()
         self.deadlines.finish(received.arrived_s, line)
-        self.stages.adapt(received.frame)
+        self.failures.contain(PROFILE, self.stages.adapt, received.frame)
 
     def _step(self, received: Received) -> LedgerLine:
         """Run the stages, then the sinks, which cost no frame if they fail; returns the frame's ledger line."""
@@ -297,13 +298,14 @@ class Service(Loop):
             self._reload(notifier)
 
     def _reload(self, notifier: Notifier) -> None:
-        """Take over the profile from disk. An invalid one is refused, and counted."""
+        """Take over the profile from disk. One that cannot be used is refused, and counted."""
         notifier.reloading()
         try:
             self.stages.reload()
-        except ModtError as error:
+        except Exception as error:
             self.refused_reloads += 1
-            log.error("%s; the profile before stays in use", error)
+            traceback = None if isinstance(error, ModtError) else error
+            log.error("%s; the profile before stays in use", error, exc_info=traceback)
         else:
             self.reloads += 1
             log.warning("profile loaded again")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -79,7 +80,9 @@ class Stages:
         self.misfits = 0
         self.read: dict[str, Any] | None = None  # account of what was read, at the end
         self.comparison: Thread | None = None
-        self._chosen_by_thread: list[tuple[Frame | None, ChosenProfile]] = []  # chosen by the thread `comparison`
+        # Found by the thread `comparison`: the sweep and its profile, or why there is none
+        self._found_by_thread: list[tuple[Frame | None, ChosenProfile] | Exception] = []
+        self._failure: Exception | None = None  # of the last comparison with the profiles
         self._compared_s = 0.0  # time of the sweep that was last compared with the profiles
         self._continuity = assembly.Continuity()
         self._requested = profile.resolve(request.profile)
@@ -106,15 +109,21 @@ class Stages:
         return self._mode.budget(self.config)
 
     def choose_profile(self, first: Frame, named: str | None = None) -> None:
-        """Use the profile that fits the first sweep; `named` is the profile that the messages of the sensor name."""
-        self._chosen_for = first
+        """Use the profile that fits the first sweep; `named` is the profile that the messages of the sensor name.
+
+        Raises:
+            ModtError: a file of the installation or of the profile cannot be used. The profile stays in use, and
+                `adapt` compares a later sweep.
+        """
         self._info = replace(self._info, profile=named or self._info.profile)
-        chosen = self._choose(first)
-        self._began_with = first, chosen
-        if chosen.config == self.config:
-            self.chosen = chosen
-        else:
-            self._use(chosen)
+        with self._remembering_failure():
+            chosen = self._choose(first)
+            if chosen.config == self.config:
+                self.chosen = chosen
+            else:
+                self._use(chosen)
+            self._chosen_for = first
+            self._began_with = first, chosen
 
     def step(self, frame: Frame, budget: Budget, *, reduced: bool) -> FrameResult:
         """Process a frame, and judge how far its result can be believed.
@@ -131,7 +140,12 @@ class Stages:
         """What is held against source and profile, and what the odometry holds against its poses."""
         findings = dict(self.source_findings)
         recognition = self.chosen.recognition
-        if not self.chosen.fits:
+        if self._failure is not None:
+            cause = f"the sweeps cannot be compared with the profiles: {self._failure}"
+            findings["profile"] = Finding(
+                TrustLevel.DEGRADED, cause, "restore the files of modt, its profiles and models"
+            )
+        elif not self.chosen.fits:
             cause = f"the sweeps do not fit the profile {self.chosen.sensor}: {', '.join(recognition.differences)}"
             findings["profile"] = Finding(TrustLevel.DEGRADED, cause, "give the profile of this sensor")
         elif self.config.sensor != self._began_with[1].config.sensor:
@@ -147,15 +161,18 @@ class Stages:
         """Adapt to a changed sensor between two frames. The comparison is slow, so a thread makes it.
 
         A sensor that was knocked or turned keeps its profile: one that fits the view from there would hide that.
-        After an exchange sweeps are compared at intervals, as the exchange may be the effect of a fault that ends.
+        After an exchange sweeps are compared at intervals, as the exchange may be the effect of a fault that ends,
+        and after a failure until a comparison succeeds.
+
+        Raises:
+            Exception: the comparison failed. The present profile stays in use.
         """
         watch = self.trust.watch
-        exchanged = self.chosen is not self._began_with[1]
-        wanted = watch.compare_profiles or (exchanged and frame.time_s - self._compared_s >= RECOMPARED_S)
-        if self._chosen_by_thread:
-            self.misfits += 1
-            self._chosen_for, chosen = self._chosen_by_thread.pop()
-            self._use(chosen)
+        unsettled = self._failure is not None or self.chosen is not self._began_with[1]
+        wanted = watch.compare_profiles or (unsettled and frame.time_s - self._compared_s >= RECOMPARED_S)
+        if self._found_by_thread:
+            with self._remembering_failure():
+                self._follow(self._found_by_thread.pop())
         elif wanted and not watch.displaced and self._live and not self._thread_runs:
             watch.compare_profiles = False
             self._compared_s = frame.time_s
@@ -168,19 +185,24 @@ class Stages:
         return self.comparison is not None and self.comparison.is_alive()
 
     def recover(self, *, anew: bool) -> None:
-        """Restore the tracks of the last good frame; with `anew` make new stages without tracks."""
+        """Restore the tracks of the last good frame; with `anew` make new stages without tracks.
+
+        Raises:
+            ModtError: the model cannot be used, so the stages stay, without tracks.
+        """
         if not anew:
             self._continuity.tracks.roll_back()
             return
-        self._continuity.odometry = None
         self._continuity.tracks.clear()
-        self.pipeline = self._new_pipeline(self.config)
+        continuity = assembly.Continuity(self._continuity.tracks)
+        self.pipeline = self._new_pipeline(self.config, continuity)
+        self._continuity = continuity
 
     def reload(self) -> None:
         """Use the profile as it is on disk now; the tracks are kept.
 
         Raises:
-            ModtError: it is not valid; nothing has changed.
+            Exception: it cannot be used; nothing has changed.
         """
         requested = profile.resolve(self.request.profile)
         chosen = choose(requested, self._chosen_for, self._info)
@@ -189,6 +211,7 @@ class Stages:
         self._use(chosen)
         self._requested = requested
         self._began_with = self._chosen_for, chosen
+        self._failure = None
 
     def facts(self, core: int | None, command: Sequence[str]) -> dict[str, Any]:
         """Content of run.yaml."""
@@ -225,23 +248,57 @@ class Stages:
             "profile": profile.dump(chosen.config),
         }
 
+    def _follow(self, found: tuple[Frame | None, ChosenProfile] | Exception) -> None:
+        """Use what a comparison has found."""
+        if isinstance(found, Exception):
+            raise found
+        sweep, chosen = found
+        if chosen is self.chosen:
+            return
+        self._use(chosen)
+        if self._chosen_for is None:  # no sweep before could be compared
+            self._began_with = found
+        else:
+            self.misfits += 1
+        self._chosen_for = sweep
+
+    @contextmanager
+    def _remembering_failure(self) -> Iterator[None]:
+        """Remember that a comparison with the profiles failed, which is a reason until another one succeeds."""
+        try:
+            yield
+        except Exception as error:
+            self._failure = error
+            raise
+        self._failure = None
+
     def _compare(self, frame: Frame) -> None:
         """Choose a profile anew if a sweep has other beams than the present one, or fits it as none did before."""
-        if recognise(frame.points, self.config).fits == self.chosen.fits:
-            return
-        back = recognise(frame.points, self._began_with[1].config).fits and self._began_with[1].fits
-        self._chosen_by_thread.append(self._began_with if back else (frame, self._choose(frame)))
+        try:
+            fits = recognise(frame.points, self.config).fits
+            if self._failure is None and fits == self.chosen.fits:
+                return
+            began_with = self._began_with[1]
+            compared = self._chosen_for is not None
+            back = compared and began_with.fits and recognise(frame.points, began_with.config).fits
+            self._found_by_thread.append(self._began_with if back else (frame, self._choose(frame)))
+        except Exception as error:
+            self._found_by_thread.append(error)
 
     def _choose(self, first: Frame | None) -> ChosenProfile:
         return choose(self._requested, first, self._info)
 
-    def _new_pipeline(self, config: ProfileConfig) -> Pipeline:
+    def _new_pipeline(self, config: ProfileConfig, continuity: assembly.Continuity | None = None) -> Pipeline:
         mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
         fov = inputs.field_of_view(self.request, self._info, mount)
-        return assembly.pipeline(self._mode, config, fov, self.ledger, self._continuity)
+        return assembly.pipeline(self._mode, config, fov, self.ledger, continuity or self._continuity)
 
     def _use(self, chosen: ChosenProfile) -> None:
-        """Exchange the stages for those of another profile; the tracks are kept."""
+        """Exchange the stages for those of another profile; the tracks are kept.
+
+        Raises:
+            Exception: they cannot be made; nothing has changed.
+        """
         self.pipeline = self._new_pipeline(chosen.config)
         if chosen.config.sensor != self.config.sensor and not self.trust.watch.displaced:
             self.trust.watch = _watch(chosen.config, self.trust.watch)
