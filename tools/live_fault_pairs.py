@@ -34,6 +34,7 @@ from modt_simulation.synthetic_stream import SyntheticStream
 from tools.deploy.faults import FAULTS, NO_FAULT
 from tools.deploy.sender import Faulty
 from tools.fault_pairs import CHANGES, SECONDS, SENSOR, Change, moved_by, overlapping, pair_options
+from tools.send.faults import Timed
 from tools.send.ideal_packets import packets_of
 from tools.send.loops import VelodyneStamps
 
@@ -177,18 +178,29 @@ class Sender:
             packets.connect(("127.0.0.1", self._ports[0]))
             poses.connect(("127.0.0.1", self._ports[1]))
             self.began_s = self._wait(packets, poses, waiting)
-            said = 0
-            times_s = (self.began_s + k * PACKET_S for k in range(len(drive)))
-            timed = ((at_s, _stamped(payload, at_s)) for at_s, payload in zip(times_s, drive, strict=True))
             end = repeat((np.inf, bytes(PACKET_BYTES)))
-            for at_s, payload in self._faulty.applied(chain(timed, end)):
-                if np.isinf(at_s) or self.too_late:
+            for at_s, payload in self._faulty.applied(chain(self._drive(drive, given, poses), end)):
+                if np.isinf(at_s):
                     break
-                while said < min(int((at_s - self.began_s) / PERIOD_S), len(given) - 1):
-                    self._switch(said, said + 1)
-                    self._send_poses(poses, given[said : said + 2], self.began_s + said * PERIOD_S)
-                    said += 1
                 self._send_packet(packets, payload, at_s)
+
+    def _drive(self, drive: Sequence[bytes], given: Sequence[Frame], poses: socket.socket) -> Iterator[Timed]:
+        """Each packet of the drive at its time, after the poses and the faults that are due.
+
+        A fault that lets no packet through ends here, as this goes on meanwhile.
+        """
+        said = 0
+        for k, payload in enumerate(drive):
+            at_s = self.began_s + k * PACKET_S
+            self._await(at_s)
+            if self.too_late:
+                self._faulty.fault = NO_FAULT
+                return
+            while said < min(int((at_s - self.began_s) / PERIOD_S), len(given) - 1):
+                self._switch(said, said + 1)
+                self._send_poses(poses, given[said : said + 2], self.began_s + said * PERIOD_S)
+                said += 1
+            yield at_s, _stamped(payload, at_s)
 
     def _wait(self, packets: socket.socket, poses: socket.socket, waiting: Sequence[bytes]) -> float:
         """Send sweeps of the beginning until the run is ready; returns the stamp of the next packet."""
@@ -205,9 +217,12 @@ class Sender:
 
     def _send_packet(self, to: socket.socket, payload: bytes, at_s: float) -> None:
         """Send a packet at its time."""
+        self._await(at_s)
+        _send(to, payload)
+
+    def _await(self, at_s: float) -> None:
         time.sleep(max(at_s - time.time(), 0.0))
         self.latest_s = max(self.latest_s, time.time() - at_s)
-        _send(to, payload)
 
     def _switch(self, before: int, sweep: int) -> None:
         """Begin and end the faults of the network, and send the signals that are due."""

@@ -1,10 +1,12 @@
 """Verdicts over records of live runs with pairs of faults."""
 
 import json
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from modt.types import Frame
 from tools import live_fault_pairs
 from tools.live_fault_pairs import LIVE_FAULTS, NETWORK, PERIOD_S, LiveEpisode
 
@@ -56,3 +58,18 @@ def test_a_pair_overlaps_and_has_one_fault_of_the_network_at_most():
         one, other = live_fault_pairs.drawn(rng)
         assert one.begin < other.begin < one.end <= other.end
         assert not {one.fault.name, other.fault.name} <= NETWORK.keys()
+
+
+def test_a_silence_ends_though_no_packet_of_it_is_sent(monkeypatch):
+    """The faults and the poses go on with the packets of the sensor, not with those that arrive."""
+    frames = [Frame(k, PERIOD_S * k, np.zeros((1, 4), np.float32), np.eye(4)) for k in range(40)]
+    pair = (LiveEpisode(FAULTS["silence"], 10, 20), LiveEpisode(FAULTS["reload"], 15, 25))
+    signals = []
+    sender = live_fault_pairs.Sender(frames, pair, (1, 2), signals.append, lambda: True)
+    monkeypatch.setattr(sender, "_await", lambda at_s: None)
+    poses = Mock()
+    drive = [bytes(live_fault_pairs.PACKET_BYTES)] * (len(frames) * live_fault_pairs.PACKETS_PER_SWEEP)
+    sent = list(sender._faulty.applied(sender._drive(drive, frames, poses)))
+    assert len(sent) / live_fault_pairs.PACKETS_PER_SWEEP == pytest.approx(30, abs=0.2)
+    assert poses.send.call_count == live_fault_pairs.POSES_PER_SWEEP * (len(frames) - 1)
+    assert len(signals) == 1
