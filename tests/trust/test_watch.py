@@ -137,7 +137,11 @@ def test_a_knock_under_a_cover_is_reported_when_the_cover_is_gone():
 
 @pytest.mark.parametrize(
     ("name", "second", "key"),
-    [("turned by 90 deg", "rolled by 15 deg", "ground"), ("a fifth farther", "turned by 90 deg", "scene")],
+    [
+        ("turned by 90 deg", "rolled by 15 deg", "ground"),
+        ("a fifth farther", "turned by 90 deg", "scene"),
+        ("half the view", "every second point", "returns"),
+    ],
 )
 def test_a_fault_that_begins_during_another_one_is_reported_by_itself_and_withdrawn(name, second, key):
     """The robot drives on for 7 s, so the scene before both is out of view when they end."""

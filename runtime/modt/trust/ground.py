@@ -30,7 +30,9 @@ KNOWN_SHARE = 0.35
 """Share of the limits within which it is the known one, as seen from another place; hills come near it by chance."""
 UNSEEN_FACTOR = 2.5
 """Multiple of the limits by which the ground has moved if the sensor went on while nothing was seen."""
-LEFT_SHARE = 0.25
+WITHDRAWN_S = 60.0
+"""Time for which a step is known that was taken for back, as the ground looked like the one before it [s]."""
+LEFT_SHARE = 0.35
 """Share of a step that another one may leave, as the ground has another shape elsewhere."""
 OUT_OF_VIEW = np.array([np.inf, 0.0, 0.0])
 """Step of a ground that is no longer seen where it was."""
@@ -46,6 +48,7 @@ class GroundCheck:
     Attributes:
         plane: (3,) the ground z = plane @ (1, x, y).
         phrase: how the ground has moved at once, in words; empty if it has not, or is back.
+        undone: whether a step at the last look was the way back from one that was taken for back too early.
     """
 
     def __init__(self, tuning: GroundTuning, height_m: float | None) -> None:
@@ -53,10 +56,12 @@ class GroundCheck:
         self.plane = np.array([-(height_m or 1.0), 0.0, 0.0])
         self._profile_z_m = self.plane[0]
         self.phrase = ""
+        self.undone = False
         self._offset = np.zeros(3)  # plane by which it is moved
         self._greatest = 0.0  # greatest size that it had
         self._before: Sample | None = None  # the last sweep before that
         self._looks = 0  # in a row in which it is back
+        self._withdrawn: tuple[float, Float64] | None = None  # time and offset of one that was taken for back
         self._known_looks = 0  # in a row in which enough of the lowest returns lie on the plane
 
     def learn(self, sample: Sample) -> None:
@@ -91,6 +96,7 @@ class GroundCheck:
             pairs: sweeps since `first`, each with the one that came soon after it.
             back_looks: number of looks in a row in which it has to be back.
         """
+        self.undone = False
         if not self._known:
             return
         if self._size(_moved_between(first, now)) >= self._least():
@@ -100,7 +106,9 @@ class GroundCheck:
         as_before = self._size(_moved_between(self._before, now)) < BACK_SHARE
         is_back = as_before or self._size(self._from_plane(now)) < KNOWN_SHARE
         self._looks = self._looks + 1 if is_back else 0
-        if self._looks >= back_looks or self._size(self._offset) < max(1.0, LEFT_SHARE * self._greatest):
+        undone = self._is_undone(self._offset, self._greatest)
+        if self._looks >= back_looks or undone:
+            self._withdrawn = None if undone else (now.time_s, self._offset)
             self.phrase = ""
             self._before = None
 
@@ -111,6 +119,12 @@ class GroundCheck:
         steps = (_moved_between(before, now), self._from_plane(now))
         if min(self._size(step) for step in steps) >= (1.0 if same_place else UNSEEN_FACTOR):
             self._add([(before, now)])
+
+    def forget_step_within(self, begin_s: float, end_s: float) -> None:
+        """Forget a step that began in some time. A turned scene on a slope moves the ground as well."""
+        if self._before is not None and begin_s <= self._before.time_s < end_s:
+            self.phrase = ""
+            self._before = None
 
     def _from_plane(self, sample: Sample) -> Float64:
         """Plane (3,) by which most cells of a sweep are off the known ground; OUT_OF_VIEW if few have any."""
@@ -125,6 +139,10 @@ class GroundCheck:
             step = _moved_between(before, after)
             if self._size(step) < self._least():
                 continue
+            if self._before is None and self._undoes_withdrawn(step, after.time_s):
+                self.undone = True
+                self.plane = self.plane + step  # it was learned while the sensor was moved
+                continue
             if self._before is None:
                 self._before = before
                 self._offset = np.zeros(3)
@@ -133,6 +151,18 @@ class GroundCheck:
             self._offset = self._offset + step
             self._greatest = max(self._greatest, self._size(self._offset))
             self.phrase = self._describe()
+
+    def _is_undone(self, left: Float64, greatest: float) -> bool:
+        """Whether hardly anything is left of a step of some greatest size."""
+        return self._size(left) < max(1.0, LEFT_SHARE * greatest)
+
+    def _undoes_withdrawn(self, step: Float64, now_s: float) -> bool:
+        """Whether a step is the way back from one that was taken for back too early, which is then forgotten."""
+        withdrawn = self._withdrawn
+        self._withdrawn = None
+        if withdrawn is None or now_s - withdrawn[0] > WITHDRAWN_S:
+            return False
+        return self._is_undone(withdrawn[1] + step, self._size(withdrawn[1]))
 
     def _least(self) -> float:
         """Least size of a step. A smaller one may undo another."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from modt.config import SensorConfig
-from modt.trust.sample import NEAREST_M, SECTORS, Sample, turn_of
+from modt.trust.sample import NEAREST_M, SECTORS, Sample, part_of_turn, turn_of
 from modt.trust.tuning import LastingTuning
 from modt.types import Bool, Float32, Float64, Int
 
@@ -113,7 +113,7 @@ class SectorHistory:
         """Look at the returns of a sweep."""
         tuning = self._tuning
         now_s = sample.time_s
-        count = np.bincount(_bearing(sample.turn), minlength=BEARINGS).astype(np.float64)
+        count = np.bincount(part_of_turn(sample.turn, BEARINGS), minlength=BEARINGS).astype(np.float64)
         if self._began_s is None:
             self._began_s = now_s
             self._usual = count
@@ -145,13 +145,8 @@ class SectorHistory:
         x, y, z = raw.T[:3]
         range_m = np.sqrt(x * x + y * y)
         near = (range_m > 0) & (range_m < self._near_m) & (z > -LEVEL_SHARE * range_m)
-        bearing = _bearing(turn_of(x[near], y[near]))
+        bearing = part_of_turn(turn_of(x[near], y[near]), BEARINGS)
         return bool(((bearing - first + BESIDE) % BEARINGS < n + 2 * BESIDE).any())
-
-
-def _bearing(turn: Float32) -> Int:
-    """(c,) part of a turn, of BEARINGS, in which each bearing [turns] lies."""
-    return (turn * np.float32(BEARINGS)).astype(np.int64) % BEARINGS
 
 
 def _within(sectors_deg: Sequence[float]) -> Bool:

@@ -85,11 +85,11 @@ class ReturnsCheck:
         n_expected = int(np.count_nonzero(expected))
         n_lost = int(np.count_nonzero(lost))
         blind = n_lost >= tuning.blind_share * max(n_expected, 1)
-        if not blind:  # few that are lost are none, whether they ended at once or not
-            enough = n_lost >= tuning.degraded_sectors
-            lost &= self._lost | self._ended(samples, usual, lost, 1) if enough else self._lost
+        enough = n_lost >= tuning.degraded_sectors  # few that are lost are none, whether they ended at once or not
+        self._lost = lost & (self._lost | self._ended(samples, usual, lost, 1) if enough else self._lost)
+        if not blind:
+            lost = self._lost
             n_lost = int(np.count_nonzero(lost))
-        self._lost = lost
         if n_lost < tuning.degraded_sectors:
             return None
         where = "any direction" if n_lost >= 0.9 * n_expected else sides(lost)

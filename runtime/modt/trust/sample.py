@@ -87,7 +87,7 @@ class Sample:
     @cached_property
     def sector(self) -> Int:
         """(c,) sectors of the returns."""
-        return (self.turn * np.float32(SECTORS)).astype(np.int64) % SECTORS
+        return part_of_turn(self.turn, SECTORS)
 
     @cached_property
     def seen(self) -> Bool:
@@ -124,6 +124,11 @@ def sample(frame: Frame, T_world_sensor: Float64, sensor: SensorConfig, plane: F
     raw = frame.points.take(rows, axis=0)
     reach_m = REACH_SHARE * sensor.max_range_m
     return Sample(frame.time_s, raw, reach_m, weight, plane, T_world_sensor, frame.R_level_sensor)
+
+
+def part_of_turn(turn: Float32, n: int) -> Int:
+    """(c,) part of a turn, of n, in which each bearing [turns] lies."""
+    return np.minimum((turn * np.float32(n)).astype(np.int64), n - 1)
 
 
 def turn_of(x: Float32, y: Float32) -> Float32:

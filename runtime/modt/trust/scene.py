@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import inverse, rotation_zyx, se3
-from modt.trust.sample import SECTORS, Sample, turn_of
+from modt.trust.sample import SECTORS, Sample, part_of_turn, turn_of
 from modt.trust.tuning import SceneTuning
 from modt.types import Bool, Float32, Float64, Int
 
@@ -98,12 +98,13 @@ class SceneCheck:
 
     Attributes:
         change: how the scene is changed since it was last believed.
+        before: the last sweep before the change, None if there is none.
     """
 
     def __init__(self, tuning: SceneTuning) -> None:
         self._tuning = tuning
         self.change = SAME
-        self._before: Sample | None = None  # the last sweep before the change
+        self.before: Sample | None = None
         self._agreed = 1.0  # share of the obstacle points that stood still at the last look
         self._looks = 0  # in a row in which the scene is back
 
@@ -129,13 +130,13 @@ class SceneCheck:
             least, pair = self._least_agreeing(pairs, agreed)
             if least < tuning.suspected:
                 self._explain(*pair, least, on_moved_ground=on_moved_ground)
-        if self._before is None:
+        if self.before is None:
             return
-        is_back = agreement(self._before, now, SAME) >= tuning.back or self._moves_as_before(first, now)
+        is_back = agreement(self.before, now, SAME) >= tuning.back or self._moves_as_before(first, now)
         self._looks = self._looks + 1 if is_back else 0
         if self._looks >= back_looks or self.change.is_none:
             self.change = SAME
-            self._before = None
+            self.before = None
 
     def _least_agreeing(
         self, pairs: Sequence[tuple[Sample, Sample]], agreed: float
@@ -172,15 +173,15 @@ class SceneCheck:
         if self.change.then(change).is_none:  # the way back
             needed = 0.0
         if share >= max(needed, least + tuning.better) and not change.is_none:
-            if self._before is None:
-                self._before = before
+            if self.before is None:
+                self.before = before
                 self._looks = 0
             self.change = self.change.then(change)
 
 
 def _cells(x: Float32, y: Float32, turn: Float32) -> Int:
     """(k,) cells of points, below 0 where they are beyond the grid."""
-    bearing = (turn * np.float32(BEARINGS)).astype(np.int64) % BEARINGS
+    bearing = part_of_turn(turn, BEARINGS)
     far = (np.log(np.maximum(x * x + y * y, FIRST_RANGE_M**2)) * np.float32(0.5 / LOG_STEP)).astype(np.int64)
     return np.where(far < RANGES, bearing * RANGES + far, -1)
 
@@ -204,7 +205,7 @@ def _in(cells: Int, seen: Bool) -> Int:
 def _grown(cells: Int) -> Bool:
     """(BEARINGS, RANGES) occupied cells, and those beside them."""
     grid = np.zeros((BEARINGS + 2, RANGES), np.bool_)
-    grid[1:-1].flat[cells] = True
+    grid[1:-1].reshape(-1)[cells] = True
     grid[0] = grid[-2]
     grid[-1] = grid[1]
     wide: Bool = grid[1:-1] | grid[:-2] | grid[2:]

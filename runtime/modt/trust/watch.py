@@ -202,8 +202,14 @@ class TrustWatch:
             self._samples[-1] = replace(self._samples[-1], plane=self._ground.present)
             pairs = [(first, self._samples[-1])]
         now = self._samples[-1]
-        on_moved_ground = moves or bool(self._ground.phrase)
+        if self._ground.undone:  # the returns were learned while the sensor was moved
+            self._returns = ReturnsCheck(self._tuning.returns)
+        on_moved_ground = moves or self._ground.undone or bool(self._ground.phrase)
+        changed_after = self._scene.before
         self._scene.look(first, now, pairs, self._tuning.back_looks, on_moved_ground=on_moved_ground)
+        if changed_after is not None and self._scene.change.is_none:
+            begin_s = changed_after.time_s
+            self._ground.forget_step_within(begin_s, begin_s + self._tuning.look_s)
 
     def _look_past(self, before: Sample, now: Sample) -> None:
         """Compare the sweeps before and after a time in which nothing was seen."""
