@@ -44,6 +44,9 @@ class SegmentationStage(Protocol):
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points."""
 
+    def leave_out(self, dead_deg: tuple[float, ...]) -> None:
+        """Take the beams of these elevations for dead, and all others for alive."""
+
     def facts(self) -> dict[str, str]:
         """Kernels of the segmenter, for the record of a run."""
 

@@ -13,6 +13,8 @@ from modt.app.inputs import Request
 from modt.app.stages import Stages
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
+from modt.geometry import rotation_zyx
+from modt.segmentation.segmenter import Segmenter
 from modt.trust.sample import REACH_SHARE
 from modt.trust.watch import TrustWatch
 from modt.types import NONE, UNLIMITED, Frame, TrustLevel
@@ -383,3 +385,17 @@ def test_a_displaced_sensor_keeps_its_profile_until_it_is_back(monkeypatch):
     monkeypatch.setattr(TrustWatch, "displaced", False)
     stages.adapt(frame)
     stages.comparison.join()
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 5.0], ids=["level", "tilted"])
+def test_a_dead_beam_is_left_out_while_the_sweeps_are_level(tilt_deg, monkeypatch):
+    stages = stages_of()
+    R_level_sensor = rotation_zyx(0.0, np.deg2rad(tilt_deg), 0.0) if tilt_deg else None
+    told = []
+    monkeypatch.setattr(TrustWatch, "dead_deg", (1.0,))
+    monkeypatch.setattr(Segmenter, "leave_out", lambda segmenter, dead_deg: told.append(dead_deg))
+    level = lambda frame: dataclasses.replace(frame, R_level_sensor=R_level_sensor)  # noqa: E731
+    monkeypatch.setattr(stages.pipeline.view.leveller, "level", level)
+    for frame in frames()[:2]:
+        stages.step(frame, UNLIMITED, reduced=False)
+    assert told == 2 * [() if tilt_deg else (1.0,)]

@@ -145,6 +145,19 @@ def test_the_points_of_a_ceiling(kernels):
     assert same(numpy.above_ground(points), native.above_ground(points))
 
 
+@given(seed=SEEDS, dead=st.sets(st.integers(0, 15), max_size=4))
+@settings(max_examples=30, deadline=None)
+def test_sweeps_with_dead_beams(kernels, seed, dead):
+    car = (4.2, 1.8, 0.2, 1.4)
+    points, _ = scans.scan([(9.0, 1.0, *car), (14.0, -3.0, *car)], 0.8, scans.VLP_16, seed=seed, step_deg=1.0)
+    sensor = profile.load("vlp-16").sensor
+    numpy, native = (Segmenter(SegmentationConfig(), sensor, FULL, each) for each in (NUMPY, kernels))
+    for each in (numpy, native):
+        each.leave_out(tuple(sensor.beam_elevations_deg[k] for k in dead))
+    assert same(numpy.above_ground(points), native.above_ground(points))
+    assert same(numpy.segment(points), native.segment(points))
+
+
 def test_every_value_of_the_tuning_reaches_both_kernels_alike(kernels):
     points = street(5, 3000)
     for part in dataclasses.fields(SegmentationTuning()):

@@ -113,6 +113,10 @@ class BlindSectorFilter:
         """Kernels of the segmenter."""
         return self.segmenter.facts()
 
+    def leave_out(self, dead_deg: tuple[float, ...]) -> None:
+        """Take the beams of these elevations for dead, and all others for alive."""
+        self.segmenter.leave_out(dead_deg)
+
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points."""
         kept = points.copy()

@@ -8,7 +8,8 @@
  *   5. smooth          medians across the rays: the ground under a vehicle is that beside it
  *   6. keep_points     points within bounds, with their heights, and low points that may belong to something
  *   7. append_low      those after the others
- * Before 3, measure_roughness tells how far above the ground a return is clear of it.
+ * Before 3, measure_roughness tells how far above the ground a return is clear of it, and reach_across raises the
+ * highest returns below gaps of dead beams.
  * Passes 1, 2 and 6 go by blocks of points that stay in the first-level cache. A value a cell stands at
  * ring * sectors + sector; the cell after the last stands for the points out of bounds of range.
  */
@@ -25,7 +26,8 @@ typedef struct {
     float max_rise_beside;
     float min_height_m, max_height_m, min_sqrt_range, max_sqrt_range; /* of the points that are used, exclusive */
     const i32 *low_sectors SHAPE(near_rings); /* sectors to the left and right that a low thing does not reach */
-    i32 near_rings, quarters;
+    i32 near_rings, quarters, n_gaps;
+    const float *gaps SHAPE(n_gaps, 4); /* of dead beams: tangents of the elevations of gaps.py */
     float low_m, clear_m, foot_share, min_foot_m;
 } Ground;
 
@@ -196,6 +198,17 @@ static void measure_roughness(const Ground *g, const GroundScratch *s, float *to
         for (i32 k = first; k < first + in_quarter; k++)
             s->clear[k] = clear_m;
     }
+}
+
+/* GroundEstimator._across_gaps, of n points. */
+static void reach_across(const Ground *g, const GroundScratch *s, i64 n)
+{
+    for (const float *gap = g->gaps; gap < g->gaps + 4 * g->n_gaps; gap += 4) /* EDGE, FIRST, LAST and TOP */
+        for (i64 i = 0; i < n; i++) {
+            float range_m = s->sqrt_range[i] * s->sqrt_range[i], *highest = &s->ends[s->cell[i]][1];
+            int is_below = (s->z[i] > range_m * gap[0]) & (s->z[i] < range_m * gap[1]);
+            *highest = is_below ? minf(-(range_m * gap[2]), *highest) : *highest;
+        }
 }
 
 /* _position of ground.py: position of the lowest return of a cell in its ring, from 0 to 1. */
@@ -493,6 +506,7 @@ EXPORT void modt_above_ground(const Ground *g, const u4 *points, i64 n, float he
         find_ends(g, height_m, m, s->z + i, s->sqrt_range + i, s->cell + i, s->ends);
     }
     measure_roughness(g, s, out->top);
+    reach_across(g, s, n);
     for (i64 k = (i64)g->bonnet_ring * g->sectors; k < cells - g->sectors; k++) /* far away, right behind it */
         s->ends[k][1] = minf(s->ends[k][1], s->ends[k + g->sectors][1]);
     trace(g, height_m, s);

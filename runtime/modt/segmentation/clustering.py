@@ -9,8 +9,9 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.cells import CellClusterer, Cells, Clusters, ClusterSizes, moved
+from modt.segmentation.gaps import NO_GAPS, unseen_m
 from modt.segmentation.grids import PointColumns
-from modt.segmentation.groups import consecutive
+from modt.segmentation.groups import consecutive, label_max
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.porosity import PorosityFinder
 from modt.segmentation.strips import ELEVATION
@@ -44,6 +45,7 @@ class Clusterer:
         self.kernels = kernels
         self.config = config
         self.beams = sensor.beams
+        self.gaps = NO_GAPS  # of dead beams
         self.cells = CellClusterer(sensor, config, tuning.cells, tuning.split, tuning.structure, tuning.clusters)
         self.porosity = PorosityFinder(sensor, self.cells.fine, tuning.porosity)
         self.tuning = tuning.porosity
@@ -69,9 +71,11 @@ class Clusterer:
         cluster, sizes = self.kernels.cluster(self.cells, found.cells, found.sampled, found.air.beam_m)
         cluster, sizes = self._people_split_off(cluster, sizes, found.cells, found.sampled, found.air.beam_m)
         found = replace(found, cluster_of_cell=cluster, n=len(sizes))
-        strip = ((self._kind(sizes) == PointKind.MEMBER) | ~sizes.of_oversized) & self.may_be_strips(sizes)
+        unseen_m = self._unseen_m(found)
+        is_member = self._kind(sizes, unseen_m) == PointKind.MEMBER
+        strip = (is_member | ~sizes.of_oversized) & self.may_be_strips(sizes)
         target = self._merged(found, strip)
-        kind = self._kind(sizes.merged(target))
+        kind = self._kind(sizes.merged(target), unseen_m)
         target_of_cell = target.take(cluster)
         is_porous = self.kernels.mean_solidity(found, target_of_cell, len(kind)) < self.tuning.min_cluster_solidity
         kind[is_porous] = kind_of_porous
@@ -135,12 +139,19 @@ class Clusterer:
             target[cluster_of_strip] = cluster_of_strip[first_strip]
         return target
 
-    def _kind(self, sizes: ClusterSizes) -> Int8:
+    def _unseen_m(self, clusters: Clusters) -> Float32 | float:
+        """(G,) height by which each cluster may be taller than what is seen, across a gap of a dead beam [m]."""
+        if not len(self.gaps):
+            return 0.0
+        of_cell = unseen_m(self.gaps, clusters.sampled)
+        return np.maximum(label_max(of_cell, clusters.cluster_of_cell, clusters.n), np.float32(0.0))
+
+    def _kind(self, sizes: ClusterSizes, unseen_m: Float32 | float = 0.0) -> Int8:
         """(G,) PointKind: MEMBER of an object's size. A part of an oversized cluster must stand out from it."""
         config = self.config
         oversized = sizes.extent_m >= config.max_extent_m
         stands_out = (sizes.top_m >= self.valid.min_part_top_m) & (sizes.points >= self.valid.min_part_points)
-        tall = sizes.top_m - sizes.bottom_m >= config.min_height_m
+        tall = sizes.top_m - sizes.bottom_m + unseen_m >= config.min_height_m
         line = (sizes.points >= self.valid.min_line_points) & (sizes.top_m > self.valid.min_line_top_m)
         kind = np.full(len(sizes), PointKind.MEMBER, np.int8)
         kind[~(tall | line)] = PointKind.LOW

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import SensorConfig
+from modt.segmentation.gaps import EDGE, FIRST, LAST, NO_GAPS
 from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid
 from modt.segmentation.groups import label_max, label_min
 from modt.segmentation.tuning import GroundTuning, PolarGridTuning, SensorHeightTuning
@@ -88,13 +89,15 @@ class GroundEstimator:
     Behind a crest or an edge, the foot of what stands there is hidden. Where something stands more than `near_m` from
     the last ground, and the lowest return of its cell is below the line of the ray, the ground is taken to be
     `hidden_m` lower, unless ground on a ray beside it is as high. The surface lies above no lowest return of a cell
-    in which something stands.
+    in which something stands. Something may stand in a cell with a return of the beam below a dead one, up to where
+    that beam would have met it.
 
     Args:
         sensor: range.
         max_slope_deg: greatest change of the slope of the ground.
         tuning: bounds on ground that continues that of a ray.
         polar: cells of the polar grid.
+        gaps: (n, 4) gaps of dead beams (`modt.segmentation.gaps`).
     """
 
     def __init__(
@@ -103,8 +106,10 @@ class GroundEstimator:
         max_slope_deg: float,
         tuning: GroundTuning = GroundTuning(),
         polar: PolarGridTuning = PolarGridTuning(),
+        gaps: Float32 = NO_GAPS,
     ) -> None:
         self.tuning = tuning
+        self.gaps = gaps
         self.grid = PolarGrid(sensor.max_range_m, polar)
         self.flat_m: Float32 = self.grid.flat_m.astype(np.float32)
         self.bonnet_ring = int(np.searchsorted(self.grid.range_m, tuning.bonnet_range_m))
@@ -112,6 +117,7 @@ class GroundEstimator:
         self.depth_m: Float32 = np.diff(self.grid.edge_m)
         self.depth_m[self.bonnet_ring :] *= 2
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
+        self.max_sqrt_range = np.float32(np.sqrt(sensor.max_range_m))
         # (near rings,) sectors to the left and right of a cell that a low thing does not reach.
         near_m = self.grid.range_m[self.grid.range_m < tuning.low_range_m]
         sectors = np.rint(tuning.low_half_width_m / (2 * np.pi / SECTORS * near_m))
@@ -136,7 +142,8 @@ class GroundEstimator:
         lowest = self._lowest(points, cell, sensor_height_m)
         highest = label_max(points.z, cell, self.grid.size).reshape(-1, SECTORS)
         clear_m = self.clear_m(lowest, highest)
-        rays = self.trace(lowest, self._tops(highest), sensor_height_m)
+        tops = self._tops(self._across_gaps(points, cell, highest))
+        rays = self.trace(lowest, tops, sensor_height_m)
         is_ramp = rays.is_ramp
         surface = _median_across(self._interpolate(rays.lowest, rays.is_ground, rays.end_slope, sensor_height_m))
         # The ground under a vehicle, and under what stands on a ramp, is that of the rays beside it.
@@ -207,6 +214,19 @@ class GroundEstimator:
         sqrt_range = (ring.astype(np.float32) + _position(lowest)) * np.float32(self.grid.ring_step)
         range_m: Float32 = sqrt_range * sqrt_range
         return range_m
+
+    def _across_gaps(self, points: PointColumns, cell: Int, highest: Float32) -> Float32:
+        """(rings, SECTORS) height up to which something may stand in each cell, given its highest return [m]."""
+        if not len(self.gaps):
+            return highest
+        standing = highest
+        in_range = (points.sqrt_range > self.min_sqrt_range) & (points.sqrt_range < self.max_sqrt_range)
+        range_m = points.sqrt_range * points.sqrt_range
+        for gap in self.gaps:
+            below = in_range & (points.z > range_m * gap[EDGE]) & (points.z < range_m * gap[FIRST])
+            across_m = label_max((range_m * gap[LAST])[below], cell[below], self.grid.size)
+            standing = np.maximum(standing, across_m.reshape(highest.shape))
+        return standing
 
     def _tops(self, highest: Float32) -> Float32:
         """(rings, SECTORS) highest return in each cell or, far away, right behind it [m]."""

@@ -55,7 +55,8 @@ def _filled(layout: Layout, *sources: object, **others: Any) -> Filled:
 
 def _ground(ground: GroundEstimator, bounds: Bounds) -> Filled:
     sources = bounds, ground, ground.tuning, ground.grid
-    return _filled(GROUND, *sources, sectors=SECTORS, quarters=QUARTERS, far_m=FAR_M, clear_m=ground.tuning.clear_m)
+    chosen = {"clear_m": ground.tuning.clear_m, "n_gaps": len(ground.gaps)}
+    return _filled(GROUND, *sources, sectors=SECTORS, quarters=QUARTERS, far_m=FAR_M, **chosen)
 
 
 def _clusters(clusters: Clusters) -> Filled:

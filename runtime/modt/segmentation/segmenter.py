@@ -11,6 +11,7 @@ from modt.geometry import FieldOfView
 from modt.segmentation.ceiling import CeilingFinder
 from modt.segmentation.cells import Clusters, Members
 from modt.segmentation.clustering import Clusterer
+from modt.segmentation.gaps import gaps_of
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, has_reflectance
 from modt.segmentation.kernels import NUMPY, Above, Bounds, Kernels
@@ -46,6 +47,8 @@ class Segmenter:
         range_m = sensor.min_range_m, sensor.max_range_m
         self.bounds = Bounds(config.clearance_m, config.max_height_m, *map(math.sqrt, range_m))
         self.height_estimator = HeightEstimator(sensor, tuning.sensor_height, tuning.polar)
+        self._max_slope_deg = config.max_slope_deg
+        self._dead_deg: tuple[float, ...] = ()
         self.ground = GroundEstimator(sensor, config.max_slope_deg, tuning.ground, tuning.polar)
         self.ceiling = CeilingFinder(self.ground, config.max_height_m, kernels, tuning.ceiling)
         self.clusterer = Clusterer(sensor, config, kernels, tuning)
@@ -55,6 +58,15 @@ class Segmenter:
     def facts(self) -> dict[str, str]:
         """Name of the kernels."""
         return {"kernels": self.kernels.name}
+
+    def leave_out(self, dead_deg: tuple[float, ...]) -> None:
+        """Take the beams of these elevations for dead, and all others for alive; the sweeps are not tilted."""
+        if dead_deg == self._dead_deg:
+            return
+        self._dead_deg = dead_deg
+        gaps = gaps_of(self.sensor.beam_elevations_deg, dead_deg)
+        self.ground = GroundEstimator(self.sensor, self._max_slope_deg, self.tuning.ground, self.tuning.polar, gaps)
+        self.clusterer.gaps = gaps
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""

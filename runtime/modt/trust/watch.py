@@ -101,6 +101,11 @@ class TrustWatch:
         """Whether ground or scene have moved, which a watch without their history would not know."""
         return bool(self._ground.phrase) or not self._scene.change.is_none
 
+    @property
+    def dead_deg(self) -> tuple[float, ...]:
+        """Elevations of the dead beams, descending."""
+        return self._beams.dead_deg
+
     def adopt(self, other: TrustWatch) -> None:
         """Keep the reasons of another sensor's watch until looks of this one have confirmed or withdrawn them."""
         self._debounced = other._debounced
