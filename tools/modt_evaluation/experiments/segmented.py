@@ -161,6 +161,9 @@ class PlayedBack:
         """(R, 4) likelihoods of the network."""
         return self._network.classify(points, proposals, which)
 
+    def leave_out(self, dead_deg: tuple[float, ...]) -> None:
+        """Change nothing: the proposals are recorded."""
+
     def facts(self) -> dict[str, str]:
         """Facts of the network."""
         return self._network.facts()
