@@ -5,32 +5,25 @@ Streets have none of these, and a network that has never seen a heap takes it fo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import cycle
 
 import numpy as np
 from numpy.random import Generator
 from scipy import ndimage
 
 from modt import profile
+from modt.config import ProfileConfig
 from modt.types import Float64
 from modt_simulation import scenery
 from modt_simulation.builder import SceneBuilder
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
-from modt_simulation.sensors import SENSORS
-from modt_simulation.simulator import Simulator
 from modt_simulation.solids import Solids, Triple, block, box, cylinder, ellipsoid, rod, wedge
 from modt_simulation.terrain import Terrain
 from modt_simulation.world import World
-from modt_training.scan import Scan
-from modt_training.simulated import labelled_scan
+from tools.train.worlds import Worlds
 
-HEIGHT_M = (0.25, 2.2)
-"""Least and greatest height of a mount that is not the usual one of its sensor."""
-USUAL_HEIGHT_SHARE = 0.4
-"""Share of the sweeps from the usual height of the sensor."""
 RANGE_M = (2.0, 40.0)
 """Least and greatest distance of the middle of a thing."""
 MARGIN_M = 0.6
@@ -298,14 +291,18 @@ def _mound(rng: Generator, x: Float64, y: Float64) -> Float64:
     return np.asarray(tall * shape, np.float64)
 
 
-def bare_scans(seeds: Sequence[int], sensors: Sequence[str] = tuple(SENSORS)) -> Iterator[Scan]:
-    """A sweep of a scene for each seed, by one sensor after another, each at a height of its own."""
-    for seed, name in zip(seeds, cycle(sensors), strict=False):
-        rng = np.random.default_rng([seed, 5])
-        config = profile.load(name)
-        usual = rng.random() < USUAL_HEIGHT_SHARE
-        height_m = SENSORS[name].height_m if usual else float(np.exp(rng.uniform(*np.log(HEIGHT_M))))
-        simulator = Simulator(bare_scene(rng, height_m), SENSORS[name], seed)
-        frame, truth = simulator.sweep(int(rng.integers(0, 10)))
-        scan = labelled_scan(frame, truth, f"bare-{seed}", f"bare-{seed}", camera=False, sensor=name)
-        yield replace(scan, profile=replace(config, sensor=replace(config.sensor, height_m=height_m)))
+def _at_height(sensor: str, height_m: float) -> ProfileConfig:
+    """The profile of a sensor, for a mount at this height."""
+    config = profile.load(sensor)
+    return replace(config, sensor=replace(config.sensor, height_m=height_m))
+
+
+bare_scans = Worlds(
+    name="bare",
+    stream=5,
+    scene=bare_scene,
+    height_m=(0.25, 2.2),
+    usual_height_share=0.4,
+    sweeps=10,
+    profile=_at_height,
+).scans

@@ -8,7 +8,7 @@ ones are not validated either. Every scan is segmented by the profile of its sen
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, cycle
 from pathlib import Path
 
@@ -45,6 +45,14 @@ PASTES = 120
 """Pasting attempts in each scan of KITTI."""
 MIN_HOST_POINTS = 60_000
 """Objects are pasted into scans of more points."""
+SIMULATED: Mapping[str, Callable[..., Iterator[Scan]]] = {
+    "near": near_scans,
+    "bare": bare_scans,
+    "people": people_scans,
+    "riders": rider_scans,
+    "worn": worn_scans,
+}
+"""Sweeps of the kinds of worlds, by seeds."""
 SPARSE = ("vlp-16", "vlp-16", "mid-360")
 """Sensors of few beams, or of few points a sweep."""
 SEEDS_APART = 100_000
@@ -108,39 +116,19 @@ def synthetic_crops(path: Path, worlds: int, labels: Path | None = None) -> None
     _save_simulated(path, scans, {"synthetic": worlds, "placed": bool(labels), "seed": 1})
 
 
-def near_crops(path: Path, worlds: int, seed: int) -> None:
-    """Write crops of simulated sweeps of low sensors among people at arm's length, one sweep of each world."""
-    scans = near_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
-    _save_simulated(path, scans, {"near": worlds, "seed": seed})
+def simulated_crops(path: Path, kind: str, worlds: int, seed: int, sensors: Sequence[str] | None = None) -> None:
+    """Write crops of simulated sweeps of worlds of a kind, a key of SIMULATED.
 
-
-def bare_crops(path: Path, worlds: int, seed: int) -> None:
-    """Write crops of simulated sweeps without an object, among heaps and plants, one sweep of each world."""
-    scans = bare_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
-    _save_simulated(path, scans, {"bare": worlds, "seed": seed})
-
-
-def people_crops(path: Path, worlds: int, seed: int, sensors: Sequence[str] = tuple(SENSORS)) -> None:
-    """Write crops of simulated sweeps of people in all postures, one sweep of each world, by the sensors in turn."""
-    scans = people_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds), sensors)
-    _save_simulated(path, scans, {"people": worlds, "seed": seed})
-
-
-def sparse_people_crops(path: Path, worlds: int, seed: int) -> None:
-    """Write such crops of sensors of few beams alone."""
-    people_crops(path, worlds, seed, SPARSE)
-
-
-def rider_crops(path: Path, worlds: int, seed: int) -> None:
-    """Write crops of simulated sweeps of roads with rows of parked two-wheelers, one sweep of each world."""
-    scans = rider_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
-    _save_simulated(path, scans, {"riders": worlds, "seed": seed})
-
-
-def worn_crops(path: Path, worlds: int, seed: int) -> None:
-    """Write crops of simulated sweeps by worn sensors, some sweeps of each world."""
-    scans = worn_scans(range(seed * SEEDS_APART, seed * SEEDS_APART + worlds))
-    _save_simulated(path, scans, {"worn": worlds, "seed": seed})
+    Args:
+        path: file to write (.npz).
+        kind: kind of the worlds, named in the provenance.
+        worlds: number of the worlds.
+        seed: number that sets these worlds apart from others of the kind.
+        sensors: sensors of the sweeps, in turn; by default those of the kind.
+    """
+    seeds = range(seed * SEEDS_APART, seed * SEEDS_APART + worlds)
+    scans_of = SIMULATED[kind]
+    _save_simulated(path, scans_of(seeds, sensors) if sensors else scans_of(seeds), {kind: worlds, "seed": seed})
 
 
 def street_crops(path: Path, worlds: int, seed: int) -> None:

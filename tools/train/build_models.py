@@ -18,18 +18,7 @@ from pathlib import Path
 
 from modt import profile
 from tools.options import parser
-from tools.train.build_crops import (
-    bare_crops,
-    kitti_crops,
-    near_crops,
-    own_crops,
-    people_crops,
-    rider_crops,
-    sparse_people_crops,
-    street_crops,
-    synthetic_crops,
-    worn_crops,
-)
+from tools.train.build_crops import SPARSE, kitti_crops, own_crops, simulated_crops, street_crops, synthetic_crops
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS = 240
@@ -90,24 +79,26 @@ def build(crops: list[Path], work: Path, out: Path, steps: int, data: str, licen
 
 def further_crops(work: Path) -> None:
     """Write the crops of the further training, and of the training of the network beside a model."""
-    for name, write, worlds_of_seed in (
-        ("bare", bare_crops, BARE_WORLDS),
-        ("people", people_crops, PEOPLE_WORLDS),
-        ("people", sparse_people_crops, SPARSE_WORLDS),
-        ("rider", rider_crops, RIDER_WORLDS),
-        ("worn", worn_crops, WORN_WORLDS),
-        ("street", street_crops, STREET_WORLDS),
-        ("near", near_crops, NEAR_WORLDS),
+    for kind, worlds_of_seed in (
+        ("bare", BARE_WORLDS),
+        ("people", PEOPLE_WORLDS),
+        ("riders", RIDER_WORLDS),
+        ("worn", WORN_WORLDS),
+        ("near", NEAR_WORLDS),
     ):
         for seed, worlds in worlds_of_seed.items():
-            write(work / f"{name}-{seed}.npz", worlds, seed)
+            simulated_crops(work / f"{kind}-{seed}.npz", kind, worlds, seed)
+    for seed, worlds in SPARSE_WORLDS.items():
+        simulated_crops(work / f"people-{seed}.npz", "people", worlds, seed, SPARSE)
+    for seed, worlds in STREET_WORLDS.items():
+        street_crops(work / f"street-{seed}.npz", worlds, seed)
 
 
 def train_further(crops: list[Path], work: Path, out: Path, steps: int) -> None:
     """Train a model on worlds without objects and on worlds of people. Its own data sets are `crops`."""
     bare = [work / f"bare-{seed}.npz" for seed in BARE_WORLDS]
     people = [work / f"people-{seed}.npz" for seed in (*SPARSE_WORLDS, *PEOPLE_WORLDS)]
-    riders = [work / f"rider-{seed}.npz" for seed in RIDER_WORLDS]
+    riders = [work / f"riders-{seed}.npz" for seed in RIDER_WORLDS]
     worn = [work / f"worn-{seed}.npz" for seed in WORN_WORLDS]
     streets = [work / f"street-{seed}.npz" for seed in STREET_WORLDS]
     data: list[str | Path] = ["--bare", *bare, "--people", *people, "--riders", *riders, "--worn", *worn]

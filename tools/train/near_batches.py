@@ -60,7 +60,7 @@ class NearSource:
     """Draws near crops.
 
     Args:
-        near: crops of build_crops.near_crops.
+        near: crops of worlds of the kind "near".
         streets: crops of the streets; real ones that show enough are cut near.
     """
 

@@ -6,9 +6,8 @@ background.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import cycle
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
@@ -19,20 +18,13 @@ from modt_simulation.materials import Material
 from modt_simulation.motion import Path
 from modt_simulation.people import Posture
 from modt_simulation.scenery import chair, pallets, shelf, table
-from modt_simulation.sensors import SENSORS
-from modt_simulation.simulator import Simulator
 from modt_simulation.solids import Solids, block
 from modt_simulation.world import Body, World
 from modt_simulation.yard import enclose, floor
-from modt_training.scan import Scan
-from modt_training.simulated import labelled_scan
 from tools.train import bare_scans
 from tools.train.mounts import mounted
+from tools.train.worlds import Worlds
 
-HEIGHT_M = (0.25, 2.2)
-"""Least and greatest height of a mount that is not the usual one of its sensor."""
-USUAL_HEIGHT_SHARE = 0.3
-"""Share of the sweeps from the usual height of the sensor."""
 RANGE_M = (0.8, 18.0)
 """Least and greatest distance of people and things."""
 SLOTS = 26
@@ -270,13 +262,12 @@ THINGS: tuple[Callable[[Generator], Solids], ...] = (
 )  # fmt: skip
 
 
-def people_scans(seeds: Sequence[int], sensors: Sequence[str] = tuple(SENSORS)) -> Iterator[Scan]:
-    """A sweep of a scene for each seed, by one sensor after another, each at a height of its own."""
-    for seed, name in zip(seeds, cycle(sensors), strict=False):
-        rng = np.random.default_rng([seed, 6])
-        usual = rng.random() < USUAL_HEIGHT_SHARE
-        height_m = SENSORS[name].height_m if usual else float(np.exp(rng.uniform(*np.log(HEIGHT_M))))
-        simulator = Simulator(people_scene(rng, height_m), SENSORS[name], seed)
-        frame, truth = simulator.sweep(int(rng.integers(0, 10)))
-        scan = labelled_scan(frame, truth, f"people-{seed}", f"people-{seed}", camera=False, sensor=name)
-        yield replace(scan, profile=mounted(name, height_m))
+people_scans = Worlds(
+    name="people",
+    stream=6,
+    scene=people_scene,
+    height_m=(0.25, 2.2),
+    usual_height_share=0.3,
+    sweeps=10,
+    profile=mounted,
+).scans

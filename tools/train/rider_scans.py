@@ -5,10 +5,6 @@ The streets of the simulator have few two-wheelers. A network that has seen no r
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import cycle
-
 import numpy as np
 from numpy.random import Generator
 
@@ -16,19 +12,12 @@ from modt_simulation import kinds, scenery
 from modt_simulation.builder import SceneBuilder
 from modt_simulation.materials import Material
 from modt_simulation.motion import Path
-from modt_simulation.sensors import SENSORS
-from modt_simulation.simulator import Simulator
 from modt_simulation.solids import block
 from modt_simulation.world import World
 from modt_simulation.yard import floor
-from modt_training.scan import Scan
-from modt_training.simulated import labelled_scan
 from tools.train.mounts import mounted
+from tools.train.worlds import Worlds
 
-HEIGHT_M = (0.4, 2.2)
-"""Least and greatest height of a mount that is not the usual one of its sensor."""
-USUAL_HEIGHT_SHARE = 0.6
-"""Share of the sweeps from the usual height of the sensor."""
 HALF_M = 45.0
 """Half the length of the road."""
 SCOOTER_SHARE = 0.7
@@ -108,13 +97,12 @@ def _row(builder: SceneBuilder, side: int, half_road_m: float) -> None:
         x += length + rng.uniform(0.3, 3.0)
 
 
-def rider_scans(seeds: Sequence[int], sensors: Sequence[str] = tuple(SENSORS)) -> Iterator[Scan]:
-    """A sweep of a scene for each seed, by one sensor after another, each at a height of its own."""
-    for seed, name in zip(seeds, cycle(sensors), strict=False):
-        rng = np.random.default_rng([seed, 7])
-        usual = rng.random() < USUAL_HEIGHT_SHARE
-        height_m = SENSORS[name].height_m if usual else float(np.exp(rng.uniform(*np.log(HEIGHT_M))))
-        simulator = Simulator(rider_scene(rng, height_m), SENSORS[name], seed)
-        frame, truth = simulator.sweep(int(rng.integers(0, 5)))
-        scan = labelled_scan(frame, truth, f"rider-{seed}", f"rider-{seed}", camera=False, sensor=name)
-        yield replace(scan, profile=mounted(name, height_m))
+rider_scans = Worlds(
+    name="rider",
+    stream=7,
+    scene=rider_scene,
+    height_m=(0.4, 2.2),
+    usual_height_share=0.6,
+    sweeps=5,
+    profile=mounted,
+).scans
